@@ -6,12 +6,13 @@ Folders: `psychophysics` (trials -> thresholds and statistics), `look` (statisti
 
 Decisions:
 
-2026-11-21. The published one-way analysis is computed as published, and the one within participants stands beside it
-with the difference in words: readers need the first for comparison with the paper, the second for inference.
-2026-11-22. A threshold with a peak at the cap is called cut by the cap, and no lower bound: it lies above the true
-threshold in some runs. The mark is set by peaks at the cap; comparing the mean with the cap would miss
-every guesser (they end near 2.7 N of 3 N). `psychophysics.thresholds.is_censored` has the measured operating
-characteristics.
+2026-11-21. The published one-way analysis of variance is computed as published; the analysis within participants
+(repeated measures) is reported in addition, with the difference in words: readers need the first for comparison with
+the paper, the second for inference.
+2026-11-22. A threshold of a staircase with a peak at the force cap is reported as censored, not as a lower bound: in
+some runs it lies above the true threshold. The mark is set by peaks at the cap, because comparing the mean with the cap
+would miss every participant who guesses (their staircases end near 2.7 N of 3 N). The measured operating
+characteristics are in `psychophysics.thresholds.is_censored`.
 """
 
 from importlib import import_module
@@ -39,7 +40,7 @@ _HOME = {
     "overview": "analysis.look.overview:overview",
     "study_pictures": "analysis.figures.study_pictures:study_pictures",
 }
-"""Module and name of what is exported; imported when it is asked for, because a module may take seconds."""
+"""Exported name -> "module:name". Imported at first access, because importing a module may take seconds."""
 
 __all__ = [
     "DiagnosisSettings",
@@ -55,6 +56,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    """The exported object of this name, imported at first access (PEP 562). Raises AttributeError for other names."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, _, own = _HOME[name].partition(":")

@@ -1,4 +1,9 @@
-"""Words for what a run's threshold is: a mean of reversals, or the mean of Psi's posterior."""
+"""Wording of figures, tables and warnings for the two kinds of thresholds of a run.
+
+A staircase's threshold is the mean of its last reversal levels; that of the Bayesian Psi method is the mean of the
+posterior distribution. `threshold_words` selects the wording by the protocol's rule, so that no other module has to
+distinguish the two. The thresholds are computed in `analysis.psychophysics.thresholds`.
+"""
 
 from dataclasses import dataclass
 
@@ -7,24 +12,24 @@ from protocols.definition.staircase_rule import StaircaseRule
 
 @dataclass(frozen=True, slots=True)
 class ThresholdWords:
-    """Sentences and nouns on a run's threshold, for a single kind of rule."""
+    """Sentences and nouns about a run's threshold, for one kind of rule."""
 
     means: str
-    """Thresholds of runs, in the plural; begins small."""
+    """Name of the thresholds, in the plural; begins with a lower-case letter."""
     cut: str
-    """What the cap did to a threshold that is marked as cut."""
+    """Relative clause: effect of the cap (largest level) on a threshold that is marked as cut."""
     cut_note: str
-    """Below a table with such marks."""
+    """Note below a table in which thresholds are marked as cut."""
     too_low: str
-    """Why Tobit's model of them is no more than a sensitivity analysis."""
+    """Reason why Tobit's model of cut thresholds is only a sensitivity analysis."""
     measured_in: str
-    """In which trials accelerations and displacements were measured."""
+    """Trials in which accelerations and displacements were measured, as a noun phrase."""
     levels: str
-    """Why observed shares of right answers lie beside the curve of a model that is right."""
+    """Sentence: why observed shares of correct answers deviate from the psychometric function of a correct model."""
     track: str
-    """What the figure of a run's levels shows."""
+    """Caption of the figure of a run's levels."""
     sensitivity: str
-    """What d' of the answers says beside a cue."""
+    """Sentence: what the observed d' says when it is compared with the d' of a cue."""
 
 
 CUT_END = (
@@ -45,6 +50,7 @@ REVERSALS = ThresholdWords(
 
 
 def _psi(rule: StaircaseRule) -> ThresholdWords:
+    """The words for the Psi method. Physical units are measured in the last `averaged_reversals` trials."""
     last = rule.averaged_reversals
     return ThresholdWords(
         means="Psi's posterior means",
@@ -63,5 +69,5 @@ def _psi(rule: StaircaseRule) -> ThresholdWords:
 
 
 def threshold_words(rule: StaircaseRule) -> ThresholdWords:
-    """The words for a rule: those of Psi's posterior where the rule is Bayesian, else those of reversals."""
+    """The words for a rule: those of the Psi method where the rule is Bayesian, else those of reversal means."""
     return _psi(rule) if rule.is_bayesian else REVERSALS

@@ -1,4 +1,8 @@
-"""Formatting of numbers and lists as text, the same everywhere; a dash where there is no number."""
+"""Formatting of numbers, p-values, lists and sentences for reports, tables and messages.
+
+All text for people is formatted here, so that it looks the same everywhere: a true minus sign (U+2212), a fixed number
+of decimals, and an en dash for a missing number.
+"""
 
 import re
 from collections.abc import Sequence
@@ -12,8 +16,9 @@ _UNTIMED = (
 """Units that depend on time, and their replacements where samples are numbered and the rate of 1 Hz is nominal."""
 
 NONE = "–"
+"""Text for a missing number (en dash)."""
 _NAMED = 12
-"""Most things that a sentence lists."""
+"""Largest number of items that a sentence lists."""
 
 
 def typeset(formatted: str) -> str:
@@ -36,7 +41,7 @@ def format_signed(value: float, digits: int = 2) -> str:
 
 
 def mark_cut(value: float | None, cut: bool, digits: int = 2) -> str:
-    """The value, followed by "cut" where the cap cut into it."""
+    """The value, followed by "cut" where the largest permitted level (cap) limited it; a dash for None."""
     return f"{number(value, digits)} cut" if cut and value is not None else number(value, digits)
 
 
@@ -53,7 +58,7 @@ def p_value(p: float | None) -> str:
 
 
 def p_text(p: float | None) -> str:
-    """A p-value with its letter, for a sentence."""
+    """A p-value for a sentence, such as "p = 0.0312" or "p < 0.0001"."""
     text = p_value(p)
     return f"p {text}" if text.startswith("<") else f"p = {text}"
 
@@ -64,7 +69,7 @@ def f_text(df_first: int | None, df_second: int | None, f: float | None) -> str:
 
 
 def conjoin(things: Sequence[str]) -> str:
-    """ "a, b and c"; a long list is cut and says by how much."""
+    """The items as a list in words, "a, b and c"; of more than 12, the first 12 "and n more"."""
     if len(things) > _NAMED:
         return f"{', '.join(things[:_NAMED])} and {len(things) - _NAMED} more"
     return " and ".join((", ".join(things[:-1]), things[-1])) if len(things) > 1 else "".join(things)
@@ -76,23 +81,23 @@ def capitalise(sentence: str) -> str:
 
 
 def as_sentence(text: str) -> str:
-    """The text with a capital and exactly one full stop."""
+    """The text with a capital first letter and exactly one full stop at the end."""
     return f"{capitalise(text).rstrip('.')}."
 
 
 def begin_sentence(sentence: str) -> str:
-    """The sentence with a capital, unless it begins with the name of a file or an effect."""
+    """The sentence with a capital first letter, unless its first word has a mark of a file or identifier (. / \\ _)."""
     named = any(mark in sentence.partition(" ")[0] for mark in "./\\_")
     return sentence if named else capitalise(sentence)
 
 
 def end_sentence(sentence: str) -> str:
-    """The sentence with a full stop added, unless it ends with a mark or is empty."""
+    """The sentence with a full stop added, unless it ends with . ! or ?, or is empty."""
     return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."
 
 
 def write_without_time(text: str) -> str:
-    """A sentence or label of a recording without known time, in samples instead of seconds and hertz."""
+    """A sentence or label of a recording whose sample rate is unknown, in samples instead of seconds and hertz."""
     for unit, instead in _UNTIMED:
         text = re.sub(unit, instead, text)
     return text

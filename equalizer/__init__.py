@@ -1,4 +1,6 @@
-"""The device and its control. Pure: values in, values out; independent of protocols and sessions.
+"""Models of a haptic device, their identification, and the control that equalizes its response.
+
+Functions are pure: values in, values out, independent of protocols and sessions.
 
 Read in this order: `signals.signal` and `signals.recording` (the two basic types), `signals.lockin`,
 `plant` (models of the device, the vocabulary of effects), `tracking.feedforward.equalizer` (the interface that a
@@ -38,7 +40,7 @@ _HOME = {
     "stored_gains": "equalizer.tracking.lqr.lqr:stored_gains",
     "track": "equalizer.tracking.lqr.lqr:track",
 }
-"""Module and name of what is exported; imported when it is asked for, because a module may take seconds."""
+"""Module and name of each export. `__getattr__` imports it on access, because importing a module may take seconds."""
 
 __all__ = [
     "EFFECTS",
@@ -58,6 +60,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    """The export of this name, imported on access (PEP 562). Raises AttributeError for any other name."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, _, own = _HOME[name].partition(":")

@@ -1,17 +1,16 @@
-"""The experiment: numbers and rules that are fixed before a participant takes part. Pure; imports none of our other
-packages.
+"""Protocols of experiments: numbers and rules that are fixed before a participant takes part. Nothing here reads or
+writes files, or imports another package of this project.
 
 Folders: `definition` (schema of a TOML file), `wording` (texts for participants) -> `document` (text to protocol and
-back, hash, lock) -> `procedure` (order, levels, random draws). Read in this order:
-
-`staircase_rule` and `staircase` (the rule that decides the next level), `study_protocol` and `recording_protocol`
-(schemas of TOML files), `schedule` (order and draws from keys), `trial` (one row of the results), `loading` (text to
-protocol, every problem named), `hashing` and `lock` (fixed before data).
+back, hash, lock) -> `procedure` (order, levels, random draws). Read in this order: `staircase_rule` and `staircase`
+(rule for the next level), `study_protocol` and `recording_protocol` (schemas of TOML files), `schedule` (order and
+random draws), `trial` (one row of the results), `loading` (text to protocol, with all problems listed), `hashing` and
+`lock` (proof that a protocol was fixed before data were recorded).
 
 Decisions:
 
-2026-11-21. Draws are keyed by (run, trial, attempt) and never sequential: a repeated or resumed trial shifts nothing.
-2026-11-21. Defaults are filled in before a protocol is hashed, so a new field changes every hash: bump versions then.
+2026-11-21. Random draws are keyed by (run, trial, attempt), never sequential: a repeated trial changes no later draw.
+2026-11-21. Defaults are filled in before a protocol is hashed: a new field changes every hash and needs a new version.
 """
 
 from importlib import import_module
@@ -41,7 +40,7 @@ _HOME = {
     "staircase_level_n": "protocols.procedure.staircase:level_n",
     "step_staircase": "protocols.procedure.staircase:step",
 }
-"""Module and name of what is exported; imported when it is asked for, because a module may take seconds."""
+"""Module and name of each exported object, imported at first use, because importing a module may take seconds."""
 
 __all__ = [
     "RecordingProtocol",
@@ -58,6 +57,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    """Import an exported object at first use (PEP 562). Raises AttributeError for another name."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, _, own = _HOME[name].partition(":")
@@ -65,4 +65,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
+    """Names of the exported objects."""
     return sorted(__all__)

@@ -1,11 +1,15 @@
-"""One trial of a study as a row of results: what was presented, what was answered, what the device delivered."""
+"""One presentation of a study as a row of results: what was presented, answered, and delivered by the device.
+
+`Trial` is the row type of `trials.csv`, which the analysis reads; its columns are listed in docs/formats.md. The
+unit of a number is the suffix of its name.
+"""
 
 from dataclasses import dataclass
 from enum import Enum
 
 
 class Phase(Enum):
-    """Kind of a trial or run."""
+    """Kind of a trial: training (practice included), detection, test, or catch trial within a test run."""
 
     TRAINING = "training"
     DETECTION = "detection"
@@ -18,7 +22,7 @@ class TrialStatus(Enum):
 
     OK = "ok"
     FLAGGED = "flagged"
-    """Counts, but something about the stimulus is worth a look (a lean on the spring, late ticks)."""
+    """Counts, but the stimulus should be inspected (for example a hand that leaned on the spring, or late ticks)."""
     UNMEASURED = "unmeasured"
     """Counts; answered before a full period of the steady stimulus was recorded, or its recording was lost."""
     SPOILED = "spoiled"
@@ -35,7 +39,7 @@ class VoidCause(Enum):
     PAUSED = "paused"
     """The participant asked for a pause."""
     LEFT = "left"
-    """The participant left, or the program was interrupted at its keyboard."""
+    """The participant left, or the program was interrupted by Ctrl-C."""
     LATE = "late"
     """No answer within the protocol's time limit."""
     EARLY = "early"
@@ -47,9 +51,9 @@ class VoidCause(Enum):
     MISSED_TICKS = "missed_ticks"
     """Too many ticks of the control loop were missed."""
     NO_ACCELERATION = "no_acceleration"
-    """The protocol needs the accelerometer, and too much of what it sent was lost."""
+    """The protocol requires the accelerometer, and too many of its samples were lost."""
     SCREEN_LATE = "screen_late"
-    """The program or its screen gave no sign of life in time."""
+    """The program or its screen did not respond in time."""
     PROGRAM_ENDED = "program_ended"
     """The program ended before the answer."""
 
@@ -60,7 +64,7 @@ AT_WILL = frozenset({VoidCause.ASKED, VoidCause.PAUSED, VoidCause.LEFT, VoidCaus
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One presentation, one row of `trials.csv`. `None` where a value does not exist (yet)."""
+    """One presentation, one row of `trials.csv`. None where a value does not exist, or not yet."""
 
     subject: str
     session: str
@@ -75,45 +79,49 @@ class Trial:
     correct: bool | None
     reversal: bool
     response_time_s: float | None
-    """From the start of the stimulus, its fade-in included; in detection from the end of the second interval."""
+    """Response time (s) from the start of the stimulus, its fade-in included; in detection from the end of the second
+    interval."""
     delivered_mps2: float | None
     off_axis_mps2: float | None
     displacement_mm: float | None
     missed_ticks: int | None
     felt: bool | None
-    """False: a person answered while no device moved. None: a simulated participant."""
+    """True: a device moved the participant's hand. False: a person answered while no device moved. None: a simulated
+    participant."""
     status: TrialStatus
     angle_deg: float | None = None
-    """Angle of the direction played, in the plane of the protocol's directions; independent of the labels."""
+    """Angle of the direction played (degrees), in the plane of the protocol's directions; independent of the labels."""
     wanted_mps2: float | None = None
-    """The acceleration that the level stands for. None where the level is the commanded force."""
+    """Target acceleration of this level (m/s²). None where the level is the commanded force."""
     void_cause: VoidCause | None = None
-    """Why this presentation is void. None where it counts, is open, or comes from a log that says no cause."""
+    """Why this presentation is void. None where it counts, is open, or its log contains no cause."""
     repeat_cause: VoidCause | None = None
-    """Why this trial is presented again: the cause of the attempt before. None for a first attempt."""
+    """Why this trial is repeated: the cause for which the previous attempt is void. None for a first attempt."""
     late_ticks: int | None = None
-    """Run, but their work ended after the next was due; missed ones come on top. 0 where the device is simulated: its
-    world waits. None in a log of before they were written down."""
+    """Number of ticks that were run but ended after the next tick was due; missed ticks are counted separately. 0 for a
+    simulated device, whose time waits for the program. None in logs older than this column."""
     latest_s: float | None = None
-    """The longest from when a tick was due until its work, or that of the tick that came in its place, was done."""
+    """Longest time (s) from when a tick was due to the end of its work; for a missed tick, to the end of the tick that
+    was run in its place."""
     onset_s: float | None = None
-    """When the presentation was logged, right before the device moved: seconds of the wall clock since the session was
-    opened, breaks included."""
+    """Time (s) at which the presentation was logged, directly before the device moved: wall-clock time since the
+    session was opened, breaks included."""
     harmonics_mps2: float | None = None
-    """Amplitude of the acceleration at 2 to 5 times the frequency, all axes together. None where none was measured."""
+    """Amplitude of the acceleration (m/s²) at 2 to 5 times the frequency, all axes together. None where it was not
+    measured."""
     nominal_n: float | None = None
-    """Level of the staircase, where `level_n`, which was played, was drawn around it. None where nothing is roved."""
+    """Level of the staircase (N), around which the played `level_n` was drawn. None without roving."""
     lost_packets: int | None = None
-    """Lost packets of the accelerometer, torn or garbled ones among them. None, with the next two, where the sensor is
-    read with each tick or there is none."""
+    """Lost packets of the accelerometer, including incomplete and corrupt ones. None, like the next two fields, where
+    the sensor is read with each tick or there is none."""
     garbled_bytes: int | None = None
-    """From the accelerometer, that belonged to no whole packet."""
+    """Bytes from the accelerometer that belonged to no complete packet."""
     acceleration_missing: float | None = None
-    """Share of its packets, or of the recorded ticks if that is more, without which the acceleration was measured."""
+    """Missing share (0 to 1) of the accelerometer's data: of its packets or of the recorded ticks, the larger one."""
 
     @property
     def staircase_n(self) -> float:
-        """Level of the staircase (N): without roving that of the stimulus."""
+        """Level of the staircase (N); without roving it is the level of the stimulus."""
         return self.level_n if self.nominal_n is None else self.nominal_n
 
     @property

@@ -1,19 +1,20 @@
-"""Sessions, devices, files, people, screens: the only package with side effects.
+"""Sessions, devices, files, participants and screens: the only package with side effects.
 
 Layers, each importing only those after it: `cli`, `tui`, `evaluation`, `workflows`, `importing`, `devices`, then
-`store` and `participants` beside each other, then `local_clock`, `session`, which is pure, `regular_file` and `errors`.
+`store` and `participants` (independent of each other), then `local_clock`, `session` (without side effects),
+`regular_file` and `errors`.
 
 Read in this order: `session.facts.events` (the facts), `session.state.fold` (the state that follows from them),
 `session.state.machine` (the next action), `workflows.session.run_session` and `workflows.trial.present_trial` (its
-execution), `devices.device` (the port), `devices.governor.govern` (force limits) and `store.sessions.event_log` (facts
-are on disk before the program acts on them).
+execution), `devices.device` (interface of a device), `devices.governor.govern` (force limits) and
+`store.sessions.event_log` (facts are on disk before the program acts on them).
 
 Decisions:
 
-2026-11-21. The staircase moves when a trial is closed by its measurement, not at the answer: a trial that the device
-spoiled must be void although it was answered. An answer whose measurement was lost in a crash counts.
-2026-11-21. A display may know nothing about level, frequency or correctness: its views have no field for them.
-2026-11-21. A simulated participant is told what it feels through the port `Hand`; a person's hand needs no telling.
+2026-11-21. The staircase is updated when the measurement of a trial is complete, not at the answer: a trial that the
+device spoiled must be void although it was answered. An answer whose measurement was lost in a crash counts.
+2026-11-21. A display must not know level, frequency or correctness: its views have no field for them.
+2026-11-21. A simulated participant receives what it feels through the interface `Hand`; a person feels the device.
 """
 
 from importlib import import_module
@@ -59,7 +60,7 @@ _HOME = {
     "write_mechanical_model": "study.store.formats.mechanical_model_file:write_mechanical_model",
     "write_recording": "study.store.formats.recording_file:write_recording",
 }
-"""Module and name of what is exported; imported when it is asked for, because a module may take seconds."""
+"""Module and name of each export. A module is imported at the first access, because the import may take seconds."""
 
 __all__ = [
     "ImportPlan",

@@ -1,4 +1,4 @@
-"""Base error for screen and command line: what happened, what was saved, what to do now."""
+"""Errors that the screen and the command line show: what happened, what was saved, what to do now; and exit codes."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,13 +7,13 @@ from typing import Any
 
 
 class ExitCode(IntEnum):
-    """Exit codes of `hapteq`, a contract with those who script it."""
+    """Exit codes of the command `hapteq`. Scripts may rely on them."""
 
     DONE = 0
     ERROR = 1
     """A `StudyError` of any other kind."""
     WRONG_USE = 2
-    """A command line, a file or a setting that cannot be meant."""
+    """An invalid command line, file or setting."""
     DEVICE = 3
     """The device: missing, failed, lost during a session, or found not in order by `hapteq doctor`."""
     INTERRUPTED = 130
@@ -21,9 +21,9 @@ class ExitCode(IntEnum):
 
 
 class StudyError(Exception):
-    """An error that a person can act on.
+    """Base class of errors that a user can act on.
 
-    `happened` and `do_now` are whole sentences; `saved` says what is safe, where anything was at stake.
+    `happened` and `do_now` are whole sentences; `saved` says which data are safe, where data could have been lost.
     """
 
     exit_code = ExitCode.ERROR
@@ -36,7 +36,7 @@ class StudyError(Exception):
         self.do_now = do_now
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Errors cross process boundaries; a subclass with its own constructor must survive pickling too."""
+        """Pickle by attributes: errors cross process boundaries, also those of a subclass with another constructor."""
         return _restore_error, (type(self), self.__dict__)
 
     def __str__(self) -> str:
@@ -44,7 +44,7 @@ class StudyError(Exception):
 
 
 class WrongUseError(StudyError):
-    """The command line asked for something that cannot be."""
+    """The command line requests something that is impossible."""
 
     exit_code = ExitCode.WRONG_USE
 
@@ -56,15 +56,15 @@ class DeviceError(StudyError):
 
 
 class UserInterruptError(StudyError):
-    """Ctrl-C was pressed or the terminal closed, and what was done so far is safe."""
+    """Ctrl-C was pressed or the terminal was closed; the results so far are safe."""
 
     exit_code = ExitCode.INTERRUPTED
 
 
 @contextmanager
 def resumable(happened: str, saved: str, also: tuple[type[UserInterruptError], ...] = ()) -> Iterator[None]:
-    """Turn Ctrl-C into a UserInterruptError which says that the same command continues. also: UserInterruptError, where
-    a part of the work raises its own, which says less."""
+    """Context that turns Ctrl-C into a UserInterruptError which says that the same command continues the work. also:
+    (UserInterruptError,) where a part of the work raises its own error, which this error then replaces."""
     caught: tuple[type[BaseException], ...] = (KeyboardInterrupt, *also)
     try:
         yield

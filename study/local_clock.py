@@ -1,4 +1,4 @@
-"""Local time of this computer, for texts that a person reads."""
+"""Local time of this computer, for texts that people read. Logs and data keep UTC."""
 
 from datetime import UTC, datetime
 
@@ -6,9 +6,10 @@ from study.session.views.local_time import local_time
 
 
 def machine_zone(time: datetime) -> datetime:
-    """A `study.session.views.local_time.Zone`: of this computer, summer time included.
+    """Convert a moment to the local time of this computer, summer time included; a
+    `study.session.views.local_time.Zone`.
 
-    Raises ValueError, OverflowError or OSError for moments that it cannot convert.
+    Raises ValueError, OverflowError or OSError for a moment that cannot be converted.
     """
     return time.astimezone()
 

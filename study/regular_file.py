@@ -1,4 +1,4 @@
-"""Open regular files only, without blocking: a pipe, a device or a folder is an error at once."""
+"""Open regular files only, without blocking: for a pipe, a device or a folder, an error is raised at once."""
 
 import errno
 import io
@@ -7,24 +7,24 @@ import stat
 from pathlib import Path
 
 TABLE_BYTES = 2**28
-"""Largest text that is read (tables, logs): an hour at 1 kHz with four columns of 17 digits."""
+"""Largest text that is read (tables, logs), in bytes: an hour at 1 kHz with four columns of 17 digits."""
 DOCUMENT_BYTES = 2**24
-"""Largest JSON and TOML document that is read; the largest that hapteq writes are below 1 MB."""
+"""Largest JSON and TOML document that is read, in bytes; the largest that hapteq writes are below 1 MB."""
 
 _BLOCK_BYTES = 2**20
-"""Bytes that are read at once."""
+"""Number of bytes that are read at once."""
 _KINDS = (
     (stat.S_ISFIFO, "it is a pipe, not a file"),
     (stat.S_ISSOCK, "it is a socket, not a file"),
     (stat.S_ISCHR, "it is a device, not a file"),
     (stat.S_ISBLK, "it is a device, not a file"),
 )
-"""Tests of a file's mode, and what is said where one is met."""
+"""Tests of the mode of a file, and the words of the error for each."""
 
 
 class RefusedFileError(OSError):
-    """A file that the system could read but we do not: not regular, or too large. An OSError, so that it is handled
-    like any file that cannot be opened. `words`: a sentence without capital and full stop."""
+    """A file that the system could read but hapteq refuses: not regular, or too large. An OSError, so that it is
+    handled like any file that cannot be opened. `words`: a sentence without capital and full stop."""
 
     def __init__(self, number: int, words: str) -> None:
         super().__init__(number, words)
@@ -32,8 +32,9 @@ class RefusedFileError(OSError):
 
 
 def open_regular(path: Path) -> io.BufferedReader:
-    """Open for reading; symbolic links are followed. Raises OSError, RefusedFileError among them."""
-    _require_regular(path.stat())  # first, because opening some devices does something to them
+    """Open a regular file for reading; symbolic links are followed. Raises OSError; RefusedFileError, a kind of it, for
+    other files."""
+    _require_regular(path.stat())  # first, because opening some devices has side effects
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
     descriptor = os.open(path, flags)
     try:
@@ -45,12 +46,12 @@ def open_regular(path: Path) -> io.BufferedReader:
 
 
 def read_regular(path: Path, most_bytes: int = TABLE_BYTES) -> bytes:
-    """The whole content. Raises OSError; RefusedFileError for a larger file, before reading."""
+    """The whole content of a regular file. Raises OSError; RefusedFileError for a file of more than `most_bytes`."""
     with open_regular(path) as file:
         size = os.fstat(file.fileno()).st_size
         blocks: list[bytes] = []
         found = 0
-        # Not by the stated size alone: a system file may state 0 bytes and be endless.
+        # The stated size is not trusted alone: a system file may state 0 bytes and be endless.
         while size <= most_bytes and found <= most_bytes and (block := file.read(_BLOCK_BYTES)):
             blocks.append(block)
             found += len(block)
@@ -60,6 +61,7 @@ def read_regular(path: Path, most_bytes: int = TABLE_BYTES) -> bytes:
 
 
 def _require_regular(found: os.stat_result) -> None:
+    """Raises IsADirectoryError for a folder, RefusedFileError for anything else that is not a regular file."""
     if stat.S_ISDIR(found.st_mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     if not stat.S_ISREG(found.st_mode):

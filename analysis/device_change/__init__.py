@@ -1,5 +1,6 @@
 """Changes of a device since an earlier recording of the same excitation: friction, gain, response, noise.
 
-`measure_device` computes numbers from one recording; `compare_devices` compares two of them with limits. `probe_lines`
-and `probe_drift` do that for short probes within a session, with a hand on the handle.
+For the daily check of a free device: `measure_device` computes the numbers from one recording, `compare_devices`
+compares those of two recordings with limits. For short probes within a session, with a hand on the handle,
+`probe_lines` computes spectra and `probe_drift` compares them. Begin at `compare_devices.py`.
 """

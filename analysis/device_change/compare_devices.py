@@ -1,4 +1,9 @@
-"""Changes between two measurements of a device, each number beside the accepted one and its limit."""
+"""Changes between two measurements of a device: each number with its accepted value, standard error and limit.
+
+Compared are dry friction, gain, frequency response by third octaves and noise, of a recording at the acceptance of the
+device and of one of today (`measure_device`). A number counts as changed if the difference exceeds both its limit,
+derived from the smallest step of the published staircases, and three standard errors (`ChangeLimits`).
+"""
 
 import math
 from collections.abc import Iterator
@@ -18,13 +23,13 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class ChangeLimits:
-    """Limits within which two measurements of a device count as equal, by hand or from the staircase's step."""
+    """Limits within which two measurements of a device count as equal: by hand, or the finest step of a staircase."""
 
     step_db: float = 1.0
     """Limit of gain and response: the finest step of the published staircases. A smaller change moves a threshold by
     less than a step."""
     friction_n: float = 0.12
-    """The same step at the 1 N with which those staircases begin."""
+    """Limit of friction: a step of 1 dB at the 1 N with which those staircases begin, 10^(1/20) - 1 = 0.12."""
     noise_factor: float = 2.0
     """Limit of the noise, chosen by hand: no threshold depends on the noise, and a loose sensor or broken shield
     multiplies it."""
@@ -41,16 +46,18 @@ class ChangeLimits:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One number, then and now."""
+    """One number of a device at its acceptance and today."""
 
     kind: str
     """friction, gain, response or noise"""
     axis: str
     """Channel of the command, or of the response for noise."""
     accepted: float
+    """Value at the acceptance, in `unit`; a gain is relative to it (1), a response's difference too (0)."""
     today: float
+    """Value today; NaN = not measurable."""
     error: float
-    """Standard error of the difference."""
+    """Standard error of the difference; for a response, the relative rms difference that noise alone makes."""
     limit: float
     """Limit of the difference; for noise, of the ratio."""
     unit: str
@@ -68,9 +75,10 @@ class Change:
 def compare_devices(
     baseline: Recording, recording: Recording, limits: ChangeLimits | None = None
 ) -> tuple[Change, ...]:
-    """All changes, small ones too. baseline, recording: the same excitation, then and today.
+    """All compared numbers, changed or not. baseline, recording: the same excitation, at the acceptance and today.
 
-    Raises NotMeasurableError where one of them does not tell what is compared, or they do not belong together.
+    Raises NotMeasurableError where a number cannot be measured in a recording, or where the excitations, channels or
+    reliable frequencies of the two do not agree.
     """
     limits = limits or ChangeLimits()
     _check_played_alike(baseline, recording)
@@ -84,6 +92,7 @@ def compare_devices(
 
 
 def _check_played_alike(baseline: Recording, recording: Recording) -> None:
+    """Raise NotMeasurableError unless both have segments of the same kinds, amplitudes and periods, in one order."""
     then, now = ([(s.kind, s.amplitude, s.period) for s in each.segments] for each in (baseline, recording))
     if len(then) != len(now):
         raise NotMeasurableError(f"{len(now)} pieces were played, {len(then)} at the acceptance")
@@ -114,9 +123,11 @@ def _response_changes(then: FrequencyResponse, now: FrequencyResponse, limits: C
         raise NotMeasurableError("no frequency is reliable in both recordings")
     then, now = (each.of_lines(np.isin(each.frequency_hz, shared)) for each in (then, now))
     for axis, channel in enumerate(then.input_channels):
-        # Column: the answer of all outputs to this force. A common factor is the gain; what is left, the response.
+        # Norm over all outputs of the response to this force. Its median ratio over frequency is the change of gain;
+        # differences from that common factor are changes of the response.
         ratio = np.linalg.norm(now.response[:, :, axis], axis=1) / np.linalg.norm(then.response[:, :, axis], axis=1)
         gain = float(np.median(ratio))
+        # Standard error of a median: sqrt(pi / 2) = 1.2533 times that of a mean; 1.4826 MAD estimates the deviation.
         error = float(1.2533 * 1.4826 * np.median(np.abs(ratio - gain)) / np.sqrt(len(ratio)))
         changed = _is_beyond(np.log(gain), error / gain, np.log1p(limits.share), limits)
         unclear = not changed and limits.deviations * error > limits.share
@@ -125,7 +136,7 @@ def _response_changes(then: FrequencyResponse, now: FrequencyResponse, limits: C
 
 
 def _lost_bands(then: FrequencyResponse, now: FrequencyResponse, limits: ChangeLimits) -> Iterator[Change]:
-    """Bands most of whose lines were reliable at the acceptance only: whether anything changed there is not known."""
+    """Bands in which most lines that were reliable at the acceptance are not reliable today: reported as unclear."""
     before_hz = then.frequency_hz[then.reliable]
     lost = ~np.isin(before_hz, now.frequency_hz[now.reliable])
     band = _bands(before_hz, limits)
@@ -140,7 +151,7 @@ def _lost_bands(then: FrequencyResponse, now: FrequencyResponse, limits: ChangeL
 
 
 def _bands(frequency_hz: FloatArray, limits: ChangeLimits) -> FloatArray:
-    """Number of the band of each line, from the lowest on."""
+    """(lines,): number of the third-octave band of each line, counted from the lowest line."""
     number: FloatArray = np.floor(np.log2(frequency_hz / frequency_hz[0]) / limits.band_octaves)
     return number
 
@@ -148,10 +159,10 @@ def _bands(frequency_hz: FloatArray, limits: ChangeLimits) -> FloatArray:
 def _worst_band(
     then: FrequencyResponse, now: FrequencyResponse, axis: int, gain: float, limits: ChangeLimits
 ) -> Change:
-    """The third octave in which the response, less the common gain, differs most beyond the noise.
+    """The third octave in which the response, divided by the common gain, differs most beyond the noise.
 
-    Noise of late and missed ticks comes in bursts that hit neighbouring lines alike: the difference counts beyond
-    `deviations` times the power that the scatter from period to period lets expect.
+    Late and missed ticks make noise in bursts, which affect neighbouring lines alike. Therefore `deviations` times the
+    power that is expected from the scatter between periods is subtracted from the power of the difference.
     """
     band = _bands(then.frequency_hz, limits)
     found = []
@@ -196,4 +207,5 @@ def _noise_changes(accepted: DeviceMeasures, today: DeviceMeasures, limits: Chan
 
 
 def _is_beyond(difference: float, error: float, limit: float, limits: ChangeLimits) -> bool:
+    """Whether a difference exceeds both its limit and `deviations` standard errors."""
     return bool(abs(difference) > limit and abs(difference) > limits.deviations * error)

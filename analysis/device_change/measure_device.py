@@ -1,6 +1,8 @@
 """Measures of a free device from one recording: friction from slow strokes, frequency response, noise at rest.
 
-Friction is the work lost in a closed stroke over its path, oint F dx / path: spring, weight and inertia do no net work.
+Friction is the work lost in a closed stroke over the length of its path, oint F dx / path (N). Forces of springs,
+weights and inertia do no net work over a closed path, so that no model is needed. Used by the daily check of a device
+(`compare_devices`).
 """
 
 from dataclasses import dataclass, replace
@@ -15,14 +17,15 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal, runs_of
 
 STROKES_BELOW_HZ = 1.0
-"""Sinusoids slower than this are strokes: the shipped daily check has 0.5 Hz, the lowest stimulus of a study 5 Hz."""
+"""Sinusoids below this frequency count as strokes: those of the shipped daily check have 0.5 Hz, and the lowest
+stimulus of a study has 5 Hz."""
 
 MISSED_LIMIT = 0.02
-"""Share of missed ticks at most: that of a trial in the shipped protocols."""
+"""Largest share of missed ticks: the limit of a trial in the shipped protocols."""
 
 
 class NotMeasurableError(ValueError):
-    """The recording does not tell what is compared; the text says why."""
+    """A measure cannot be computed from the recording; the text says why."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,16 +35,17 @@ class DeviceMeasures:
     friction_n: FloatArray
     """(axes,): mean force that resisted the strokes along each axis; NaN where the handle did not move."""
     friction_error_n: FloatArray
-    """(axes,): standard error of it, from stroke to stroke."""
+    """(axes,): standard error of the friction, from the scatter between strokes."""
     response: FrequencyResponse
     noise: FloatArray
-    """(outputs,): rms of the response at rest, in its unit, less a straight line."""
+    """(outputs,): rms of the response at rest about a straight line, in its unit."""
     noise_samples: int
+    """Number of samples at rest from which the noise was computed."""
 
 
 def measure_device(recording: Recording) -> DeviceMeasures:
     """Friction, frequency response and noise of a free device. recording: strokes and a broadband excitation along
-    every axis, with rests. Raises NotMeasurableError."""
+    every axis, with rests. Raises NotMeasurableError where any of the three cannot be computed."""
     recording = _without_gaps(recording)
     response = _response(recording)
     friction = np.array([_friction_n(recording, axis) for axis in range(len(recording.command.channels))])
@@ -53,7 +57,7 @@ def measure_device(recording: Recording) -> DeviceMeasures:
 
 
 def _without_gaps(recording: Recording) -> Recording:
-    """Interpolated across missed ticks: a single one would cost a whole period."""
+    """The recording with missed ticks interpolated: a single one would otherwise cost a whole period."""
     if recording.position is None:
         raise NotMeasurableError("it has no position")
     command, response = _fill_missing(recording.command, "command"), _fill_missing(recording.response, "response")
@@ -63,6 +67,7 @@ def _without_gaps(recording: Recording) -> Recording:
 
 
 def _fill_missing(signal: Signal, name: str) -> Signal:
+    """The signal with missing samples interpolated. Raises NotMeasurableError for a share above `MISSED_LIMIT`."""
     missing = 1 - float(np.isfinite(signal.samples).all(axis=1).mean())
     if missing > MISSED_LIMIT:
         raise NotMeasurableError(f"{100 * missing:.1f} % of its {name} is missing, more than {100 * MISSED_LIMIT:g} %")
@@ -80,9 +85,10 @@ def _response(recording: Recording) -> FrequencyResponse:
 
 
 def _friction_n(recording: Recording, axis: int) -> tuple[float, float]:
-    """Mean and standard error over strokes of the work that a stroke loses, over the path of the handle.
+    """Mean friction along an axis and its standard error, both in N: the work that a stroke loses, over its path.
 
-    What spring, weight and inertia take they give back within a stroke; so no model is needed.
+    Energy that springs, weights and inertia store is returned within a stroke, so that no model is needed. Raises
+    NotMeasurableError with fewer than two strokes along the axis.
     """
     found = [
         _lost_per_path_n(recording, start, start + segment.period, axis)
@@ -100,11 +106,12 @@ def _is_stroke(recording: Recording, segment: Segment) -> bool:
 
 
 def _driven_axis(recording: Recording, segment: Segment) -> int:
+    """Index of the command with the largest peak-to-peak excitation in a segment."""
     return int(np.argmax(np.ptp(instrument_signal(recording)[segment.start : segment.stop], axis=0)))
 
 
 def _lost_per_path_n(recording: Recording, start: int, stop: int, axis: int) -> float:
-    """NaN where the handle did not move further than it trembles across."""
+    """Work per path (N) of one stroke along an axis; NaN where the handle moved no further along it than across it."""
     assert recording.position is not None
     position_m = recording.position.samples[start : stop + 1]
     force_n = recording.command.samples[start : start + len(position_m) - 1]
@@ -116,7 +123,7 @@ def _lost_per_path_n(recording: Recording, start: int, stop: int, axis: int) -> 
 
 
 def _second_halves_of_rests(recording: Recording) -> list[FloatArray]:
-    """Stretches (k, outputs) at rest; in the first half of each rest what was excited dies away."""
+    """Responses (k, outputs) in the second half of each long rest; transients decay in the first half."""
     rests = runs_of(np.asarray(~instrument_signal(recording).any(axis=1)))
     longest = max((stop - start for start, stop in rests), default=0)
     return [
@@ -125,6 +132,7 @@ def _second_halves_of_rests(recording: Recording) -> list[FloatArray]:
 
 
 def _noise(recording: Recording, rests: list[FloatArray]) -> tuple[FloatArray, int]:
+    """(outputs,): rms of the response about the least-squares line of each rest, and the number of samples."""
     squares, samples = np.zeros(len(recording.response.channels)), 0
     for rest in rests:
         at = np.arange(len(rest)) - (len(rest) - 1) / 2

@@ -1,5 +1,5 @@
-"""Spectra of a probe: force, acceleration and position at each spectral line, and the spectrum of the dry friction
-along the probe's motion.
+"""Spectra of a probe (a short multisine, with a hand on the handle): force, acceleration and position at each spectral
+line, and the spectrum of dry friction along the probe's motion. `probe_drift` compares them within a session.
 
 Friction follows Dahl's law (P. R. Dahl, "A solid friction model", 1968) at a level of 1 N,
 
@@ -18,7 +18,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 DRIVEN_SHARE = 0.1
-"""Least amplitude of a driven line, relative to an axis's strongest: weaker ones are due to rounding and the spring."""
+"""Least amplitude of a driven line, relative to the strongest of its axis: weaker lines are due to rounding and to the
+virtual spring. By hand."""
 
 FROM_HZ = 3.0
 """Lower end of the lines at which the acceleration is integrated twice: below it, the result is the sensor's drift. By
@@ -28,13 +29,13 @@ TO_HZ = 150.0
 """Upper end of the lines that make up the position: above it, the handle hardly moves. By hand."""
 
 BREAK_AWAYS_M = tuple(np.geomspace(2e-6, 5e-5, 8).tolist())
-"""Break-away lengths x0 of Dahl's law that are tried (m), from a stiff contact to a soft one. The level of friction is
-wrong in the direction in which the length is: with steps of a factor 1.6 by some 10 %, with steps of 2.5 by 40 %. By
-hand."""
+"""Break-away lengths x0 of Dahl's law that are tried (m), from a stiff contact to a soft one. Too large a length gives
+too large a level of friction, too small a length too small a level: by some 10 % where lengths differ by a factor of
+1.6, by 40 % for a factor of 2.5. By hand."""
 
 PASSES = 3
-"""Periods computed until Dahl's force, which remembers its start, repeats: it forgets within a few break-away
-lengths."""
+"""Number of periods over which Dahl's law is integrated; the last is used. Its initial state decays within a few
+break-away lengths of motion, so that the force is then periodic."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,16 +47,16 @@ class ProbeLines:
     driven: npt.NDArray[np.bool_]
     """(lines, axes): whether the probe's multisine drives the axis at the line."""
     force_n: ComplexArray
-    """(lines, axes): the command, virtual spring and damper included."""
+    """(lines, axes): the command in N, including the forces of the virtual spring and damper."""
     acceleration_mps2: ComplexArray
-    """(lines, axes)"""
+    """(lines, axes): as measured, in m/s^2."""
     position_m: ComplexArray
-    """(lines, axes): from the encoders; NaN where there are none."""
+    """(lines, axes): from the encoders, in m; NaN where there are none."""
 
 
 def probe_lines(recording: Recording, period_s: float) -> ProbeLines:
-    """Spectra of the mean period of a probe, of its first segment where it has segments. Raises ValueError where less
-    than a period was kept, or samples are missing."""
+    """Spectra of the mean period of a probe; of its first segment where the recording has segments. period_s: period of
+    the multisine. Raises ValueError where less than a period was recorded, or samples are missing."""
     period = round(period_s * recording.sample_rate_hz)
     # With a virtual spring, the command also holds the spring's force, which would count as driven.
     designed = recording.command if recording.excitation is None else recording.excitation
@@ -83,19 +84,20 @@ def probe_lines(recording: Recording, period_s: float) -> ProbeLines:
 
 
 MASS_LINES_HZ = (30.0, 60.0)
-"""Lines between which the response is nearly that of a mass: friction and springs matter below, the linkage's modes
-above."""
+"""Band in Hz in which the response is nearly that of a mass: friction and springs matter below it, the modes of the
+linkage above it. By hand."""
 
 
 def apparent_mass_kg(lines: ProbeLines) -> float:
-    """Median of the real part of force over acceleration of the driven axis, over the driven lines in `MASS_LINES_HZ`:
-    a hand on the handle adds to it. Raises ValueError where there is no such line, or the median is not positive."""
+    """Apparent mass in kg: median of the real part of force over acceleration, over the driven lines in
+    `MASS_LINES_HZ`, each on its driven axis. A hand on the handle adds to it. Raises ValueError where there is no such
+    line, or the median is not positive."""
     low_hz, high_hz = MASS_LINES_HZ
     in_band = (lines.frequency_hz >= low_hz) & (lines.frequency_hz <= high_hz)
     rows, axes = np.nonzero(lines.driven & in_band[:, None])
     if not len(rows):
         raise ValueError(f"it has no line between {low_hz:g} and {high_hz:g} Hz, which would tell the handle's mass")
-    with np.errstate(divide="ignore", invalid="ignore"):  # of a dead sensor
+    with np.errstate(divide="ignore", invalid="ignore"):  # a dead sensor reads zero
         mass_kg = float(np.median((lines.force_n[rows, axes] / lines.acceleration_mps2[rows, axes]).real))
     if not np.isfinite(mass_kg) or mass_kg <= 0:
         raise ValueError("its acceleration does not follow the force: is the accelerometer right?")

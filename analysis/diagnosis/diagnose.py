@@ -1,4 +1,10 @@
-"""The whole diagnosis: from recordings and a model to findings, without files, clocks or screens."""
+"""The whole diagnosis: from recordings and a model to findings, without files, clocks or screens.
+
+There are three ways. Without a given model, laws are found by the force balance and confirmed by simulation; where that
+names none, effects are searched by simulation. With a given model, effects are searched by simulation, then judged by
+held-out gain and by the force balance with that model. With clean recordings of the device, faults are found by
+comparison with them (`contrast`), and by search where no fault explains the difference.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -36,6 +42,7 @@ if TYPE_CHECKING:
 
 
 TOO_SHORT = "the recordings are so short that other laws would explain them as well"
+"""Reason not to name a law of short recordings (`is_too_short_to_name`)."""
 
 
 def diagnose(
@@ -45,8 +52,9 @@ def diagnose(
     map_: Mapper,
     progress: Progress,
 ) -> Findings:
-    """What the model lacks. recordings: of one device, alike in channels, units and rate; see `input_checks` for what
-    is refused. Raises NothingLearned where the clean recordings cannot be compared with these."""
+    """Findings about the physics that the model lacks. recordings: of one device, alike in channels, units and rate;
+    not checked here (see `input_checks`). map_: as `map`, may run in parallel. progress: receives a description of the
+    current step and the share that is done. Raises NothingLearned where clean recordings cannot be compared."""
     balances: tuple[Balance, ...] = ()
     if settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.0)
@@ -95,6 +103,7 @@ def _diagnose_by_model(
     progress: Progress,
     balances: "tuple[Balance, ...]" = (),
 ) -> Findings:
+    """Findings by search with simulations of the model. balances: force balances of a model fitted by the program."""
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     if settings.fitted and balances:
         # Imported here, as above: only a model that was fitted has balances.
@@ -119,8 +128,9 @@ def _diagnose_beside_clean(
     map_: Mapper,
     progress: Progress,
 ) -> Findings:
-    """Findings by comparison with the clean recordings, or by search where no fault explains the difference, or where
-    the given model predicts the clean ones well enough to be used itself, or repeats show that noise is small."""
+    """Findings by comparison with the clean recordings. A given model is searched by simulation instead where it
+    predicts the clean recordings well or repeats show the noise, unless the comparison contradicts the result, and
+    where the comparison leaves the fault open."""
     # Imported here, as below: only some diagnoses have clean recordings.
     from analysis.diagnosis.reference.compare_with_reference import contrast_of, noise_is_from_repeats, predicts_clean
     from analysis.diagnosis.reference.learn_model_error import learn_model_floor
@@ -151,7 +161,7 @@ def _diagnose_beside_clean(
 def _evaluate_given_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchResult:
-    """The model as it is given, with nothing named."""
+    """The search result of the given model without a search: nothing is named."""
     context = search_context_of(recordings[0], fitting, settings, map_)
     given = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     stands = context.with_test_score(context.candidate(given))
@@ -166,8 +176,8 @@ def _search_beside_clean(
     map_: Mapper,
     progress: Progress,
 ) -> Findings | None:
-    """Findings by the search beside clean recordings. weighed: effects that the comparison tested, and did not find.
-    None where the search names nothing else, or cannot be done."""
+    """Findings by a search with clean recordings as the floor of the model error. weighed: effects that the comparison
+    tested and did not find; the search leaves them out. None where it names no effect, or cannot be done."""
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared)
     rest = replace(settings, without=(*settings.without, *weighed))
     try:
@@ -183,6 +193,7 @@ def _search_beside_clean(
 
 
 def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper) -> "tuple[Balance, ...]":
+    """Force balances of the recordings, one per command; none where the guard caught a crash."""
     # Imported here: a given model has a balance of its own.
     from analysis.diagnosis.balance.balances import find_balances
 
@@ -193,8 +204,8 @@ def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_
 def _judge_with_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, outcome: SearchOutcome, settings: DiagnosisSettings
 ) -> "tuple[SearchOutcome, tuple[Balance, ...]]":
-    """The outcome after the decision by held-out gain, and the force balances with the model as their base; unchanged
-    where nothing is left unexplained, or impacts were compared by band power."""
+    """The outcome after the decision by held-out gain, and the force balances with the model as their base; unchanged,
+    without balances, where nothing remains unexplained, or where a statistic such as band power was compared."""
     searched = outcome.result
     if searched.judgement.verdict not in ("unexplained", "partly_explained") or searched.found.statistic is not None:
         return outcome, ()
@@ -213,6 +224,7 @@ def _assemble(
     outcome: SearchOutcome,
     balances: "Sequence[Balance]",
 ) -> Findings:
+    """The findings from the outcome of a search: named effects, candidates, maps of states, errors and remarks."""
     result, names = outcome.result, names_of_parts(recordings, settings.names)
     found = result.found if result.judgement.named else replace(result.found, after=result.found.retuned)
     whole = assemble_findings(replace(result, found=found), fitting.chosen.floors, names, outcome.floor)

@@ -1,4 +1,8 @@
-"""The whole diagnosis as one call of values: recordings in, findings out, with a model or without one."""
+"""The whole diagnosis as one function of values: recordings in, findings out, with or without a model.
+
+Checks and prepares the recordings, fits a linear first model where none is given, and calls `diagnose`. This is
+`analysis.diagnose` of the Python interface.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -26,12 +30,13 @@ def diagnose_values(
     map_: Mapper = map,
     progress: Progress = _ignore_progress,
 ) -> Findings:
-    """Which physics a model of the device lacks.
+    """Findings about the physics that a model of the device lacks.
 
-    recordings: of one device, alike in channels, units and rate. model: None = a first one is fitted to them, or to the
-    clean ones where there are any. settings: what is left out of the search, clean recordings of the device, what is
-    compared. map_: as `map`, may run in parallel. progress(what is being done, share done). Raises NothingToDiagnose
-    with what is wrong in the recordings, NothingLearned where clean recordings say nothing of these.
+    recordings: of one device, alike in channels, units and rate. model: None = a linear model is fitted to them, or to
+    the clean recordings where there are any. settings: effects left out of the search, clean recordings of the device,
+    compared signals. map_: as `map`, may run in parallel. progress: receives a description of the current step and the
+    share that is done. Raises NothingToDiagnose with the error in the recordings, NothingLearned where clean recordings
+    cannot be compared with them.
     """
     given = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or DiagnosisSettings()
@@ -56,6 +61,7 @@ def diagnose_values(
 def _first_model(
     recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper, progress: Progress
 ) -> FirstModel:
+    """A linear model with remarks: of these recordings with their force balances, or of the clean ones alone."""
     if not settings.clean:
         return first_model_of(recordings, settings.without, settings.time_left, progress, map_)
     what = "fitting a linear model, as none was given"

@@ -1,4 +1,5 @@
-"""Settings of a diagnosis: effects to consider, signals to compare, time limit."""
+"""Settings of a diagnosis: effects to consider, signals to compare, time limit. The limits that decide are in
+`settings.py`."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -15,30 +16,32 @@ if TYPE_CHECKING:
 
 
 BALANCE = "the force balance"
-"""Name of the force balance in a remark about its crash."""
+"""Name of the force balance in the remark that it crashed."""
 
 
 @dataclass(frozen=True, slots=True)
 class DiagnosisSettings:
-    """Settings of one diagnosis; the defaults are those of `hapteq diagnose`, but that this discovers laws too."""
+    """Settings of one diagnosis. The defaults differ from those of the command `hapteq diagnose`, which has `discovery`
+    and `guard` on."""
 
     without: tuple[str, ...] = ()
-    """Effects that are not to be considered."""
+    """Names of effects that are left out."""
     names: tuple[str, ...] = ()
-    """Names of the recordings, for the reader."""
+    """Names of the recordings in the findings; empty: recording 1, recording 2 and so on."""
     clean: tuple[Recording, ...] = ()
-    """Recordings of the device without the fault: its difference from the re-tuned model there is no mismatch."""
+    """Recordings of the device without the fault. The error of the re-tuned model there does not count as mismatch."""
     fitted: bool = False
-    """The model was fitted to these recordings by the program: laws are then tested in the force balance."""
+    """Whether the program fitted the model to these recordings: laws are then tested in the force balance."""
     balances: "tuple[Balance, ...] | None" = None
-    """`find_balances` of these recordings, where known already."""
+    """Result of `find_balances` for these recordings, where it is known already; None = it is computed."""
     compared: Compared = "auto"
-    """What is compared: motion, force, or what suits."""
+    """Compared quantity: motion or force; "auto" = chosen by `errors.choose_measure`."""
     discovery: bool = False
     """Whether laws are discovered where no effect of the catalogue is named."""
     kept: tuple[LawEntry, ...] = ()
-    """Laws discovered elsewhere, to be tried beside the catalogue."""
+    """Laws discovered in other recordings, tried in addition to the catalogue."""
     time_left: TimeBudget = always
-    """Asked before each piece of the search; once it says no, what was found until then stands."""
+    """Whether there is time left; called before each step of the search. Once it returns False, the search ends with
+    the result so far."""
     guard: Guard = field(default_factory=Guard)
-    """Where it is on, an effect that crashes is left out, with a remark."""
+    """If on, an effect that crashes is left out, with a remark; if off, the exception is raised."""

@@ -1,4 +1,4 @@
-"""Prepares recordings for the comparison with a model, the same for files, real recordings and values.
+"""Prepares recordings for the comparison with a model; the same for recordings from files and from arrays.
 
 In this order: segments are found where a recording states none, commands and responses are brought into the form that a
 force balance needs (only where no model says what they are), motions become force-driven, short gaps in commands are
@@ -21,24 +21,24 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, runs_of
 
 STILL = 1e-9
-"""Range of a signal over its size, below which changes are rounding errors."""
+"""Range of a signal over its largest magnitude, below which changes are rounding errors."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedRecordings:
-    """The recordings in the form that a diagnosis takes, and what was done to them."""
+    """The recordings in the form that a diagnosis needs, and remarks on the changes."""
 
     recordings: tuple[Recording, ...]
     remarks: tuple[str, ...] = ()
-    """Sentences about what was changed, and what is weak."""
+    """Sentences for the user on what was changed, and on weaknesses such as few cycles."""
 
 
 def prepare(
     recordings: Sequence[Recording], names: Sequence[str], plain: bool, short: bool | None = None
 ) -> PreparedRecordings:
-    """The prepared recordings. recordings: alike, in the order of names. plain: one motion for each force, as a force
-    balance needs it. short: few cycles or samples are a remark and no refusal; None: as plain. Raises
-    NothingToDiagnose."""
+    """The prepared recordings. recordings: alike in channels, units and rate, in the order of names. plain: convert
+    them to one motion per force (no model was given). short: few cycles or samples are a remark instead of a refusal;
+    None: as plain. Raises NothingToDiagnose for unsuitable recordings."""
     found = [find_segments(each) for each in recordings]
     named_repeats = [(name, text) for name, (_, text) in zip(names, found, strict=True) if text]
     repeats = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in named_repeats)
@@ -56,7 +56,8 @@ def prepare(
 
 
 def comparable(recordings: Sequence[Recording], names: Sequence[str], short: bool) -> PreparedRecordings:
-    """The last two steps alone, for recordings in this form, such as a session's trials. Raises NothingToDiagnose."""
+    """The last two steps only, for recordings that are prepared already, such as the trials of a session. Raises
+    NothingToDiagnose for unsuitable recordings."""
     require_different(recordings, names)
     few = tuple(f"{begin_sentence(problem)}." for problem in require_something(recordings, names, short))
     alike = keep_common_signals(recordings)
@@ -65,7 +66,8 @@ def comparable(recordings: Sequence[Recording], names: Sequence[str], short: boo
 
 
 def keep_common_signals(recordings: Sequence[Recording]) -> PreparedRecordings:
-    """The recordings with the positions and conditions that all of them hold; else without, and a remark."""
+    """The recordings with their positions and conditions; where these are not the same in all, without them and with a
+    remark."""
     alike = _keep_common_conditions(recordings)
     kinds = {None if each.position is None else (each.position.channels, each.position.units) for each in recordings}
     if len(kinds) < 2:
@@ -75,7 +77,7 @@ def keep_common_signals(recordings: Sequence[Recording]) -> PreparedRecordings:
 
 
 def _keep_common_conditions(recordings: Sequence[Recording]) -> PreparedRecordings:
-    """The recordings with their conditions, where all hold the same ones; else without, and a remark."""
+    """The recordings with their conditions; where these are not the same in all, without them and with a remark."""
     held = [None if each.condition is None else (each.condition.channels, each.condition.units) for each in recordings]
     if len(set(held)) < 2:
         return PreparedRecordings(tuple(recordings))
@@ -86,7 +88,7 @@ def _keep_common_conditions(recordings: Sequence[Recording]) -> PreparedRecordin
 
 
 def _drop_constant_position(recordings: Sequence[Recording]) -> PreparedRecordings:
-    """The recordings without positions where a position never changes: its errors have no unit to be counted in."""
+    """The recordings, without positions where one never changes: its errors cannot be normalised to its signal."""
     positions = [each.position for each in recordings if each.position is not None]
     if not positions:
         return PreparedRecordings(tuple(recordings))
@@ -100,21 +102,24 @@ def _drop_constant_position(recordings: Sequence[Recording]) -> PreparedRecordin
 
 
 def _without_position(recordings: Sequence[Recording], why: str) -> PreparedRecordings:
+    """The recordings without positions, and a remark. why: begins the remark."""
     left = tuple(replace(each, position=None) for each in recordings)
     return PreparedRecordings(left, (f"{why}: the position was left out of the comparison.",))
 
 
 Stretch = tuple[int, int]
+"""Start and stop (exclusive) of samples."""
 
 
 def bridge_gaps(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """The recordings with gaps in their commands filled or cut out, and a sentence for each that was changed. A
-    recording of which too much would be lost is not changed."""
+    """The recordings with gaps (NaN) in their commands interpolated or cut out, and a sentence for each that was
+    changed. A recording of which less than `LEAST_KEPT` of the known samples would remain is not changed."""
     found = [_bridge_or_cut(recording, name) for recording, name in zip(recordings, names, strict=True)]
     return tuple(each for each, _ in found), tuple(remark for _, remark in found if remark)
 
 
 def _bridge_or_cut(recording: Recording, name: str) -> tuple[Recording, str]:
+    """See `bridge_gaps`. The parts between gaps that were cut out are noted in the recording's meta data."""
     missing: Mask = np.asarray(np.isnan(recording.command.samples).any(axis=1))
     if not missing.any() or missing.all():
         return recording, ""
@@ -141,8 +146,8 @@ def _bridge_or_cut(recording: Recording, name: str) -> tuple[Recording, str]:
 
 
 def _can_bridge(samples: FloatArray, gap: int) -> bool:
-    """Whether straight lines over so many samples fit the command where it is known: then it changes little in a gap of
-    that length."""
+    """Whether a gap of so many samples may be interpolated: straight lines over that length differ from the known
+    command by at most `BRIDGED` of its standard deviation (rms)."""
     before, after = (gap + 1) // 2, (gap + 2) // 2
     middle = samples[before : len(samples) - after]
     if not len(middle):
@@ -165,6 +170,7 @@ def _stretches_between(stretch: Stretch, gaps: Sequence[Stretch]) -> list[Stretc
 
 
 def _interpolate(samples: FloatArray) -> FloatArray:
+    """Samples (n, m) with NaN replaced by linear interpolation, channel by channel."""
     whole, places = np.array(samples), np.arange(len(samples))
     for column in whole.T:
         known = np.isfinite(column)

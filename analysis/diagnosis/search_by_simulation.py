@@ -1,4 +1,8 @@
-"""The search by simulation: the effects to try, the error measure, and the use of its result."""
+"""The search by simulation: selects the effects to try, runs `search`, and adds rattling play where that explains more.
+
+Where force balances were fitted first, their laws decide which effects remain to be tried. With clean recordings, the
+model error learned from these counts as noise.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -27,16 +31,16 @@ if TYPE_CHECKING:
 
 
 TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
-"""Laws of the command that a force balance tests: those that it does not name are absent."""
+"""Laws of the command that a force balance tests; a law that it does not name is taken as absent."""
 LOWEST_MAINS_HZ = 45.0
-"""Lowest frequency of a tone that is taken for mains hum (Hz): grids run at 50 or 60 Hz."""
+"""Lowest frequency (Hz) at which a tone is accepted as mains hum: power grids run at 50 or 60 Hz."""
 GAINS = ("force_gain", "sensor_gain")
-"""Effects that a model fitted to the recordings absorbs: only with a calibrated model can a gain be found wrong."""
+"""Effects that a model fitted to the recordings absorbs: a wrong gain shows only with a calibrated model."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchOutcome:
-    """A search's result with the model error that was learned from clean recordings."""
+    """The result of a search, with the model error that was learned from clean recordings."""
 
     result: SearchResult
     floor: CleanFloor
@@ -46,7 +50,8 @@ class SearchOutcome:
 def search_context_of(
     recording: Recording, fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchContext:
-    """The shared state of the search. recording: as given; where forces are compared, the measure's own differ."""
+    """The shared state of the search. recording: as given by the user, for names and units; the records of a measure
+    that compares forces differ from it."""
     measure = fitting.chosen.measure
     model = with_units_of(fitting.model, recording.command.units, recording.response.units, time_unit(recording))
     tuning = tuning_of(model, recording.command.channels)
@@ -61,14 +66,15 @@ def search_by_simulation(
     progress: Progress,
     balances: "Sequence[Balance]",
 ) -> SearchOutcome:
-    """The result of the search by simulation. balances: where they name a law of the motion, nothing else is tried;
-    where they name none, only effects of actuator and sensor are."""
+    """The result of the search by simulation. balances: force balances of the same recordings, if any; where they name
+    a law, no effect is tried, else only effects of the actuator and the sensor that a balance cannot observe. Raises
+    NothingLearned with clean recordings from which no model error can be learned."""
     chosen, context = fitting.chosen, search_context_of(recordings[0], fitting, settings, map_)
     catalogue = _catalogue(settings, recordings[0], context.barred)
     may_be_named = [effect for effect in catalogue if effect.name not in context.barred]
     if balances:
         named = any(balance.named for balance in balances)
-        # From commands without the force of other motions no effect of the actuator can be told.
+        # Effects of the actuator show only in complete commands: not in those reduced by the force of other motions.
         driven = not fitting.is_reduced and not recordings[0].meta.get("imposed")
         catalogue = [] if named else [e for e in catalogue if _unseen_by_balance(e.name, place_of_effect(e), driven)]
         may_be_named = []
@@ -91,8 +97,8 @@ def search_by_simulation(
 
 
 class _ImpactSearch:
-    """The search for play that rattles, compared by band power; made once, early or at the end, and again only where
-    the result has more effects by then: these are its rivals."""
+    """The search for rattling play, compared by band power. It runs once, before a third effect or at the end; again
+    only where the result has gained effects, which are then rivals of play."""
 
     def __init__(
         self, fitting: FittingMeasure, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
@@ -103,8 +109,8 @@ class _ImpactSearch:
         self._steps = -1
 
     def before_thirds(self, seen: SearchResult) -> SearchResult:
-        """The result with play, where periods differ, two effects leave much of the mismatch, and play explains all of
-        it: further effects would take all the time, and none of them predicts the waveform."""
+        """The result with play, where the drive repeats, two effects leave the mismatch unexplained, and play explains
+        all of it: a third effect would take much time and could not predict a chaotic waveform."""
         repeats = any(floor.how == "repeats" for floor in self._fitting.chosen.floors)
         left = not seen.judgement.named and judge(seen.found).verdict == "unexplained"
         if not repeats or not left or hums_low(seen.found) or not self._settings.time_left():
@@ -113,15 +119,16 @@ class _ImpactSearch:
         return rattled if rattled is not None and rattled.judgement.verdict == "explained" else seen
 
     def at_end(self, seen: SearchResult) -> SearchResult:
-        """The result with play, where the search leaves something open that play explains, in part at least."""
+        """The result with play, where the search leaves a mismatch that play explains at least partly."""
         left = seen.judgement.verdict in ("unexplained", "partly_explained") and not has_law(seen)
         if not left or seen.context.certain or not self._settings.time_left():
             return seen
         return self._look(seen) or seen
 
     def _look(self, seen: SearchResult) -> SearchResult | None:
+        """The result with play, or None where play does not explain the recordings; computed as the class describes."""
         if self._steps < 0 or (self._found is not None and len(seen.found.steps) > self._steps):
-            # Imported here: only a diagnosis that leaves something open looks for impacts.
+            # Imported here, because only a diagnosis that leaves a mismatch looks for impacts.
             from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
             from analysis.diagnosis.search.impacts import explain_impacts
 
@@ -141,8 +148,8 @@ def _search_with_learned_error(
     settings: DiagnosisSettings,
     progress: Progress,
 ) -> SearchOutcome:
-    """The search with what the model lacks on the clean recordings counted as noise. given: the shared state, the
-    effects to try, and those that sensor faults may be named of. Raises NothingLearned."""
+    """The search in which the model error on the clean recordings counts as noise. given: the shared state, the effects
+    to try, and the effects that may be named as sensor faults without a search. Raises NothingLearned."""
     from analysis.diagnosis.reference.learn_model_error import learn_model_error
     from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
     from analysis.diagnosis.reference.search_with_reference import search_with_reference
@@ -161,27 +168,31 @@ def _search(
     progress: Progress,
     impacts: _ImpactSearch,
 ) -> SearchOutcome:
+    """The search without clean recordings: with laws outside the catalogue where `settings` asks for them, and, unless
+    the model was fitted to the recordings, repeated with a wider bound where needed."""
     beyond = Beyond(before_thirds=impacts.before_thirds)
     if settings.discovery and not settings.fitted:
-        # Imported here: only a diagnosis that looks for laws needs their grammar.
+        # Imported here, because only a diagnosis that searches for laws needs their grammar.
         from analysis.diagnosis.discovery.add_laws import LawSearch
 
         laws = LawSearch(progress, settings.time_left)
         beyond = Beyond(_unless_hum(laws.add_short), impacts.before_thirds, _unless_hum(laws.add_any))
     found = search_effects(context, catalogue, progress, settings.time_left, beyond)
-    # A model that was fitted to the recordings has no calibration to leave.
+    # A model that was fitted to the recordings has no calibration, hence no bound to widen.
     if not settings.fitted:
         found = move_model_further(context, found, catalogue, progress, settings.time_left)
     return SearchOutcome(found, CleanFloor())
 
 
 def _unless_hum(add_laws: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:
-    """Low-frequency hum is not accepted as an answer: the search is repeated without it, before any law is added."""
+    """The law search, skipped where hum below the mains was found: that is no answer, and the search is repeated
+    without hum before any law is added."""
     return lambda seen: seen if hums_low(seen.found) else add_laws(seen)
 
 
 def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozenset[str]) -> list[Effect]:
-    """The effects to try; with barred effects that others refine, as rivals."""
+    """The effects to try: the catalogue and the kept laws without the excluded effects; excluded effects that others
+    refine are included as rivals that cannot be named."""
     left_out = {*settings.without, *(GAINS if settings.fitted and not settings.clean else ())}
     known = (*CATALOGUE, *kept_effects(settings.kept, recording))
     catalogue = [effect for effect in known if effect.name not in left_out]
@@ -190,19 +201,19 @@ def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozen
 
 
 def _unseen_by_balance(name: str, place: str, driven: bool) -> bool:
-    """Whether a force balance cannot observe an effect of the actuator or sensor. driven: by an actuator with the
-    commands as they are; no actuator drives an imposed motion."""
+    """Whether a force balance cannot observe an effect of the actuator or the sensor. driven: an actuator drives the
+    device with the commands as recorded, neither reduced by other forces nor with an imposed motion."""
     untested = name != "body_on_actuator" and name not in TESTED_BY_BALANCE
     return place == "sensor" or (place == "actuator" and driven and untested)
 
 
 def hums_low(found: Explanation) -> bool:
-    """A line far below any mains is a harmonic of what drives the device."""
+    """Whether mains hum was named at a frequency below `LOWEST_MAINS_HZ`: such a line comes from the drive itself."""
     placed = found.after.fitted.hypothesis.list_placed_effects()
     return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)
 
 
 def has_law(result: SearchResult) -> bool:
-    """Whether a discovered law is among what is named."""
+    """Whether a discovered law is among the named effects."""
     claims = result.found.after.fitted.hypothesis.claims
     return result.judgement.named and any(claim.effect.law is not None for claim in claims)

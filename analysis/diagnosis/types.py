@@ -1,4 +1,4 @@
-"""Types that all folders of the diagnosis share."""
+"""Types that all folders of the diagnosis share: masks of samples, parallel maps, progress and time limits."""
 
 from collections.abc import Callable, Iterable
 
@@ -6,13 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 Mask = npt.NDArray[np.bool_]
-"""Mask of the samples, or of the lines of a spectrum, that count."""
+"""(n,): True at the samples, or at the lines of a spectrum, that count."""
 
 Mapper = Callable[..., Iterable[object]]
-"""`map`, or a function that works in parallel and keeps the order."""
+"""The built-in `map`, or a function with its arguments that works in parallel; results keep the order of the items."""
 
 Progress = Callable[[str, float], None]
-"""Called with what is being done, and the share of the whole work that is done."""
+"""Called with the current step in words, and the share of the whole work that is done, 0 to 1."""
 
 TimeBudget = Callable[[], bool]
-"""Time limit: called before each piece of a search; False ends it, and keeps what was found until then."""
+"""Time limit: called before each piece of a search. True = time is left; False ends the search, which keeps what it has
+found."""

@@ -1,4 +1,6 @@
-"""Formats physical values: unit prefix, as many digits as the confidence interval allows, raised exponents."""
+"""Formats physical values for people: SI prefixes, raised exponents, and as many digits as the confidence interval
+allows.
+"""
 
 import re
 from dataclasses import dataclass
@@ -14,6 +16,7 @@ _RANGE_WITHOUT_PREFIX = (0.01, 1e4)
 _ALWAYS_PREFIXED = ("m", "s", "m/s", "N m")
 """Units for which a prefix is usual within that range too: 54 mm, not 0.054 m."""
 _NEVER_PREFIXED = ("1", "deg", "ppm", "kg", "kg m^2")
+"""Units without a prefix; `scale_of` treats kg and kg m^2 separately."""
 _NO_PREFIX = re.compile(r"1/|[A-Za-z]+\^")
 """Units that begin with a reciprocal or a power: a prefix would be raised to it as well."""
 _RAISED = {"^2": "²", "^3": "³"}
@@ -36,7 +39,8 @@ _LEAST_INERTIA = 0.1
 
 
 def scale_of(unit: str, magnitude: float) -> Scale:
-    """The displayed unit and its factor for values of about this size. unit: SI in ASCII."""
+    """The displayed unit, and the factor from SI to it, for values of about this magnitude (SI). unit: SI in ASCII,
+    such as "m/s^2"."""
     size = abs(magnitude) if np.isfinite(magnitude) else 0.0
     if unit == "kg":
         return Scale(1.0, "kg") if size >= 1 or size == 0 else Scale(1e3, "g")
@@ -50,7 +54,7 @@ def scale_of(unit: str, magnitude: float) -> Scale:
 
 
 def typeset_unit(unit: str) -> str:
-    """ "m/s^2" as "m/s²", "1/m" as "per m"; a plain number has none."""
+    """The unit with raised exponents: "m/s^2" gives "m/s²", "1/m" gives "per m", and "1" gives an empty string."""
     shown = "" if unit == "1" else f"per {unit[2:]}" if unit.startswith("1/") else unit
     for ascii_, raised in _RAISED.items():
         shown = shown.replace(ascii_, raised)
@@ -58,7 +62,8 @@ def typeset_unit(unit: str) -> str:
 
 
 def value_text(value: float, unit: str, ci95: tuple[float, float] | None = None) -> str:
-    """ "54 µm [49, 60]"; without an interval three digits."""
+    """A value with its 95 % interval, such as "54 µm [49, 60]"; three significant digits without an interval. value,
+    ci95: in `unit`, SI."""
     scale = scale_of(unit, value)
     shown = value * scale.factor
     interval = None if ci95 is None else (ci95[0] * scale.factor, ci95[1] * scale.factor)
@@ -71,26 +76,26 @@ def value_text(value: float, unit: str, ci95: tuple[float, float] | None = None)
 
 
 def percent_text(share: float, ci95: tuple[float, float] | None = None) -> str:
-    """A share as per cent, with its interval."""
+    """A share (0 to 1) as per cent, with its 95 % interval."""
     shown = value_text(100 * share, "1", None if ci95 is None else (100 * ci95[0], 100 * ci95[1]))
     value, bracket, interval = shown.partition(" [")
     return f"{value} %{bracket}{interval}"
 
 
 def error_text(error: float | None) -> str:
-    """ "14 %" of the signal."""
+    """An error relative to the signal: "14 %", from 1000 % on "12 times", and "unknown" for None."""
     if error is None:
         return "unknown"
     return f"{100 * error:.3g} %" if 100 * error < 1000 else f"{error:.3g} times"
 
 
 def error_of_signal(error: float | None) -> str:
-    """ "14 % of the signal", "12 times the signal"."""
+    """An error in words: "14 % of the signal", "12 times the signal"."""
     return f"{error_text(error)} {'the' if error is not None and 100 * error >= 1000 else 'of the'} signal"
 
 
 def probability_text(probability: float) -> str:
-    """A probability with two decimals; "< 0.01" and "> 0.99" beyond."""
+    """A probability with two decimals, or "< 0.01" or "> 0.99" outside that range."""
     return f"{probability:.2f}" if 0.01 <= probability <= 0.99 else ("< 0.01", "> 0.99")[probability > 0.5]
 
 
@@ -100,7 +105,8 @@ def share_text(share: float) -> str:
 
 
 def _decimals(value: float, interval: tuple[float, float] | None) -> int:
-    """Decimals with which half the interval's width has one significant digit."""
+    """Number of decimals: as many as give half the interval's width one significant digit, but at most `_MOST_DIGITS`
+    significant digits of the value; without an interval, `_DIGITS` significant digits."""
     size = np.floor(np.log10(abs(value))) if value else 0.0
     if interval is None or not interval[1] > interval[0]:
         return int(max(0, _DIGITS - 1 - size))
@@ -110,6 +116,7 @@ def _decimals(value: float, interval: tuple[float, float] | None) -> int:
 
 
 def _number(value: float, decimals: int) -> str:
+    """The value with this number of decimals; in exponent notation from 1e6 on, or with more than five decimals."""
     if value and (abs(value) >= 1e6 or decimals > 5):
         return typeset(f"{value:.3g}")
     return typeset(f"{value:.{decimals}f}")

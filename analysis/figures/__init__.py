@@ -1,7 +1,7 @@
-"""Figures: values in, Matplotlib figures out. Nothing is written here.
+"""Figures: functions from values to Matplotlib figures. No file is written here.
 
-One subject a file. A file named `…_pictures` gathers all figures of one report, in its order (`study_pictures`,
-`look_pictures`, `blind_test_pictures`, `reproduction_pictures`, and `diagnosis/` for a diagnosis); the others draw one
-figure each. All draw with the colours and axes of `style` and hand on a `picture`: the figure with its title, its
-caption and its text for screen readers.
+A file named `…_pictures` collects all figures of one report, in the order of the report (`study_pictures`,
+`look_pictures`, `blind_test_pictures`, `reproduction_pictures`; `diagnosis/` holds those of a diagnosis); each other
+file draws one figure. All use the colours and axes of `style`. A `picture` is a figure with its title, its caption and
+its text for screen readers. Begin at `picture.py`, then a `…_pictures` file.
 """

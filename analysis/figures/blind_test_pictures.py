@@ -1,7 +1,7 @@
 """Figures of the blind test (`hapteq prove`): detection thresholds, detection by effect size, confusion, reliability.
 
-The outcomes are those of a bank of simulated devices with concealed effects. The line of the figures is that of an
-ideal observer that knows the effect: it compares the device with and without it, with no model to be re-tuned.
+The outcomes are those of a bank of simulated devices with concealed effects. Vertical bars in the figure of detection
+thresholds mark an ideal observer, which compares the device with and without the effect and has no model to re-tune.
 """
 
 from collections.abc import Sequence
@@ -19,11 +19,12 @@ from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_fi
 MARKS = {"right": ("o", BLUE), "in the set": ("D", ORANGE), "missed": ("X", VERMILLION), "invisible": (".", GREY)}
 """Marker and colour of each outcome of a single effect (`Outcome`)."""
 NO_ANSWER = "no name"
+"""Column of the confusion matrix for devices of which no effect is named."""
 
 
 def blind_test_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tuple[Picture, ...]:
-    """Pictures of detection, sizes and confusion where single effects were drawn, and of reliability where names were
-    given."""
+    """Pictures of detection thresholds, detection by effect size and confusion, where the bank has devices with a
+    single effect; and of reliability, where effects were named."""
     singles = [outcome for outcome in outcomes if outcome.kind == "single"]
     pictures = []
     if singles:
@@ -34,7 +35,7 @@ def blind_test_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -
 
 
 def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
-    """A row per effect: the outcome of each draw over its strength."""
+    """Detection thresholds: a row per effect, with the outcome of each device over the effect's strength (0 to 1)."""
     figure = new_figure(8.8, 1.3 + 0.21 * len(strips))
     axes = figure.add_subplot()
     plain_axes(axes)
@@ -65,7 +66,8 @@ def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
 
 
 def _size_picture(singles: Sequence[Outcome]) -> Picture:
-    """Share named right of all effects together, over the size of the change that they cause."""
+    """Detection curve: share of devices whose effect is named right, over the change of the readings by the effect (rms
+    over the noise's rms)."""
     figure = new_figure(7.4, 3.6)
     axes = figure.add_subplot()
     plain_axes(axes)
@@ -89,7 +91,7 @@ def _size_picture(singles: Sequence[Outcome]) -> Picture:
 
 
 def _confusion_picture(singles: Sequence[Outcome]) -> Picture:
-    """Concealed effects (rows) against the first named (columns)."""
+    """Confusion matrix of the detectable single effects: concealed effect (rows) against the first named (columns)."""
     detectable = [outcome for outcome in singles if outcome.detectable]
     answers = [outcome.named_names[0] if outcome.named else NO_ANSWER for outcome in detectable]
     pairs = [(outcome.names[0], answer) for outcome, answer in zip(detectable, answers, strict=True)]
@@ -113,6 +115,7 @@ def _confusion_picture(singles: Sequence[Outcome]) -> Picture:
 
 
 def _draw_counts(axes: Axes, counts: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> None:
+    """Cells of the confusion matrix, shaded by their count; the diagonal in another colour. counts: (rows, columns)."""
     rows, columns = counts.shape
     most = max(counts.max(initial=1.0), 1.0)
     for i in range(rows):
@@ -131,6 +134,7 @@ def _draw_counts(axes: Axes, counts: np.ndarray[tuple[int, ...], np.dtype[np.flo
 
 
 def _reliability_picture(calibration: Calibration) -> Picture:
+    """Reliability diagram: share of right names over their stated probability, with the diagonal."""
     figure = new_figure(5.2, 4.4)
     axes = figure.add_subplot()
     plain_axes(axes)

@@ -1,5 +1,8 @@
-"""A transient at a contact: the wanted acceleration, the delivered one along the normal and across it, and the
-forces."""
+"""Figure of an acceleration transient that is played at a contact, along the surface normal.
+
+Three rows over time, a column per way of playing it: acceleration along the normal, wanted and measured; magnitude of
+the measured acceleration across the normal, which should be 0; and the forces.
+"""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -9,11 +12,11 @@ from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, new_figure, pl
 from equalizer.signals.signal import FloatArray
 
 Play = tuple[str, FloatArray, FloatArray]
-"""Name, forces (N, 3) in N, and measured acceleration (N, 3) in m/s^2."""
+"""One way of playing the transient: its name, forces (n, 3) in N, and measured acceleration (n, 3) in m/s^2."""
 
 
 def contact_picture(normal: FloatArray, sample_rate_hz: float, wanted: FloatArray, *plays: Play) -> Picture:
-    """Figure of a transient played at a contact. normal: (3,), of length 1. wanted: (N, 3), m/s^2."""
+    """Figure of a transient played at a contact. normal: (3,), unit vector. wanted: (n, 3), acceleration in m/s^2."""
     words = ", ".join(f"{part:.2g}" for part in normal)
     return Picture(
         name="contact",

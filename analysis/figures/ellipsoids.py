@@ -1,4 +1,7 @@
-"""Acceleration ellipses by frequency (the published figure 3), in both definitions."""
+"""Figure of acceleration ellipses by frequency, as in the published figure 3, by second moments and by phasors.
+
+`analysis.psychophysics.ellipsoid` defines both ellipses and the frame: the first axis is the test direction.
+"""
 
 from collections.abc import Sequence
 
@@ -13,15 +16,17 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.wording import number
 
 _COLUMNS = 6
-"""Panels side by side."""
+"""Largest number of frequencies in a row of panels."""
 _COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
 _STYLES: tuple[LineStyleType, ...] = ("-", "--", "-.", ":", (0, (5, 1)))
 
 
 def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:
-    """One column per frequency: above by second moments, below by phasors, each scaled to its largest axis.
+    """A column per frequency: above the ellipse by second moments, below by phasors, each scaled to its largest
+    semi-axis.
 
-    The horizontal line is the test direction. Repeats lie over each other; directions differ by colour and dash.
+    The horizontal line is the test direction. Repeats are drawn over each other; test directions differ by colour and
+    dash. A note is drawn where there are no results.
     """
     if not results:
         return draw_no_data_note(new_figure(8.6, 2.0), "There is no ellipsoid to draw.")
@@ -49,6 +54,7 @@ def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:
 
 
 def _draw_panels(above: Axes, below: Axes, here: list[EllipsoidResult], directions: list[str], height: float) -> None:
+    """Both panels of one frequency. here: results at this frequency. height: half height of a panel, semi-axis = 1."""
     for axes in (above, below):
         axes.set_aspect("equal")
         axes.set_xlim(-1.15, 1.15)
@@ -70,11 +76,13 @@ def _draw_panels(above: Axes, below: Axes, here: list[EllipsoidResult], directio
 
 
 def _label(ratio: float, tilt_deg: float) -> str:
+    """Ratio of the semi-axes and tilt (degrees) of an ellipse, as a line of a title."""
     return f"\n1 : {ratio:.2f}, tilt {number(tilt_deg, 0)}°"
 
 
 def _half_height(result: EllipsoidResult) -> float:
-    """How far the taller of both ellipses rises above the line of the test direction."""
+    """Extent of the taller of both ellipses perpendicular to the test direction, largest semi-axis = 1:
+    hypot(sin(turn), ratio cos(turn))."""
     shapes = (
         (result.moments.normalised_axes[1], result.moments.turn_deg),
         (result.phasor.ellipticity, result.phasor.turn_deg),
@@ -83,6 +91,7 @@ def _half_height(result: EllipsoidResult) -> float:
 
 
 def _draw_ellipse(axes: Axes, ratio: float, turn_deg: float, colour: str, style: LineStyleType) -> None:
+    """An ellipse with semi-axes 1 and `ratio`, turned by turn_deg counter-clockwise."""
     angle, turn = np.linspace(0, 2 * np.pi, 181), np.radians(turn_deg)
     x, y = np.cos(angle), ratio * np.sin(angle)
     axes.plot(

@@ -1,4 +1,8 @@
-"""Figure of coupling, direction perception and control method over frequency (the published figure 1)."""
+"""Figure of coupling, direction perception and control method over frequency, as in the published figure 1.
+
+Above: measured worst coupling and its onset. Below: where the axes of the device couple, where a person perceives
+directions, and which control method suits each frequency band (`frequency_bands`).
+"""
 
 from collections.abc import Sequence
 from textwrap import fill
@@ -18,18 +22,19 @@ from equalizer.identification.frequency_response.octave_bins import octave_bins
 
 _COLOURS = {"low": GREEN, "middle": BLUE, "high": PURPLE}
 _HALF, _TALLER = 0.4, 0.35
-"""Half the height of a row; how much more the row of the methods has to either side."""
+"""Half the height of a row, and additional half height of the row of control methods, in units of the ordinate."""
 _LETTERS = 110
-"""Letters that fit into the width of the figure."""
+"""Approximate number of letters that fit into the width of the axes, for line breaks."""
 _Shade = tuple[str, float]
-"""Colour and opacity, as Matplotlib takes them."""
+"""Colour and opacity (0 to 1) of a bar."""
 
 
 def frequency_bands_picture(
     response: FrequencyResponse, onset: CouplingOnset, bands: Sequence[FrequencyBand], direction_limit_hz: float
 ) -> Picture:
-    """Figure of coupling and direction perception by frequency band. response: with inputs and outputs in one frame.
-    bands: by `frequency_bands`, at least one."""
+    """Picture of coupling, direction perception and control by frequency band. response: inputs and outputs in the same
+    frame. bands: from `frequency_bands`, at least one. direction_limit_hz: frequency from which directions are hardly
+    perceived."""
     return Picture(
         name="frequency-bands",
         title="Frequency bands",
@@ -62,6 +67,7 @@ def draw_frequency_bands(
 
 
 def _draw_coupling(axes: Axes, response: FrequencyResponse, onset: CouplingOnset) -> None:
+    """Worst coupling of the reliable lines in per cent, averaged over 1/24 octave, with the threshold of the onset."""
     plain_axes(axes)
     lines = response.of_lines(response.reliable)
     if len(lines):
@@ -81,6 +87,7 @@ def _draw_coupling(axes: Axes, response: FrequencyResponse, onset: CouplingOnset
 
 
 def _mark_onset(axes: Axes, frequency_hz: float, onset: CouplingOnset) -> None:
+    """Mark of the onset of coupling, with its confidence interval as a shade."""
     level = 100 * onset.threshold
     if onset.interval_hz is not None:
         axes.axvspan(*onset.interval_hz, color=VERMILLION, alpha=0.3, linewidth=0)
@@ -93,6 +100,7 @@ def _mark_onset(axes: Axes, frequency_hz: float, onset: CouplingOnset) -> None:
 
 
 def _draw_rows(axes: Axes, onset: CouplingOnset, bands: Sequence[FrequencyBand], direction_limit_hz: float) -> None:
+    """Three rows of bars: coupling of the device, direction perception, control method by band."""
     lowest, highest = bands[0].low_hz, bands[-1].high_hz
     coupled_hz = highest if onset.frequency_hz is None else min(max(onset.frequency_hz, lowest), highest)
     _bar(axes, 2, (lowest, coupled_hz), "axes hardly couple", (GREY, 0.18))
@@ -111,6 +119,7 @@ def _draw_rows(axes: Axes, onset: CouplingOnset, bands: Sequence[FrequencyBand],
 
 
 def _bar(axes: Axes, row: int, band_hz: tuple[float, float], words: str, colour: _Shade) -> None:
+    """A labelled bar over a frequency band; none for an empty band. row: ordinate; 0 is the taller row of methods."""
     low_hz, high_hz = band_hz
     if high_hz <= low_hz:
         return

@@ -1,4 +1,7 @@
-"""Figures of a recording before any model: time series, spectra, coherence, levels, derivatives."""
+"""Figures of a recording before any model is fitted: time series, spectra, coherence, levels, derivatives.
+
+They show the values of `analysis.look.overview.Overview`; each figure is drawn only where the recording has its data.
+"""
 
 from collections.abc import Sequence
 
@@ -18,18 +21,19 @@ from analysis.look.overview import Overview
 from equalizer.signals.signal import FloatArray
 
 COLUMNS = 1200
-"""Columns of a time series, each drawn from its lowest to its highest sample."""
+"""Columns of a drawn time series, each from its lowest to its highest sample."""
 SHOWN_SAMPLES = 600
-"""Samples shown where two time series are compared."""
+"""Samples that are shown where two time series are compared."""
 _FIT, _TEST, _BAND = "#EEF3E6", "#FBEFD9", "#EEF3E6"
+"""Background colours of samples to fit, of samples to test, and of the driven band."""
 _DECADES = 8
-"""Decades below the largest amplitude that a spectrum shows."""
+"""Decades of amplitude that a spectrum shows, from its largest value down."""
 _COLOUR_OF = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "position": SKY, "condition": GREY}
 
 
 def look_pictures(found: Overview, place: int) -> tuple[Picture, ...]:
-    """All figures of one recording. place: of the recording among those of the page, from 1; part of the pictures'
-    names."""
+    """All figures of one recording; in samples instead of seconds where its time axis is unknown. place: number of the
+    recording on the page, from 1, for the names of the pictures."""
     pictures = [_signals_picture(found, f"signals-{place}")]
     if found.spectra is not None:
         pictures.append(_spectra_picture(found, f"spectra-{place}"))
@@ -43,6 +47,7 @@ def look_pictures(found: Overview, place: int) -> tuple[Picture, ...]:
 
 
 def _channel_panels(found: Overview, height_in: float) -> tuple[Figure, list[Axes]]:
+    """A figure with a titled panel per channel. height_in: height of a panel in inches."""
     figure = new_figure(8.6, 0.8 + height_in * len(found.channels))
     axes = figure.subplots(len(found.channels), 1, sharex=True, squeeze=False)[:, 0]
     for channel, panel in zip(found.channels, axes, strict=True):
@@ -52,6 +57,7 @@ def _channel_panels(found: Overview, height_in: float) -> tuple[Figure, list[Axe
 
 
 def _signals_picture(found: Overview, name: str) -> Picture:
+    """Time series of all channels, with the samples to fit and to test, and the boundaries of parts."""
     figure, axes = _channel_panels(found, 1.15)
     rate_hz = found.recording.sample_rate_hz
     for channel, panel in zip(found.channels, axes, strict=True):
@@ -77,16 +83,18 @@ def _signals_picture(found: Overview, name: str) -> Picture:
 
 
 def envelope(samples: FloatArray, rate_hz: float, columns: int = COLUMNS) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Times, lowest and highest of equal stretches; (≤ columns,) each, NaN where all are missing."""
+    """Start times (s), lowest and highest samples of equal stretches; (k,) each, k at most `columns`. Missing samples
+    (NaN) are ignored."""
     starts = np.unique(np.linspace(0, len(samples), min(columns, len(samples)), endpoint=False).astype(int))
     low = np.fmin.reduceat(samples, starts)
     high = np.fmax.reduceat(samples, starts)
-    # Neighbouring columns touch, or a steep curve would fall into pieces.
+    # Each column is extended to touch the one before it, so that steep curves have no gaps.
     low[1:], high[1:] = np.fmin(low[1:], high[:-1]), np.fmax(high[1:], low[:-1])
     return starts / rate_hz, low, high
 
 
 def _spectra_picture(found: Overview, name: str) -> Picture:
+    """Amplitude densities of all channels, in their units per root hertz."""
     assert found.spectra is not None
     figure, axes = _channel_panels(found, 1.25)
     frequency_hz = found.spectra.frequency_hz
@@ -116,18 +124,21 @@ def _spectra_picture(found: Overview, name: str) -> Picture:
 
 
 def _shade_bands(panel: Axes, found: Overview) -> None:
+    """Shade from the lowest to the highest driven frequency."""
     if found.bands:
         low, high = min(band.low_hz for band in found.bands), max(band.high_hz for band in found.bands)
         panel.axvspan(low, high, color=_BAND, zorder=0)
 
 
 def _band_lines(found: Overview) -> Mask:
+    """(lines,): the spectral lines from the lowest to the highest driven frequency."""
     assert found.spectra is not None
     low, high = min(band.low_hz for band in found.bands), max(band.high_hz for band in found.bands)
     return np.asarray((found.spectra.frequency_hz >= low) & (found.spectra.frequency_hz <= high))
 
 
 def _coherence_picture(found: Overview, name: str) -> Picture:
+    """Multiple coherence of each response with all commands; faint outside the driven band."""
     assert found.spectra is not None
     figure = new_figure(8.6, 3.0)
     panel = figure.subplots()
@@ -160,6 +171,7 @@ def _coherence_picture(found: Overview, name: str) -> Picture:
 
 
 def _levels_picture(found: Overview, name: str) -> Picture:
+    """Rms of each command and response by segment, relative to its largest: curves of a linear device coincide."""
     figure = new_figure(8.6, 3.2)
     panel = figure.subplots()
     plain_axes(panel)
@@ -194,6 +206,7 @@ def _levels_picture(found: Overview, name: str) -> Picture:
 
 
 def _derivatives_picture(found: Overview, name: str) -> Picture:
+    """Recorded velocities or accelerations compared with the differentiated signals of the same motion."""
     pairs = found.pairs
     figure = new_figure(8.6, 0.8 + 1.9 * len(pairs))
     axes = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
@@ -215,12 +228,13 @@ def _derivatives_picture(found: Overview, name: str) -> Picture:
 
 
 def _draw_pair(panel: Axes, pair: KinematicPair, found: Overview) -> None:
+    """A recorded channel, and central differences of the channel whose derivative it should be."""
     rate_hz = found.recording.sample_rate_hz
     by_label = {channel.label: channel for channel in found.channels}
     later = by_label[pair.derivative]
     start, stop = _most_varying_part(later, found.stretches)
     times_s = np.arange(start, stop) / rate_hz
-    # Of this stretch alone: where two parts meet, the place jumps.
+    # Differences within this stretch only: positions jump where two parts of a recording meet.
     differences = derivative(by_label[pair.place].samples[start:stop], pair.order, rate_hz)
     plain_axes(panel)
     panel.plot(times_s, later.samples[start:stop], color=BLACK, linewidth=2.2, alpha=0.35)
@@ -230,7 +244,8 @@ def _draw_pair(panel: Axes, pair: KinematicPair, found: Overview) -> None:
 
 
 def _most_varying_part(channel: Channel, stretches: Sequence[tuple[int, int]]) -> tuple[int, int]:
-    """The part of a single stretch in which the channel varies most."""
+    """First and end sample of the `SHOWN_SAMPLES` samples (or fewer, in a shorter stretch) in which the channel's
+    variance is largest; missing samples count as the mean."""
     best, place = -1.0, stretches[0]
     for start, stop in stretches:
         piece = np.nan_to_num(channel.samples[start:stop] - np.nanmean(channel.samples))
@@ -245,4 +260,5 @@ def _most_varying_part(channel: Channel, stretches: Sequence[tuple[int, int]]) -
 
 
 def _unit_text(unit: str) -> str:
+    """The unit with a raised 2; "no unit" for "1"."""
     return "no unit" if unit == "1" else unit.replace("^2", "²")

@@ -1,4 +1,9 @@
-"""Medians of the primary analysis with their intervals, the people it sees, and the direction limit."""
+"""Figure of the primary analysis of a study: median thresholds by frequency with intervals, the participants'
+estimates, and the limit of direction perception.
+
+The values come from a hierarchical psychometric model (`analysis.psychophysics.hierarchy`). Thresholds are force
+amplitudes in N. Above the cap, the largest force that was played, only a lower bound is known.
+"""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,18 +27,19 @@ from analysis.psychophysics.hierarchy.inference import DirectionLimit, MedianThr
 from analysis.psychophysics.hierarchy.primary import PersonEstimate, PrimaryAnalysis
 
 _SPREAD = 0.5
-"""Width taken by the people at one frequency, in steps between frequencies."""
+"""Width over which the participants are spread at one frequency, as a share of the step between frequencies."""
 _ABOVE, _TOP = 1.12, 1.45
-"""Of the cap: the line of those above it, and the least end of the axis."""
+"""Ordinate of participants above the cap, and least upper end of the axis, relative to the cap."""
 _HIGHEST, _ARROW = 8.0, 1.25
-"""Of the cap: the highest end of the axis. Of its lower end: the least length of a bound's arrow."""
+"""Largest upper end of the axis, relative to the cap; and least ratio of an arrow's upper to its lower end."""
 _LEGEND_LIMIT = 24
-"""Most people for whom there is a legend."""
+"""Largest number of participants that the legend lists."""
 
 
 def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
-    """Over newtons on a logarithmic axis. Above the cap nothing has a size: people stand on one line, hollow with an
-    arrow, and a median is an arrow from its one-sided bound."""
+    """Thresholds in N on a logarithmic axis, by frequency. A threshold above the cap has no known size: participants
+    are drawn on a common line with an arrow, and a median as an arrow that begins at its one-sided lower bound. cap_n:
+    largest force that was played, N."""
     figure = new_figure(PAGE_IN, 4.2)
     axes = figure.add_subplot()
     plain_axes(axes)
@@ -59,13 +65,14 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
 
 
 def _top(primary: PrimaryAnalysis, cap_n: float) -> float:
-    """End of the axis: intervals and bounds are inside, unless they lie so far above the cap that nothing else would be
-    readable."""
+    """Upper end of the axis in N: above all intervals and arrows, but at most `_HIGHEST` times the cap, so that the
+    rest stays readable."""
     ends = [median.upper_n or _ARROW * (median.lower_n or 0.0) for median in primary.medians]
     return min(max(_TOP * cap_n, *(1.1 * end for end in ends)), _HIGHEST * cap_n)
 
 
 def _lowest(primary: PrimaryAnalysis) -> float:
+    """Lower end of the axis in N, below all thresholds and bounds."""
     people = [value for person in primary.persons for value in person.thresholds_n]
     return 0.85 * min(*people, *(median.lower_n or median.newton for median in primary.medians))
 
@@ -73,8 +80,8 @@ def _lowest(primary: PrimaryAnalysis) -> float:
 def _draw_person(
     axes: Axes, person: PersonEstimate, place: tuple[int, float], known: NDArray[np.bool_], cap_n: float
 ) -> None:
-    """place: number, and shift on the axis. known: (k,), where the person has answers: what the model expects elsewhere
-    is not drawn."""
+    """A participant's thresholds, joined by a line. place: number of the participant, and shift along the abscissa.
+    known: (k,), frequencies at which the participant has answers; the model's estimates elsewhere are not drawn."""
     number, shift = place
     above_cap = np.array(person.above_cap)
     shown = np.where(above_cap, _ABOVE * cap_n, person.thresholds_n)[known]
@@ -85,7 +92,8 @@ def _draw_person(
 
 
 def _draw_median(axes: Axes, place: int, median: MedianThreshold, ends: tuple[float, float]) -> None:
-    """ends: of the axis."""
+    """The median at one frequency with its interval; an arrow where it is above the cap. ends: lower and upper end of
+    the ordinate, N."""
     if median.above_cap:
         begin = ends[0] if median.lower_n is None else min(median.lower_n, ends[1] / _ARROW)
         axes.annotate("", (place, ends[1]), xytext=(place, begin), zorder=4,
@@ -101,6 +109,7 @@ def _draw_median(axes: Axes, place: int, median: MedianThreshold, ends: tuple[fl
 
 
 def _draw_limit(axes: Axes, limit: DirectionLimit, frequencies_hz: tuple[float, ...], cap_n: float) -> None:
+    """The limit of direction perception with its interval, on the line of the cap; interpolated in log frequency."""
     if limit.frequency_hz is None:
         return
     ends = (limit.lower_hz or frequencies_hz[0], limit.frequency_hz, limit.upper_hz or frequencies_hz[-1])
@@ -110,6 +119,7 @@ def _draw_limit(axes: Axes, limit: DirectionLimit, frequencies_hz: tuple[float, 
 
 
 def _legend(primary: PrimaryAnalysis, cap_n: float) -> list[Line2D]:
+    """Legend entries of what the figure contains."""
     percent = f"{100 * primary.confidence:g} %"
     handles = [
         Line2D([], [], color=BLACK, marker="_", markersize=12, markeredgewidth=2.4, linewidth=0,

@@ -1,4 +1,8 @@
-"""Figure of model orders: singular values, error on held-out lines, multiplications per tick."""
+"""Figure for the choice of a model order: singular values, error on held-out lines, multiplications per tick.
+
+The values are those of `OrderReport`: each order is fitted to every second spectral line and tested on the others. A
+tick is one step of the device loop.
+"""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +15,7 @@ from equalizer.identification.state_space.order_report import VISIBLE, OrderRepo
 
 
 def model_order_picture(report: OrderReport, chosen: int) -> Picture:
-    """Figure of the compared model orders. chosen: the order of the model that was made."""
+    """Picture of the compared model orders. chosen: order of the identified model."""
     return Picture(
         name="model-order",
         title="What the order of the model buys and costs",
@@ -25,7 +29,8 @@ def model_order_picture(report: OrderReport, chosen: int) -> Picture:
 
 
 def draw_model_order(report: OrderReport, chosen: int) -> Figure:
-    """Figure of singular values (left) and errors by order (right). chosen: order of the model."""
+    """Figure of the singular values (left), and of errors and multiplications by order (right). chosen: order of the
+    identified model."""
     figure = new_figure(8.6, 3.2)
     left, right = figure.subplots(1, 2)
     _draw_singular_values(left, report)
@@ -34,6 +39,7 @@ def draw_model_order(report: OrderReport, chosen: int) -> Figure:
 
 
 def _draw_singular_values(axes: Axes, report: OrderReport) -> None:
+    """Singular values in units of the noise; those above `VISIBLE` are filled."""
     plain_axes(axes)
     values = report.singular_values
     number = np.arange(1, len(values) + 1)
@@ -48,6 +54,8 @@ def _draw_singular_values(axes: Axes, report: OrderReport) -> None:
 
 
 def _draw_errors(axes: Axes, report: OrderReport, chosen: int) -> None:
+    """Held-out errors in per cent with the noise as their lower limit, and multiplications per tick on a second
+    axis."""
     plain_axes(axes)
     orders = [row.order for row in report.rows]
     axes.semilogy(orders, [100 * row.held_out_error for row in report.rows], "o-", color=VERMILLION, markersize=5)

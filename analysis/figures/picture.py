@@ -1,4 +1,8 @@
-"""A figure together with what a page or a folder of files needs to show it."""
+"""A Matplotlib figure with its name, title, caption and alternative text, and its rendering as inline SVG.
+
+Reports embed the SVG in their HTML page, and the same SVG is written as a file. The text of the SVG is the same in
+every run: it holds no date, and its ids are derived from the picture's name.
+"""
 
 import io
 import re
@@ -13,12 +17,13 @@ from analysis.wording import write_without_time
 
 
 def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> str:
-    """The <svg> element alone, with a title and a description for screen readers. The same figure gives the same text.
+    """The figure as an <svg> element, with a title and a description for screen readers. The same figure gives the same
+    text.
 
-    name: letters, digits, hyphens; put before every id, so that two figures in a page do not share any.
+    name: letters, digits, hyphens; the prefix of every id, so that two figures on one page have no id in common.
     """
     buffer = io.StringIO()
-    # Text stays text: it can be read aloud, searched and copied.
+    # Text is not converted to outlines, so that it can be read aloud, searched and copied.
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
         _lay_out(figure)
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
@@ -36,8 +41,8 @@ def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> 
 
 
 def _lay_out(figure: Figure) -> None:
-    """Place the axes once, for text as wide as in SVG. `savefig` would draw a figure with any layout engine twice, even
-    with an empty one."""
+    """Execute the layout engine once, with the text widths of the SVG renderer, and remove it: `savefig` draws a figure
+    that has a layout engine twice."""
     engine = figure.get_layout_engine()
     if engine is not None and figure.axes:
         resolution = figure.dpi
@@ -48,6 +53,7 @@ def _lay_out(figure: Figure) -> None:
 
 
 def _escape_markup(text: str) -> str:
+    """The text with the characters escaped that have a meaning in XML element content."""
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
@@ -56,18 +62,18 @@ class Picture:
     """A figure with its name, title, caption and alternative text."""
 
     name: str
-    """Letters, digits, hyphens: the name of its file, and of its place in the page."""
+    """Letters, digits, hyphens: the name of the picture's file, and the prefix of the ids of its SVG."""
     title: str
     caption: str
     figure: Figure
     folded: bool = False
-    """Shown in a report only when asked for."""
+    """Whether a report shows only the title until the reader opens the picture."""
     bitmap: bool = True
-    """Also written as PNG. Diagnoses do without for the many that are folded."""
+    """Whether the picture is also written as PNG. Diagnoses omit the PNG of their many folded pictures."""
     alternative: str = ""
-    """Description for screen readers; the title alone where empty."""
+    """Description for screen readers; empty: they read the title alone."""
     drawn: list[str] = field(default_factory=list)
-    """Cached result of `inline_svg`, because the page and the file beside it use the same."""
+    """Cached result of `inline_svg`, empty before the first call of `picture_svg`: page and file use the same SVG."""
 
 
 def picture_svg(picture: Picture) -> str:
@@ -78,13 +84,13 @@ def picture_svg(picture: Picture) -> str:
 
 
 def without_figure(picture: Picture) -> Picture:
-    """A drawn one that can be sent from another process: its figure is empty."""
+    """A copy of the picture with an empty figure and the SVG already drawn, which can be sent to another process."""
     return replace(picture, figure=Figure())
 
 
 def count_in_samples(picture: Picture) -> Picture:
-    """State all texts in samples instead of seconds and hertz, for a recording without known time. Call it before
-    drawing."""
+    """Replace seconds and hertz by units of samples in all texts, for a recording without known time. Texts of the
+    figure are changed in place. Call this function before the picture is drawn."""
     for text in picture.figure.findobj(Text):
         if isinstance(text, Text):
             text.set_text(write_without_time(text.get_text()))

@@ -1,4 +1,9 @@
-"""Figure of delivered over wanted acceleration, with and without equalizer, centre and edge (published figure 5)."""
+"""Magnitude of the response from wanted to delivered acceleration, with and without equalizer (published figure 5).
+
+Each row of panels is one condition (centre or edge of the workspace, equalizer, friction), each column the axis of the
+wanted acceleration. A perfect equalizer gives 0 dB along that axis and nothing across it. `played_response` measures
+the responses.
+"""
 
 from collections.abc import Sequence
 from textwrap import fill
@@ -16,7 +21,7 @@ from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, draw_no_data_n
 _AXES = "xyz"
 _COLOURS = (BLUE, VERMILLION, GREEN)
 _LOWEST_DB, _HIGHEST_DB = -55.0, 12.0
-"""Range of the vertical axis."""
+"""Range of the vertical axis, dB."""
 _TICKS_HZ = (5, 10, 20, 35)
 """Ticks of the frequency axis, as in the published figure."""
 
@@ -48,7 +53,7 @@ def friction_picture(rows: Sequence[PlayedResponse]) -> Picture:
 
 
 def draw_played_responses(rows: Sequence[PlayedResponse]) -> Figure:
-    """One row of panels for each, three columns."""
+    """Figure with a row of panels per response and three columns, one per axis of the wanted acceleration."""
     if not rows:
         return draw_no_data_note(new_figure(8.6, 2.0), "Nothing was played.")
     figure = new_figure(8.6, 0.8 + 1.75 * len(rows))
@@ -68,9 +73,11 @@ def draw_played_responses(rows: Sequence[PlayedResponse]) -> Figure:
 
 
 def _draw_panel(axes: Axes, row: PlayedResponse, wanted: int) -> None:
+    """Draw |T| in dB over frequency for the three delivered axes. wanted: index of the wanted axis, drawn thicker."""
     plain_axes(axes)
     axes.axhline(0, color=GREY, linewidth=0.8)
     for came, colour in enumerate(_COLOURS):
+        # -180 dB at the least, far below the axis: the logarithm of 0 is never taken.
         level_db = 20 * np.log10(np.maximum(np.abs(row.response[:, came, wanted]), 1e-9))
         along = came == wanted
         axes.plot(row.frequency_hz, level_db, color=colour, linewidth=1.8 if along else 0.8, zorder=3 if along else 2)

@@ -1,4 +1,9 @@
-"""Power of each analysis over the number of participants, and what the primary analysis's interval covers."""
+"""Figure of statistical power over the number of participants, by analysis, and of the coverage of the intervals.
+
+The upper panel shows the share of simulated studies in which each analysis finds the difference: the power, or without
+a true difference the type-1 error. The lower panel shows the coverage of the primary analysis's 95 % interval. Both
+come from `analysis.psychophysics.power.power_curve`.
+"""
 
 from collections.abc import Sequence
 
@@ -14,18 +19,19 @@ from analysis.threshold_words import REVERSALS
 from equalizer.signals.signal import FloatArray
 
 _DESIRED_POWER = 80.0
-"""Percent: what is usually asked for (J. Cohen, Statistical Power Analysis for the Behavioral Sciences, 1988)."""
+"""Conventional power, percent (J. Cohen, Statistical Power Analysis for the Behavioral Sciences, 1988)."""
 _MARKER_STEP = 0.12
-"""Between the curves' markers, in participants, so that their bars do not hide each other."""
+"""Horizontal offset between the curves, in participants, so that their error bars do not hide each other."""
 _ROOM = 1.5
-"""At either end, in participants."""
+"""Margin at either end of the horizontal axis, in participants."""
 
 
 def power_picture(
     points: Sequence[PowerPoint], effect_db: float, pair_hz: tuple[float, float], means: str = REVERSALS.means
 ) -> Picture:
-    """points: one sample size each, at least one. effect_db: true difference, 0 for none, of the first frequency of
-    pair_hz from the second. means: what thresholds of runs are, in the plural."""
+    """Picture of power and coverage with its caption. points: at least one, each of one sample size. effect_db: true
+    threshold at the first frequency of pair_hz minus that at the second; 0: the power is the type-1 error. means: noun
+    for the thresholds of runs, in the plural."""
     found = "finds the difference" if effect_db else "finds a difference that is not there (type-1 error)"
     aim = "the power that is usually asked for" if effect_db else "the level of the test"
     return Picture(
@@ -45,10 +51,12 @@ def power_picture(
 
 
 def _line_percent(effect_db: float) -> float:
+    """Reference line, percent: the conventional power, or without an effect the level of the test."""
     return _DESIRED_POWER if effect_db else 100 * (1 - CONFIDENCE)
 
 
 def _draw(points: Sequence[PowerPoint], effect_db: float, means: str) -> Figure:
+    """Two panels: power (above) and coverage (below) over the number of participants."""
     figure = new_figure(PAGE_IN, 5.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     curves = (
@@ -68,7 +76,7 @@ def _draw(points: Sequence[PowerPoint], effect_db: float, means: str) -> Figure:
     below.set_ylabel("Covered (%)", fontsize=9)
     below.set_xlabel("Participants", fontsize=9)
     below.set_xticks(people)
-    # With a single size, or close ones, the markers of one size stay beside each other.
+    # A fixed margin, so that the markers of one sample size stay close together where there are few sizes.
     below.set_xlim(people.min() - _ROOM, people.max() + _ROOM)
     for axes in (above, below):
         plain_axes(axes)
@@ -77,6 +85,7 @@ def _draw(points: Sequence[PowerPoint], effect_db: float, means: str) -> Figure:
 
 
 def _draw_shares(axes: Axes, people: FloatArray, shares: Sequence[Share], colour: str, style: str) -> ErrorbarContainer:
+    """Draw shares in percent, with their intervals as error bars."""
     percent = 100 * np.array([(share.value, share.lower, share.upper) for share in shares])
     bars = np.abs(percent[:, 1:] - percent[:, :1]).T
     return axes.errorbar(

@@ -1,4 +1,8 @@
-"""Figures of psychometric functions: shares of right answers with Wilson's intervals, and the curves of the model."""
+"""Figures of psychometric functions: observed shares of right answers over level, and the fitted curves.
+
+Shares come in bins of levels with Wilson's 95 % interval (`hierarchy.observed_shares`); the curves are those of the
+hierarchical model (`hierarchy.curve`). One panel per frequency; one figure for all people together, one per person.
+"""
 
 import math
 from collections.abc import Sequence
@@ -34,13 +38,13 @@ from protocols.procedure.staircase import to_db
 _LINE_IN = 2.2
 """Height of a row of panels, inches."""
 _SMALLEST, _LARGEST = 2.5, 7.5
-"""Marker sizes in points: of a single trial, and of `_MANY` or more."""
+"""Marker sizes in points: the lower limit, for very few trials, and that of `_MANY` trials or more."""
 _MANY = 100
 """Number of trials from which a marker has its largest size."""
 
 
 def draw_people_curves(answers: Answers, fit: FittedCurves) -> Figure:
-    """All people together, one panel per frequency, over the level re each person's threshold."""
+    """Figure of all people together, one panel per frequency, over the level in dB re each person's threshold."""
     k = len(fit.frequencies_hz)
     figure, places = panel_grid(k, _LINE_IN, sharex=True)
     shown = [shares_of_people(answers, fit, place) for place in range(k)]
@@ -59,7 +63,8 @@ def draw_people_curves(answers: Answers, fit: FittedCurves) -> Figure:
 
 
 def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: float) -> Figure:
-    """One person, one panel per frequency that was played, over the level in newtons. person: number in the answers."""
+    """Figure of one person, one panel per frequency with answers, over the level in newtons. person: index of the
+    person; cap_n: cap of the level, drawn as a dashed line."""
     estimate, k = fit.persons[person], len(fit.frequencies_hz)
     played = [(place, shares) for place in range(k) if (shares := shares_of_person(answers, person, place))]
     if not played:
@@ -87,6 +92,7 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
 
 
 def _draw_shares(axes: Axes, x: Sequence[float], shares: Sequence[ObservedShare]) -> None:
+    """Draw shares in percent at the places `x`, with their intervals and a dotted line at the threshold's share."""
     plain_axes(axes)
     axes.axhline(100 * TARGET, color=GREY, linestyle=":", linewidth=1.0)
     for at, share in zip(x, shares, strict=True):
@@ -98,10 +104,12 @@ def _draw_shares(axes: Axes, x: Sequence[float], shares: Sequence[ObservedShare]
 
 
 def _marker_size(trials: int) -> float:
+    """Marker size in points: it rises with the square root of the trials up to `_MANY`."""
     return _SMALLEST + (_LARGEST - _SMALLEST) * math.sqrt(min(1.0, trials / _MANY))
 
 
 def _legend(curve: str) -> list[Line2D]:
+    """Handles of the legend. curve: label of the fitted curve."""
     return [
         *(
             Line2D([], [], marker="o", color=BLUE, linewidth=0.8, markersize=_marker_size(trials), label=label)

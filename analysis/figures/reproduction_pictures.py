@@ -1,4 +1,8 @@
-"""The figures of a reproduction, by the number of the published one."""
+"""The five figures of the reproduction report, by the number of the published figure that each reproduces.
+
+1: frequency bands and onset of coupling. 2: direction thresholds by frequency. 3: acceleration ellipses. 4: transfer
+functions. 5: response from wanted to delivered acceleration, with a second picture for the effect of friction.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -22,7 +26,8 @@ def reproduction_pictures(
     direction_limit_hz: float,
     rows: EqualizedRows,
 ) -> Mapping[int, tuple[Picture, ...]]:
-    """Draw the figures for which there are data."""
+    """Pictures by number of the published figure; figure 2 has none where no run has a threshold. direction_limit_hz:
+    frequency from which directions are no longer perceived, drawn in figure 1."""
     return {
         1: (frequency_bands_picture(device.response, device.onset, bands, direction_limit_hz),),
         2: tuple(picture for picture in study_pictures(study) if picture.name == "thresholds"),

@@ -1,4 +1,8 @@
-"""All figures of one study, in the order of the report."""
+"""All figures of one study with titles and captions, in the order of its report.
+
+Thresholds by frequency and in other units, psychometric functions of the model, delivered acceleration, staircases, and
+acceleration ellipses. A figure without data is left out; figures of single participants are folded.
+"""
 
 import re
 from collections.abc import Sequence
@@ -22,7 +26,7 @@ from analysis.threshold_words import threshold_words
 
 
 def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult] = ()) -> tuple[Picture, ...]:
-    """Draw the figures for which there are data."""
+    """Pictures of the study, in the order of the report; without those that have no data."""
     pictures = []
     if any(row.complete for row in analysis.thresholds):
         pictures.append(_thresholds_picture(analysis))
@@ -51,6 +55,7 @@ def ellipsoid_picture(ellipsoids: Sequence[EllipsoidResult]) -> Picture:
 
 
 def _thresholds_picture(analysis: StudyAnalysis) -> Picture:
+    """Picture of the thresholds in newtons, with group means and comparison intervals."""
     return Picture(
         name="thresholds",
         title="Thresholds by frequency",
@@ -63,7 +68,7 @@ def _thresholds_picture(analysis: StudyAnalysis) -> Picture:
 
 
 def _units_pictures(analysis: StudyAnalysis) -> list[Picture]:
-    """Draw the figures in other units; empty where newtons are the only unit."""
+    """The picture of the thresholds in all units with data, as a list; empty where newtons are the only such unit."""
     tables = [
         table
         for table in _unit_tables(analysis)
@@ -89,6 +94,7 @@ def _units_pictures(analysis: StudyAnalysis) -> list[Picture]:
 
 
 def _unit_tables(analysis: StudyAnalysis) -> list[ThresholdTable]:
+    """Tables of thresholds in N, m/s², mm, and dB above the detection threshold, in this order."""
     frequencies_hz = analysis.table.frequencies_hz
     measured = [
         threshold_table(analysis.thresholds, frequencies_hz, quantity)
@@ -98,7 +104,8 @@ def _unit_tables(analysis: StudyAnalysis) -> list[ThresholdTable]:
 
 
 def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
-    """Psychometric functions of all people together and of each."""
+    """Medians of the model, then psychometric functions of all people together and of each person; empty without a
+    fit."""
     fit = analysis.primary or analysis.single
     answers = count_answers(analysis.trials, fit.frequencies_hz) if fit is not None else None
     if fit is None or answers is None:
@@ -138,6 +145,7 @@ def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
 
 
 def _medians_picture(primary: PrimaryAnalysis, cap_n: float) -> Picture:
+    """Picture of the median thresholds by the hierarchical model, with the direction limit."""
     return Picture(
         name="medians",
         title="Thresholds by the model of all answers",
@@ -151,10 +159,12 @@ def _medians_picture(primary: PrimaryAnalysis, cap_n: float) -> Picture:
 
 
 def _file_name(subject: str) -> str:
+    """The subject's code with letters, digits and hyphens only, as picture names need."""
     return re.sub(r"[^A-Za-z0-9]+", "-", subject).strip("-")
 
 
 def _draw_delivered(analysis: StudyAnalysis) -> Picture:
+    """Picture of the delivered acceleration over the commanded level, along and off the direction."""
     return Picture(
         name="delivered",
         title="Delivered acceleration against commanded level",
@@ -166,6 +176,7 @@ def _draw_delivered(analysis: StudyAnalysis) -> Picture:
 
 
 def _staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
+    """A folded picture per participant with the levels of all runs."""
     subjects = dict.fromkeys(run.subject for run in analysis.runs)
     return [
         Picture(

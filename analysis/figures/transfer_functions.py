@@ -1,4 +1,9 @@
-"""Measured transfer functions of all channels over frequency (the published figure 4)."""
+"""Figure of the measured transfer functions from every force to every acceleration (the published figure 4).
+
+Magnitude over frequency, both logarithmic, a panel per entry of the transfer matrix. Lines are averaged over bins of
+1/24 octave (`octave_bins`); the range of single lines and their expected noise are drawn as well, and on request the
+response of a fitted model.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,23 +24,25 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 _BIN_OCTAVES = 1 / 24
 """Width of a bin in which lines are averaged for drawing, octaves."""
 _DIM = "#B8B8B8"
+"""Colour of bins that are not reliable."""
 _BAND = "#EEF3E6"
+"""Colour of a marked frequency band."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResponseCurve:
-    """A response to lay over the measured one, as of a model."""
+    """A response to draw on top of the measured response, such as that of a fitted model."""
 
     name: str
     frequency_hz: FloatArray
     response: ComplexArray
-    """(lines, outputs, inputs)"""
+    """(lines, outputs, inputs), complex, in the unit of the measured response."""
 
 
 def transfer_functions_picture(
     response: FrequencyResponse, model: ResponseCurve | None = None, band_hz: tuple[float, float] | None = None
 ) -> Picture:
-    """Figure of all transfer functions. band_hz: marked in every panel, as the band of a fit."""
+    """Picture of all transfer functions with its caption. band_hz: band to mark in every panel, as that of a fit."""
     return Picture(
         name="transfer-functions",
         title="Transfer functions of all channels",
@@ -49,8 +56,8 @@ def transfer_functions_picture(
 def draw_transfer_functions(
     response: FrequencyResponse, model: ResponseCurve | None = None, band_hz: tuple[float, float] | None = None
 ) -> Figure:
-    """Figure of the magnitudes of all entries, a row per output and a column per input. model: dashed; band_hz:
-    shaded."""
+    """Figure of the magnitudes of all entries, a row per output and a column per input. model: drawn dashed; band_hz:
+    drawn shaded."""
     if not len(response):
         return draw_no_data_note(new_figure(8.6, 2.0), "There is no line to draw.")
     outputs, inputs = response.response.shape[1:]
@@ -77,6 +84,7 @@ def draw_transfer_functions(
 
 
 def _draw_entry(axes: Axes, bins: OctaveBins, row: int, column: int) -> None:
+    """Draw one entry: mean magnitude, range of single lines, and expected noise of a line (standard deviation)."""
     plain_axes(axes)
     mean = np.abs(bins.response[:, row, column])
     low, high = bins.lowest[:, row, column], bins.highest[:, row, column]
@@ -89,14 +97,15 @@ def _draw_entry(axes: Axes, bins: OctaveBins, row: int, column: int) -> None:
 
 
 def _extend_mask(where: BoolArray) -> BoolArray:
-    """The mask with each next bin included, so that a curve that changes its colour has no gap."""
+    """The mask, with the bin after each true bin included, so that a curve that changes its colour has no gap."""
     wide = where.copy()
     wide[1:] |= where[:-1]
     return wide
 
 
 def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
-    """The axes are shared: one is set for all."""
+    """Set scales, limits and number formats of all panels: they share their axes. The lower limit of the magnitude is
+    half its 1 % quantile, so that a single low bin does not set it."""
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(max(1.0, float(bins.frequency_hz[0])), float(bins.frequency_hz[-1]))
@@ -112,6 +121,7 @@ def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
 def _legend(
     bins: OctaveBins, model: ResponseCurve | None, band_hz: tuple[float, float] | None
 ) -> Sequence[Line2D | Patch]:
+    """Handles of the legend, for what the figure shows."""
     handles: list[Line2D | Patch] = [
         Line2D([], [], color=BLUE, linewidth=1.4, label="measured"),
         Patch(color=SKY, alpha=0.45, label="single lines"),
@@ -129,4 +139,5 @@ def _legend(
 
 
 def _unit_text(unit: str) -> str:
+    """The unit in ASCII, such as m/s^2, with a superscript 2."""
     return unit.replace("^2", "²")

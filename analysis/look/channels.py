@@ -1,4 +1,8 @@
-"""The channels of a recording, and its stretches, within which time is continuous."""
+"""The channels of a recording as a flat list, for checks that treat each channel alike; text and rms of their values.
+
+A recording groups its channels by signal (command, response, position and so on); here each channel is one item with
+its role, name, quantity and unit. A stretch is a range of samples within which time is continuous.
+"""
 
 from dataclasses import dataclass
 
@@ -10,7 +14,7 @@ from equalizer.signals.recording_checks import signals_of
 from equalizer.signals.signal import FloatArray
 
 Stretch = tuple[int, int]
-"""First sample, and the one after the last."""
+"""Index of the first sample, and of the sample after the last."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,7 +27,7 @@ class Channel:
     quantity: str
     unit: str
     samples: FloatArray
-    """(n,)"""
+    """(n,), in the channel's unit; NaN where a sample is missing."""
 
     @property
     def label(self) -> str:
@@ -52,7 +56,7 @@ def channels_of(recording: Recording) -> tuple[Channel, ...]:
 
 
 def format_value(value: float, unit: str, digits: int = 3) -> str:
-    """A value with its unit, to `digits` significant digits; the unit "1" is not written."""
+    """A value as text, with its unit and `digits` significant digits; the unit "1" is not written."""
     return f"{typeset(f'{value:.{digits}g}')}{'' if unit == '1' else f' {unit}'}"
 
 

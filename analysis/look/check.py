@@ -1,10 +1,13 @@
-"""Result of a single check of a recording."""
+"""Result of a single check of a recording: its level, what was found, and advice, in sentences for the user.
+
+All checks of this package return it, so that `overview` can list and sort them alike.
+"""
 
 from dataclasses import dataclass
 from typing import Literal
 
 Level = Literal["fine", "notice", "wrong"]
-"""`wrong` would mislead an analysis; `notice` should be known; `fine` was checked and is in order."""
+"""`wrong`: a defect that would mislead an analysis; `notice`: a fact that the user should know; `fine`: in order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,7 +15,7 @@ class Check:
     """Result of a check, with its level and advice."""
 
     name: str
-    """Name of the check: "clipping"."""
+    """Name of the check, such as "clipping"."""
     level: Level
     seen: str
     """One sentence, with numbers and units."""
@@ -21,5 +24,5 @@ class Check:
 
 
 def fine_if_none(name: str, found: tuple[Check, ...], text: str) -> tuple[Check, ...]:
-    """The findings, or one check that says that there are none."""
+    """The findings, or where there are none a single "fine" check of this name with this text."""
     return found or (Check(name, "fine", text),)

@@ -1,8 +1,9 @@
 """Detection of clipping: flat extremes at the limit of a sensor, a converter or an amplifier.
 
-A signal that reverses by itself is slow there, so it stays near its extreme no longer than its slope before and after
-allows. A clipped one arrives fast, stays at the last value, and leaves fast: by its slopes and the time at the extreme,
-it would have risen further by slope x time / 4 (a parabola through both).
+A signal that reverses by itself slows down before its extreme, so its time near the extreme is short for its slope. A
+clipped signal reaches the limit fast, keeps that value, and leaves it fast. A parabola that crosses the limit with the
+slopes s and -s, a time T apart, peaks s T / 4 above it: a run of equal readings counts as clipped where this
+extrapolated rise exceeds a few rounding steps. Several different runs, or a long one, are needed.
 """
 
 from collections.abc import Sequence
@@ -16,26 +17,27 @@ from equalizer.signals.signal import FloatArray, runs_of
 
 CLIPPING = "clipping"
 LEAST_SAMPLES = 5
-"""Samples at an extreme below which they are chance."""
+"""Fewest samples at an extreme; fewer may lie there by chance. Also the length from which a single run suffices."""
 LEAST_RUNS = 2
-"""Fewest runs of equal readings at the top that count as clipping."""
+"""Fewest different runs of equal readings at the top that count as clipping, unless a run has `LEAST_SAMPLES`."""
 _STEPS = 3.0
 """Least extrapolated rise beyond the extreme, in steps of rounding."""
 SETTLES = 0.4
-"""Share of its earlier speed that a signal must keep until it is flat: with less it comes to rest by itself."""
+"""Share of its earlier slope that a signal must keep until a flat run begins: with less it comes to rest by itself."""
 _FEW_VALUES = 24
 """Channels with no more distinct values are not checked: a binary command, a series of steps, a coarse encoder."""
 _CROWDED = 4.0
-"""Samples at the extreme over those in the next equally wide bin below it."""
+"""Least ratio of the samples at the extreme to those in the next bin below it, one rounding step wide or wider."""
 
 
 def check_clipping(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """A check of each clipped channel, excitations left out; a single "fine" check where none is clipped."""
+    """A check of each clipped channel, without excitations; a single "fine" check where no channel is clipped."""
     found = tuple(check for channel in channels if channel.role != "excitation" for check in _channel_checks(channel))
     return fine_if_none(CLIPPING, found, "No channel is flat at its extremes.")
 
 
 def _channel_checks(channel: Channel) -> tuple[Check, ...]:
+    """The check of a channel that is clipped at either end; empty for others. A clipped command is only a notice."""
     if len(np.unique(channel.known)) <= _FEW_VALUES:
         return ()
     sides = [(sign, count_clipped_samples(sign * channel.samples)) for sign in (1.0, -1.0)]
@@ -53,7 +55,8 @@ def _channel_checks(channel: Channel) -> tuple[Check, ...]:
 
 
 def count_clipped_samples(samples: FloatArray) -> int:
-    """Clipped samples at the upper end; 0 where the signal reverses there by itself. samples: (n,), NaN = missing."""
+    """Number of clipped samples at the upper end; 0 where the signal reverses there by itself. samples: (n,), NaN =
+    missing, at least one known."""
     filled = np.where(np.isfinite(samples), samples, -np.inf)
     top = float(filled.max())
     known = samples[np.isfinite(samples)]
@@ -61,7 +64,7 @@ def count_clipped_samples(samples: FloatArray) -> int:
     width = max(step, 1e-3 * float(np.ptp(known)))
     tolerance = max(0.5 * step, 1e-9 * float(np.ptp(known)))
     at_top = filled >= top - tolerance
-    # With the bin width of the top value, so that a rounded signal is compared step by step.
+    # The next bin is at least one rounding step wide, so that a rounded signal is compared value by value.
     next_below = int(np.sum((filled < top - tolerance) & (filled >= top - tolerance - width)))
     if at_top.sum() < LEAST_SAMPLES or at_top.sum() < _CROWDED * next_below:
         return 0
@@ -69,21 +72,23 @@ def count_clipped_samples(samples: FloatArray) -> int:
     beyond = [_extrapolate_rise(filled, start, stop) for start, stop in runs]
     needed = max(_STEPS * step, 1e-6 * float(np.ptp(known)))
     counted = [stop - start for (start, stop), over in zip(runs, beyond, strict=True) if over > needed]
-    # A periodic signal comes back to its peak again and again, by the same way: that is one run.
+    # A periodic signal returns to its peak along the same samples: its equal runs count once.
     ways = {_run_signature(filled, run, needed) for run, over in zip(runs, beyond, strict=True) if over > needed}
     return int(at_top.sum()) if len(ways) >= LEAST_RUNS or max(counted, default=0) >= LEAST_SAMPLES else 0
 
 
 def _run_signature(samples: FloatArray, run: tuple[int, int], step: float) -> tuple[float, ...]:
-    """Length of a flat run, and the samples on either side in steps, sorted: equal for runs of a periodic signal."""
+    """Length of a flat run, and the sample on either side of it in multiples of `step`, sorted: equal for the runs of a
+    periodic signal."""
     start, stop = run
     beside = sorted((round(float(samples[start - 1]) / step), round(float(samples[stop]) / step)))
     return (stop - start, *beside)
 
 
 def _extrapolate_rise(samples: FloatArray, start: int, stop: int) -> float:
-    """Extrapolated rise of the signal above a flat run; 0 at the ends of a recording."""
-    back = max(1, (stop - start) // 8)  # a rounded signal stands still between its steps, so not by two samples alone
+    """Rise s T / 4 of the signal above a flat run, in its unit, with the lesser slope of both sides as s. 0 at the ends
+    of a recording, next to missing samples, and where the signal comes to rest before the run (`SETTLES`)."""
+    back = max(1, (stop - start) // 8)  # several samples, since a slow rounded signal repeats each value
     if start - 1 < 2 * back or stop + back >= len(samples):
         return 0.0
     before, earlier = samples[start - 1 - back], samples[start - 1 - 2 * back]

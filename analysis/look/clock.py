@@ -1,4 +1,9 @@
-"""Time stamps against the stated rate: jitter, gaps and drift."""
+"""Checks of the time stamps of a recording against its stated sample rate: gaps, jitter and drift.
+
+A straight line is fitted by least squares to the stamps over the sample numbers (gaps counted as lost samples). Its
+slope gives the true period, hence the drift in ppm; the deviations from it are the jitter. Without stamps only the
+plausibility of the rate, and the notes of a resampling at import, can be checked.
+"""
 
 from collections.abc import Sequence
 
@@ -10,17 +15,21 @@ from equalizer.signals.recording import Recording
 
 CLOCK = "clock"
 GAP = 1.5
-"""Difference of two stamps, in steps, from which it is a gap."""
+"""Difference of two successive stamps, in sample periods, above which samples were lost between them."""
 JITTER, WILD = 0.02, 0.2
-"""Rms deviation of stamps from their places, in steps: from the first it is reported, from the second phases fail."""
+"""Rms deviation of the stamps from the fitted line, in sample periods: above the first it is a notice; above the
+second it is "wrong", because phases are then not reliable."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1e5
-"""Sample rates of known devices and sensors: outside, stamps in s were probably called ms, or the reverse."""
+"""Range of sample rates of known devices and sensors. Outside it, stamps in s were probably labelled ms, or the
+reverse."""
 DRIFT_PPM, RATE_PPM = 100.0, 5000.0
-"""Deviation from the stated rate: of a cheap oscillator, and from which the rate is wrong."""
+"""Deviation from the stated rate in ppm: above the first, that of a cheap oscillator, it is a notice; above the second
+the stated rate is wrong."""
 
 
 def check_clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Check, ...]:
-    """Checks of the time stamps in each stretch; without stamps, of the stated rate and of resampling."""
+    """Checks of the time stamps in each stretch; without stamps, of the stated rate and of resampling. A notice alone
+    where no time is known."""
     if recording.meta.get("time") == "unknown":
         return (
             Check(
@@ -38,7 +47,7 @@ def check_clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Che
 
 
 def rate_objection(rate_hz: float) -> str:
-    """Objection to an implausible rate, as from stamps in another unit; empty where there is none."""
+    """Sentence on an implausible rate, as it comes from stamps in another unit; empty for a plausible rate."""
     if SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
         return ""
     other = "s, called ms" if rate_hz > FASTEST_HZ else "ms, called s"
@@ -46,18 +55,20 @@ def rate_objection(rate_hz: float) -> str:
 
 
 def _rate_checks(rate_hz: float) -> tuple[Check, ...]:
+    """A notice where the rate is implausible; else empty."""
     odd = rate_objection(rate_hz)
     return (Check(CLOCK, "notice", odd, "Check the unit of the time, and import again."),) if odd else ()
 
 
 def _clock_source(recording: Recording) -> str:
+    """Sentence on where the sample rate comes from: even stamps at the import, or the user."""
     if recording.meta.get("time") == "stamps":
         return f"The time stamps of the file were even at its import; they give {recording.sample_rate_hz:g} Hz."
     return f"There are no time stamps; {recording.sample_rate_hz:g} Hz is taken as stated."
 
 
 def _check_resampling(recording: Recording) -> tuple[Check, ...]:
-    """Checks from an import's notes about uneven stamps."""
+    """Notices from the notes of an import that resampled uneven stamps; empty without such notes."""
     origin = recording.meta.get("import")
     notes = origin.get("notes", ()) if isinstance(origin, dict) else ()
     uneven = [str(note) for note in notes if "uneven stamps" in str(note)] if isinstance(notes, list) else []
@@ -68,6 +79,7 @@ def _check_resampling(recording: Recording) -> tuple[Check, ...]:
 
 
 def _stamp_checks(recording: Recording, start: int, stop: int) -> tuple[Check, ...]:
+    """Checks of gaps, jitter and drift in one stretch; empty for fewer than three stamps."""
     assert recording.time_s is not None
     stamps, rate_hz = recording.time_s[start:stop], recording.sample_rate_hz
     if len(stamps) < 3:
@@ -90,6 +102,7 @@ def _stamp_checks(recording: Recording, start: int, stop: int) -> tuple[Check, .
 
 
 def _gap_check(steps: np.ndarray, gaps: np.ndarray, stamps: np.ndarray, rate_hz: float) -> Check | None:
+    """steps: (n - 1,), differences of successive stamps in sample periods; gaps: (n - 1,), those above `GAP`."""
     if not gaps.any():
         return None
     first, longest = int(np.argmax(gaps)), float(steps.max())
@@ -103,6 +116,7 @@ def _gap_check(steps: np.ndarray, gaps: np.ndarray, stamps: np.ndarray, rate_hz:
 
 
 def _jitter_check(jitter: float, most: float, step_s: float) -> Check | None:
+    """jitter, most: rms and largest deviation, in sample periods of step_s seconds."""
     text = (
         f"Time stamps lie {jitter * step_s * 1e6:.3g} us rms off their places ({jitter:.1%} of a step), "
         f"{most * step_s * 1e6:.3g} us at most."
@@ -117,6 +131,7 @@ def _jitter_check(jitter: float, most: float, step_s: float) -> Check | None:
 
 
 def _drift_check(drift_ppm: float, rate_hz: float) -> Check | None:
+    """drift_ppm: relative excess of the measured over the stated sample period, in ppm."""
     slower = "slower" if drift_ppm > 0 else "faster"
     text = f"By its stamps the clock is {abs(drift_ppm):.4g} ppm {slower} than {rate_hz:g} Hz."
     if abs(drift_ppm) > RATE_PPM:

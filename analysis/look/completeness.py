@@ -1,4 +1,8 @@
-"""Checks of completeness: missing samples, constant channels, copies of other channels."""
+"""Checks of completeness: missing samples, constant channels, copies of other channels.
+
+A constant sensor or two identical sensors usually mean an unplugged cable or a wrong channel map. A channel is a copy
+of another where it equals that channel, scaled and shifted (least squares), to the rounding of single precision.
+"""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -11,11 +15,11 @@ from equalizer.signals.signal import FloatArray, runs_of
 
 MISSING, CONSTANT, COPIES = "missing samples", "constant channels", "copied channels"
 _MANY = 0.2
-"""Share of missing samples from which a channel is useless to most analyses."""
+"""Share of missing samples above which a channel is useless to most analyses."""
 _SAME_STORED = 1e-6
-"""Share of a channel's rms that a copy may differ by: rounding in single precision."""
+"""Largest rms difference between a channel and its copy, relative to the rms: rounding in single precision."""
 _FIRST_FEW = 1000
-"""Samples in which a copy is searched for first, because most channels are none."""
+"""Number of samples that are compared first, to save time: most pairs of channels differ there already."""
 
 
 def check_missing_samples(channels: Sequence[Channel], rate_hz: float) -> tuple[Check, ...]:
@@ -25,6 +29,7 @@ def check_missing_samples(channels: Sequence[Channel], rate_hz: float) -> tuple[
 
 
 def _check_missing(channel: Channel, rate_hz: float) -> Check:
+    """The check of a channel with at least one missing sample: "wrong" above the share `_MANY`."""
     lost = ~np.isfinite(channel.samples)
     count, first = int(lost.sum()), int(np.argmax(lost))
     longest = max(stop - start for start, stop in runs_of(lost))
@@ -38,13 +43,15 @@ def _check_missing(channel: Channel, rate_hz: float) -> Check:
 
 
 def check_constant_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Check commands and sensors for constant channels; a condition or an excitation may be constant."""
+    """A check of each constant command or sensor; a single "fine" check where all change. Conditions and excitations
+    are left out: they may be constant."""
     measured = [channel for channel in channels if channel.role not in ("condition", "excitation")]
     found = tuple(_constant_check(channel) for channel in measured if channel.known.size and np.ptp(channel.known) == 0)
     return fine_if_none(CONSTANT, found, "Every command and every sensor changes.")
 
 
 def _constant_check(channel: Channel) -> Check:
+    """The check of a constant channel: a notice for a command, "wrong" for a sensor."""
     text = f"{channel.label} is {channel.format(float(channel.known[0]))} throughout."
     if channel.role == "command":
         return Check(CONSTANT, "notice", text, "Nothing can be said of what it drives; leave it out, or drive it.")
@@ -52,13 +59,14 @@ def _constant_check(channel: Channel) -> Check:
 
 
 def check_copied_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Check for copies, also scaled or shifted ones. An excitation that equals its command is not a copy: nothing was
-    fed back."""
+    """A check of each channel that is a copy of another, also scaled or shifted; a single "fine" check without copies.
+    An excitation may equal its command: without feedback they are the same signal."""
     found = tuple(_copy_checks(channels))
     return fine_if_none(COPIES, found, "No channel is a copy of another.")
 
 
 def _copy_checks(channels: Sequence[Channel]) -> Iterator[Check]:
+    """Compare each pair of channels that change; "wrong" where both are commands or responses, else a notice."""
     moving = [channel for channel in channels if channel.known.size and np.ptp(channel.known) > 0]
     for each, other in combinations(moving, 2):
         if {each.role, other.role} == {"command", "excitation"}:
@@ -77,7 +85,7 @@ def _copy_checks(channels: Sequence[Channel]) -> Iterator[Check]:
 
 
 def _find_copy_factor(first: FloatArray, second: FloatArray) -> float | None:
-    """Factor of the second channel to the first; None where it is not a copy."""
+    """Factor from the first channel to the second; None where the second is no copy. Both: (n,)."""
     few = slice(None, None, max(1, len(first) // _FIRST_FEW))
     if len(first) > _FIRST_FEW and _copy_factor(first[few], second[few]) is None:
         return None
@@ -85,6 +93,7 @@ def _find_copy_factor(first: FloatArray, second: FloatArray) -> float | None:
 
 
 def _copy_factor(values: FloatArray, copy: FloatArray) -> float | None:
+    """Least-squares factor between both channels about their means; None where the residual exceeds rounding."""
     known = np.isfinite(values) & np.isfinite(copy)
     if known.sum() < 3:
         return None

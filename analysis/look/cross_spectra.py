@@ -1,4 +1,10 @@
-"""Power and cross spectra of all channels, averaged over windows (Welch 1967), within stretches only."""
+"""One-sided power and cross spectral densities of all channels by Welch's method: averages over Hann windows.
+
+Windows overlap by half; a straight line is subtracted from each. No window spans two stretches of a recording or
+contains a missing sample, so gaps do not leak into the spectra.
+
+Reference: Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967), 70-73.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,11 +16,12 @@ from analysis.look.channels import Channel, Stretch
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _WINDOWS = 12
-"""Number of half-overlapping windows to aim for; with so many, half of a coherence of 0.1 is chance."""
+"""Number of half-overlapping windows to aim for. The estimated coherence of unrelated signals averages 1 / n for n
+independent windows, so coherences near 0.1 mean little here."""
 _SHORTEST, _LONGEST = 32, 8192
 """Shortest and longest window, samples."""
 MOST_WINDOWS = 400
-"""Largest number of windows that are averaged: more take time without benefit."""
+"""Largest number of windows that are averaged, spread over the recording: more take time without benefit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,10 +29,11 @@ class CrossSpectra:
     """Power and cross spectral densities of all channels, averaged over windows."""
 
     frequency_hz: FloatArray
-    """(lines,), without the mean's."""
+    """(lines,), ascending, without the line at 0 Hz."""
     matrix: ComplexArray
-    """(lines, channels, channels), densities in unit x unit / Hz; [:, i, j] is conj(i) j."""
+    """(lines, channels, channels), one-sided densities in unit x unit / Hz; [:, i, j] is the mean of conj(X_i) X_j."""
     windows: int
+    """Number of windows averaged."""
     columns: tuple[str, ...]
     """Labels of the channels."""
 
@@ -43,7 +51,8 @@ class CrossSpectra:
 def cross_spectra(
     channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float, samples_per_window: int = 0
 ) -> CrossSpectra | None:
-    """Cross-spectral densities, without windows with missing samples. None where no window is whole."""
+    """Cross-spectral densities of the channels; None where no window is whole. stretches: at least one. rate_hz: sample
+    rate. samples_per_window: 0: chosen by the length of the recording."""
     columns = np.column_stack([channel.samples for channel in channels])
     total = sum(stop - start for start, stop in stretches)
     usual = 2 ** int(np.log2(max(2 * total / _WINDOWS, _SHORTEST)))

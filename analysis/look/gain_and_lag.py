@@ -3,7 +3,8 @@
 Two channels that show the same quantity differ by a gain g, negative where a sign is reversed, and by a lag of L
 samples: Y(f) = g X(f) exp(-2j pi f L / f_s). Per spectral line, |g| is the square root of the ratio of the powers and L
 follows from the slope of the cross spectrum's phase over frequency. Only coherent lines count, each weighted with its
-share of the second channel's power. So a recording shows whether units, signs and clocks of its channels are right.
+share of the second channel's power. A wrong unit shows as a wrong gain, a reversed sign as a negative gain, and a
+clock error or a filter as a lag.
 
 Reference: Bendat and Piersol, Random Data (4th ed., 2010), chapters 5 and 6 (cross spectra, coherence, time delays).
 """
@@ -18,13 +19,13 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 COHERENT = 0.9
 """Least magnitude-squared coherence of a line whose phase and magnitude count."""
 LONGEST_LAG = 20.0
-"""Longest lag that is looked for, in samples, earlier or later."""
+"""Longest lag that is searched for, in samples, of either sign."""
 _HIGHEST_LINE = 0.25
 """Highest line that is compared, as a share of the sample rate: above, finite differences and the filters of sensors
 change phase and gain."""
 _LAG_PENALTY = 0.01
-"""What the longest lag loses of a score between 0 and 1, so that of two lags that fit equally well the shorter is
-chosen."""
+"""Penalty on the score (0 to 1) at the longest lag, in proportion to the lag: of two lags that fit equally well the
+shorter is chosen."""
 _LAG_STEP = 0.1
 """Step of the search over lags, in samples; a least-squares slope then refines the best."""
 
@@ -48,8 +49,9 @@ def estimate_gain_and_lag(
 ) -> GainAndLag | None:
     """Gain and lag of channel `second` relative to channel `first`, which are indices; None where no line is coherent.
 
-    difference_gain: (lines,), known gain that a finite difference gave the first channel, which is taken out again.
+    difference_gain: (lines,), gain that a finite difference gave the first channel; the result is corrected for it.
     """
+    # With windows of an even length the last line is at half the sample rate.
     power_first, power_second = spectra.power(first), spectra.power(second)
     nyquist_hz = float(spectra.frequency_hz[-1])
     usable = spectra.frequency_hz <= 2 * _HIGHEST_LINE * nyquist_hz

@@ -1,10 +1,10 @@
-"""Tell whether a motion was imposed and a force measured, or a force given and a motion measured: what was commanded
-follows a law of its own.
+"""Decide which of two signals was imposed: the motion, with a measured force, or the force, with a measured motion.
 
-Testing machines, shakers and drives move by ramps and sines. Of both the speed squared is a quadratic in the position:
-v^2 = p + q x + r x^2, with r = q = 0 for ramps of either direction and r = -w^2 for a sine. It is fitted in stretches
-of a few half cycles, so that amplitudes and rates may change. A random command, and the answer of a device that has
-mass, friction or a nonlinear force, does not follow it. Pure computation on samples.
+Testing machines, shakers and drives impose ramps and sines. For both, the speed squared is a quadratic in the position:
+v^2 = p + q x + r x^2, with q = r = 0 for ramps of constant speed and r = -w^2 for a sine of angular frequency w. The
+quadratic is fitted by trimmed least squares in stretches of a few half cycles, so that amplitude and rate may change
+between stretches. A random command, and the response of a device with mass, friction or a nonlinear force, do not obey
+it.
 """
 
 import numpy as np
@@ -12,23 +12,24 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 _BLOCKS = 32
-"""Means per half cycle: noise is averaged, corners stay sharp."""
+"""Block means per half cycle: enough averaging against noise, and short enough to keep corners sharp."""
 _HALF_CYCLES = 4
 """Length, in half cycles, of the stretches in which the motion is compared with ramps or sinusoids."""
 _REVERSAL = 0.1
-"""A turn counts as the end of a half cycle from this fraction of the range on."""
+"""Least reversal that ends a half cycle, as a fraction of the signal's range."""
 _KEPT = 0.7
-"""Fraction of the samples between the corners of ramps and trapezoids."""
+"""Fraction of the samples that a fit keeps: the rest lie at the corners of ramps and trapezoids. Also the fraction of
+unchanged samples above which a signal is a series of steps."""
 _RESTS = 0.1
-"""Share of the usual speed squared below which it rests, as between the ramps of a trapezoid."""
+"""Speed squared below which the signal rests, as between the ramps of a trapezoid, relative to its 90 % quantile."""
 FOLLOWS = 0.1
-"""Misfit below which a signal follows a law; a random one leaves about a quarter."""
+"""Misfit below which a signal obeys the law of ramps or sines; that of a random signal is about 0.25."""
 CLEARLY = 3.0
-"""Ratio of misfits from which one of two signals is the command."""
+"""Least ratio of the force's misfit to the motion's at which the motion is the command."""
 
 
 def is_imposed(motion: FloatArray, force: FloatArray) -> bool:
-    """Whether the motion (n,), not the force (n,), follows a law of ramps or sines."""
+    """Whether the motion (n,) obeys the law of ramps, or of ramps and sines, and the force (n,) clearly less so."""
     for ramps in (True, False):
         of_motion, of_force = law_misfit(motion, ramps=ramps), law_misfit(force, ramps=ramps)
         if of_motion < FOLLOWS and of_force > max(FOLLOWS / 2, CLEARLY * of_motion):
@@ -37,8 +38,8 @@ def is_imposed(motion: FloatArray, force: FloatArray) -> bool:
 
 
 def law_misfit(values: FloatArray, *, ramps: bool = False) -> float:
-    """Median share of the speed squared that ramps and sines leave, or ramps alone; 0 for steps, 1 where nothing can be
-    told."""
+    """Mean absolute residual of the fit relative to the mean speed squared, median over the stretches of a signal (n,).
+    ramps: fit a constant in place of the quadratic. 0 for a series of steps; 1 where the samples do not suffice."""
     known = np.isfinite(values)
     if known.sum() < 2 * _BLOCKS or not np.ptp(values[known]) > 0:
         return 1.0
@@ -55,7 +56,7 @@ def law_misfit(values: FloatArray, *, ramps: bool = False) -> float:
 
 
 def _half_cycles(values: FloatArray) -> int:
-    """Number of turns by more than a fraction of the range, and one."""
+    """Number of half cycles: reversals by more than `_REVERSAL`, plus one. values: (n,), scaled to a range of 1."""
     count, rising, extreme = 1, bool(values[len(values) // 2] > values[0]), float(values[0])
     for value in values.tolist():
         if (value > extreme) == rising:
@@ -66,7 +67,8 @@ def _half_cycles(values: FloatArray) -> int:
 
 
 def _misfit(values: FloatArray, count: int) -> float:
-    """Error of a fit of one stretch (m,) by a number of terms; the samples that fit worst, at corners, are left out."""
+    """Misfit of one stretch of block means (m,), with the first `count` terms of the quadratic; 1 where the blocks do
+    not suffice. Three least-squares fits, each without the samples that fitted worst before."""
     if len(values) < _BLOCKS // 2:
         return 1.0
     squared = ((values[4:] - values[:-4]) / 4) ** 2

@@ -27,12 +27,12 @@ class ResponseBias:
     d_prime: float
     """d' over all levels of the run: it describes the run and is not a threshold."""
     criterion: float
-    """c. 0: no tendency. Positive: to answer 2; negative: to answer 1."""
+    """c, in units of d'. 0: no tendency; positive: a tendency to answer 2; negative: to answer 1."""
 
 
 def response_bias(directions_shown: Sequence[int], correct: Sequence[bool]) -> ResponseBias | None:
-    """Sensitivity d' and criterion of identification answers. directions_shown: 1 or 2 per trial. None when one of the
-    directions was never shown."""
+    """Sensitivity d' = z(H) - z(F) and criterion c of identification answers. directions_shown: 1 or 2 per trial, as
+    many as `correct`. None where one of the directions was never shown."""
     hits = [right for shown, right in zip(directions_shown, correct, strict=True) if shown == 1]
     false_alarms = [not right for shown, right in zip(directions_shown, correct, strict=True) if shown == 2]
     if not hits or not false_alarms:
@@ -42,13 +42,15 @@ def response_bias(directions_shown: Sequence[int], correct: Sequence[bool]) -> R
 
 
 def criterion_variance(right: int, first: float, second: float) -> float:
-    """Variance of c by chance, that of two z scores at the share of right answers over both directions. right: correct
-    answers; first, second: trials of each direction, above 0."""
+    """Binomial variance of c of an unbiased observer, for whom z(H) and -z(F) have the same mean, z at the share p of
+    right answers: p (1 - p) / phi(z)^2 (1 / first + 1 / second) / 4 by the delta method, with the log-linear correction
+    of p. right: correct answers; first, second: trials of each direction, above 0."""
     rate = (right + 0.5) / (first + second + 1.0)
     by_answer = rate * (1.0 - rate) / NormalDist().pdf(NormalDist().inv_cdf(rate)) ** 2
     return by_answer * (1.0 / first + 1.0 / second) / 4.0
 
 
 def _correct_z(answers: Sequence[bool]) -> float:
-    """z of the rate with half an answer added to either side, which keeps rates of 0 and 1 finite."""
+    """z of a rate with the log-linear correction: half an answer is added to either count, so that z is finite for
+    rates of 0 and 1."""
     return NormalDist().inv_cdf((sum(answers) + 0.5) / (len(answers) + 1.0))

@@ -1,4 +1,9 @@
-"""The result that the protocol declared before the data: its contrast by either analysis, its sample and exclusions."""
+"""The declared result: the contrast, sample and exclusions that the protocol fixed before the data were collected.
+
+The contrast is the threshold at one frequency minus that at another, by two analyses: the hierarchical model of all
+answers (dB, t interval over people) and the published one-way analysis (N, Tukey's interval). The protocol says which
+is primary; both are reported.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,12 +32,13 @@ class ContrastResult:
 
     analysis: Literal["hierarchical", "published"]
     declared: bool
-    """Whether this is the declared primary analysis."""
+    """Whether this analysis is the declared primary one."""
     unit: Literal["dB", "N"]
     participants: tuple[int, int]
-    """At the first and at the second frequency."""
+    """Number of participants at the first and at the second frequency."""
     difference: float | None
-    """In `unit`, as the interval. None, as these and p, where the data do not determine it: `notes` says why."""
+    """In `unit`, as the interval. Difference, interval and p are None where the data do not determine them; `notes` say
+    why."""
     lower: float | None
     upper: float | None
     p: float | None
@@ -41,7 +47,7 @@ class ContrastResult:
 
 @dataclass(frozen=True, slots=True)
 class DeclaredResult:
-    """The declared contrast by each analysis, and the declared beside the actual sample and exclusions."""
+    """The declared contrast by each analysis, and sample and exclusions, declared and actual."""
 
     primary: Literal["undeclared", "hierarchical", "published"]
     contrast_hz: tuple[float, ...]
@@ -50,15 +56,15 @@ class DeclaredResult:
     results: tuple[ContrastResult, ...]
     """The declared analysis first, then the other; none without a declared contrast."""
     participants_declared: int
-    """0: none declared."""
+    """Declared sample size; 0: none declared."""
     participants_analysed: int
-    """With a test run that entered."""
+    """Number of participants in the analysis: those with a test run."""
     exclusions: tuple[str, ...]
-    """As declared."""
+    """Declared rules of exclusion, in sentences."""
     left_out: tuple[str, ...]
-    """What did not enter, and why, in sentences."""
+    """Data that were left out, and why, in sentences."""
     interval: Literal["undeclared", "paired_t", "tukey"] = "undeclared"
-    """As declared by name; undeclared: the one that goes with `primary`."""
+    """Declared method of the interval; undeclared: the method that belongs to `primary`."""
 
 
 def declared_result(
@@ -69,8 +75,8 @@ def declared_result(
     left_out: Sequence[str],
     rule: StaircaseRule,
 ) -> DeclaredResult:
-    """primary: with the contrast of `declared`. table: thresholds in newtons, from which `comparisons` come. rule: of
-    their runs."""
+    """The declared contrast by both analyses, the declared one first. primary: with the contrast of `declared`; None
+    without a fit. table: thresholds in newtons, from which `comparisons` come. rule: staircase rule of the runs."""
     results = []
     if declared.contrast_hz:
         pair_hz = (declared.contrast_hz[0], declared.contrast_hz[1])
@@ -99,6 +105,7 @@ def declared_result(
 
 
 def _by_model(pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, declared: bool) -> ContrastResult:
+    """The contrast by the hierarchical model, in dB; without values, and with the reason, where there is none."""
     contrast = primary.declared_contrast if primary is not None else None
     if primary is None or contrast is None:
         people, reason = (0, NO_MODEL) if primary is None else (len(primary.persons), _no_contrast(pair_hz, primary))
@@ -117,6 +124,7 @@ def _by_model(pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, dec
 
 
 def _no_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
+    """Sentence on why the model gives no contrast."""
     if set(pair_hz) <= set(primary.far_above_hz):
         return FAR_ABOVE
     missing = [f"{frequency_hz:g} Hz" for frequency_hz in pair_hz if frequency_hz in primary.missing_hz]
@@ -124,7 +132,8 @@ def _no_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
 
 
 def _cap_notes(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[str, ...]:
-    """Notes on the interval of a contrast where a median lies above the cap."""
+    """Notes on the interval of a contrast where a median lies above the cap. Such a median is known only to be high, so
+    the difference, first minus second, has a valid lower end for the first and a valid upper end for the second."""
     above = [median.frequency_hz for median in primary.medians if median.above_cap and median.frequency_hz in pair_hz]
     if len(above) == 2:
         return ("Both medians are above the cap: the size of their difference is not known.",)
@@ -138,6 +147,7 @@ def _cap_notes(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[
 def _as_published(
     pair_hz: tuple[float, float], comparisons: Comparisons, table: ThresholdTable, declared: bool, meaning: str
 ) -> ContrastResult:
+    """The contrast by the one-way analysis, in newtons, with Tukey's interval. meaning: first note."""
     first, second = (frequency_name(frequency_hz) for frequency_hz in pair_hz)
     groups = table.groups()
     sizes = [sum(value is not None for value in groups.get(name, ())) for name in (first, second)]

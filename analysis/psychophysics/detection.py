@@ -1,6 +1,7 @@
-"""Detection thresholds: two-interval runs, one interval of which holds a stimulus.
+"""Detection thresholds from two-interval forced choice: one of two intervals of each trial holds a stimulus.
 
-Chance is 50 %, as for directions, so the same staircase converges at the same proportion of right answers.
+Chance is 50 %, as for the choice of a direction, so the same staircase converges at the same proportion of right
+answers. Sensitivity is d' = (z(H) - z(F)) / sqrt(2). Direction thresholds are then given in dB above detection.
 
 Source of the two-interval sensitivity: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed.
 (2005), chapter 7.
@@ -26,23 +27,25 @@ class BelowDetection:
     subject: str
     frequency_hz: float
     direction_n: float
+    """Direction threshold, N."""
     detection_n: float
+    """Detection threshold, N."""
 
 
 def detection_thresholds(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[Threshold, ...]:
-    """One row per detection run. `d_prime` is that of two intervals; the criterion as in `analysis.psychophysics.bias`.
+    """One row per detection run. `d_prime` is that of two intervals; criterion as in `analysis.psychophysics.bias`.
 
-    Raises InconsistentTrialsError where the rows contradict the rule.
+    Raises InconsistentTrialsError (a ValueError) where the trials contradict the rule.
     """
     rule = staircase_rule(protocol, Phase.DETECTION)
     rows = (threshold_of(run, rule) for run in recompute_runs(trials, rule, Phase.DETECTION))
-    # Two looks at the same thing: the difference of the intervals has twice the variance.
+    # The decision depends on the difference of two intervals, whose variance is twice that of one.
     return tuple(row if row.d_prime is None else replace(row, d_prime=row.d_prime / math.sqrt(2)) for row in rows)
 
 
 def above_detection(direction: ThresholdTable, detection: ThresholdTable) -> ThresholdTable:
-    """Thresholds of direction in dB above those of detection, of the same participants and frequencies. Both tables in
-    newtons. Cut where the cap cut either."""
+    """Direction thresholds in dB above the detection threshold of the same participant and frequency; None where either
+    is missing. Both tables in newtons. A value is marked as cut where the cap cut either threshold."""
     values, cut = [], []
     for subject, row, bounds in zip(direction.subjects, direction.values, direction.censored, strict=True):
         felt = [_felt(detection, subject, frequency_hz) for frequency_hz in direction.frequencies_hz]
@@ -57,7 +60,7 @@ def above_detection(direction: ThresholdTable, detection: ThresholdTable) -> Thr
 
 
 def _felt(detection: ThresholdTable, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
-    """Threshold of detection (N), and whether the cap cut it."""
+    """Detection threshold (N; None where missing), and whether the cap cut it."""
     if subject not in detection.subjects or frequency_hz not in detection.frequencies_hz:
         return None, False
     row, column = detection.subjects.index(subject), detection.frequencies_hz.index(frequency_hz)

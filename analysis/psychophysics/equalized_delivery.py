@@ -1,7 +1,8 @@
-"""Delivered over wanted accelerations in a study whose stimuli are equalized.
+"""Ratio of delivered to wanted acceleration by frequency and direction, in a study whose stimuli are equalized.
 
-By direction of the device, not by its number on the screen: numbers may be exchanged between people, and a device that
-delivers too much along one direction and too little along the other would then seem right on average.
+The ratio is computed per direction of the device (its angle), not per number on the screen. The numbers may be swapped
+between people; a device that delivers too much along one direction and too little along the other would then seem
+correct on average.
 """
 
 from collections.abc import Sequence
@@ -13,23 +14,24 @@ from analysis.wording import conjoin
 from protocols.trial import Trial
 
 NEAR = 0.1
-"""Relative deviation from the wanted acceleration, along or off the direction, from which a frequency is named."""
+"""Relative deviation from the wanted acceleration, along or off the direction, above which a warning names the
+frequency."""
 
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """Delivery at a single frequency, over all measured trials: medians by direction."""
+    """Delivery at a single frequency: medians over all counted trials with a measured acceleration."""
 
     frequency_hz: float
     trials: int
     along: tuple[float | None, float | None]
-    """Delivered over wanted, along the protocol's direction 1 and 2; None without a trial of it."""
+    """Delivered over wanted amplitude, along the protocol's directions 1 and 2; None for a direction without trials."""
     off_axis: float
-    """Off the direction over what was delivered along it."""
+    """Amplitude off the direction over that along it, both as delivered."""
 
     @property
     def is_as_wanted(self) -> bool:
-        """Whether what was delivered is within `NEAR` of what was wanted, along the direction and off it."""
+        """Whether the delivered acceleration is within `NEAR` of the wanted one, along the direction and off it."""
         return self.off_axis <= NEAR and all(abs(ratio - 1) <= NEAR for ratio in self.along if ratio is not None)
 
 
@@ -44,7 +46,7 @@ def deliveries(trials: Sequence[Trial]) -> tuple[Delivery, ...]:
 
 
 def delivery_warning(found: Sequence[Delivery]) -> str:
-    """A warning that names the frequencies with deviations; empty where there are none."""
+    """Sentence that names the frequencies with a deviation above `NEAR`; empty where there are none."""
     off = [delivery for delivery in found if not delivery.is_as_wanted]
     if not off:
         return ""
@@ -61,7 +63,7 @@ def delivery_warning(found: Sequence[Delivery]) -> str:
 
 
 def _summarise_delivery(frequency_hz: float, trials: list[Trial], first_deg: float | None) -> Delivery:
-    """first_deg: angle of direction 1, where it is known."""
+    """Medians of the trials at one frequency. first_deg: angle of direction 1; None where it is not known."""
     sides: list[float | None] = []
     for number in (1, 2):
         ratios = [_delivery_ratio(trial) for trial in trials if _find_played_direction(trial, first_deg) == number]
@@ -75,7 +77,7 @@ def _summarise_delivery(frequency_hz: float, trials: list[Trial], first_deg: flo
 
 
 def _larger_angle_deg(trials: Sequence[Trial]) -> float | None:
-    """Angle of the protocol's direction 1, the larger of the two; None where not both are known."""
+    """Angle of the protocol's direction 1, the larger of the two; None unless the trials have exactly two angles."""
     angles = {trial.angle_deg for trial in trials}
     return max((angle for angle in angles if angle is not None), default=None) if len(angles - {None}) == 2 else None
 
@@ -88,4 +90,5 @@ def _find_played_direction(trial: Trial, first_deg: float | None) -> int:
 
 
 def _delivery_ratio(trial: Trial) -> float:
+    """Delivered over wanted acceleration amplitude."""
     return (trial.delivered_mps2 or 0.0) / (trial.wanted_mps2 or 1.0)

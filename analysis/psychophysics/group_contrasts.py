@@ -1,4 +1,8 @@
-"""Contrasts within participants, each frequency against the lowest or a declared pair: difference, equivalence, spread.
+"""Contrasts of thresholds within participants: each frequency against the first, or a declared pair of frequencies.
+
+Per contrast: mean difference in dB with its t interval and test (p corrected by Holm's method), two one-sided tests of
+equivalence, and the test of Pitman and Morgan of equal variances: the correlation of sum and difference of the paired
+values is 0 where both have the same variance. Values are thresholds, or pseudo-thresholds of the hierarchical model.
 
 Sources: S. Holm, Scand. J. Stat. 6 (1979), 65-70; D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987), 657-680 (two
 one-sided tests); E. J. G. Pitman, Biometrika 31 (1939), 9-12 and W. A. Morgan, Biometrika 31 (1939), 13-19 (equal
@@ -17,12 +21,13 @@ from scipy.stats import t as student
 from equalizer.signals.signal import FloatArray
 
 EQUIVALENCE_DB = 2.0
-"""Differences within this are called equivalent: two of the staircase's small steps, half of its large one."""
+"""Margin of equivalence (dB): two small steps of the published staircase, or half a large step."""
 EQUIVALENCE_UP_TO_HZ = 25.0
-"""Highest frequency (Hz) tested for equivalence: up to it the published thresholds are alike, and none is censored."""
+"""Highest frequency (Hz) tested for equivalence: up to it the published thresholds are similar, and none is
+censored."""
 
 ROUNDING_DB = 1e-9
-"""Differences closer than this are equal: sums of the same steps in another order."""
+"""Range of differences (dB) up to which they count as equal: sums of the same steps may differ by rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,20 +36,25 @@ class Contrast:
 
     frequency_hz: float
     against_hz: float
+    """Frequency whose threshold is subtracted."""
     participants: int
-    """Those who have both."""
+    """Number of participants with values of their own at both frequencies."""
     difference_db: float
     lower_db: float
     upper_db: float
+    """Limits of the t interval, uncorrected."""
     p: float
+    """Two-sided p value of the t test, uncorrected."""
     p_holm: float
-    """Holm's, over all contrasts of the family, also those that are not reported: together wrong in at most 5 %."""
+    """p with Holm's correction over all planned contrasts, including those that are not reported."""
     effect_size: float | None
-    """Mean over standard deviation of the differences (Cohen's d_z); None where the differences are not known."""
+    """Mean over standard deviation of the differences (Cohen's d_z); None where some of them rest on answers at other
+    frequencies only."""
     p_equivalence: float | None
-    """Two one-sided tests against +-2 dB; None where equivalence was not asked."""
+    """p value of two one-sided tests against +-`EQUIVALENCE_DB`; None above `EQUIVALENCE_UP_TO_HZ`."""
     p_spread: float | None
-    """Pitman and Morgan: whether people differ equally much at both frequencies. None below three participants."""
+    """p value of Pitman and Morgan's test: equal variance between people at both frequencies. None below three
+    participants, and where `effect_size` is None."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,20 +62,20 @@ class MeanErrors:
     """Standard errors of means over people, (m,) each."""
 
     people: NDArray[np.intp]
-    """Those with answers of their own."""
+    """Number of people with answers of their own."""
     error: FloatArray
-    """Infinite below two of them."""
+    """Infinite below two such people."""
     df: FloatArray
     """Degrees of freedom for Student's t."""
 
 
 def mean_errors(values: FloatArray, known: NDArray[np.bool_]) -> MeanErrors:
-    """Errors of the means of pseudo-values. values: (n, m), one from each person; known: (n, m), whether it rests on
-    answers of their own there, or only on their answers at other frequencies.
+    """Standard errors of the means of pseudo-values. values: (n, m), a row per person; known: (n, m), True where the
+    value rests on answers of the person there, False where it rests only on answers at other frequencies.
 
-    Where all are known this is the textbook's error, with n - 1 degrees of freedom. Else both groups of people add
-    their part, each with its own degrees of freedom (F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110-114): the
-    estimate follows the few who have answers, so that their number counts and not that of all.
+    Where all are known this is s / sqrt(n) with n - 1 degrees of freedom. Otherwise the variances of both groups add,
+    with the degrees of freedom of F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110-114: the estimate depends mostly
+    on the few people with answers, so that their number counts, not that of all.
     """
     n = len(values)
     people = known.sum(axis=0)
@@ -74,7 +84,7 @@ def mean_errors(values: FloatArray, known: NDArray[np.bool_]) -> MeanErrors:
     inside = np.sum(squares * known, axis=0) * people / known_df
     outside, others = np.sum(squares * ~known, axis=0), np.maximum(n - people, 1)
     error = np.where(people == n, values.std(axis=0, ddof=1) / math.sqrt(n), np.sqrt(inside + outside))
-    # Where all values are equal both parts are 0.
+    # Where all values are equal both variances are 0, and df stays that of the known group.
     below = inside**2 / known_df + outside**2 / others
     df = np.where(people == n, n - 1.0, known_df)
     df = np.divide((inside + outside) ** 2, below, out=df, where=(people < n) & (below > 0))
@@ -87,9 +97,9 @@ def contrasts(
     confidence: float,
     known: NDArray[np.bool_] | None = None,
 ) -> tuple[Contrast, ...]:
-    """values_db: (n, k), NaN for a gap. Contrasts without two participants, or with differences equal in all, are
-    left out, but stay in Holm's family: its size is planned, and not chosen by the data. known: (n, k), of
-    pseudo-values, which have no gaps; see `mean_errors`."""
+    """Contrasts of each frequency against the first. values_db: (n, k), NaN for a gap. Contrasts with fewer than two
+    participants, or with the same difference in all, are left out, but count in Holm's family: its size is planned, not
+    chosen by the data. known: (n, k), for pseudo-values, which have no gaps; see `mean_errors`."""
     known = np.isfinite(values_db) if known is None else known
     found = []
     for place in range(1, len(frequencies_hz)):
@@ -112,10 +122,10 @@ def pair_contrast(
     confidence: float,
     known: NDArray[np.bool_] | None = None,
 ) -> Contrast | None:
-    """The first frequency of the pair minus the second. values_db, known: (n, k), as `contrasts` takes them.
+    """Contrast of the first frequency of the pair minus the second. values_db, known: (n, k), as for `contrasts`.
 
-    None without a pair, where one of the two was not played, and where `contrasts` leaves it out. A family of its own:
-    Holm's p is the plain one.
+    None without a pair, where one of the two was not played, and where `contrasts` leaves it out. The family has one
+    test, so that `p_holm` equals `p`.
     """
     if len(pair_hz) != 2 or not set(pair_hz) <= set(frequencies_hz):
         return None
@@ -126,8 +136,8 @@ def pair_contrast(
 
 
 def holm_correction(p_values: Sequence[float], planned: int | None = None) -> tuple[float, ...]:
-    """Holm's step-down correction for multiple tests, in the order given. planned: size of the family, with tests that
-    have no p and so come last; None: those given."""
+    """p values with Holm's step-down correction, in the order given. planned: size of the family, including tests
+    without a p value, which rank last; None: the number of p values."""
     size = len(p_values) if planned is None else planned
     corrected, worst = [0.0] * len(p_values), 0.0
     for rank, index in enumerate(sorted(range(len(p_values)), key=lambda i: p_values[i])):
@@ -137,8 +147,8 @@ def holm_correction(p_values: Sequence[float], planned: int | None = None) -> tu
 
 
 class _Pair:
-    """Values (n, 2) at two frequencies, and how well their mean difference is known. having: (n,), as `mean_errors`
-    takes it."""
+    """Values (n, 2) in dB at two frequencies, with mean, standard error, degrees of freedom and p value of their
+    differences, second minus first. having: (n,), `known` of `mean_errors`."""
 
     def __init__(self, both: FloatArray, having: NDArray[np.bool_]) -> None:
         self.both, self.differences = both, both[:, 1] - both[:, 0]
@@ -151,6 +161,7 @@ class _Pair:
 def _compute_contrast(
     frequency_hz: float, against_hz: float, pair: _Pair, p_holm: float, confidence: float
 ) -> Contrast:
+    """The contrast of a pair, with its interval at this confidence and its further tests."""
     half = float(student.ppf(0.5 + confidence / 2, pair.df)) * pair.error
     equivalence = _equivalence_p(pair.mean, pair.error, pair.df)
     return Contrast(
@@ -171,4 +182,5 @@ def _compute_contrast(
 
 
 def _equivalence_p(mean_db: float, error_db: float, df: float, margin_db: float = EQUIVALENCE_DB) -> float:
+    """p value of Schuirmann's two one-sided t tests: the larger of the two."""
     return float(student.sf((margin_db - abs(mean_db)) / error_db, df))

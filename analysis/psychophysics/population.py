@@ -1,4 +1,8 @@
-"""Population that answered: people, simulated participants, or people who felt nothing; never mixed in an analysis."""
+"""Separation of trials by who answered: people, simulated participants, or people at a device that did not move.
+
+An analysis never mixes these populations: answers of simulated participants, or of people who felt nothing, say nothing
+about human thresholds. The column `felt` of a trial decides: empty, true or false.
+"""
 
 from collections.abc import Iterable
 from enum import Enum
@@ -7,18 +11,18 @@ from protocols.trial import Trial
 
 
 class Population(Enum):
-    """Who answered a trial, and whether anything could be felt."""
+    """Who answered a trial, and whether a stimulus could be felt."""
 
     PEOPLE = "people"
     SIMULATED = "simulated participants"
     NOT_FELT = "people who felt nothing"
-    """A person answered while a simulated device moved nothing: good for a rehearsal, no measurement."""
+    """A person answered while the device was simulated, so that nothing moved: a rehearsal, not a measurement."""
 
 
 def split_by_population(trials: Iterable[Trial]) -> dict[Population, tuple[Trial, ...]]:
-    """The trials of each kind that occurs, in the order given.
+    """The trials of each population that occurs, in the order given.
 
-    A session belongs to one kind as a whole. Raises ValueError naming the session where its answers do not agree.
+    Raises ValueError, with the name of the session, where the answers of one session belong to different populations.
     """
     sessions: dict[tuple[str, str], list[Trial]] = {}
     for trial in trials:
@@ -30,7 +34,8 @@ def split_by_population(trials: Iterable[Trial]) -> dict[Population, tuple[Trial
 
 
 def _population_of(subject: str, session: str, rows: list[Trial]) -> Population:
-    # A trial that was never answered may not know yet who would have felt it.
+    """Population of one session, whose trials are `rows`; raises ValueError where they disagree."""
+    # Only answered trials count, if there are any: `felt` may not be known yet for a trial without an answer.
     kinds = {_kind(trial) for trial in rows if trial.counts} or {_kind(trial) for trial in rows}
     if len(kinds) > 1:
         named = " and ".join(kind.value for kind in Population if kind in kinds)
@@ -42,6 +47,7 @@ def _population_of(subject: str, session: str, rows: list[Trial]) -> Population:
 
 
 def _kind(trial: Trial) -> Population:
+    """Population of a trial, by its column `felt`."""
     if trial.felt is None:
         return Population.SIMULATED
     return Population.PEOPLE if trial.felt else Population.NOT_FELT

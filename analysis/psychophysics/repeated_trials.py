@@ -1,9 +1,10 @@
-"""Participants who often made presentations void: by repeats, pauses, leaving, or answers outside the time.
+"""Warning for participants who often made presentations void: by repeats, pauses, leaving, or answers out of time.
 
-A second look helps a participant who looks again when unsure. Under the first rules of a session, which drew a new
-stimulus, it moved thresholds by up to -2 dB. Now the same stimulus comes again and the repeat key is limited; pauses
-and leaving are not, and without a limit second looks moved simulated thresholds by -1.9 to -4.8 dB. So a flag means
-that a threshold may be too low, not only that trials took longer.
+A void presentation is played again, so that a participant who makes trials void when unsure has more evidence than a
+single presentation gives, and a threshold that is too low. In simulations this lowered thresholds by up to 2 dB under
+the first rules of a session, which drew a new stimulus for the repeat. Now the same stimulus is repeated. The repeat
+key is limited, but pauses and leaving are not; without a limit the repeats lowered simulated thresholds by 1.9 to
+4.8 dB.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,19 +13,21 @@ from analysis.wording import conjoin
 from protocols.trial import AT_WILL, Phase, Trial
 
 OFTEN_COUNT = 3
-"""Fewest repeats of a run's trials that give a warning."""
+"""Fewest void presentations, of a run or a participant, that give a warning."""
 OFTEN_RATE = 0.02
-"""A cough or a noise comes once or twice in a run of some 60 presentations. Three, of at most 150, are a habit."""
+"""Least share of void presentations that gives a warning. A cough or a noise may spoil one or two of some 60
+presentations of a run; three of at most 150 are taken for a habit."""
 OFTEN_WORDS = f"at least {OFTEN_COUNT}, and at least {100 * OFTEN_RATE:g} % of them"
 
 
 def is_often(repeats: int, presentations: int) -> bool:
-    """Whether repeats are at least `OFTEN_COUNT`, and at least the share `OFTEN_RATE` of the presentations."""
+    """Whether the repeats are at least `OFTEN_COUNT` in number and at least the share `OFTEN_RATE` of presentations."""
     return repeats >= OFTEN_COUNT and repeats >= OFTEN_RATE * presentations
 
 
 def repeat_warning(trials: Sequence[Trial]) -> str:
-    """Runs, and participants over all their runs, that are beyond the limit; training is left out. Empty for none."""
+    """Sentence that names the runs, and the participants over all their runs, with too many void presentations; empty
+    without any. Training is left out."""
     tested = [trial for trial in trials if trial.phase is not Phase.TRAINING]
     people = _frequent_repeats(tested, lambda trial: trial.subject)
     runs = _frequent_repeats(tested, lambda trial: f"{trial.subject} at {trial.frequency_hz:g} Hz ({trial.session})")
@@ -38,6 +41,7 @@ def repeat_warning(trials: Sequence[Trial]) -> str:
 
 
 def _frequent_repeats(trials: Sequence[Trial], name_of: Callable[[Trial], str]) -> list[str]:
+    """Text for each group of trials of the same name in which presentations were often made void at will."""
     void: dict[str, list[bool]] = {}
     for trial in trials:
         void.setdefault(name_of(trial), []).append(trial.void_cause in AT_WILL)

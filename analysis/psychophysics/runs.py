@@ -1,4 +1,8 @@
-"""Staircase runs recomputed from the raw answers, which checks the levels in the rows."""
+"""Runs of a study recomputed from the raw answers: the levels in the file are checked, not trusted.
+
+The rule of the protocol (`protocols.procedure.staircase`: staircase or Psi) is replayed with the recorded answers. A
+level that differs from the replayed one, or a missing, doubled or surplus trial, raises InconsistentTrialsError.
+"""
 
 import itertools
 import math
@@ -10,44 +14,46 @@ from protocols.procedure.staircase import StaircaseState, begin, is_complete, is
 from protocols.trial import AT_WILL, Phase, Trial, TrialStatus
 
 LEVEL_TOLERANCE = 1e-4
-"""Relative: a thousandth of a dB. Covers rounding in a table, and is far below any step."""
+"""Relative tolerance of a level, about 0.001 dB: above rounding in a table, and far below any step."""
 ROUNDING_DB = 1e-3
-"""Rounding in a table, as `LEVEL_TOLERANCE`."""
+"""Tolerance of a roved level (dB) beyond its range, for rounding in a table."""
 
 
 class InconsistentTrialsError(ValueError):
-    """Rows that cannot have come from the stated rule."""
+    """Raised for rows of trials that cannot have come from the stated rule."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One staircase of one participant at one frequency."""
+    """One run (staircase or Psi) of one participant at one frequency."""
 
     subject: str
     session: str
     run: int
     frequency_hz: float
     answered: tuple[Trial, ...]
-    """The trials that moved the staircase, in order; catch trials among them are not here."""
+    """The trials that moved the staircase, in order, without catch trials."""
     spoiled_trials: int
+    """Number of spoiled presentations, without those of catch trials."""
     state: StaircaseState
-    """Level of the staircase after the last of them."""
+    """State of the rule after the last answer."""
     complete: bool
-    """Whether the run has a threshold by its rule; one that ran out of trials has not."""
+    """Whether the run has a threshold by its rule; False for a run that reached the trial limit before."""
     presentations: int = 0
-    """Void ones and catch trials included."""
+    """Number of all presentations, including void ones and catch trials."""
     repeats_at_will: int = 0
-    """Presentations that the participant made void: asked for again, paused, left, answered too late or too early."""
+    """Number of presentations that the participant made void: asked for again, paused, left, answered too late or too
+    early."""
 
 
 def recompute_runs(
     trials: Iterable[Trial], rule: StaircaseRule, phase: Phase = Phase.TEST, rove_db: float = 0.0
 ) -> tuple[Run, ...]:
-    """All runs of one phase, in the order in which they first occur. rove_db: range from which the protocol draws
-    levels around the staircase's.
+    """All runs of one phase, in the order in which they first occur. rove_db: width of the range around the staircase's
+    level from which the protocol draws the level of a trial.
 
-    Catch trials lie within test runs, with trial numbers of their own, and move nothing. Practice runs follow no
-    staircase: a caller who asks for TRAINING leaves them out of `trials` (see `analysis.psychophysics.study_analysis`).
+    Catch trials lie within test runs, numbered in the same sequence, and do not move the staircase. Practice runs
+    follow no staircase: a caller who passes TRAINING must leave them out of `trials` (see `study_analysis`).
 
     Raises InconsistentTrialsError naming subject, session, run and trial where a level is not the one that the
     answers before it lead to, or where a row is missing, doubled or too many.
@@ -61,6 +67,7 @@ def recompute_runs(
 
 
 def _recompute(rows: list[Trial], rule: StaircaseRule, rove_db: float) -> Run:
+    """The run of these rows, at least one, of one subject, session and run number."""
     first = rows[0]
     counted = tuple(sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial))
     _refuse_strange_rows(rows, counted)
@@ -81,6 +88,7 @@ def _recompute(rows: list[Trial], rule: StaircaseRule, rove_db: float) -> Run:
 
 
 def _replay_answers(counted: tuple[Trial, ...], rule: StaircaseRule, rove_db: float) -> StaircaseState:
+    """State of the rule after all counted answers; each level is compared with that of the rule."""
     state = begin(rule)
     for trial in counted:
         if is_finished(rule, state):
@@ -106,7 +114,7 @@ def _replay_answers(counted: tuple[Trial, ...], rule: StaircaseRule, rove_db: fl
 
 
 def _refuse_level_beyond_roving(trial: Trial, rove_db: float) -> None:
-    """Half of the range lies on either side of the staircase's level."""
+    """Raise where the level played is farther from the staircase's level than half the roving range."""
     if trial.nominal_n is None:
         return
     off_db = abs(to_db(trial.level_n) - to_db(trial.nominal_n)) if trial.nominal_n > 0 else math.inf
@@ -119,7 +127,7 @@ def _refuse_level_beyond_roving(trial: Trial, rove_db: float) -> None:
 
 
 def _refuse_weak_catch_trial(trial: Trial, rule: StaircaseRule) -> None:
-    """A test trial that was renamed shows below the cap."""
+    """Raise where a catch trial was not played at the cap: it may be a test trial whose phase was changed."""
     if not math.isclose(trial.level_n, rule.cap_n, rel_tol=LEVEL_TOLERANCE):
         raise InconsistentTrialsError(
             f"{_trial_text(trial)}: level_n of a catch trial is {trial.level_n:.6g} N; catch trials are played at the "
@@ -128,6 +136,7 @@ def _refuse_weak_catch_trial(trial: Trial, rule: StaircaseRule) -> None:
 
 
 def _refuse_strange_rows(rows: list[Trial], counted: tuple[Trial, ...]) -> None:
+    """Raise where a run has two frequencies, or counted trials that are doubled or not numbered in sequence."""
     first = rows[0]
     for trial in rows:
         if trial.frequency_hz != first.frequency_hz:

@@ -1,4 +1,9 @@
-"""Warnings that a reader of a study's results must know, as sentences."""
+"""Warnings about the results of a study, as sentences for its report.
+
+They cover runs without a threshold, thresholds cut by the cap, small or unequal samples, answers at chance, response
+bias and its drift, trials that were spoiled, flagged or not measured, lapses in catch trials, and direction thresholds
+below detection.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -18,21 +23,22 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Trial, TrialStatus
 
 FEW_PARTICIPANTS = 5
-"""Number of participants below which means and their comparison say little about people in general."""
+"""Number of participants below which means and tests say little about people in general."""
 STRONG_BIAS = 0.6
-"""Criterion beyond which response bias costs a staircase four in a hundred right answers. An observer
-without bias exceeds it by chance in about one of 250 whole runs."""
+"""Magnitude of the criterion c (units of d') above which a run is named: at d' = 1.64 it lowers the share of right
+answers by 0.04. An unbiased observer exceeds it by chance in about one of 250 whole runs."""
 BIAS_ERRORS = 2.58
-"""Standard errors by which a criterion must differ from 0, too: in unfinished runs of 3 to 12 trials, one in ten of an
-observer without bias exceeds `STRONG_BIAS`. 1 % by chance; in 45 trials or more `STRONG_BIAS` asks more."""
+"""Standard errors by which a criterion must also differ from 0 (1 % by chance): in unfinished runs of 3 to 12 trials,
+one in ten of an unbiased observer exceeds `STRONG_BIAS`. From 45 trials on `STRONG_BIAS` is the stricter limit."""
 DRIFT_LEVEL, LEFT_OUT_LEVEL = 0.02, 0.2
-"""Levels of the test of a drifting criterion, by session: of all runs, and of those without any one of them. Together
+"""Levels of the test for a drift of the criterion in a session: of all runs, and with any single run left out. Together
 they named 3 of 1000 simulated sessions with a constant criterion, and 438 of 1000 whose criterion moved by 0.3 in 100
 trials (tests/references/drift_flag.py)."""
 MANY_LAPSES = 0.1
-"""Lapse rate on catch trials that is worth a look; the published staircase is meant for attentive people."""
+"""Lapse rate on catch trials above which a participant is named: the published staircase assumes attentive people."""
 FELT_BY_ALL_HZ = 15.0
-"""Up to here all participants are expected to feel the direction at full level, so that an error there is a lapse."""
+"""Highest frequency (Hz) at which all participants are expected to feel the direction at full level, so that an error
+in a catch trial there is a lapse."""
 REPEAT_SD_DB = 2.4
 """Standard deviation of the difference of two runs with the same true threshold: sqrt(2) times 1.7 dB, the spread of
 500 simulated runs under the published rule (Weibull slope 2, 2 % lapses)."""
@@ -41,7 +47,8 @@ REPEAT_SD_DB = 2.4
 def study_warnings(
     trials: Sequence[Trial], rows: Sequence[Threshold], table: ThresholdTable, protocol: StudyProtocol
 ) -> tuple[str, ...]:
-    """All warnings about a study's results. trials: of the test phase. rows, table: what was computed from them."""
+    """All warnings about the direction thresholds. trials: of the test phase. rows, table: thresholds of runs and table
+    of thresholds in newtons, computed from these trials."""
     if not rows:
         return ("No test trial is there, so there is no threshold of direction.",)
     candidates = (
@@ -65,7 +72,7 @@ def study_warnings(
 def side_warnings(
     catches: Sequence[CatchTally], detection: Sequence[Threshold], table: ThresholdTable, felt: ThresholdTable
 ) -> tuple[str, ...]:
-    """Warnings about catch trials and detection runs. table: thresholds of direction, felt: of detection, both in
+    """Warnings about catch trials and detection runs. table: direction thresholds; felt: detection thresholds, both in
     newtons."""
     broken = [_run_text(row) for row in detection if not row.complete]
     cut = [_run_text(row) for row in detection if row.complete and row.censored]
@@ -107,7 +114,7 @@ def _warn_of_stopped(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
 
 
 def _progress(row: Threshold, rule: StaircaseRule) -> str:
-    """How far a run came."""
+    """Progress of an unfinished run: its reversals, or under Psi its trials."""
     if rule.is_bayesian:
         return f"{row.trials} trials"
     return f"{row.reversals} of {rule.reversals} reversals"
@@ -161,6 +168,7 @@ def _chance_warning(rows: Sequence[Threshold]) -> str:
 
 
 def _runs_at_chance(rows: Sequence[Threshold]) -> list[str]:
+    """Texts of the runs whose answers are not shown to be better than chance."""
     return [
         f"{_run_text(row)} ({row.percent_correct:.0f} % right of {row.trials})"
         for row in rows
@@ -169,6 +177,7 @@ def _runs_at_chance(rows: Sequence[Threshold]) -> list[str]:
 
 
 def _is_above_chance(percent_correct: float, trials: int) -> bool:
+    """Whether a one-sided binomial test at the 5 % level rejects a probability of 1/2 for a right answer."""
     right = round(percent_correct / 100.0 * trials)
     return bool(binom.sf(right - 1, trials, 0.5) < 0.05)
 
@@ -185,12 +194,14 @@ def _bias_warning(rows: Sequence[Threshold]) -> str:
 
 
 def _leans(row: Threshold, criterion: float) -> bool:
-    """The variance is that of a run that showed both directions equally often."""
+    """Whether the criterion exceeds both limits. Its standard error is that of a run with both directions equally
+    often."""
     half, right = row.trials / 2.0, round(row.trials * (row.percent_correct or 0.0) / 100.0)
     return abs(criterion) > max(STRONG_BIAS, BIAS_ERRORS * math.sqrt(criterion_variance(right, half, half)))
 
 
 def _drift_warning(trials: Iterable[Trial]) -> str:
+    """Sentence on sessions in which the criterion drifted over the runs; empty without any."""
     sessions: dict[tuple[str, str], dict[int, list[Trial]]] = {}
     for trial in trials:
         if trial.counts:
@@ -210,6 +221,7 @@ def _drift_warning(trials: Iterable[Trial]) -> str:
 
 
 def _answers(run: Sequence[Trial]) -> tuple[list[int], list[bool]]:
+    """Directions shown (1 or 2), and whether each answer was right."""
     return [trial.direction_shown for trial in run], [bool(trial.correct) for trial in run]
 
 
@@ -236,6 +248,7 @@ def _warn_of_unmeasured(trials: Iterable[Trial]) -> str:
 
 
 def _lapse_warning(catches: Sequence[CatchTally]) -> str:
+    """Sentence on participants with many wrong catch trials up to `FELT_BY_ALL_HZ`; empty without any."""
     lapsing = []
     slow = [tally for tally in catches if tally.frequency_hz <= FELT_BY_ALL_HZ]
     for subject in dict.fromkeys(tally.subject for tally in slow):

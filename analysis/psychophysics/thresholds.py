@@ -1,4 +1,8 @@
-"""Threshold of a run: the mean of its last reversals, and whether the cap cut into it."""
+"""Threshold of each run: mean of its last reversal levels, or posterior mean of Psi, and whether the cap cut it.
+
+A run also has its response bias (d', criterion), counts of trials, and the threshold as measured acceleration and
+displacement. Runs are recomputed from the answers (`runs`). The rows are those of the table `thresholds.csv`.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -18,35 +22,35 @@ class RunEnd(StrEnum):
     """Reason for the end of a run."""
 
     REVERSALS = "reversals"
-    """All reversals of the rule: there is a threshold."""
+    """The run reached all reversals of the rule: it has a threshold."""
     PSI = "psi"
-    """All trials of the Psi method, or its wanted spread: there is a threshold."""
+    """The run reached all trials of the Psi method, or its wanted posterior spread: it has a threshold."""
     TRIAL_LIMIT = "trial_limit"
-    """The protocol's `trial_limit`. The run has no threshold, and is more often that of a high threshold: under a
-    limit of 100 trials 58 % of guessers and 0.1 % of people with a threshold of 1 N end so."""
+    """The protocol's `trial_limit` stopped the run, so that it has no threshold. This happens more often at high
+    thresholds: under a limit of 100 trials to 58 % of guessers and 0.1 % of people with a threshold of 1 N."""
     UNFINISHED = "unfinished"
-    """The sitting: the run can go on, or was left."""
+    """The sitting ended before the run: the run may be continued, or was abandoned."""
 
 
 @dataclass(frozen=True, slots=True)
 class Threshold:
-    """One run's result, one row of `thresholds.csv`; the fields are its columns, in order.
-
-    A run that has not reached its reversals is a row too, with `complete` False and no threshold.
+    """Result of one run, a row of `thresholds.csv`; the fields are its columns, in order. An incomplete run has a row,
+    too, with `complete` False and no threshold.
     """
 
     subject: str
     frequency_hz: float
     threshold_n: float | None
-    """Arithmetic mean of the averaged reversal levels in newtons."""
+    """Arithmetic mean of the averaged reversal levels in newtons; for Psi, the posterior mean (taken in dB)."""
     threshold_db: float | None
-    """Mean of the same levels in dB re 1 N."""
+    """Mean of the same levels in dB re 1 N; for Psi, the posterior mean."""
     censored: bool
-    """Cut by the cap: see `is_censored`. No bound: the true threshold may lie above or below."""
+    """Whether the cap cut into the threshold (`is_censored`; Psi: `MAYBE_ABOVE`). The value is then no bound: the true
+    threshold may lie above or below it."""
     reversals: int
     trials: int
     cap_reversals: int
-    """Number of averaged reversals that are peaks at the cap."""
+    """Number of averaged reversals that are peaks at the cap; 0 for Psi."""
     trials_at_cap: int
     pushes_against_cap: int
     complete: bool
@@ -58,19 +62,20 @@ class Threshold:
     """c, positive for a tendency to answer 2: see `analysis.psychophysics.bias`."""
     spoiled_trials: int
     threshold_mps2: float | None
-    """Mean acceleration amplitude along the direction, as measured in the trials of the averaged reversals."""
+    """Mean measured acceleration amplitude along the direction (m/s²) in the trials of the averaged reversals; for Psi,
+    in the last trials, each scaled in proportion to the threshold."""
     threshold_mm: float | None
-    """Mean displacement amplitude, as measured in the same trials."""
+    """Mean measured displacement amplitude (mm) in the same trials."""
     measured_reversals: int
-    """Number of averaged reversals with a measured acceleration."""
+    """Number of these trials with a measured acceleration."""
     ended: RunEnd | None = None
     """Reason for the end of the run; None in tables of older versions."""
     repeats_at_will: int = 0
-    """Presentations of the run that the participant made void; catch trials among them."""
+    """Number of presentations of the run that the participant made void, including those of catch trials."""
     repeat_rate: float = 0.0
-    """Share of void presentations in all presentations of the run."""
+    """`repeats_at_will` over all presentations of the run."""
     asked_often: bool = False
-    """See `analysis.psychophysics.repeated_trials.is_often`."""
+    """Whether presentations were made void often: see `analysis.psychophysics.repeated_trials.is_often`."""
 
 
 def thresholds(trials: Iterable[Trial], rule: StaircaseRule, rove_db: float = 0.0) -> tuple[Threshold, ...]:
@@ -83,8 +88,8 @@ def thresholds(trials: Iterable[Trial], rule: StaircaseRule, rove_db: float = 0.
 
 
 def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
-    """Threshold of a run by its reversals or Psi's posterior, with response bias and counts; None in its values where
-    the run is not complete."""
+    """Threshold of a run by its reversals or Psi's posterior, with response bias and counts. Where the run is not
+    complete, thresholds are None in every unit."""
     found = _from_posterior(run, rule) if rule.is_bayesian else _from_reversals(run, rule)
     state = run.state
     correct = [bool(trial.correct) for trial in run.answered]
@@ -123,15 +128,18 @@ def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
+    """Threshold of a run before the other columns are added."""
+
     newton: float | None
     db: float | None
     censored: bool
     cap_reversals: int
     measured: tuple[tuple[Trial, float], ...]
-    """Trials that say what the threshold is in other units, and the level (N) to which each is taken in proportion."""
+    """Trials whose measurements give the threshold in other units, each with the level (N) to which it is scaled."""
 
 
 def _from_reversals(run: Run, rule: StaircaseRule) -> _Found:
+    """Means of the last `averaged_reversals` reversal levels, in newtons and in dB."""
     state = run.state
     averaged_db = state.reversal_levels_db[-rule.averaged_reversals :]
     averaged_n = [min(to_newton(level), rule.cap_n) for level in averaged_db]
@@ -147,7 +155,8 @@ def _from_reversals(run: Run, rule: StaircaseRule) -> _Found:
 
 
 def _from_posterior(run: Run, rule: StaircaseRule) -> _Found:
-    """Posterior mean, never above the cap; cut where the threshold is as likely as not to be above it, or nearly."""
+    """Posterior mean, limited by the cap; cut where the posterior probability of a threshold above the cap exceeds
+    `MAYBE_ABOVE`."""
     cap_db = to_db(rule.cap_n)
     found = estimate(posterior(run.state.answered, cap_db), cap_db)
     db = min(found.mean_db, cap_db)
@@ -157,41 +166,42 @@ def _from_posterior(run: Run, rule: StaircaseRule) -> _Found:
 
 
 def _at_level(trial: Trial, measured: float | None, level_n: float) -> float | None:
-    """A measured value of a trial scaled in proportion to another level (N), also where the level was roved; None where
-    nothing was measured."""
+    """Measured value of a trial, scaled in proportion from the level played to another level (N); None where nothing
+    was measured."""
     return None if measured is None else measured * level_n / trial.level_n
 
 
 MAYBE_ABOVE = 0.1
-"""Probability, by Psi's posterior, of a threshold above the cap from which a run is marked as cut."""
+"""Posterior probability (Psi) of a threshold above the cap above which the threshold is marked as cut."""
 
 
 def is_censored(cap_reversals: int) -> bool:
     """Whether the cap cut into a threshold: at least one of the averaged reversals is a peak at the cap.
 
-    Such a peak would have been higher on a stronger device, so the mean is lower than it would have been there.
-    That makes it no lower bound of the true threshold: the mean scatters, and in flagged runs of people with a true
-    threshold of 2 N it lies above the truth in 78 %, at 2.5 N in 26 %, from 3 N on in none (same simulation). Whether
-    the mean *equals* the cap is no test: its valleys lie below, and a pure guesser ends near 2.68 N under a cap of 3 N.
+    Such a peak would be higher on a stronger device, and so would the mean. A mean equal to the cap is no criterion:
+    valleys lie below the cap, and a pure guesser ends near 2.68 N under a cap of 3 N.
 
-    Operating characteristics under the published rule, 1000 simulated runs each (Weibull slope 2, 2 % lapses),
-    by true 79.4 % level: flagged 0.0 % at 1 N, 0.6 % at 1.5 N, 15 % at 2 N (mean already 8 % too low), 54 % at
-    2.5 N, 78 % at 3 N, 95 % at 4 N, 98 % at 6 N; a pure guesser 99.8 %. Asking for two or three such peaks would
-    miss 13 % or 27 % of participants whose true threshold is 4 N.
+    Share of flagged runs under the published rule, from 1000 simulated runs each (Weibull slope 2, 2 % lapses), by true
+    79.4 % level: 0.0 % at 1 N, 0.6 % at 1.5 N, 15 % at 2 N (mean already 8 % too low), 54 % at 2.5 N, 78 % at 3 N, 95 %
+    at 4 N, 98 % at 6 N; a pure guesser 99.8 %. Two or three required peaks would miss 13 % or 27 % of participants with
+    a true threshold of 4 N. A flagged mean is no lower bound of the true threshold: in flagged runs it is above the
+    true value in 78 % at 2 N, in 26 % at 2.5 N, and in none from 3 N on.
     """
     return cap_reversals > 0
 
 
 def _run_end(run: Run, rule: StaircaseRule) -> RunEnd:
+    """Reason for the end of the run, from its state and rule."""
     if run.complete:
         return RunEnd.PSI if rule.is_bayesian else RunEnd.REVERSALS
     return RunEnd.TRIAL_LIMIT if is_finished(rule, run.state) else RunEnd.UNFINISHED
 
 
 def _mean_of_measured(values: Sequence[float | None]) -> float | None:
+    """Mean of the values that were measured; None without any."""
     measured = [value for value in values if value is not None]
     return fmean(measured) if measured else None
 
 
 _SAME_LEVEL = 1e-9
-"""Relative difference below which two levels are the same, rounding apart."""
+"""Relative difference below which a level counts as equal to the cap: rounding."""

@@ -1,4 +1,9 @@
-"""Comparison of the published and the primary analysis, as text: differences, reasons, and which was declared."""
+"""Comparison of the published and the primary analysis as text for reports.
+
+The published analysis is a one-way analysis of variance of reversal means with Tukey's comparisons; the primary
+analysis is the hierarchical model of all answers. The text states which analysis the protocol declared, where estimates
+differ by 1 dB or more, where significance at the 5 % level differs, and the measured coverage near the cap.
+"""
 
 from collections.abc import Sequence
 
@@ -14,9 +19,9 @@ from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 
 NOTABLE_DB = 1.0
-"""A difference between the two analyses that is worth a sentence: the small step of the staircase."""
+"""Least difference (dB) between the two analyses that is reported: the small step of the published staircase."""
 SIMULATED_RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0, 10)), 13, 10)
-"""The published staircase and cap: what `measured_coverage` counted was simulated with it and holds for no other."""
+"""The published staircase and cap, with which `measured_coverage` was simulated: its counts hold for no other rule."""
 NOTHING_DECLARED = (
     "The protocol declares no primary analysis, contrast, sample size or exclusions; the hierarchical model is put "
     "first because it needs the fewest excuses near the cap, and a choice made after the data is no declaration."
@@ -35,7 +40,8 @@ _INTERVALS = {
 
 
 def declaration_text(declared: AnalysisSettings) -> str:
-    """The protocol's declarations before the data, and what it left open, as text."""
+    """Text on what the protocol declares before the data (analysis, contrast, sample size, exclusions), and on what it
+    does not declare."""
     if declared == AnalysisSettings():
         return NOTHING_DECLARED
     if declared.primary == "undeclared":
@@ -69,8 +75,9 @@ def comparison_text(
     table: ThresholdTable,
     rule: StaircaseRule,
 ) -> str:
-    """Differences between the published and the primary analysis, in sentences. means: contrasts of reversal means in
-    dB, against the same frequency as those of the primary analysis. rule: the staircase that was played."""
+    """Sentences on the differences between the published and the primary analysis. primary: None without a fit. means:
+    contrasts of reversal means in dB, against the same frequency as those of the primary analysis. rule: the staircase
+    of the study."""
     if primary is None:
         return (
             "The hierarchical model needs answers of two participants, at two frequencies; these data have fewer, so "
@@ -85,15 +92,16 @@ def comparison_text(
 
 
 def coverage_notes(analyses: Sequence[str], table: ThresholdTable, rule: StaircaseRule) -> tuple[str, ...]:
-    """Measured coverage of the intervals of these analyses (names of `coverage_words.NAMES`), as sentences, where the
-    cap cut into the data; empty for a staircase other than the simulated one."""
+    """Sentences on the measured coverage of the intervals of these analyses (names of `coverage_words.NAMES`). Empty
+    where neither the cap nor the trial limit affected a threshold, and for a rule other than `SIMULATED_RULE`."""
     if not table.coverage or rule != SIMULATED_RULE:
         return ()
     return tuple(filter(None, (coverage_sentence(MEASURED, name) for name in analyses)))
 
 
 def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: StaircaseRule) -> str:
-    """Difference between the results by the model and by the runs' thresholds, as text."""
+    """Sentence on the differences in dB by the model and by the thresholds of runs: equal within `NOTABLE_DB`, or where
+    not."""
     named = threshold_words(rule).means
     by_frequency = {contrast.frequency_hz: contrast for contrast in means}
     against = f"{primary.frequencies_hz[0]:g} Hz"
@@ -114,7 +122,8 @@ def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: Stair
 
 
 def _verdict_text(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:
-    """Frequencies at which only a single analysis finds a significant difference at the 5 % level, as text."""
+    """Sentence on the frequencies at which only one analysis finds a difference at the 5 % level; empty where they have
+    no pair in common."""
     lowest = frequency_name(primary.frequencies_hz[0])
     pairs = {pair.second: pair.p for pair in comparisons.pairs if pair.first == lowest}
     split = [

@@ -1,4 +1,8 @@
-"""Report of a blind test: misses first, then the figures with their intervals, then the method."""
+"""HTML report of a blind test: the diagnosis of simulated devices with concealed missing physics.
+
+Wrong answers come first, each with what was concealed and what was said; then the scores with 95 % intervals, the next
+proposed experiments, the controls, and the method. `analysis.evaluation.blind_test` computes the scores.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,15 +30,20 @@ HOW = (
 
 @dataclass(frozen=True, slots=True)
 class BlindTestFacts:
-    """Facts of a blind test beside its outcomes: seeds, seal, commit, engines, controls and further recordings."""
+    """Facts about a blind test that its outcomes do not contain."""
 
     seeds: str
+    """Seeds of the simulated devices, as text."""
     seal: str
+    """SHA-256 of labels.sha256, the file with the hashes of the labels."""
     commit: str
     engines: tuple[str, ...]
+    """Versions of the code of the diagnosis."""
     remarks: tuple[str, ...]
+    """Sentences for the banner of the report."""
     controls: tuple[ControlOutcome, ...] = ()
     followed: tuple[FollowUp, ...] = ()
+    """Ambiguous answers that were diagnosed again with a further recording."""
 
 
 def render_blind_test_report(
@@ -45,7 +54,7 @@ def render_blind_test_report(
     provenance: Mapping[str, str],
     generated: str,
 ) -> str:
-    """HTML."""
+    """The report as an HTML page. generated: local time of the report; provenance: versions and hashes by name."""
     sections = (
         Section(f"Misses: {len(score.misses)}", tables=(_miss_table(score.misses),) if score.misses else ()),
         Section("Figures", tables=(_figure_table(score),)),
@@ -68,6 +77,7 @@ def render_blind_test_report(
 
 
 def _control_sections(controls: Sequence[ControlOutcome]) -> tuple[Section, ...]:
+    """Section on the controls: changes with a known effect on the answer; empty without controls."""
     if not controls:
         return ()
     rows = tuple(
@@ -79,6 +89,7 @@ def _control_sections(controls: Sequence[ControlOutcome]) -> tuple[Section, ...]
 
 
 def _follow_up_sections(found: Sequence[FollowUp]) -> tuple[Section, ...]:
+    """Section on ambiguous answers after the proposed and after a random further recording; empty without any."""
     if not found:
         return ()
     rows = tuple(
@@ -96,6 +107,7 @@ def _follow_up_sections(found: Sequence[FollowUp]) -> tuple[Section, ...]:
 
 
 def _describe_returned(recorded: str, returned: Sequence[str]) -> str:
+    """Names returned after a further recording; "-" where there was none."""
     return (", ".join(returned) or "no name") if recorded else "-"
 
 
@@ -109,6 +121,7 @@ def _fact_points(facts: BlindTestFacts) -> tuple[str, ...]:
 
 
 def _miss_table(misses: Sequence[Outcome]) -> Table:
+    """Table of all wrong answers, with the error over the noise of the re-tuned model and of the model found."""
     rows = tuple(
         (
             str(miss.number), f"{miss.kind}, {miss.bank}", describe_concealed(miss), strength_text(miss) or "-",
@@ -121,6 +134,7 @@ def _miss_table(misses: Sequence[Outcome]) -> Table:
 
 
 def _figure_table(score: Score) -> Table:
+    """Table of all scores with 95 % intervals, the expected calibration error last."""
     calibration = score.calibration
     whole = Figure(
         "expected calibration error, 10 bins of equal count", calibration.error, calibration.low, calibration.high,

@@ -1,4 +1,8 @@
-"""The first section of a study report: the declared result, and what was declared beside what was analysed."""
+"""First section of a study report: the contrast declared in the protocol, by both analyses, with sample and exclusions.
+
+The section shows the result that was fixed before the data were collected (`declared_result`), so that a reader can
+distinguish it from results chosen afterwards.
+"""
 
 from analysis.psychophysics.declared_result import ContrastResult, DeclaredResult
 from analysis.reports.page import Section, Table
@@ -8,8 +12,8 @@ NAMES = {"hierarchical": "hierarchical model of all answers", "published": "publ
 
 
 def make_declared_section(declaration: str, result: DeclaredResult) -> Section:
-    """The section on the declared result. declaration: what was declared and what was not, in words. Where nothing was,
-    the section is this alone."""
+    """The section on the declared result. declaration: text on what was declared and what was not. Where nothing was
+    declared, the section consists of this text."""
     heading = "The declared result"
     if not _is_anything_declared(result):
         return Section(heading, paragraphs=(declaration,))
@@ -19,7 +23,7 @@ def make_declared_section(declaration: str, result: DeclaredResult) -> Section:
 
 
 def describe_declared(result: DeclaredResult) -> tuple[str, ...]:
-    """The declared contrast, in a sentence for each analysis, the declared one first; empty without a contrast."""
+    """A sentence on the declared contrast per analysis, the declared analysis first; empty without a contrast."""
     return tuple(_sentence(row, result) for row in result.results)
 
 
@@ -30,6 +34,7 @@ def _is_anything_declared(result: DeclaredResult) -> bool:
 
 
 def _sentence(row: ContrastResult, result: DeclaredResult) -> str:
+    """Sentence on the contrast by one analysis, with interval, p and notes."""
     first, second = result.contrast_hz
     role = ", the declared analysis" if row.declared else ""
     opening = f"Declared contrast, {first:g} Hz minus {second:g} Hz, by the {NAMES[row.analysis]}{role}:"
@@ -43,6 +48,7 @@ def _sentence(row: ContrastResult, result: DeclaredResult) -> str:
 
 
 def _contrast_table(result: DeclaredResult) -> Table:
+    """Table of the contrast with a row per analysis."""
     first, second = result.contrast_hz
     rows = []
     for row in result.results:
@@ -62,6 +68,7 @@ def _contrast_table(result: DeclaredResult) -> Table:
 
 
 def _sample_table(result: DeclaredResult) -> Table:
+    """Table of sample size and exclusions, declared and actual."""
     return Table(
         caption="Participants and exclusions",
         header=("", "Declared", "In this analysis"),
@@ -81,9 +88,11 @@ def _sample_table(result: DeclaredResult) -> Table:
 
 
 def _interval(row: ContrastResult) -> str:
+    """Limits of the interval as text without unit; `NONE` for a limit that is not determined."""
     ends = [NONE if end is None else format_signed(end, _digits(row)) for end in (row.lower, row.upper)]
     return " to ".join(ends)
 
 
 def _digits(row: ContrastResult) -> int:
+    """Decimals of a difference: one in dB, two in N."""
     return 1 if row.unit == "dB" else 2

@@ -1,4 +1,8 @@
-"""The tables of a diagnosis."""
+"""Tables of a diagnosis report: parameters, rivals and candidates of the missing physics, model errors, mismatches.
+
+Errors are given for the model as given, for the model with re-tuned parameters, and for the model with the effects that
+were found, each on the fitted and on held-out data. `diagnosis_report` arranges the tables.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -14,6 +18,7 @@ from analysis.reports.page import Table
 from analysis.wording import NONE, capitalise, end_sentence, format_signed, p_value
 
 _STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With what was found"))
+"""Attribute of each stage of the model, and its heading."""
 _MOST_PLACES = 12
 """Most rows of the table of mismatches."""
 _SHARE = (
@@ -21,6 +26,7 @@ _SHARE = (
     "is named, of the mismatch's power that sits in it."
 )
 _PARTS: Mapping[str, str] = {"fit": "the data that were fitted to", "test": "held-out data"}
+"""Part of the data, and its text."""
 
 
 def parameter_table(effect: NamedEffect) -> Table:
@@ -49,7 +55,7 @@ def rival_table(effect: NamedEffect) -> Table:
 
 
 def candidate_table(found: Findings) -> Table | None:
-    """Table of unconfirmed candidates, the best first; None without any."""
+    """Table of candidate effects that were not confirmed, the best first; None without candidates."""
     device = device_of(found)
     rows = tuple(
         (
@@ -73,7 +79,8 @@ def candidate_table(found: Findings) -> Table | None:
 
 
 def error_table(found: Findings) -> Table:
-    """Errors of both records, over all channels."""
+    """Table of root-mean-square errors over all channels as a share of the signal, on fitted and on held-out data, by
+    stage of the model, with the noise."""
     rows = tuple(
         (f"On {_PARTS[part]}", *(_stage_error_text(errors, stage) for stage, _ in _STAGES), error_text(errors.noise))
         for part, errors in (("fit", found.diagnosis.fit.fit), ("test", found.diagnosis.fit.test))
@@ -83,7 +90,8 @@ def error_table(found: Findings) -> Table:
 
 
 def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None:
-    """Errors in each channel's unit, with the multiple of the noise; None where the series are not known by channel."""
+    """Table of the rms error of each channel in its unit, with its ratio to the noise, by stage of the model; None
+    where there are no time series. Where a statistic was fitted, its chance error takes the place of the noise."""
     if not found.time_series:
         return None
     names, units, noises = found.time_series[0].channels, found.time_series[0].units, found.noise_rms
@@ -107,7 +115,8 @@ def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None
 
 
 def mismatch_table(caption: str, places: Sequence[Mismatch], is_timed: bool = True) -> Table:
-    """The first, folded. is_timed: bands are in hertz, and not in cycles per sample."""
+    """Folded table of the first `_MOST_PLACES` mismatches between model and device. is_timed: bands are in hertz; else
+    in cycles per sample."""
     worst = places[:_MOST_PLACES]
     rows = tuple(
         (
@@ -129,7 +138,8 @@ def mismatch_table(caption: str, places: Sequence[Mismatch], is_timed: bool = Tr
 
 
 def tabulate_retuned(found: Findings) -> Table | None:
-    """Table of all re-tuned parameters, folded on the page; None where nothing was re-tuned."""
+    """Folded table of all re-tuned parameters, before and after the found effects were added, with their deviations in
+    standard deviations; None where nothing was re-tuned."""
     if found.tuning is None:
         return None
     alone = all_parameters(found.tuning, found.explanation.retuned.fitted.deviations)
@@ -143,15 +153,18 @@ def tabulate_retuned(found: Findings) -> Table | None:
 
 
 def _stage_error_text(errors: Errors, stage: str) -> str:
+    """Error of one stage of `_STAGES` as text."""
     value: float | None = getattr(errors, stage)
     return error_text(value)
 
 
 def _ratio_text(ratio: float) -> str:
+    """Ratio of an error to the noise, such as 1.25×."""
     return f"{ratio:.2f}×" if ratio < 10 else f"{ratio:.3g}×"
 
 
 def _interval_text(estimate: Estimate) -> str:
+    """95 % interval of an estimate with the digits of `value_text`; `NONE` without an interval."""
     if estimate.ci95 is None:
         return NONE
     text = value_text(estimate.value, estimate.unit, estimate.ci95)

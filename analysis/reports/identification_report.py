@@ -1,4 +1,8 @@
-"""Report of an identified device: the measurement, the fitted model, and its quality."""
+"""HTML report of an identified device: measured transfer functions, resonances, fitted state-space model and its order.
+
+The response maps commanded forces (N) to accelerations of the handle (m/s²). The report has the published figures 1
+(frequency bands) and 4 (transfer functions), and the held-out error of each candidate model order.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,27 +23,33 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 
 CURVE_LINES = 400
-"""Points of a drawn curve."""
+"""Number of frequencies at which the model's response is drawn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IdentificationFindings:
-    """The content of an identification report: the measured response, the model, and what follows from them."""
+    """The content of an identification report: the measured response, the model, and results derived from them."""
 
     estimate: FrequencyResponse
+    """Measured response."""
     model: IdentifiedModel
     resonances: tuple[Resonance, ...]
     onset: CouplingOnset
+    """Frequency from which the axes are coupled."""
     bands: tuple[FrequencyBand, ...]
     direction_limit_hz: float
+    """Highest frequency at which directions are perceived, drawn with the bands."""
     order: OrderReport | None
-    """None where the data are too few to hold lines out."""
+    """Comparison of model orders; None where there are too few lines to hold some out."""
     results: tuple[str, ...]
+    """Sentences on the model."""
     remarks: tuple[str, ...]
+    """Further sentences, shown as a list."""
 
 
 def identification_pictures(found: IdentificationFindings) -> tuple[Picture, ...]:
-    """Transfer functions (the published figure 4), bands (figure 1) and the choice of order."""
+    """Pictures of the transfer functions (published figure 4), the bands (figure 1) and the choice of order; those
+    without data are left out."""
     low, high = found.model.band_hz
     curve_hz = np.geomspace(low, high, CURVE_LINES)
     curve = ResponseCurve("model", curve_hz, model_response(found.model, curve_hz))
@@ -54,11 +64,13 @@ def identification_pictures(found: IdentificationFindings) -> tuple[Picture, ...
 def render_identification_report(
     found: IdentificationFindings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
 ) -> str:
-    """The report as a page of HTML. pictures: by name; those that are missing are left out."""
+    """The report as an HTML page. pictures: those of `identification_pictures`, recognised by name; missing pictures
+    are left out. generated: local time of the report; provenance: versions and hashes by name."""
     by_name = {picture.name: picture for picture in pictures}
     low, high = found.model.band_hz
 
     def shown(name: str) -> tuple[Picture, ...]:
+        """The picture of this name; empty where it is missing."""
         return (by_name[name],) if name in by_name else ()
 
     sections = (
@@ -83,6 +95,7 @@ def render_identification_report(
 
 
 def _resonance_table(resonances: Sequence[Resonance]) -> Table:
+    """Table of resonance frequencies and damping ratios with 95 % intervals."""
     rows = tuple(
         (
             f"{resonance.frequency_hz:.2f} Hz",
@@ -97,6 +110,7 @@ def _resonance_table(resonances: Sequence[Resonance]) -> Table:
 
 
 def _onset_sentence(onset: CouplingOnset) -> str:
+    """Sentence on the frequency at which coupling begins, and the rule by which it was found."""
     if onset.frequency_hz is None:
         return f"No onset of coupling was found. Rule: {onset.rule}."
     between = ""
@@ -106,6 +120,7 @@ def _onset_sentence(onset: CouplingOnset) -> str:
 
 
 def _order_tables(order: OrderReport | None) -> tuple[Table, ...]:
+    """Table of held-out error and multiplications per tick by model order; empty without a comparison."""
     if order is None:
         return ()
     rows = tuple(

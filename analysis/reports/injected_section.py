@@ -1,4 +1,9 @@
-"""Report section on faults that were injected into real recordings."""
+"""Report section on faults injected into real recordings: how often the diagnosis named them.
+
+A known fault of mechanism, actuator or sensor is added to one of two stretches of a real recording; the diagnosis gets
+both stretches and the model. The section has the rates of right answers with 95 % intervals, tallies by kind of fault
+and by recording, and every miss. `analysis.evaluation.blind_test.injected` judges the answers.
+"""
 
 from collections.abc import Sequence
 
@@ -15,7 +20,7 @@ from analysis.reports.page import Section, Table
 
 
 def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
-    """Section with rates of right answers, tallies by kind and by recording, and all misses."""
+    """Section with rates of right answers, tallies by kind and by recording, and all misses; without empty tables."""
     rates = Table(
         "How often it was right",
         ("what", "rate, 95 % interval"),
@@ -56,11 +61,12 @@ def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
 
 
 def kind_of(injected_outcome: InjectedOutcome) -> str:
-    """The injected fault's name, "two at once" for two, or empty for none."""
+    """Kind of a case: name of the injected fault, "two at once" for two faults, or empty without a fault."""
     return "two at once" if len(injected_outcome.effects) > 1 else injected_outcome.injected
 
 
 def _tally_table(title: str, what: str, rows: Sequence[Tally]) -> Table:
+    """Table of tallies, one row each. what: heading of the first column."""
     head = (what, "drawn", "detectable", *JUDGED[:-1], "named or in class", "nothing injected, nothing named")
     return Table(
         title,
@@ -80,11 +86,12 @@ def _tally_table(title: str, what: str, rows: Sequence[Tally]) -> Table:
 
 
 def _change_text(change: float | None) -> str:
+    """Ratio of the held-out errors with and without the fault."""
     return "unknown" if change is None else f"{change:.2f}"
 
 
 def figure_text(figure: Figure) -> str:
-    """ "88 % [69, 96] of 24"."""
+    """A share with its 95 % interval and number of cases: 88 % [69, 96] of 24; "none was drawn" without cases."""
     if figure.value is None or figure.low is None or figure.high is None:
         return "none was drawn"
     return f"{100 * figure.value:.0f} % [{100 * figure.low:.0f}, {100 * figure.high:.0f}] of {figure.of}"

@@ -1,4 +1,8 @@
-"""The methods of a study in words, with the numbers of its protocol."""
+"""Methods section of a study report: task, stimulus, schedule, levels, threshold and statistics as paragraphs.
+
+The text is generated from the protocol, so that its numbers are those of the study. Sources of the methods are in the
+modules of `analysis.psychophysics` and in docs/statistics.md.
+"""
 
 from analysis.psychophysics.thresholds import MAYBE_ABOVE
 from analysis.wording import conjoin, typeset
@@ -46,7 +50,7 @@ _SENSITIVITY = (
 
 
 def methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
-    """One paragraph each: task, stimulus, schedule, staircase, threshold, what stood beside it, statistics."""
+    """A paragraph each on task, stimulus, schedule, levels, threshold, further procedures (if any) and statistics."""
     rule = protocol.staircase
     return (
         _task(protocol),
@@ -60,6 +64,7 @@ def methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
 
 
 def _task(protocol: StudyProtocol) -> str:
+    """Paragraph on the directions, the answer, feedback, void trials and swapped numbers."""
     trial, directions = protocol.trial, protocol.directions
     first, second, middle = (typeset(f"{directions.symmetry_deg + side:g}") for side in (45, -45, 0))
     limit = f"within {trial.time_limit_s:g} s" if trial.time_limit_s else "without a limit of time"
@@ -83,6 +88,7 @@ def _task(protocol: StudyProtocol) -> str:
 
 
 def _stimulus(protocol: StudyProtocol) -> str:
+    """Paragraph on the envelope, polarity, quantity and roving of the stimulus, and the virtual spring."""
     stimulus = protocol.stimulus
     polarity = "to either side at random" if stimulus.onset_polarity == "random" else "always to the same side"
     return (
@@ -105,6 +111,7 @@ def _stimulus(protocol: StudyProtocol) -> str:
 
 
 def _schedule(protocol: StudyProtocol) -> str:
+    """Paragraph on the frequencies, their order, rests and training."""
     frequencies = conjoin([f"{frequency:g}" for frequency in protocol.stimulus.frequencies_hz])
     training = conjoin([f"{frequency:g} Hz" for frequency in protocol.training.frequencies_hz])
     rest = f", at least {protocol.rests.after_run_s:g} s apart" if protocol.rests.after_run_s else ""
@@ -116,6 +123,8 @@ def _schedule(protocol: StudyProtocol) -> str:
 
 
 def _staircase(rule: StaircaseRule) -> str:
+    """Paragraph on how levels are chosen (staircase or Psi) and when a run ends. Under 1 up, m down a run converges
+    where m right answers in a row have the probability 1/2: at a share of 0.5^(1/m)."""
     if rule.is_bayesian:
         early = f", or once its standard deviation was below {rule.bayesian.spread_db:g} dB"
         return (
@@ -143,6 +152,7 @@ def _staircase(rule: StaircaseRule) -> str:
 
 
 def _threshold(rule: StaircaseRule) -> str:
+    """Paragraph on the threshold of a run, the mark of the cap, and the measures of response bias."""
     if rule.is_bayesian:
         return (
             "The threshold is the mean of its posterior in dB, at most the cap. It was recomputed from the answers, "
@@ -159,6 +169,7 @@ def _threshold(rule: StaircaseRule) -> str:
 
 
 def _side_procedures(protocol: StudyProtocol) -> tuple[str, ...]:
+    """Paragraph on demonstration, gate, practice, catch trials and detection, as far as the protocol has them."""
     demo, practice, catch, detection = protocol.demo, protocol.practice, protocol.catch, protocol.detection
     sentences = []
     if demo.level_n:
@@ -192,11 +203,12 @@ def _side_procedures(protocol: StudyProtocol) -> tuple[str, ...]:
 
 
 def _track(rule: StaircaseRule) -> str:
+    """Noun for a run: "staircase", or under Psi "run"."""
     return "run" if rule.is_bayesian else "staircase"
 
 
 def levels_words(settings: DemoSettings | PracticeSettings) -> str:
-    """The fixed level, or the range that each level was drawn from."""
+    """Text for the fixed level, or for the range in N from which each level was drawn."""
     if not settings.rove_db:
         return f"{settings.level_n:g} N"
     half = 10.0 ** (settings.rove_db / 40.0)
@@ -204,4 +216,5 @@ def levels_words(settings: DemoSettings | PracticeSettings) -> str:
 
 
 def _hz(frequencies_hz: tuple[float, ...]) -> str:
+    """Frequencies as text, with the unit once."""
     return f"{conjoin([f'{frequency:g}' for frequency in frequencies_hz])} Hz"

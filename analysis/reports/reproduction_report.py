@@ -1,4 +1,9 @@
-"""Report of a reproduction: five figures, each with the published and the reproduced findings."""
+"""HTML report of the reproduction of the five published figures on a simulated omega.3.
+
+Per figure: what the paper states, what came out here, whether both agree by a stated rule, and what differs in the
+method. The errors of the identified models come first, because the results depend on them; figure 5 has tables of
+flatness, coupling and axis error of what was played. `analysis.evaluation.reproduction` computes the findings.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -14,8 +19,10 @@ BANNER = (
 )
 
 _SAYS: dict[bool | None, str] = {True: "yes", False: "no", None: "–"}
+"""Text for whether a finding is as published; None: not compared."""
 
 _MEASURES = ("Flatness", "Worst coupling", "Median coupling", "Axis error", "Error")
+"""Column headings of `_numbers`."""
 
 _MODEL_NOTE = (
     "Root mean squares relative to the response, as measured. Held out: the prediction of a record that the fit did "
@@ -43,7 +50,8 @@ def render_reproduction_report(
     provenance: Mapping[str, str],
     generated: str,
 ) -> str:
-    """HTML. pictures: by the number of the published figure."""
+    """The report as an HTML page. pictures: by the number of the published figure. generated: local time of the report;
+    provenance: versions and hashes by name."""
     sections = [*_models(reproduction), _overview(reproduction)]
     for figure in sorted(reproduction.figures, key=lambda each: each.figure):
         played = _tabulate_played(reproduction) if figure.figure == 5 else ()
@@ -66,7 +74,7 @@ def render_reproduction_report(
 
 
 def overview_lines(reproduction: Reproduction) -> tuple[str, ...]:
-    """One line per figure, for a terminal."""
+    """A line per figure with the number of findings as published, for a terminal."""
     return tuple(
         f"Figure {figure.figure}: {_agreement_text(figure)}  {figure.title}"
         for figure in sorted(reproduction.figures, key=lambda figure: figure.figure)
@@ -91,6 +99,7 @@ def _percent(share: float | None) -> str:
 
 
 def _overview(reproduction: Reproduction) -> Section:
+    """Section with the number of findings as published, and a list of those that differ."""
     compared = [finding for figure in reproduction.figures for finding in figure.findings if _is_compared(finding)]
     agreeing = sum(finding.as_published is True for finding in compared)
     otherwise = tuple(
@@ -108,6 +117,7 @@ def _overview(reproduction: Reproduction) -> Section:
 
 
 def _section(figure: FigureFindings, pictures: Sequence[Picture], tables: tuple[Table, ...]) -> Section:
+    """Section on one figure: what was published, differences in the method, pictures and tables."""
     return Section(
         f"Figure {figure.figure}: {figure.title}",
         paragraphs=(
@@ -121,6 +131,7 @@ def _section(figure: FigureFindings, pictures: Sequence[Picture], tables: tuple[
 
 
 def _findings_table(figure: FigureFindings) -> Table:
+    """Table of published and reproduced findings of a figure; the rules of comparison are its notes."""
     rows = tuple(
         (finding.what, finding.published or "–", finding.here, _SAYS[finding.as_published])
         for finding in figure.findings
@@ -132,6 +143,7 @@ def _findings_table(figure: FigureFindings) -> Table:
 
 
 def _remarks(figure: FigureFindings) -> tuple[Table, ...]:
+    """Folded table of the remarks of the analyses; empty without remarks."""
     if not figure.remarks:
         return ()
     rows = tuple((str(number), remark) for number, remark in enumerate(figure.remarks, start=1))
@@ -139,6 +151,7 @@ def _remarks(figure: FigureFindings) -> tuple[Table, ...]:
 
 
 def _tabulate_played(reproduction: Reproduction) -> tuple[Table, ...]:
+    """Table of the quality of every row of figure 5, and if known a table of other ways to drive the device."""
     header = ("", "Device", "Wanted", *_MEASURES)
     rows = tuple((row.name, row.device, row.signal, *_numbers(row)) for row in reproduction.played)
     tables = [Table("What was played, row by row", header, rows, notes=_ROW_NOTES)]
@@ -150,6 +163,7 @@ def _tabulate_played(reproduction: Reproduction) -> tuple[Table, ...]:
 
 
 def _numbers(row: PlayedRow) -> tuple[str, ...]:
+    """The values of `_MEASURES` as text with units."""
     return (
         f"{number(row.flatness_db)} dB",
         f"{number(row.coupling_db, 1)} dB",
@@ -164,6 +178,7 @@ def _cost(row: PlayedRow) -> str:
 
 
 def _is_compared(finding: Finding) -> bool:
+    """Whether a rule compares the finding with the published one."""
     return finding.as_published is not None
 
 

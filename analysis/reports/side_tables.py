@@ -1,4 +1,8 @@
-"""Tables beside the direction thresholds: detection, catch trials, practice."""
+"""Tables of a study report on detection, delivered acceleration, catch trials and practice.
+
+They supplement the direction thresholds: detection thresholds tell whether a vibration is felt at all, the ratio of
+delivered to wanted acceleration whether the stimulus was as intended, catch trials how attentive a participant was.
+"""
 
 from collections.abc import Iterator
 
@@ -13,7 +17,7 @@ from protocols.procedure.staircase import to_db
 
 
 def detection_table(analysis: StudyAnalysis) -> Table:
-    """Detection beside direction, per participant and frequency."""
+    """Table of detection and direction thresholds (N) per participant and frequency, with their ratio in dB."""
     table = analysis.detection_table
     rows = [
         (subject, f"{frequency:g} Hz", *_beside_direction(analysis, subject, frequency, value, bound))
@@ -33,8 +37,8 @@ def detection_table(analysis: StudyAnalysis) -> Table:
 
 
 def detection_run_table(analysis: StudyAnalysis) -> Table:
-    """Table of all detection runs: thresholds in newtons, trials, share of right answers, d' of two intervals, and
-    criterion."""
+    """Folded table of all detection runs: thresholds in newtons, trials, share of right answers, d' of two intervals,
+    and criterion."""
     turns = () if analysis.protocol.staircase.is_bayesian else ("Reversals",)
     return Table(
         caption="All detection runs",
@@ -53,7 +57,7 @@ def detection_run_table(analysis: StudyAnalysis) -> Table:
 
 
 def delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
-    """Share of the wanted acceleration, where stimuli were accelerations."""
+    """Table of delivered over wanted acceleration by frequency; empty where levels are commanded forces."""
     rows = tuple(
         (
             f"{delivery.frequency_hz:g} Hz",
@@ -98,7 +102,7 @@ def catch_table(analysis: StudyAnalysis) -> Table:
 
 
 def practice_table(analysis: StudyAnalysis) -> Table:
-    """Table of practice runs, with right answers and whether each was passed, not passed or broken off."""
+    """Folded table of practice runs, with right answers and whether each was passed, not passed or broken off."""
     settings = analysis.protocol.practice
     return Table(
         caption="Practice runs",
@@ -131,6 +135,8 @@ def practice_table(analysis: StudyAnalysis) -> Table:
 def _beside_direction(
     analysis: StudyAnalysis, subject: str, frequency_hz: float, felt_n: float | None, felt_bound: bool
 ) -> Iterator[str]:
+    """Cells with the detection threshold, the direction threshold, and their ratio in dB where neither is cut. felt_n:
+    detection threshold (N); felt_bound: whether the cap cut it."""
     told_n, told_bound = _direction(analysis, subject, frequency_hz)
     yield mark_cut(felt_n, felt_bound)
     yield mark_cut(told_n, told_bound)
@@ -141,6 +147,7 @@ def _beside_direction(
 
 
 def _direction(analysis: StudyAnalysis, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
+    """Direction threshold (N; None where missing), and whether the cap cut it."""
     table = analysis.table
     if subject not in table.subjects or frequency_hz not in table.frequencies_hz:
         return None, False

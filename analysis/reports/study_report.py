@@ -1,4 +1,10 @@
-"""Report of a study as a self-contained page."""
+"""Report of a psychophysical study as one self-contained HTML page.
+
+This module decides which sections the page has and in which order: declared contrast, quality of the device model,
+warnings, thresholds and their comparison, detection, catch and practice trials, delivered stimuli, cues, acceleration
+ellipses, single runs, methods. The tables come from `study_tables` and its neighbours, the statistics from
+`analysis.psychophysics.study_analysis`; no statistic is computed here.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -36,6 +42,7 @@ _BANNERS = {
     Population.NOT_FELT: "Nothing was felt: people answered while a simulated device moved nothing. These numbers are "
     "a rehearsal and must not be used as measurements of people.",
 }
+"""Banner on top of the page, by who answered; empty where people felt the stimuli."""
 
 
 def render_study_report(
@@ -46,9 +53,11 @@ def render_study_report(
     ellipsoids: Sequence[EllipsoidResult] = (),
     qualities: Sequence[tuple[str, str]] = (),
 ) -> str:
-    """HTML. pictures: of `analysis.figures.study_pictures`, for the same analysis and ellipsoids.
+    """The page as HTML text.
 
-    qualities: of the models that stimuli went through, as (sessions, sentence).
+    pictures: those of `analysis.figures.study_pictures` for the same analysis and ellipsoids. provenance: versions,
+    hashes and inputs by name. generated: local time of the report with its UTC offset. qualities: pairs (sessions,
+    sentence) on the device models that converted accelerations to forces.
     """
     by_name = {picture.name: picture for picture in pictures}
     sections = [
@@ -76,6 +85,7 @@ def render_study_report(
 
 
 def _summary(analysis: StudyAnalysis) -> str:
+    """Line under the title: numbers of participants, runs, complete runs and counted trials."""
     if not analysis.thresholds:
         return _detection_summary(analysis)
     complete = sum(row.complete for row in analysis.thresholds)
@@ -118,6 +128,7 @@ def _warnings(analysis: StudyAnalysis) -> Section:
 
 
 def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Section]:
+    """Thresholds, the primary analysis, and the published comparison, in this order; empty without a test run."""
     if not analysis.thresholds:
         return []
     pairs = (pair_table(analysis),) if analysis.comparisons.pairs else ()
@@ -139,7 +150,7 @@ def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Se
 
 
 def _side_sections(analysis: StudyAnalysis) -> list[Section]:
-    """Detection, catch trials, practice: each only where it was taken."""
+    """Detection runs, catch trials and practice runs, each only where the study has them."""
     sections = []
     if analysis.detection:
         felt = "Which of two intervals held a vibration, in any direction: the level from which it is felt at all."
@@ -155,6 +166,7 @@ def _side_sections(analysis: StudyAnalysis) -> list[Section]:
 
 
 def _delivery(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Section]:
+    """Section on the accelerations that the device delivered; empty where the figure `delivered` does not exist."""
     if "delivered" not in by_name:
         return []
     tables = delivery_tables(analysis)

@@ -1,4 +1,8 @@
-"""Tables of a study report, in which numbers become text."""
+"""Tables of a study report: thresholds, one-way ANOVA, Tukey-Kramer pairs, repeated-measures tests, runs, ellipses.
+
+This module only formats values of `analysis.psychophysics.study_analysis` as text; tests and effect sizes are computed
+there. Each function takes the whole analysis and returns one `Table`. Forces are in N, levels in dB re 1 N.
+"""
 
 from collections.abc import Callable, Sequence
 
@@ -14,8 +18,8 @@ from analysis.wording import NONE, count, format_signed, mark_cut, number, p_val
 
 
 def threshold_table_text(analysis: StudyAnalysis) -> Table:
-    """Table of thresholds in newtons, a row per participant and a column per frequency; thresholds that the cap cut are
-    marked."""
+    """Table of thresholds in newtons, a row per participant and a column per frequency; thresholds that are limited by
+    the largest permitted level (cap) are marked as cut."""
     table = analysis.table
     rows = [
         (subject, *("stopped" if stop else mark_cut(value, cut) for value, cut, stop in zip(*cells, strict=True)))
@@ -67,16 +71,19 @@ def group_table(analysis: StudyAnalysis) -> Table:
 
 
 def _coverage_suffix(analysis: StudyAnalysis) -> str:
-    """Added to the name of an interval or effect size that includes cut runs."""
+    """Suffix for the name of an interval or effect size that includes cut or stopped runs: its confidence does not
+    hold; empty where there is none."""
     return ", without coverage" if analysis.table.coverage else ""
 
 
 def _coverage(analysis: StudyAnalysis) -> tuple[str, ...]:
+    """Note on why confidence levels do not hold (`ThresholdTable.coverage`); empty without cut or stopped runs."""
     return (analysis.table.coverage,) if analysis.table.coverage else ()
 
 
 def one_way_table(analysis: StudyAnalysis) -> Table:
-    """Table of the one-way ANOVA; without rows where nothing can be computed: the notes say why."""
+    """Table of the one-way ANOVA between frequencies; without rows, but with the reason in the notes, where F
+    cannot be computed."""
     anova = analysis.anova
     rows: tuple[tuple[str, ...], ...] = ()
     effect: tuple[str, ...] = ()
@@ -121,7 +128,8 @@ def pair_table(analysis: StudyAnalysis) -> Table:
 
 
 def within_table(analysis: StudyAnalysis) -> Table:
-    """Table of the repeated-measures tests that can be computed: the notes say why others cannot."""
+    """Table of the repeated-measures tests that can be computed: ANOVA with Greenhouse-Geisser's and with Huynh-Feldt's
+    correction and without one, and Friedman's test. The notes say why a test is missing."""
     within, ranks = analysis.within, analysis.ranks
     rows: list[tuple[str, ...]] = []
     effects = []
@@ -153,6 +161,7 @@ def within_table(analysis: StudyAnalysis) -> Table:
 
 
 TURNS = "Reversals at the cap: of the averaged ones. Pushes: how often the rule asked for more than the cap."
+"""Note below the table of runs, for staircases."""
 
 
 def run_table(analysis: StudyAnalysis) -> Table:
@@ -198,18 +207,20 @@ def run_table(analysis: StudyAnalysis) -> Table:
 
 
 def _threshold(row: Threshold) -> str:
+    """Threshold in N, or "stopped" where the trial limit ended the run."""
     return "stopped" if row.ended is RunEnd.TRIAL_LIMIT else mark_cut(row.threshold_n, row.censored)
 
 
 def _repeats(row: Threshold) -> str:
+    """Number and share of presentations that the participant made void; "!" marks frequent ones."""
     if not row.repeats_at_will:
         return "0"
     return f"{row.repeats_at_will} ({100 * row.repeat_rate:.1f} %){' !' * row.asked_often}"
 
 
 def ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
-    """Table of acceleration ellipses: ratio of the axes and tilt, by mean squares and by phasors; off-axis ratio;
-    harmonics."""
+    """Table of acceleration ellipses: ratio of the axes and tilt (degrees), from second moments and from phasors at the
+    driven frequency; ratio of off-axis to on-axis acceleration; share of harmonics."""
     return Table(
         caption="Acceleration ellipses",
         header=(

@@ -1,7 +1,6 @@
-"""Physical effects that a model may leave out: one file each, all alike, collected in `catalogue`.
+"""Physical effects that a device model may lack, such as friction, end stops, sensor lag: one file each, same layout.
 
-`effect` says the data type: equation, parameters, place; `starts` estimate starting values of its parameters from a
-model's residuals; `simulation` computes the response of a model with its effects to commands; `placing` translates
-effects of a model file. `discovered_law` and `law_entry` are effects that have no name. Begin at `effect.py` and
-`coulomb_friction.py`.
+`effect` defines the data type, `catalogue` collects all effects, `placing` assigns those of a model file to axes.
+Order of the data: residuals of a model -> `starts` (starting values) -> `simulation` (response with the effects).
+`discovered_law` and `law_entry` make effects of formulas without a name. Begin at `effect.py`, `coulomb_friction.py`.
 """

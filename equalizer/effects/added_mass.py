@@ -1,4 +1,9 @@
-"""Added mass: a mass at the handle that the model lacks."""
+"""Added mass: a mass at the handle, such as a tool or a grip, that the model lacks.
+
+    F = -m dv/dt        m > 0 in kg (a rotation: kg m²)
+
+It is added to the mass matrix along the driven axis: M + m a aᵀ, a the axis's unit vector.
+"""
 
 from dataclasses import replace
 
@@ -11,7 +16,7 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _GUESS = 0.1
-"""Start value as a share of the model's own mass, used where re-tuning has absorbed the missing mass."""
+"""Second starting value, as a share of the model's own mass: re-tuning the model may have absorbed the missing mass."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
@@ -20,6 +25,8 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Mass by linear regression of the missing force on -dv/dt, with position, velocity and a constant as nuisances
+    (the median over all axes for ALL_SITES); then a share of the model's mass. Only positive values."""
     sites = range(evidence.model.inputs) if axis == ALL_SITES else (axis,)
     found = []
     for site in sites:

@@ -1,4 +1,9 @@
-"""Amplifier lag: a current loop that follows its command as a first-order low pass."""
+"""Amplifier lag: a closed current loop that follows its command as a first-order low pass.
+
+    T dF/dt + F = u        T in s, command u and actuator force F in N
+
+The solution for a command that is held over a step is exact: `simulation.command_path.lag_mean` and `lag_at_end`.
+"""
 
 import numpy as np
 
@@ -10,7 +15,7 @@ from equalizer.effects.starts.response_starts import starts_for_lateness
 from equalizer.signals.signal import FloatArray
 
 SHORTEST_S, LONGEST_S = 2e-5, 0.05
-"""Range of time constants that are tried as starts."""
+"""Range of time constants (s) that are searched for a starting value."""
 
 
 def _lag_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
@@ -22,6 +27,7 @@ def _lag_force_at_end(commands: FloatArray, step_s: float, values: Values) -> Fl
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Time constants from the delay of the response and from a grid search on the missing force."""
     fitting = likeliest_value(evidence, axis, lag_mean, list(np.geomspace(SHORTEST_S, LONGEST_S, 16)), False)
     return tuple({"time_constant": late} for late in starts_for_lateness(evidence, axis, fitting, LONGEST_S))
 

@@ -1,4 +1,8 @@
-"""A well-damped oscillator on the actuator: a body on something soft, such as a finger, a case or a wrist."""
+"""Well-damped oscillator on the actuator: a body on a soft support, such as a finger, a case or a wrist.
+
+A body of mass m and position q is coupled to the axis (position x, velocity v) by a damper c and a spring k:
+F = -(c (v - q') + k (x - q)), m q'' = -F. It adds a coordinate to the model. `extra_mode` is the lightly damped case.
+"""
 
 import numpy as np
 
@@ -9,7 +13,7 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 RATIOS = (0.1, 0.3, 0.8, 2.0)
-"""Damping ratios to start from."""
+"""Damping ratios that are tried for starting values."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
@@ -18,6 +22,7 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """The two oscillators that explain most of the missing force, with k = m w² and c = 2 ratio m w."""
     missing = missing_force_spectra(evidence, axis)
     natural = np.geomspace(2.0, 0.4 * evidence.sample_rate_hz, 50).tolist()
     starts = []

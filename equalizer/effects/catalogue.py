@@ -1,4 +1,8 @@
-"""All effects that a diagnosis can name and a simulation can include."""
+"""Catalogue of all effects that a diagnosis can name and a simulation can include.
+
+Each module defines one `EFFECT`. A new effect needs its own module, an entry here and its name in
+`equalizer.plant.effect_vocabulary`, in the same order.
+"""
 
 from equalizer.effects import (
     added_mass,
@@ -62,3 +66,4 @@ CATALOGUE: tuple[Effect, ...] = tuple(
 """Effects in the order of `equalizer.plant.effect_vocabulary`."""
 
 EFFECTS: dict[str, Effect] = {effect.name: effect for effect in CATALOGUE}
+"""The same effects by name."""

@@ -1,9 +1,11 @@
-"""Clock drift: commands are sent and responses sampled by two clocks of different rate.
+"""Clock drift: two clocks of different rate, one for sending the commands and one for sampling the response.
 
-y(t) = x(t (1 + ppm 1e-6)): the sample that carries the time t was taken later, at t (1 + ppm 1e-6), where ppm > 0, by a
-clock that runs slow. A file may have been resampled from one clock to the other: `interpolated` is the share of linear
-interpolation in that (0: band-limited, which leaves the spectrum alone), `with_position` whether the position has the
-response's clock (1) or the commands' (0).
+    y(t) = x(t (1 + ppm 1e-6))
+
+The sample with time stamp t was taken at t (1 + ppm 1e-6): later than t for ppm > 0, by a clock that runs slow. A file
+may have been resampled from one clock to the other: `interpolated` is the share (0 to 1) of linear interpolation in the
+resampling; the rest is band-limited and does not change the spectrum. `with_position` is 1 where the position has the
+clock of the response and 0 where it has that of the commands.
 """
 
 import numpy as np
@@ -15,13 +17,13 @@ from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
 
 WINDOW_S, LEAST_WINDOWS = 2.0, 4
-"""Length of the windows in which the delay is measured, and fewest of them for a slope."""
+"""Length (s) of the windows in which the time shift is measured, and fewest windows for a slope."""
 LONGEST_S = 0.1
 """Largest time shift (s) of a window that is searched for."""
 LARGEST_PPM = 2e4
-"""Largest drift: beyond it the sample rate is wrong, not the clock."""
+"""Largest drift (1e-6): a larger one is taken for a wrong sample rate."""
 LEAST_SIGMA = 5.0
-"""Least drift, in its standard errors, for the effect to be tried."""
+"""Least drift, in standard errors, from which the effect is tried."""
 
 
 def _read_drifting(
@@ -35,8 +37,8 @@ def _read_position(position: FloatArray, sample_rate_hz: float, values: Values) 
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """The slope of the response's time shift over time, window by window. Linear interpolation lowers peaks, which a
-    real clock error does not: linear and band-limited interpolation are both tried."""
+    """ppm from the slope of the response's time shift over time; the better fit of linear and band-limited
+    interpolation first, because only linear interpolation lowers peaks. Empty where the slope is not significant."""
     slope = _lateness_per_second(evidence) if channel <= 0 else None
     if slope is None:
         return ()
@@ -48,6 +50,7 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
 
 
 def _misfit(evidence: Evidence, values: Values) -> float:
+    """Sum of squares of the response's residual over the noise."""
     read = _read_drifting(evidence.predicted, evidence.sample_rate_hz, (), values)
     return float(np.sum((((evidence.response - read) / evidence.noise) ** 2)[evidence.used > 0]))
 
@@ -63,6 +66,8 @@ def _position_drifts_along(evidence: Evidence, slope: float) -> float:
 
 
 def _lateness_per_second(evidence: Evidence) -> float | None:
+    """Slope of the response's time shift (s per s, equal to -1e-6 ppm); None where it is not significant or too
+    large."""
     found = _lateness_slope(evidence, evidence.response / evidence.noise, evidence.predicted / evidence.noise)
     if found is None:
         return None
@@ -71,7 +76,8 @@ def _lateness_per_second(evidence: Evidence) -> float | None:
 
 
 def _lateness_slope(evidence: Evidence, measured: FloatArray, predicted: FloatArray) -> tuple[float, float] | None:
-    """Slope of the time shift over time (Theil-Sen estimator), and its standard error; None with too few windows."""
+    """Slope of the time shift over time (Theil-Sen estimator), and its standard error from the scaled median absolute
+    deviation of the residuals; None with too few windows. measured, predicted: (n, channels), over the noise."""
     rate = evidence.sample_rate_hz
     length = int(WINDOW_S * rate)
     if LONGEST_S * rate < 1:

@@ -1,4 +1,10 @@
-"""Cogging: a force that is periodic in position, as of magnets over iron, gear teeth, or the strands of a cable."""
+"""Cogging: a force that is periodic in position, as of magnets over iron, gear teeth, or the strands of a cable.
+
+    F = A sin(2 pi x / p + phase)        A in N, pitch p in m (a rotation: N m, rad)
+
+The pitch for a fit is found in the spectrum of the missing force over position, amplitude and phase by linear least
+squares.
+"""
 
 import numpy as np
 
@@ -11,13 +17,13 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 CELLS = 4096
-"""Cells of the histogram of positions over the travel: the shortest pitch that is found is four cells long."""
+"""Number of cells into which the travel is divided; the shortest pitch that is found is four cells long."""
 PITCHES = 3
 """Number of pitches that are tried, strongest peak of the periodogram first. By hand."""
 _FINER = 8
-"""Points of the spectrum per line of the position's grid (zero padding), so that a peak between lines is found."""
+"""Factor of zero padding: spectral points per period over the travel, so that a peak between two lines is found."""
 _LEAST_PERIODS = 2
-"""Periods over the travel from which on a peak counts: fewer look like a spring."""
+"""Least number of periods over the travel: fewer cannot be distinguished from a nonlinear spring."""
 _ITERATIONS = 4
 """Fixed-point iterations of the implicit step: each multiplies the error by the force's slope over the position times
 the step's motion per newton, below 1 unless a pitch is crossed within a step. By hand."""
@@ -36,10 +42,12 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    """Parameters of `_law`: amplitude (N), wave number (rad/m), phase (rad)."""
     return np.array([values["amplitude"], 2 * np.pi / values["pitch"], values.get("phase", 0.0)])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """A set of values for each likely pitch, the set that explains most of the missing force first."""
     motion = axis_motion(evidence, axis)
     beside = regress_beside_linear(motion)
     found = [_fit_pitch(motion, beside, pitch) for pitch in _likely_pitches(motion, beside)]
@@ -48,7 +56,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 def _likely_pitches(motion: AxisMotion, beside: PartialRegression) -> list[float]:
     """Starting values of the pitch (m) from a periodogram of the missing force over the position, strongest first; none
-    where the axis does not move. beside: the regression of the missing force on linear terms."""
+    where the axis does not move. beside: regression with the linear terms projected out of the missing force."""
     way = float(np.ptp(motion.position))
     if way == 0:
         return []
@@ -72,7 +80,8 @@ def _likely_pitches(motion: AxisMotion, beside: PartialRegression) -> list[float
 
 
 def _fit_pitch(motion: AxisMotion, beside: PartialRegression, pitch: float) -> tuple[float, Values]:
-    """Explained sum of squares, and amplitude and phase, by least squares on sine and cosine of this pitch."""
+    """Share of the missing force that sine and cosine of this pitch (m) explain beyond linear terms, and the values:
+    A sin(angle + phase) = A cos(phase) sin(angle) + A sin(phase) cos(angle), by linear least squares."""
     angle = 2 * np.pi * motion.position / pitch
     fit = beside.fit(np.sin(angle), np.cos(angle))
     sine, cosine = fit.strengths.tolist()

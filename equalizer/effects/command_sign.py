@@ -1,8 +1,9 @@
-"""A mechanical model of the same device with the sign of chosen commands reversed.
+"""Converts a mechanical model with its effects to reversed signs of chosen commands.
 
-An axis points where its command pushes. With the command, the sign of its coordinate and of every force along it
-reverses: F(x, v) becomes -F(-x, -v). Most laws are odd and stay the same; the table lists the parameters of the others
-that change.
+The positive direction of a driven axis is that in which a positive command pushes. Where the sign of the command is
+reversed, the coordinate x of the axis and all forces along it reverse too: F(x, v) becomes -F(-x, -v). Odd laws, such
+as friction or springs, stay the same; `SIGN_REVERSED`, `SWAPPED` and `TILTED` list the parameters of other laws that
+change.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,17 +23,19 @@ SIGN_REVERSED: Mapping[str, tuple[str, ...]] = {
     "gravity_torque": ("angle",), "cogging": ("phase",), "end_stop": ("position", "side"),
     "pose_dependent_inertia": ("per_m",),
 }  # fmt: skip
-"""Effects that differ with the direction, and their parameters that change their sign."""
+"""Effects that depend on the sign of the axis, and their parameters that change sign with it."""
 SWAPPED = {"asymmetric_friction": ("level_positive", "level_negative")}
+"""Effects with one parameter per direction of motion; the two values are exchanged."""
 TILTED = {"extra_mode": ("tilt_next", "tilt_after_next")}
-"""Parameters that couple an axis to those after it."""
+"""Parameters that couple an axis to the next axis and the one after it; they change sign where one of the two axes is
+reversed and the other is not."""
 
 
 def with_reversed_commands(
     model: MechanicalModel, signs: Sequence[float], inputs: tuple[str, ...], outputs: tuple[str, ...]
 ) -> MechanicalModel:
-    """Return the model whose answer to the command times `signs`, 1 or -1 each, is that of `model` to the command.
-    Raises PlacingError."""
+    """The model whose response to the command times `signs` (1 or -1 per input) equals that of `model` to the command.
+    inputs, outputs: channel names. Raises PlacingError for an effect on an unknown axis."""
     way = np.asarray(signs, dtype=np.float64)
     effects = [each for effect in model.effects for each in _reverse_effects(model, effect, way, (inputs, outputs))]
     return replace(model, input=model.input * way, effects=tuple(effects))
@@ -41,7 +44,7 @@ def with_reversed_commands(
 def _reverse_effects(
     model: MechanicalModel, effect: ModelEffect, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]
 ) -> tuple[ModelEffect, ...]:
-    """One; one per axis where it differs with the direction and stood at all of them."""
+    """The effect for the reversed axes; one entry per axis where an effect that depends on the sign acts on several."""
     inputs, outputs = channels
     if effect.law is None and effect.kind not in (*SIGN_REVERSED, *SWAPPED, *TILTED):
         return (effect,)
@@ -58,6 +61,7 @@ def _reverse_effects(
 
 
 def _reverse_parameters(effect: ModelEffect, site: int, way: FloatArray) -> dict[str, float]:
+    """The effect's parameters at axis `site`. way: (m,), 1 or -1 per axis."""
     numbers = dict(effect.parameters)
     for place, name in enumerate(TILTED.get(effect.kind, ()), start=1):
         if name in numbers:
@@ -74,7 +78,8 @@ def _reverse_parameters(effect: ModelEffect, site: int, way: FloatArray) -> dict
 
 
 def _reverse_law(law: Law, site: int, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]) -> Law:
-    """The formula with the signals of reversed axes negated, and its value too where its own axis is reversed."""
+    """The law with the signals of reversed axes negated in its formula, and its result negated where its own axis
+    (site) is reversed."""
     inputs, outputs = channels
     letters, against = axis_names(inputs), set[str]()
     for axis in np.flatnonzero(way < 0):
@@ -85,6 +90,7 @@ def _reverse_law(law: Law, site: int, way: FloatArray, channels: tuple[tuple[str
 
 
 def _negate_variables(node: Node, against: set[str]) -> Node:
+    """The syntax tree with each variable named in `against` replaced by its negative."""
     match node:
         case Variable(name) if name in against:
             return Apply("neg", (node,))

@@ -1,4 +1,9 @@
-"""Constant force: the same force at all times, such as weight or a pulling cable."""
+"""Constant force along a driven axis, such as weight or the pull of a cable.
+
+    F = force        in N (a rotation: N m), of either sign
+
+It shifts the equilibrium position; a linear model keeps its resonances.
+"""
 
 import numpy as np
 
@@ -15,8 +20,9 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Mean of the missing force, and the constant of its regression with position, velocity and acceleration."""
     motion = axis_motion(evidence, axis)
-    # Re-tuning may have changed the stiffness, but it must not have moved the equilibrium.
+    # Re-tuning of a linear model can change its stiffness but not its equilibrium: a constant is no nuisance here.
     beside = PartialRegression(motion.force, linear_part(motion, constant=False))
     force = float(beside.fit(np.ones_like(motion.force)).strengths[0])
     mean = float(np.mean(motion.force))

@@ -1,8 +1,9 @@
 """Coulomb friction: a constant force against the motion; at rest it balances any smaller force.
 
-The law is F = -level sgn(v). The simulation replaces the jump at v = 0 by a bristle that slips after 50 nm
-(`equalizer.effects.simulation.dry_friction_kernel`): F = -level sgn(v) in sliding, any force from -level to level at
-rest.
+    F = -level sgn(v) in sliding, any force from -level to level at rest; level in N (a rotation: N m)
+
+The simulation replaces the jump at v = 0 by the bristle of the LuGre model, which slips after 50 nm
+(`equalizer.effects.simulation.dry_friction_kernel`).
 """
 
 import numpy as np
@@ -21,6 +22,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Level by linear regression of the missing force on -sgn(v) where the axis slides; empty unless positive."""
     motion = select_sliding_motion(evidence, axis)
     level = float(regress_beside_linear(motion).fit(-np.sign(motion.velocity)).strengths[0])
     return ({"level": level},) if level > 0 else ()

@@ -1,4 +1,8 @@
-"""Cross-axis sensitivity: a channel that also reads a share of the others, as sensing axes that are not orthogonal."""
+"""Cross-axis sensitivity: a sensor channel also reads a share of other channels, e.g. by sensing axes that are not
+orthogonal.
+
+    y_i = x_i + from_next x_(i+1) + from_after_next x_(i+2)        channels counted cyclically, shares without unit
+"""
 
 import numpy as np
 
@@ -8,11 +12,11 @@ from equalizer.effects.starts.response_starts import shares_of
 from equalizer.signals.signal import FloatArray
 
 FROM = ("from_next", "from_after_next")
-"""Parameters: share of the next channel and of the one after it, counted cyclically."""
+"""Parameter names: share of the next channel, and of the channel after it, counted cyclically."""
 LARGEST = 1.0
-"""Largest share of another channel: beyond it the channels would be exchanged, which is an error of wiring."""
+"""Largest share of another channel: a larger one means exchanged channels, which is a wiring error."""
 LEAST = 1e-4
-"""Least share that is tried: a hundredth of what data sheets of accelerometers allow (1 %)."""
+"""Least share that is tried: a hundredth of the cross-axis sensitivity that accelerometer data sheets allow (1 %)."""
 
 
 def _next_channels(channel: int, channels: int) -> list[int]:
@@ -29,6 +33,7 @@ def _mix_channels(response: FloatArray, sample_rate_hz: float, channels: tuple[i
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """Shares by linear regression of the channel's residual on the other predicted channels and its own (its gain)."""
     others = _next_channels(channel, evidence.response.shape[1])
     residual = evidence.response - evidence.predicted
     if not others:

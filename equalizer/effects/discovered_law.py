@@ -1,4 +1,9 @@
-"""A discovered law as an effect: a formula that is added to the force, or replaces a command or a response."""
+"""Discovered law as an effect: a formula that is added to the force at an axis, or replaces a command or a response.
+
+A law (`equalizer.laws.law`) is found in recordings (`analysis.diagnosis.discovery`) or written in a model file, and has
+no name in the vocabulary. This module binds the signals of its formula (x, vx, ax, fx, t, channel names) to the columns
+of a recording, compiles it, and derives the fit parameters p0, p1, … from their roles in the formula.
+"""
 
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -23,6 +28,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
 LETTERS, DERIVATIVES, COMMAND = "xyz", ("", "v", "a"), "f"
+"""Letters of the axes, and prefixes of position, velocity, acceleration and command: x, vx, ax, fx."""
 _TAKEN = {
     "t",
     "pi",
@@ -32,6 +38,7 @@ _TAKEN = {
     *FUNCTIONS,
     *(prefix + letter for letter in LETTERS for prefix in (*DERIVATIVES, COMMAND)),
 }
+"""Names that a recorded condition cannot have in a formula, because they have another meaning."""
 LARGEST, STEEPEST = 1e15, 20.0
 """Largest magnitude of a free parameter, and of an exponent."""
 
@@ -59,8 +66,9 @@ def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
     """The effect of a law, to be placed at the axis (force, command) or channel (response) that `law.axis` names. Its
     values are p0, p1, …
 
-    Signals are called by axis and quantity (x, vx, ax, fx; y, …) or as the recording's channels are. Where these do not
-    end in x, y, z, the axes are called so in their order. Raises LawError for a signal that is not there.
+    A formula names its signals by axis and quantity (x, vx, ax, fx; y, …) or by the recording's channel names. Where
+    the channel names do not end in x, y, z, these letters denote the axes in their order. Raises LawError for a signal
+    that the recording lacks.
     """
     make: dict[str, Callable[[Law, Channels], Acts]] = {
         "force": _force_action, "command": _command_action, "response": _response_action
@@ -92,12 +100,14 @@ def condition_names(channels: Channels) -> tuple[str, ...]:
 
 
 def _is_free(name: str) -> bool:
+    """Whether a condition's channel name is valid in a formula and has no other meaning there."""
     known = iskeyword(name) or name in _TAKEN or re.fullmatch(r"[pc]\d+", name)
     return name.isidentifier() and not known
 
 
 def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ...]:
-    """Units of the law's free parameters: those that it states, else those that dimensional analysis determines."""
+    """Units of the law's free parameters: those that the law states, else those from dimensional analysis in the
+    given unit system."""
     if law.units:
         return law.units
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity, 0)
@@ -137,6 +147,7 @@ def _adds_to_signal(tree: Node) -> bool:
 
 
 def _parameter(name: str, number: float, role: Role, none: float | None) -> Parameter:
+    """Fit parameter of a role (`equalizer.laws.law.Role`). none: value at which a factor makes the effect vanish."""
     if role == "factor":
         return Parameter(name, -LARGEST, LARGEST, none, scale="signed")
     if role == "phase":
@@ -157,12 +168,13 @@ def _left_hand_side(law: Law) -> str:
 
 
 def has_memory(law: Law) -> bool:
-    """Whether it depends on the past of its signals."""
+    """Whether the formula has an operator with memory (lag, play, delay, integral): it depends on past signals."""
     return any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree))
 
 
 def axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
-    """Letters of the axes in a formula: the ends of their channels' names where these are x, y, z, else in order."""
+    """Letters of the axes in a formula: the last letters of the channel names where these are distinct and in "xyz",
+    else x, y, z in the order of the channels."""
     ends = tuple(channel[-1:] for channel in channels)
     if len(set(ends)) == len(ends) and set(ends) <= set(LETTERS):
         return ends
@@ -170,7 +182,7 @@ def axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def names_of_readings(channels: Channels) -> tuple[str, ...]:
-    """Names of the response's channels in a formula: ax, ay, az of accelerations, or as the recording calls them."""
+    """Names of the response's channels in a formula: ax, ay, az of accelerations, or the recording's channel names."""
     found: dict[int, str] = {}
     for name, number in _response_signals(channels).items():
         found.setdefault(number, name)
@@ -178,7 +190,8 @@ def names_of_readings(channels: Channels) -> tuple[str, ...]:
 
 
 def force_signals(channels: Channels) -> dict[str, int]:
-    """Column of each signal in the compiled law's input."""
+    """Index of each signal in the compiled law's input: time, then position, velocity, acceleration and command of each
+    axis, then the conditions."""
     names = condition_names(channels)
     first = 1 + PER_AXIS * len(channels.inputs)
     conditions = {name: place for place, name in enumerate(names, first)}
@@ -186,6 +199,8 @@ def force_signals(channels: Channels) -> dict[str, int]:
 
 
 def _motion_signals(channels: Channels) -> Iterator[tuple[str, int]]:
+    """Names of the axes' signals, and their indices after the time; a response channel is named only where there is one
+    per axis."""
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
     for axis, letter in enumerate(axis_names(channels.inputs)):
         for number, prefix in enumerate((*DERIVATIVES, COMMAND)):
@@ -198,7 +213,9 @@ def _motion_signals(channels: Channels) -> Iterator[tuple[str, int]]:
 
 
 def _force_action(law: Law, channels: Channels, samples: FloatArray | None = None, rate_hz: float = 0.0) -> AxisForce:
-    """samples: (n, q), the recorded conditions, at `rate_hz`, each held until the next one; None = not known."""
+    """Action of a force law. samples: (n, q), the recorded conditions at `rate_hz`, each held until the next; None =
+    unknown. The action's `pack` raises ValueError for a model with another number of axes, and for missing conditions.
+    """
     signals = force_signals(channels)
     program, axes, conditions = program_of(law.tree, signals), len(channels.inputs), len(channels.conditions)
     places = {signals[name] for name in law.variables if name not in ("t", "pi")}
@@ -222,8 +239,10 @@ def _force_action(law: Law, channels: Channels, samples: FloatArray | None = Non
 
 
 def _command_action(law: Law, channels: Channels) -> OnCommand:
+    """Action of a law that replaces the command of its axis. Raises LawError for a signal that is no command."""
     signals = {COMMAND + letter: axis for axis, letter in enumerate(axis_names(channels.inputs))}
     signals |= {name: axis for axis, name in enumerate(channels.inputs)}
+    # Compiled only to raise LawError now, instead of in the first simulation.
     program_of(law.tree, {**signals, "t": -1})
 
     def of_all(commands: FloatArray, channel: int, step_s: float, values: Values) -> tuple[FloatArray, FloatArray]:
@@ -235,6 +254,7 @@ def _command_action(law: Law, channels: Channels) -> OnCommand:
 
 
 def _response_action(law: Law, channels: Channels) -> OnResponse:
+    """Action of a law that replaces its response channel. Raises LawError for a signal that is no response channel."""
     signals = _response_signals(channels)
     program_of(law.tree, {**signals, "t": -1})
 
@@ -248,6 +268,7 @@ def _response_action(law: Law, channels: Channels) -> OnResponse:
 
 
 def _response_signals(channels: Channels) -> Mapping[str, int]:
+    """Column in the response of each name that a formula can use."""
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
     letters = axis_names(channels.outputs) if order is not None else ()
     named = {DERIVATIVES[order or 0] + letter: number for number, letter in enumerate(letters)}

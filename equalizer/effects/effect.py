@@ -1,8 +1,9 @@
-"""Definition of a physical effect, for simulation and diagnosis: its equation, parameters, where and how it acts.
+"""Data types of a physical effect for simulation and diagnosis: equation, source, parameters, place and action.
 
-An effect acts in one of five ways: it changes the linear structure, adds a force that depends on the motion at a
-driven axis or within a joint, changes the command before it becomes a force, or changes the response after it was
-sensed.
+An effect acts in one of five ways: it changes the linear structure (`Structure`), adds a motion-dependent force at a
+driven axis (`AxisForce`) or within a joint (`JointForce`), changes the command before it becomes a force
+(`OnCommand`), or changes the sensed response (`OnResponse`). Sizes: n samples or coordinates, m commands, p response
+channels. SI units; on rotational axes N stands for N m and m for rad.
 """
 
 from collections.abc import Callable, Mapping
@@ -36,14 +37,15 @@ class Parameter:
     lower: float
     upper: float
     none: float | None
-    """Value at which the effect vanishes, provided that all parameters with such a value are at theirs; None: this
-    parameter does not matter for that."""
+    """Value at which the effect vanishes; where several parameters have such a value, all of them must be at it. None:
+    the effect does not vanish by this parameter."""
     scale: Literal["log", "linear", "signed"] = "log"
-    """signed: of either sign, order of magnitude unknown; a fit varies it by a share of its starting value."""
+    """How a fit varies the parameter. log: positive, by its logarithm; linear: in its own unit; signed: of either sign
+    and unknown order of magnitude, by a share of its starting value."""
     step: float = 0.01
     """Step of a finite difference in a fit: relative; on a linear scale, in the parameter's own unit."""
     fixed: bool = False
-    """The starting value is read off the recording, and a fit does not change it."""
+    """Whether a fit keeps the starting value, which is determined from the recording directly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +53,7 @@ class Structure:
     """Changes the linear model: masses, dampers, springs, couplings."""
 
     change: Callable[[MechanicalModel, int, Values], MechanicalModel]
-    """From model, index of the driven axis and values to the changed model."""
+    """Arguments: model, index of the driven axis, values. Returns the changed model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,7 @@ class AxisForce:
     """Compiled function law(parameters, memory, at) -> force in N; `equalizer.effects.simulation.instant` documents
     `at`."""
     pack: Callable[[MechanicalModel, int, Values], FloatArray]
-    """The law's `parameters` from model, axis and values."""
+    """Arguments: model, index of the driven axis, values. Returns the law's `parameters`, a flat array."""
     memory: int = 0
     """Number of state variables that the law keeps between steps; they start at zero."""
     steps: int = STEPS
@@ -82,6 +84,7 @@ class JointForce:
     """The structure with the joint in it (its additional coordinates come last), and the direction (n,) in these
     coordinates along which the joint moves and its force acts."""
     law: Any
+    """As in `AxisForce`; so are `memory`, `steps` and `acceleration`."""
     pack: Callable[[MechanicalModel, int, Values], FloatArray]
     """The law's `parameters`; the model is that before `change`."""
     memory: int = 0
@@ -90,7 +93,7 @@ class JointForce:
 
 
 def pack_values(*names: str) -> Callable[[MechanicalModel, int, Values], FloatArray]:
-    """A `pack` of the values themselves, in this order."""
+    """A `pack` function whose array is the values of these parameters in this order."""
     return lambda model, axis, values: np.array([values[name] for name in names])
 
 
@@ -117,14 +120,15 @@ class OnResponse:
     change: Callable[[FloatArray, float, tuple[int, ...], Values], FloatArray]
     """Arguments: samples (n, p), sample rate in Hz, indices of the affected channels, values."""
     stage: int = 0
-    """Order among the effects, all after the low pass: alignment, range, added signals, number format, clock."""
+    """Order of the effects, ascending, all after the low pass: alignment of axes (-2, -1), gain and nonlinearity (0),
+    range (1), added signals (2), rounding (3), clock (4), lost samples (5)."""
     of_whole: bool = False
-    """Whether it depends on the recording's length, which must then be given for an excerpt."""
+    """Whether the effect depends on the length of the recording, which must then be given for an excerpt."""
     bandwidth_hz: Callable[[float, Values], float] | None = None
     """Bandwidth of the channels' low pass in Hz, from the model's bandwidth and the values; 0 = no low pass."""
     on_position: Callable[[FloatArray, float, Values], FloatArray] | None = None
-    """Changes the positions (n, p) where they are read by the same clock. Arguments: samples, sample rate in Hz,
-    values."""
+    """Changes the positions (n, p) that the same clock samples. Arguments: positions, sample rate in Hz, values. None:
+    the effect leaves positions unchanged."""
     given: Callable[[FloatArray, FloatArray, FloatArray, tuple[int, ...], Values], FloatArray] | None = None
     """For a random effect, the response conditioned on a measurement: samples (n, p), measured (n, p), its noise (p,),
     channels, values. Without a measurement `change` draws a realisation."""
@@ -144,38 +148,44 @@ class Effect:
     equation: str
     source: str
     signature: str
-    """How the effect shows in the data, as the end of a sentence that names it."""
+    """Features of the effect in the data, as the end of a sentence that begins with its name."""
     parameters: tuple[Parameter, ...]
     acts: Acts
     starts: Callable[[Evidence, int], tuple[Values, ...]]
-    """Starting values at an axis or channel, the likeliest first; empty where the data speak against the effect."""
+    """Arguments: evidence, index of an axis or channel (or ALL_SITES). Returns sets of starting values, the likeliest
+    first; empty where the data contradict the effect."""
     sites: tuple[Literal["one", "all", "each"], ...] = ("one",)
-    """At how many places it can act: one axis or channel; all with the same parameters; all, each with its own."""
+    """Where the effect can act. one: a single axis or channel; all: every one, with the same parameters; each: every
+    one, with its own parameters."""
     simpler: tuple[str, ...] = ()
     """Names of effects that it contains as special cases."""
     report: Callable[[Values], Values] = dict
-    """The reported parameters of the vocabulary from the fitted ones, where these are more than are reported."""
+    """Converts fitted parameters to the reported ones of the vocabulary, where a fit has more."""
     alike: Callable[[Values], tuple[Values, ...]] = lambda values: ()
     """Other values with almost the same effect, at which a fit may have converged by mistake."""
     law: Law | None = None
     """Formula of an effect that has no name in the vocabulary."""
     of_time: bool = False
-    """Depends on time within a recording, or on rare events: no excerpt represents the whole recording."""
+    """Whether the effect depends on time within a recording, or on rare events, so that no excerpt represents the whole
+    recording."""
     with_conditions: Callable[[FloatArray, float], Acts] | None = None
     """For an effect that depends on recorded conditions: the effect under given conditions (n, q), sampled at a rate in
     Hz from a simulation's first sample on."""
 
     def __post_init__(self) -> None:
+        """Register the effect for `effects_by_address`."""
         _living[id(self)] = self
 
 
 _living: WeakValueDictionary[int, Effect] = WeakValueDictionary()
+"""Effects by address; weak references, so that an unused effect is freed."""
 
 
 def effects_by_address() -> dict[int, Effect]:
-    """All effects that exist, by address (`id`): those of the catalogue and those of discovered laws.
+    """All effects in this process, by address (`id`): those of the catalogue and those of discovered laws.
 
-    Effects hold functions, which cannot be sent to another process; a forked process has them at the same addresses.
+    Effects hold functions, which cannot be pickled for another process; a forked process has them at the same
+    addresses, so that the address identifies them there.
     """
     held = [reference() for reference in _living.valuerefs()]
     return {id(effect): effect for effect in held if effect is not None}

@@ -1,4 +1,10 @@
-"""End stop: a one-sided spring at the end of the travel."""
+"""End stop: a stiff one-sided spring at an end of the travel, on one side or on both.
+
+    F = -k (x - x_s) where x lies beyond the stop x_s, else 0        k in N/m (a rotation: N m/rad)
+
+A second stop at -x_s has the stiffness `opposite` times k (0 = none). Beyond means away from zero, unless `side` states
+the direction (1: upwards, -1: downwards); there is no second stop then.
+"""
 
 import numpy as np
 
@@ -11,20 +17,23 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 SHARES, FINER = np.linspace(0.3, 0.98, 18), np.linspace(-0.04, 0.04, 9)
-"""Stop positions that are tried: shares of the farthest position, then offsets around the best of these."""
+"""Stop positions that are tried, relative to the largest deflection: a coarse grid, then offsets around its best
+point."""
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Mean of the force at the step's start and end. A stop only pushes, and its penetration at the end depends on its
-    force (implicit step)."""
+    """Weighted mean of the force at the step's start and end. A stop only pushes, and its penetration at the end
+    depends on its force (implicit step). parameters: stop and stiffness, signs of both sides, relative stiffness of the
+    second."""
     force = last = 0.0
     for side in range(2):
         way = parameters[2 + side]
         stiffness = parameters[1] if side == 0 else parameters[1] * parameters[4]
         start = max(way * at[X] - parameters[0], 0.0)
         end = way * (at[X_FREE] + at[X_PER_N] * force) - parameters[0]
-        # Weighted towards the force at the end where the stop is too stiff for the step: the mean would overshoot.
+        # Weight of the end: 1/2 (trapezoidal rule) for a soft stop, towards 1 (backward Euler) for a stop that is too
+        # stiff for the step, where the trapezoidal rule would oscillate.
         slack = stiffness * at[X_PER_N]
         late = (0.5 + slack) / (1 + slack)
         push = stiffness * ((1 - late) * start + late * end) / (1 + late * slack)
@@ -37,14 +46,16 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    """Parameters of `_law`; the sign of the position states the side where `side` is 0 or missing."""
     side = values.get("side", 0.0)
     way = float(np.sign(side)) or (-1.0 if values["position"] < 0 else 1.0)
-    # On the far side of zero the two stops would overlap.
+    # With `side`, a stop may lie on the other side of zero, where a stop at -position would overlap with it.
     opposite = 0.0 if side else values.get("opposite", 0.0)
     return np.array([way * values["position"], values["stiffness"], way, -way, opposite])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """The best stop on either side by grid search and linear regression, the better first."""
     motion = axis_motion(evidence, axis)
     beside, farthest = regress_beside_linear(motion), float(np.abs(motion.position).max())
     found = []
@@ -59,7 +70,8 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 def _best_stop(
     motion: AxisMotion, beside: PartialRegression, way: float, stops: FloatArray
 ) -> tuple[float, Values] | None:
-    """Explained share and values of the best stop on one side, with another opposite that is not stiffer."""
+    """Explained share of the missing force, and values, of the best stop on the side `way` (1 or -1) with a second stop
+    that is at most 10 % stiffer; None where no stop has a positive stiffness. stops: distances (m) to try."""
     tried: list[tuple[float, Values]] = []
     for stop in stops.tolist():
         inside, outside = (np.maximum(side * motion.position - stop, 0.0) for side in (way, -way))

@@ -1,4 +1,10 @@
-"""Extra mode: a lightly damped oscillator on the axis, where the model assumes a rigid part."""
+"""Extra mode: a lightly damped oscillator on the axis, where the model assumes a rigid part.
+
+    q'' + 2 z w (q' - s') + w² (q - s) = 0,   F = -m q''        w = 2 pi f
+
+s is the motion of the axis, q that of the attached mass m, f its natural frequency, z its damping ratio. The direction
+of the oscillator may be tilted towards the other axes (`tilt_next`, `tilt_after_next`).
+"""
 
 import numpy as np
 
@@ -15,15 +21,17 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 LOWEST_HZ, STARTS = 2.0, 2
-"""Lowest resonance that is tried, and number of modes that are suggested."""
+"""Lowest natural frequency (Hz) that is tried, and largest number of modes for which starting values are returned."""
 RATIOS = (0.01, 0.04, 0.12)
-"""Damping ratios to start from."""
+"""Damping ratios of the coarse search."""
 FINER, COARSER = np.linspace(0.96, 1.04, 9), np.geomspace(0.4, 2.5, 5)
-"""Natural frequencies and damping ratios around the likeliest."""
+"""Factors of the finer search: natural frequencies and damping ratios relative to the best of the coarse search."""
 TILTS = ("tilt_next", "tilt_after_next")
+"""Parameter names: components of the oscillator's direction along the next two axes, relative to its own axis."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+    """The model with the oscillator attached along the tilted direction, a unit vector in the coordinates."""
     axes, m = driven_axes(model), model.inputs
     along = axes[:, axis].copy()
     for place, tilt in enumerate(TILTS[: m - 1], start=1):
@@ -34,6 +42,7 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Oscillators that explain most of the missing force, by a coarse and a fine grid search each."""
     missing, starts = missing_force_spectra(evidence, axis), []
     natural = np.geomspace(LOWEST_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
     for _ in range(STARTS):
@@ -43,14 +52,15 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
                 missing, axis, (each.natural_hz * FINER).tolist(), (each.damping_ratio * COARSER).tolist()
             )
             starts.append(_mode_values(near[0], axis, evidence.model.inputs))
-            # The next mode is searched for in the residual of this one.
+            # The next mode is searched for in the missing force without this mode.
             missing = subtract_oscillator(missing, near[0])
     return tuple(starts)
 
 
 def _mode_values(each: AttachedOscillator, axis: int, m: int) -> Values:
+    """Parameters of an oscillator that was fitted at an axis. m: number of driven axes."""
     tilts = [float(np.clip(each.by_axis[(axis + place) % m], -1, 1)) if place < m else 0.0 for place in (1, 2)]
-    # The pull on the own axis is that of the whole mass, less what its tilt takes away.
+    # Along a direction (1, t1, t2) the own axis feels only mass / (1 + t1² + t2²), which is what was fitted.
     mass = each.mass * (1 + tilts[0] ** 2 + tilts[1] ** 2)
     values = {"frequency": each.natural_hz, "mass": mass, "damping_ratio": each.damping_ratio}
     return values | dict(zip(TILTS, tilts, strict=True))

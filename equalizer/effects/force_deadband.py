@@ -1,4 +1,9 @@
-"""Dead band of an actuator: no force for small commands; larger ones are reduced by its width, or start with a jump."""
+"""Dead band of an actuator: no force for small commands; larger ones are reduced by its width, or start with a jump.
+
+    F = 0 where |u| <= width,  else F = u - (1 - jump) width sgn(u)        u, F, width in N; jump from 0 to 1
+
+With jump = 1 the force equals the command beyond the band; with jump = 0 it grows from zero there.
+"""
 
 import numpy as np
 
@@ -15,6 +20,7 @@ def _apply_deadband(commands: FloatArray, step_s: float, values: Values) -> Floa
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Likeliest width without a jump (0) and with a full one (1), each by grid search."""
     peaks = grid_of_peaks(evidence, axis)
     grid = [peaks[0] / 30, peaks[0] / 10, peaks[0] / 3, *peaks] if peaks else []
     found = []
@@ -29,7 +35,8 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _without_jump(values: Values) -> tuple[Values, ...]:
-    """The dead band without a jump that gives the same force beyond the band; few samples lie between the two."""
+    """The dead band without a jump that gives the same force beyond the band: the two differ only for commands between
+    both widths, where a recording has few samples."""
     jump = values.get("jump", 0.0)
     return ({"width": values["width"] * (1 - jump), "jump": 0.0},) if 0.0 < jump < 1.0 else ()
 

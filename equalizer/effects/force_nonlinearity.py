@@ -1,4 +1,10 @@
-"""Nonlinear actuator characteristic: the gain changes with the size of the command, as of propellers or coils."""
+"""Nonlinear actuator characteristic: the gain changes with the magnitude of the command, as of propellers or coils.
+
+    F = u (1 - square + square |u| / reference)        u, F, reference in N; square without unit
+
+square = 1 is the pure square law of a propeller or of a coil without bias current; square < 0 is a gain that falls as
+the command grows.
+"""
 
 import numpy as np
 
@@ -9,7 +15,8 @@ from equalizer.signals.signal import FloatArray
 
 
 def square_law_force(commands: FloatArray, square: float, reference: float) -> FloatArray:
-    """Force (n,) of commands (n,): square is the quadratic share; at |command| = reference, force equals command."""
+    """Force (n,) in N of commands (n,) in N. square: quadratic share; reference: magnitude at which force and command
+    are equal."""
     return np.asarray(commands * (1 - square + square * np.abs(commands) / reference))
 
 

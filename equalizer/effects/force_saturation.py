@@ -1,4 +1,9 @@
-"""Force saturation: an actuator whose force is limited."""
+"""Force saturation: the force of an actuator is limited symmetrically.
+
+    F = max(-limit, min(u, limit))        command u, force F and limit in N
+
+The effect vanishes for an infinite limit.
+"""
 
 import math
 
@@ -15,6 +20,7 @@ def _clip_force(commands: FloatArray, step_s: float, values: Values) -> FloatArr
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Likeliest limit by grid search, from 3 % to just below the strongest command."""
     limit = likeliest_value(
         evidence, axis, lambda u, step_s, value: np.clip(u, -value, value), grid_of_peaks(evidence, axis), True
     )

@@ -1,4 +1,9 @@
-"""Hand impedance: a mass, a damper and a spring to the ground along each axis of the handle."""
+"""Hand impedance: a mass, a damper and a spring to the ground along each driven axis of the handle.
+
+    F = -(m dv/dt + c v + k x)        in kg, N s/m, N/m (a rotation: kg m², N m s/rad, N m/rad)
+
+The values are added to the model's mass, damping and stiffness matrices along the axis.
+"""
 
 from dataclasses import replace
 
@@ -11,7 +16,8 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _GUESS = 0.1
-"""Starting values as shares of the model's own mass, damping and stiffness, used where the data show none."""
+"""Second starting values, as shares of the model's own mass, damping and stiffness. In the first, a tenth of them
+replaces each value that the regression finds negative or zero."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
@@ -26,6 +32,7 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Values by linear regression of the missing force, then shares of the model's own values."""
     motion = axis_motion(evidence, axis)
     beside = PartialRegression(motion.force, np.ones((len(motion.force), 1)))
     found = beside.fit(-motion.acceleration, -motion.velocity, -motion.position).strengths.tolist()
@@ -43,7 +50,7 @@ EFFECT = Effect(
     signature="the device is heavier, more damped and stiffer than the model along every axis, at every level; nothing "
     "appears at silent lines",
     parameters=(
-        # The response is almost linear in these values, so that a step of a fit may reach zero and come back.
+        # Not on a log scale: the response is almost linear in these values, and a fit may reach zero and return.
         Parameter("mass", 0.0, 1e6, none=0.0, scale="signed"),
         Parameter("damping", 0.0, 1e6, none=0.0, scale="signed"),
         Parameter("stiffness", 0.0, 1e9, none=0.0, scale="signed"),

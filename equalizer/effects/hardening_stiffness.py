@@ -31,7 +31,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """k3 by linear regression of the missing force on -x³ and the linear terms of the motion; empty where it is not
+    """k3 by linear regression of the missing force on -x³ and the linear terms of the motion; empty where k3 is not
     positive, so that a search by simulation begins with hardening only."""
     motion = axis_motion(evidence, axis)
     k3 = float(regress_beside_linear(motion).fit(-(motion.position**3)).strengths[0])

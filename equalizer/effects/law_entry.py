@@ -1,4 +1,8 @@
-"""Library entry of a discovered law, which is searched for in other recordings like the catalogue's effects."""
+"""Library entry of a discovered law: named effects that are searched for in other recordings like the catalogue's.
+
+A law was found at one axis of one device. An entry yields one effect per axis of the new recording, with the axis
+letters of its formula permuted cyclically, and starting values by linear regression.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,25 +31,27 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class LawEntry:
-    """A discovered law as the library keeps it: under a name, with its origin."""
+    """A discovered law in the library: name, formula, origin and features in the data."""
 
     name: str
     law: Law
-    """The law with its starting parameters, and the axis whose signals its formula calls by their letter."""
+    """The law with its starting parameters; `law.axis` is the axis at which it was found."""
     source: str
+    """Origin of the law, as text."""
     signature: str
-    """How the law shows in the data."""
+    """Features of the law in the data, as in `Effect.signature`."""
 
 
 def kept_effects(entries: Sequence[LawEntry], recording: Recording) -> tuple[Effect, ...]:
-    """Effects of all entries, written in this recording's channels. Raises LawError for a signal that it lacks."""
+    """Effects of all entries at all axes, bound to the channels of a recording. Raises LawError for a signal that the
+    recording lacks."""
     channels = law_channels(recording)
     return tuple(effect for entry in entries for effect in effects_of(entry, channels))
 
 
 def effects_of(entry: LawEntry, channels: Channels) -> tuple[Effect, ...]:
-    """One effect per axis, with the axes' letters in the formula permuted cyclically to it. Raises LawError where the
-    recording lacks a signal."""
+    """One effect per axis, the formula moved to it by a cyclic permutation of the axis letters. Raises LawError where
+    the recording lacks a signal."""
     letters = axis_names(channels.outputs if entry.law.acts_on == "response" else channels.inputs)
     found = []
     for site in range(len(letters)):
@@ -60,6 +66,7 @@ def effects_of(entry: LawEntry, channels: Channels) -> tuple[Effect, ...]:
 
 
 def _move_to_axis(law: Law, letters: tuple[str, ...], site: int) -> Law:
+    """The law at axis `site`: letters in its formula are shifted cyclically so that its own axis becomes that axis."""
     own = law.axis[-1:]
     first = letters.index(own) if own in letters else 0
     turn = {letter: letters[(number + site - first) % len(letters)] for number, letter in enumerate(letters)}
@@ -70,6 +77,7 @@ def _move_to_axis(law: Law, letters: tuple[str, ...], site: int) -> Law:
 
 
 def _rename_signals(node: Node, names: Mapping[str, str]) -> Node:
+    """The syntax tree with variables renamed by `names`; others keep their names."""
     match node:
         case Variable(name):
             return Variable(names.get(name, name))
@@ -79,8 +87,8 @@ def _rename_signals(node: Node, names: Mapping[str, str]) -> Node:
 
 
 def _make_starts(law: Law, site: int) -> Callable[[Evidence, int], tuple[Values, ...]]:
-    """Starting values at one axis. For a force: its factors by linear regression on the missing force, the other
-    parameters as they were found."""
+    """Function for starting values at axis `site`; empty at other axes. For a force: the law's factors by linear
+    regression of the missing force, the other parameters as in the library. Otherwise all as in the library."""
     factors = [place for place, role in roles(law.tree).items() if role == "factor"]
 
     def starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
@@ -103,13 +111,14 @@ def _make_starts(law: Law, site: int) -> Callable[[Evidence, int], tuple[Values,
 
 
 def _with_single_factor(law: Law, factors: Sequence[int], each: int) -> Law:
-    """The law with this factor 1 and the other factors 0."""
+    """The law with the factor p<each> set to 1 and the other factors to 0: the regressor of that factor."""
     return law.with_numbers(
         [float(place == each) if place in factors else number for place, number in enumerate(law.numbers)]
     )
 
 
 def _signal_columns(evidence: Evidence) -> dict[str, FloatArray]:
+    """(n,) each, by name: position, velocity, acceleration (central differences) and command of every axis."""
     acceleration = np.gradient(evidence.axis_velocity, 1 / evidence.sample_rate_hz, axis=0)
     motion = evidence.axis_position, evidence.axis_velocity, acceleration, evidence.command
     return {

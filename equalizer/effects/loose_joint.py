@@ -1,14 +1,14 @@
-"""Loose joint between two bodies: dry friction everywhere, and beyond a gap a spring.
+"""Loose joint between two bodies: dry friction at any relative displacement, and a spring beyond a gap.
 
 With r the relative displacement of the bodies, g the gap, k the stiffness and F_c the slip force,
 
     F = -k (|r| - g / 2) sgn(r) [|r| > g / 2] - F_c sgn(dr/dt).
 
-Over a step the spring's force is the mean of those at its ends, weighted by theta (the theta method of implicit
-integration): F = -k ((1 - theta) p + theta p+), with p the deflection of the spring at the start and p+ = p_free + c F
-that at the end, which depends on F by the compliance c of the structure over the step. theta is 1/2 (trapezoidal rule)
-where k c is small and goes to 1 (backward Euler) where the spring is too stiff for the step, for the trapezoidal rule
-would ring there. Friction is solved last, against the velocity that the spring leaves (`friction_force`).
+Over a step the spring's force is the weighted mean of the forces at both ends (theta method of implicit integration):
+F = -k ((1 - theta) p + theta p+), with p the deflection of the spring at the start and p+ = p_free + c F the deflection
+at the end, which depends on F through the compliance c of the structure over the step. theta is 1/2 (trapezoidal rule)
+where k c is small, and tends to 1 (backward Euler) where the spring is too stiff for the step and the trapezoidal rule
+would ring. Friction is solved last, for the velocity that results with the spring's force (`friction_force`).
 """
 
 from itertools import product
@@ -32,19 +32,20 @@ STEPS = 8
 """Integration steps per sample."""
 GAPS, STIFFNESSES, SLIPS = (0.2, 0.5, 1.2, 3.0, 8.0), (0.05, 0.2, 0.6), (0.01, 0.1, 0.4)
 """Starting values that are tried: gaps relative to the joint's rms travel in the model; stiffnesses relative to the
-model's; slip forces relative to the product of both."""
+model's stiffness along the joint; slip forces relative to that stiffness times that travel."""
 TRIED_S = 2.0
 """Length of the excerpt that is simulated (s)."""
 SETTLING = 4
-"""The first of so many equal parts of the excerpt is not compared: the recording was not at rest there."""
+"""The first 1/SETTLING of the excerpt is not compared: the simulation starts at rest, the recording did not."""
 FINER = 4
 """Number of the best pairs of gap and stiffness that are tried with every slip force."""
 _NO_FORCE: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
+"""Values without a force: the motion of the model alone, from which the joint's travel is computed."""
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Mean force of spring and friction over the step; `at[F_END]` becomes that at its end."""
+    """Mean force (N) of spring and friction over the step; the force at its end is written to `at[F_END]`."""
     half_gap, stiffness, slip = 0.5 * parameters[0], parameters[1], parameters[2]
     spring = spring_at_end = 0.0
     for side in (1.0, -1.0):
@@ -65,9 +66,12 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def joint_direction(model: MechanicalModel, axis: int) -> FloatArray:
-    """(n,): direction of motion, in the model's coordinates, of a joint near a driven axis: between the axis and the
-    body, among those that no command drives, which has the largest kinetic energy where it follows the axis without
-    inertia (mass times squared static ratio); against the ground where no such body is coupled to the axis."""
+    """(n,): direction of relative motion of a joint at a driven axis, in the model's coordinates.
+
+    The joint connects the axis to the undriven body that would have the largest kinetic energy if it followed the axis
+    quasi-statically (mass times squared static displacement per displacement of the axis). Where no undriven body with
+    a spring is coupled to the axis, the joint connects the axis to the ground.
+    """
     along, axes = driven_axes(model)[:, axis], driven_axes(model)
     undriven = np.linalg.norm(axes, axis=1) < 1e-9
     if not undriven.any():
@@ -79,19 +83,20 @@ def joint_direction(model: MechanicalModel, axis: int) -> FloatArray:
     body = int(np.argmax(energy))
     if energy[body] == 0:
         return along
-    # The static position of the body under the driven axes' motion, less its own.
+    # Travel of the joint: static position of the body for the driven coordinates, minus its actual position.
     relative = np.where(undriven, 0.0, -model.stiffness[body] / own_stiffness[body])
     relative[body] = -1.0
     return np.asarray(relative)
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[MechanicalModel, FloatArray]:
+    """The unchanged model, whose bodies the joint connects, and the direction of the joint."""
     return model, joint_direction(model, axis)
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """The two best of a coarse grid, by the error of a simulation of an excerpt: first gaps and stiffnesses, with a
-    medium slip force, then slip forces."""
+    """The two best values of a coarse grid by the mean square error of a simulated excerpt: first all gaps and
+    stiffnesses with a medium slip force, then the best of these with the other slip forces."""
     part, joint = _strongest_part(evidence, axis), joint_direction(evidence.model, axis)
     travel = float(np.std(_simulate_part(evidence, axis, _NO_FORCE, part)[1]))
     model_stiffness = max(abs(value_along(evidence.model.stiffness, joint)) / float(joint @ joint) ** 2, 1e-6)
@@ -118,7 +123,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _strongest_part(evidence: Evidence, axis: int) -> slice:
-    """The excerpt in which the axis, and with it the joint, is accelerated most."""
+    """The excerpt of at most `TRIED_S` in which the acceleration of the axis has the largest mean square."""
     length = min(int(TRIED_S * evidence.sample_rate_hz), len(evidence.command))
     acceleration = np.gradient(evidence.axis_velocity[:, axis])
     power = np.cumsum(np.append(0.0, acceleration**2 * evidence.used))
@@ -127,11 +132,11 @@ def _strongest_part(evidence: Evidence, axis: int) -> slice:
 
 
 def _simulate_part(evidence: Evidence, axis: int, values: Values, part: slice) -> tuple[FloatArray, FloatArray]:
-    """The response (n, p), and the joint's travel (n,)."""
+    """Simulated response (n, p) of an excerpt, and travel (n,) of the joint in m, from rest."""
     bodies = bodies_of(evidence.model, (PlacedEffect(EFFECT, (axis,), values),))
     commands, rate_hz = evidence.command[part], evidence.sample_rate_hz
     outputs, _ = simulate_bodies(bodies, ActuatorForce(commands, commands), (len(commands), STEPS), 1 / rate_hz / STEPS)
-    # Columns: positions, velocities and accelerations of the ports, then the response; the joint is the last port.
+    # Columns: positions, velocities, accelerations of the ports (axes, then the joint), response, its positions.
     ports = bodies.ports.shape[1]
     response = outputs[:, 3 * ports : 3 * ports + evidence.model.outputs]
     return low_pass(response, rate_hz, evidence.model.sensor.bandwidth_hz), outputs[:, ports - 1]

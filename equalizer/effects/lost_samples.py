@@ -1,7 +1,10 @@
-"""Lost samples: the last sample that arrived is repeated in place of each, at random.
+"""Lost samples: in place of a lost sample, a logger repeats the last sample that arrived.
 
-Simulated without a measurement, samples are drawn at random with the given fraction. Conditioned on one, those are lost
-that the measurement explains better by the sample before (likelihood ratio).
+    y[k] = y[k-1] for a random fraction of all samples, else y[k] = x[k]
+
+Without a measurement, a simulation draws the lost samples at random. With a measurement, the samples are lost for which
+the measured value is likelier under repetition than under the simulated value (likelihood ratio test, equation in
+`simulation.reading_kernel`).
 """
 
 import math
@@ -14,21 +17,22 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 CLEAR = 4.0
-"""Difference of two samples, in units of the noise, above which it is clear which of them was read."""
+"""Difference of two successive samples, over the noise, from which a repeated sample is distinguishable."""
 LEAST_EVENTS = 8
 """Fewest repeated readings that count as lost samples."""
 LARGEST = 0.3
 """Largest fraction of lost samples."""
 ROUNDS = 4
-"""Passes that refine which samples are lost."""
+"""Iterations between the fraction and the decisions on which samples are lost."""
 CONTROL = 3.0
-"""Negative control: repeats must be this many times as frequent as samples that equal the next one, which no physical
-cause produces."""
+"""Negative control: repeated samples must be more than this many times as frequent as samples that equal the next
+sample, for which there is no physical cause."""
 
 
 def _lose_at_random(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
+    # Seeded with the length, so that the same samples are lost in every simulation of a recording.
     lost = np.random.default_rng(len(response)).random(len(response)) < values["fraction"]
     read, held = response.copy(), np.empty((len(response), len(channels)))
     repeat_where(np.ascontiguousarray(response[:, channels]), lost, held)
@@ -39,6 +43,7 @@ def _lose_at_random(
 def _lose_as_measured(
     response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
+    """The response (n, p) with lost samples decided by the measurement; unchanged for a fraction of 0 or 1."""
     if not 0 < values["fraction"] < 1:
         return response
     which, read = list(channels), response.copy()
@@ -49,6 +54,8 @@ def _lose_as_measured(
 def _repeat_by_likelihood(
     samples: FloatArray, measured: FloatArray, noise: FloatArray, fraction: float
 ) -> tuple[FloatArray, Flags]:
+    """Samples (n, c) after losses, and mask (n,) of the lost ones, by likelihood ratio with the prior odds of the
+    fraction."""
     read, lost = np.empty(samples.shape), np.zeros(len(samples), dtype=np.bool_)
     repeat_as_measured(
         np.ascontiguousarray(samples),
@@ -64,8 +71,9 @@ def _repeat_by_likelihood(
 def _lose_positions_as_measured(
     before: FloatArray, after: FloatArray, position: FloatArray, measured: FloatArray
 ) -> FloatArray:
-    """Repeats positions where the response repeats, provided that the measured position shows that the same logger read
-    it; then also where only the position shows it, because the response hardly changed from one sample to the next."""
+    """Repeat positions (n, p) where samples of the response are lost, provided that this brings them closer to the
+    measured position, i.e. the same logger recorded both. Then also repeat those where only the position shows a loss,
+    because the response hardly changed between the two samples."""
     lost = np.any(after != before, axis=1)
     if not lost.any():
         return position
@@ -76,6 +84,7 @@ def _lose_positions_as_measured(
 
 
 def _repeat_rows(position: FloatArray, lost: Flags) -> FloatArray:
+    """Positions (n, p) with each lost row replaced by the last row that was not lost."""
     held = np.empty(position.shape)
     repeat_where(np.ascontiguousarray(position), lost, held)
     return held
@@ -88,12 +97,13 @@ def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> Flags:
     noise = 1.4826 * np.nanmedian(np.abs(error), axis=0)
     step = np.diff(position, axis=0, prepend=position[:1])
     with np.errstate(divide="ignore", invalid="ignore"):
-        # The squared distance to the position before, less that to its own.
+        # Squared distance to the preceding position minus squared distance to the sample's own position.
         nearer = np.nansum((2 * error * step + step**2) / noise**2, axis=1)
     return np.asarray(nearer < -(CLEAR**2) / 2)
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """The fraction of lost samples; empty where they are too few or the negative control has as many."""
     which = [channel]
     found = _estimate_fraction(evidence, which, 1)
     return (
@@ -104,8 +114,8 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
 
 
 def _estimate_fraction(evidence: Evidence, which: list[int], forwards: int) -> float | None:
-    """Share of lost samples among those where both cases can be distinguished; backwards (-1), of those that equal the
-    next one. None for too few events."""
+    """Fraction of lost samples among those where a loss is distinguishable; None for fewer than `LEAST_EVENTS`.
+    forwards: 1, or -1 for the negative control, in reversed time (samples that equal the next)."""
     samples, measured = evidence.predicted[::forwards, which], evidence.response[::forwards, which]
     noise, used = evidence.noise[which], evidence.used[::forwards] > 0
     apart = np.sum((np.diff(samples, axis=0, prepend=samples[:1]) / noise) ** 2, axis=1) > CLEAR**2

@@ -1,4 +1,9 @@
-"""Mains hum: a steady tone in the response, at mains frequency or another, that no command contains."""
+"""Mains hum: a steady tone in the response, at mains frequency or another, that no command contains.
+
+    y = x + A sin(2 pi f t + phase)        A in the unit of the response, f in Hz
+
+Starting values come from spectral lines of the residual that are strong, steady over the recording, and not commanded.
+"""
 
 import math
 
@@ -10,19 +15,21 @@ from equalizer.effects.starts.response_starts import shares_of
 from equalizer.signals.signal import FloatArray
 
 MAINS_HZ = (45.0, 65.0)
-"""Range of mains frequencies, searched before all others."""
+"""Range of mains frequencies, 50 and 60 Hz with a margin, that is searched first."""
 ABOVE = 12.0
-"""Least ratio of a tone's power to the spectrum's local median."""
+"""Least ratio of a tone's power to the median power of the lines around it."""
 NEIGHBOURS_HZ = 3.0
-"""Lines this near to the hum's are not counted as background."""
+"""Half-width (Hz) of the band around a line over which that median is taken."""
 ROUNDS = 4
 """Gauss-Newton steps for the frequency."""
 BLOCKS, STEADY = 12, 0.8
-"""Number of blocks in which a tone must have the same amplitude and phase, and the least constancy (0 to 1)."""
+"""Number of blocks of the recording that are compared in amplitude and phase, and least constancy (0 to 1) of a
+tone."""
 PLAYED = 0.1
-"""Amplitude of a tone in a command, over its rms, from which the tone counts as commanded."""
+"""Half the amplitude of a tone in a command, over the command's rms, above which the tone counts as commanded."""
 MAINLY, MOST_TIMES = 0.5, 9
-"""Likewise for a tone that holds half of a command's power, whose harmonics up to this order count as commanded."""
+"""The same ratio for a tone with half of a command's power, and highest order up to which harmonics of such a tone
+count as commanded."""
 
 
 def _add_tone(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
@@ -60,14 +67,15 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
 
 
 def _is_commanded(evidence: Evidence, frequency_hz: float) -> bool:
-    """Whether a command contains the tone throughout, or consists mainly of a tone of which it is a harmonic."""
+    """Whether a command contains the tone steadily, or consists mainly of a tone of which this is a harmonic."""
     return _commands_hold_tone(evidence, frequency_hz, PLAYED) or any(
         _commands_hold_tone(evidence, frequency_hz / times, MAINLY) for times in range(2, MOST_TIMES + 1)
     )
 
 
 def _commands_hold_tone(evidence: Evidence, frequency_hz: float, least: float) -> bool:
-    """Whether a command contains the tone throughout. least: half its amplitude over the command's rms."""
+    """Whether a command contains the tone steadily. least: lower limit of half the tone's amplitude over the command's
+    rms."""
     turn = np.exp(-2j * np.pi * frequency_hz * np.arange(len(evidence.command)) / evidence.sample_rate_hz)
     share = (
         np.abs(turn @ evidence.command) / len(turn) / np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-300)
@@ -77,13 +85,14 @@ def _commands_hold_tone(evidence: Evidence, frequency_hz: float, least: float) -
 
 
 def _loudest_channel(residual: FloatArray, evidence: Evidence, line: int) -> int:
-    """The channel in which a spectral line is strongest against the noise."""
+    """The channel in which a spectral line (index of the FFT) is strongest relative to the noise."""
     turn = np.exp(-2j * np.pi * line * np.arange(len(residual)) / len(residual))
     return int(np.argmax(np.abs(turn @ residual) / evidence.noise))
 
 
 def _steadiness(residual: FloatArray, evidence: Evidence, frequency_hz: float) -> float:
-    """Constancy of a tone's amplitude and phase over the recording's blocks, 0 to 1."""
+    """Constancy of a tone's amplitude and phase over the blocks, 0 to 1: magnitude of the mean phasor over the rms of
+    the blocks' phasors."""
     turn = np.exp(-2j * np.pi * frequency_hz * np.arange(len(residual)) / evidence.sample_rate_hz) * residual
     sums = np.array([part.sum() for part in np.array_split(turn, BLOCKS)])
     counts = np.array([part.sum() for part in np.array_split(evidence.used, BLOCKS)])
@@ -93,7 +102,8 @@ def _steadiness(residual: FloatArray, evidence: Evidence, frequency_hz: float) -
 
 
 def _fit_tone(residual: FloatArray, evidence: Evidence, frequency_hz: float) -> Values:
-    """Least squares for amplitude and phase; the phase's drift then corrects the frequency."""
+    """Amplitude, frequency and phase by Gauss-Newton iteration: linear least squares for the amplitudes of cosine and
+    sine, then a frequency correction from the derivative of the tone, limited to 0.3 lines per iteration."""
     time_s = np.arange(len(residual)) / evidence.sample_rate_hz
     # Time counts from the middle of the recording, where estimates of frequency and phase are uncorrelated.
     middle = float(time_s.mean())

@@ -1,4 +1,8 @@
-"""Converts effects between a model file's form (axis names, parameters) and the simulation's (sites, values)."""
+"""Converts effects between the form of a model file (axis names, parameters) and that of a simulation (sites, values).
+
+A site is the index of a driven axis or, for sensor effects, of a response channel. `place_effects` converts from a
+file, `model_effects` back.
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,15 +17,15 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, sugge
 from equalizer.signals.recording import Recording
 
 SHORT = 2
-"""Longest channel name that consists of quantity and axis alone, such as `fx`."""
+"""Length of the longest channel name that consists of a quantity and an axis letter, such as `fx`."""
 
 
 class PlacingError(ValueError):
-    """An effect that cannot be placed in this model. Says which and why."""
+    """An effect cannot be placed in a model. The message names the effect and the reason."""
 
 
 def place_recorded_effects(model: MechanicalModel, recording: Recording) -> tuple[PlacedEffect, ...]:
-    """`place_effects` at a recording's channels and conditions. Raises PlacingError."""
+    """`place_effects` with the channels and conditions of a recording. Raises PlacingError."""
     return place_effects(model, law_channels(recording))
 
 
@@ -38,7 +42,8 @@ def place_effects(model: MechanicalModel, channels: Channels) -> tuple[PlacedEff
 def model_effects(
     placed: tuple[PlacedEffect, ...], input_channels: tuple[str, ...], output_channels: tuple[str, ...]
 ) -> tuple[ModelEffect, ...]:
-    """The inverse of `place_effects`: an entry per site, or one without an axis where all share the effect."""
+    """The inverse of `place_effects`: an entry per site, or a single entry without an axis where an effect acts on all
+    sites with the same values. Raises PlacingError for a site beyond the channels."""
     return tuple(
         _model_effect(each, axis)
         for each in placed
@@ -53,6 +58,7 @@ def place_of_effect(effect: Effect) -> Place:
 
 
 def _model_effect(placed: PlacedEffect, axis: str | None) -> ModelEffect:
+    """Entry of a model file for a placed effect: reported parameters, or the law with its fitted parameters."""
     law = placed.effect.law
     if law is None or axis is None:
         return ModelEffect(placed.effect.name, axis, dict(placed.effect.report(placed.values)))
@@ -60,14 +66,15 @@ def _model_effect(placed: PlacedEffect, axis: str | None) -> ModelEffect:
 
 
 def axis_letter(channel: str, channels: tuple[str, ...]) -> str:
-    """The letter of a channel name ('x' of 'fx') where no two channels end alike and no name is a word, else the whole
-    name."""
+    """Last letter of a channel name ('x' of 'fx'), provided that all channels end in different letters and each name is
+    short or ends in x, y or z; otherwise the whole name."""
     ends = [name[-1:] for name in channels]
     short = all(len(name) <= SHORT or name[-1:] in "xyz" for name in channels)
     return channel[-1:] if short and len(set(ends)) == len(ends) and all(end.isalpha() for end in ends) else channel
 
 
 def _axis_names(placed: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:
+    """Axis name of each site, or a single None for all. Raises PlacingError for a site that is not there."""
     shared = placed.effect.law is None and set(placed.sites) == set(range(len(channels)))
     if shared and (len(channels) > 1 or "one" not in placed.effect.sites):
         yield None
@@ -79,6 +86,7 @@ def _axis_names(placed: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str
 
 
 def _place_effect(effect: ModelEffect, channels: Channels) -> PlacedEffect:
+    """The effect at its sites. Raises PlacingError for an unknown effect or axis, or a negative value."""
     if effect.law is not None:
         return _place_law(effect, effect.law, channels)
     entry = EFFECTS.get(effect.kind)
@@ -95,6 +103,7 @@ def _place_effect(effect: ModelEffect, channels: Channels) -> PlacedEffect:
 
 
 def _place_law(effect: ModelEffect, law: Law, channels: Channels) -> PlacedEffect:
+    """The effect of a discovered law at its site. Raises PlacingError for a signal or axis that is not there."""
     try:
         entry = law_effect(law, channels)
     except LawError as error:
@@ -103,8 +112,8 @@ def _place_law(effect: ModelEffect, law: Law, channels: Channels) -> PlacedEffec
 
 
 def find_sites(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:
-    """Numbers of the axes or channels that an effect of a model names; all of them where it names none. Raises
-    PlacingError."""
+    """Indices of the axes or channels that an effect of a model names; all where it names none. Raises PlacingError
+    where the name matches no channel or several."""
     place = EFFECTS_BY_NAME[effect.kind].place if effect.law is None else LAW_PLACES[effect.law.acts_on]
     channels = outputs if place == "sensor" else inputs
     if effect.axis is None:

@@ -1,4 +1,9 @@
-"""Position-dependent dry friction, as of a bent screw, a rack, or a cable that lies differently."""
+"""Position-dependent dry friction, as of a bent screw, a rack, or a cable whose course changes with the position.
+
+    F = -level max(1 + s x + b x², 0) sgn(v)        level in N, s in 1/m, b in 1/m² (a rotation: N m, 1/rad, 1/rad²)
+
+The bristle of `simulation.dry_friction_kernel` replaces the jump at v = 0.
+"""
 
 import numpy as np
 
@@ -13,13 +18,14 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Friction at the step's mean position."""
+    """Friction force (N) with the level at the mean of the step's start and (force-free) end position."""
     mean = 0.5 * (at[X] + at[X_FREE])
     level = max(parameters[0] * (1 + parameters[1] * mean + parameters[2] * mean * mean), 0.0)
     return float(friction_force(level, level, memory[0], memory, at))
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Values by linear regression of the missing force on -sgn(v), -x sgn(v), -x² sgn(v) where the axis slides."""
     motion = select_sliding_motion(evidence, axis)
     sign = -np.sign(motion.velocity)
     found = regress_beside_linear(motion).fit(sign, sign * motion.position, sign * motion.position**2)

@@ -1,4 +1,9 @@
-"""Presliding hysteresis: Dahl's bristle model of friction, a spring with a hysteresis loop for small motions."""
+"""Presliding hysteresis: Dahl's bristle model of friction, a spring with a hysteresis loop for small motions.
+
+    F = -k z,   dz/dt = v - k |v| z / level        level in N, k in N/m (a rotation: N m, N m/rad)
+
+The bristle deflection z saturates at level / k, where F = -level sgn(v) as in Coulomb friction.
+"""
 
 import numpy as np
 
@@ -11,13 +16,16 @@ from equalizer.effects.starts.starting_values import axis_motion, best_trial, re
 from equalizer.signals.signal import FloatArray
 
 BENDS = np.geomspace(3e-4, 1.0, 15)
-"""Slip deflections of the bristle that are tried, relative to the rms position."""
+"""Deflections level / k that are tried for starting values, relative to the rms position."""
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Dahl's bristle, deflected by the travel that its own force allows (implicit step). The force is weighted between
-    the step's middle, exact for a soft bristle, and its end, stable for a stiff one. memory: deflection."""
+    """Mean force (N) over a step, whose travel depends on the force (implicit step), by Newton's method.
+
+    The force is a weighted mean of those at both ends of the step: weight 1/2 (trapezoidal rule) for a soft bristle,
+    towards the end (backward Euler, stable) for a stiff one. memory: deflection z.
+    """
     if parameters[0] <= 0:
         return 0.0
     stiffness, longest, start = parameters[1], parameters[0] / parameters[1], memory[0]
@@ -44,6 +52,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Level and stiffness for the deflection level / k that explains most of the missing force."""
     motion = axis_motion(evidence, axis)
     path, used = evidence.axis_position[:, axis], evidence.used > 0
     rms = float(np.sqrt(np.mean(motion.position**2)))

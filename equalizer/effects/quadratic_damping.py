@@ -1,4 +1,9 @@
-"""Quadratic damping: drag that grows with the square of the velocity, as of air or oil."""
+"""Quadratic damping: drag that grows with the square of the velocity, as of air or oil in turbulent flow.
+
+    F = -c v |v|        c in N s²/m² (a rotation: N m s²/rad²)
+
+A simulation solves for the velocity at the end of each step (implicit trapezoidal rule).
+"""
 
 import numpy as np
 
@@ -12,8 +17,8 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Mean of the drag at the step's start and end. The velocity at the end solves a quadratic equation (implicit
-    step)."""
+    """Mean of the drag (N) at the step's start and end (trapezoidal rule). The end velocity w depends on it (implicit
+    step) and solves w + r w |w| = v_free - r v |v|, with r = c v_per_n / 2."""
     reach = 0.5 * parameters[0] * at[V_PER_N]
     aim = at[V_FREE] - reach * at[V] * abs(at[V])
     end = 2 * aim / (1 + np.sqrt(1 + 4 * reach * abs(aim)))
@@ -22,6 +27,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Coefficient by linear regression of the missing force on -v |v|; empty unless positive."""
     motion = axis_motion(evidence, axis)
     coefficient = float(regress_beside_linear(motion).fit(-motion.velocity * np.abs(motion.velocity)).strengths[0])
     return ({"coefficient": coefficient},) if coefficient > 0 else ()

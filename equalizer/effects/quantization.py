@@ -1,9 +1,11 @@
-"""Quantization: the response takes only whole multiples of a converter's step.
+"""Quantization: the response takes only whole multiples of the step of an analogue-to-digital converter.
 
-Where the recording itself lies on such a lattice, the reading before rounding is known to half a step, and the residual
-is computed as the quantile of the noise (Dunn and Smyth 1996, J. Comput. Graph. Stat. 5:236), so that noise which
-dithers the steps is not taken for a misfit. Otherwise the noise was added after rounding, and the prediction is
-rounded.
+    y = step round(x / step)        step in the unit of the response
+
+Where the recorded values lie on such a lattice, noise was rounded with the signal. The value before rounding is then
+known to half a step, and the residual is the quantile of the noise (randomised quantile residual; Dunn and Smyth 1996,
+J. Comput. Graph. Stat. 5:236), so that rounded noise does not count as misfit. Where they do not, noise was added after
+rounding, and the prediction is rounded.
 """
 
 import numpy as np
@@ -16,7 +18,7 @@ from equalizer.effects.starts.response_starts import channels_of
 from equalizer.signals.signal import FloatArray
 
 FAR = 1e-12
-"""Probability beyond which a quantile is not computed: its digits are lost."""
+"""Least tail probability for which a quantile is computed; below it too few significant digits remain."""
 
 
 def _round_response(
@@ -31,6 +33,7 @@ def _round_response(
 def _round_as_measured(
     response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
+    """The prediction (n, p): by quantile residuals in channels that were recorded on the lattice, else rounded."""
     read, step = _round_response(response, 0.0, channels, values), values["step"]
     for channel in channels:
         if lattice_offset(measured[:, channel], step) is not None:
@@ -41,19 +44,23 @@ def _round_as_measured(
 
 
 def _quantile_response(response: FloatArray, measured: FloatArray, noise: float, step: float) -> FloatArray:
-    """The prediction for which the residual is the noise's quantile (randomised quantile residual)."""
+    """The prediction (n,) whose residual is the randomised quantile residual: the quantile of a uniformly random
+    probability between those of both ends of the rounding interval. noise: rms of the noise before rounding."""
     missing = measured - response
-    # Computed from the shorter tail, whose probabilities keep their digits.
+    # Probabilities of the lower tail keep their digits: residuals above zero are mirrored.
     side = np.where(missing > 0, -1.0, 1.0)
     low, high = ndtr((side * missing - step / 2) / noise), ndtr((side * missing + step / 2) / noise)
+    # Seeded with the length, so that a fit sees the same residual for the same prediction.
     chance = np.random.default_rng(len(response)).random(len(response))
     residual = side * noise * ndtri(np.clip(low + chance * (high - low), FAR, 1 - FAR))
+    # Too improbable for a quantile: the distance to the nearest end of the rounding interval.
     far = high < FAR
     residual[far] = (missing - np.sign(missing) * step / 2)[far]
     return np.asarray(measured - residual)
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """The step of the lattice of measured values, or the step under added noise; empty where neither is found."""
     used = evidence.used > 0
     for each in channels_of(evidence, channel):
         measured, noise = evidence.response[used, each], float(evidence.noise[each])

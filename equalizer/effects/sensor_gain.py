@@ -1,4 +1,9 @@
-"""Sensor gain: a sensitivity that differs from the data sheet's."""
+"""Sensor gain: a sensitivity that differs from the one in the data sheet by a constant factor.
+
+    y = gain x        x: true response, y: reading, both in the unit of the response
+
+The measured position is not affected, in contrast to a gain error of the actuator.
+"""
 
 import numpy as np
 
@@ -20,6 +25,7 @@ def _scale_response(
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """Gain by least squares of the measured on the predicted response; empty where it is 1 within `LEAST`."""
     channels, used = list(channels_of(evidence, channel)), evidence.used > 0
     measured = (evidence.response[:, channels] / evidence.noise[channels])[used]
     predicted = (evidence.predicted[:, channels] / evidence.noise[channels])[used]

@@ -1,4 +1,9 @@
-"""Sensor lag: the low pass of a sensor or channel has another bandwidth than the model's."""
+"""Sensor lag: the first-order low pass of a sensor channel has a bandwidth that differs from the model's.
+
+    dy/dt = 2 pi f (x - y)        f: bandwidth (-3 dB) in Hz, used instead of the model's
+
+The sensor model applies it (`simulation.sensor_path.low_pass`, discrete at the sample rate).
+"""
 
 import math
 
@@ -11,21 +16,24 @@ from equalizer.effects.starts.response_starts import likeliest_reading
 from equalizer.signals.signal import FloatArray
 
 SLOWEST, FASTEST = 0.002, 1.5
-"""Bandwidths that are tried, as shares of the sample rate."""
+"""Range of bandwidths that are searched, as shares of the sample rate."""
 
 
 def _keep_response(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """Returns the response unchanged: the sensor model's own low pass takes the other bandwidth."""
+    """The response unchanged: the effect acts through the bandwidth of the sensor model's low pass."""
     return response
 
 
 def _bandwidth_hz(known_hz: float, values: Values) -> float:
+    """Bandwidth of the channel in Hz; that of the model where the value is infinite (no effect)."""
     return known_hz if math.isinf(values["bandwidth"]) else values["bandwidth"]
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """The bandwidth that fits the measured response best in place of the model's; empty where none improves the
+    fit."""
     rate, known_hz = evidence.sample_rate_hz, evidence.model.sensor.bandwidth_hz
     bandwidth = likeliest_reading(
         evidence,

@@ -1,4 +1,9 @@
-"""Cubic sensor nonlinearity: the sensitivity changes with the reading, symmetrically."""
+"""Cubic sensor nonlinearity: the sensitivity changes with the square of the response, in both directions alike.
+
+    y = x + cubic x³        cubic in 1 / (unit of the response)²
+
+The reading has odd harmonics that grow with the level; the measured position is not affected.
+"""
 
 import numpy as np
 
@@ -15,12 +20,13 @@ def _add_cubic(response: FloatArray, sample_rate_hz: float, channels: tuple[int,
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """The cubic coefficient by linear regression of the residual, weighted by the noise."""
     channels = list(channels_of(evidence, channel))
     weight = 1 / evidence.noise[channels]
     predicted = evidence.predicted[:, channels]
     residual = ((evidence.response[:, channels] - predicted) * weight).ravel()
     basis = np.column_stack([(predicted**3 * weight).ravel(), (predicted * weight).ravel()])
-    # Re-tuned parameters can absorb what is proportional to the response itself.
+    # The response itself is a second regressor, because re-tuned parameters can absorb a change of gain.
     cubic = float(shares_of(residual, basis, np.repeat(evidence.used, len(channels)))[0])
     return ({"cubic": cubic},) if cubic != 0 and np.isfinite(cubic) else ()
 

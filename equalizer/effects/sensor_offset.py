@@ -1,4 +1,9 @@
-"""Sensor offset (bias): the reading at rest is not zero."""
+"""Sensor offset (bias): a constant that is added to the reading, so that it is not zero at rest.
+
+    y = x + offset        in the unit of the response
+
+The measured position is not affected, in contrast to a constant force.
+"""
 
 import numpy as np
 
@@ -7,7 +12,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST_SIGMA = 4.0
-"""Least offset, in standard errors of the mean."""
+"""Least offset that is tried, in standard errors of the mean residual (samples taken as independent)."""
 
 
 def _add_offset(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
@@ -17,6 +22,7 @@ def _add_offset(response: FloatArray, sample_rate_hz: float, channels: tuple[int
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """The mean residual of the channel; empty where it is not significant."""
     residual = (evidence.response - evidence.predicted)[evidence.used > 0, channel]
     offset = float(residual.mean())
     large = abs(offset) * np.sqrt(len(residual)) > LEAST_SIGMA * float(residual.std())

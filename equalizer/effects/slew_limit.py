@@ -1,4 +1,8 @@
-"""Slew-rate limit: an actuator's force changes at a limited rate, by voltage over inductance or a software ramp."""
+"""Slew-rate limit: an actuator's force follows the command at a limited rate, by voltage over inductance or a software
+ramp.
+
+    |dF/dt| <= rate        command u and force F in N, rate in N/s (a rotation: N m/s)
+"""
 
 import math
 
@@ -11,9 +15,9 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 SELDOM = (0.3, 0.5, 0.75)
-"""Starting rates for a limit that is seldom reached, as shares of the command's fastest change."""
+"""Starting values for a limit that is rarely reached, as shares of the command's largest rate of change."""
 ERRS = 1.05
-"""Rms residual of a channel, over its noise, from which these starting values are tried."""
+"""Rms residual of a channel, over its noise, above which these starting values are tried."""
 
 
 _IN = types.Array(types.float64, 1, "A", readonly=True)
@@ -21,13 +25,13 @@ _IN = types.Array(types.float64, 1, "A", readonly=True)
 
 @njit(types.void(_IN, types.float64, types.float64[::1], types.float64[::1]), cache=True, nogil=True)
 def limit_rate(commands: FloatArray, reach: float, mean: FloatArray, end: FloatArray) -> None:
-    """Fill mean (n,) and end (n,): the force over each step and at its end, for held commands (n,). reach: largest
-    change in one step."""
+    """Fill mean (n,) and end (n,): the mean force over each step and the force at its end, for held commands (n,), from
+    zero. reach: largest change in one step, > 0."""
     force = 0.0
     for k in range(commands.shape[0]):
         missing = commands[k] - force
         if abs(missing) <= reach:
-            # Still ramping for a share of the step.
+            # Share of the step after which the ramp reaches the command; the mean of the step includes the ramp.
             on_way = abs(missing) / reach
             mean[k] = commands[k] - missing * on_way / 2
             force = commands[k]
@@ -41,7 +45,8 @@ def limit_rate(commands: FloatArray, reach: float, mean: FloatArray, end: FloatA
 def limit_slew(
     commands: FloatArray, step_s: float, rate: float, first: float = 0.0, at_end: bool = False
 ) -> FloatArray:
-    """(n,): mean force over each step, or that at its end, from `first` at the beginning. commands: (n,)."""
+    """(n,): mean force over each step, or the force at its end, for commands (n,). first: force before the first step;
+    rate: in units of force per s."""
     return np.asarray(first + _mean_and_end(commands - first, step_s, rate)[int(at_end)])
 
 
@@ -54,6 +59,7 @@ def _limit_rate_at_end(commands: FloatArray, step_s: float, values: Values) -> F
 
 
 def _mean_and_end(commands: FloatArray, step_s: float, rate: float) -> FloatArray:
+    """(2, n): mean force over each step, and force at its end; the command itself for an infinite rate."""
     if math.isinf(rate):
         return np.array([commands, commands])
     found = np.empty((2, len(commands)))
@@ -62,6 +68,8 @@ def _mean_and_end(commands: FloatArray, step_s: float, rate: float) -> FloatArra
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Likeliest rate by grid search; where the response errs by more than its noise, also fixed shares of the fastest
+    change."""
     commanded = evidence.command if axis == ALL_SITES else evidence.command[:, axis]
     fastest = float(np.abs(np.diff(commanded, axis=0)).max()) * evidence.sample_rate_hz
     if fastest == 0:
@@ -76,12 +84,12 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     likeliest = () if rate is None else ({"rate": rate},)
     if not _has_unexplained_error(evidence):
         return likeliest
-    # A limit that is seldom exceeded may be absorbed by re-tuning: then it is tried by simulation.
+    # Re-tuning may have absorbed a limit that is rarely reached, so that the missing force does not show it.
     return likeliest + tuple({"rate": share * fastest} for share in (SELDOM if axis == ALL_SITES else SELDOM[1:2]))
 
 
 def _has_unexplained_error(evidence: Evidence) -> bool:
-    """Whether any channel errs by more than its noise."""
+    """Whether the rms residual of any channel exceeds `ERRS` times its noise."""
     residual = (evidence.response - evidence.predicted)[evidence.used > 0]
     return bool((np.sqrt(np.nanmean(residual**2, axis=0)) > ERRS * evidence.noise).any())
 

@@ -1,4 +1,8 @@
-"""Transport delay: commands take effect later than assumed, as by a bus or a servo tick."""
+"""Transport delay of the command, as of a bus or a controller's tick: F(t) = u(t - delay).
+
+A command u that is held over a sample period and delayed by (k + r) periods, 0 <= r < 1, has over each period the mean
+(1 - r) u[n - k] + r u[n - k - 1] (`delay_mean`).
+"""
 
 import numpy as np
 
@@ -10,10 +14,11 @@ from equalizer.effects.starts.response_starts import starts_for_lateness
 from equalizer.signals.signal import FloatArray
 
 SHORTEST_S, LONGEST_S = 2e-5, 0.05
-"""Range of delays that are tried as starts."""
+"""Range of delays (s) among which starting values are searched."""
 BEYOND = 0.15
-"""Share of the hold time. An acceleration follows a force without delay, so that the misfit jumps where the delay
-passes a whole number of hold times, which a gradient search does not cross."""
+"""Distance of the second starting value from the nearest whole number of hold times, in hold times; heuristic. An
+acceleration follows a force without delay, so that the misfit jumps where the delay passes a whole number of hold
+times, and a gradient search does not cross that jump."""
 
 
 def _delay_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
@@ -25,6 +30,8 @@ def _delay_force_at_end(commands: FloatArray, step_s: float, values: Values) -> 
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Delays (s) from the response's time shift and from the missing force, and the first of these across the jump of
+    the misfit (see `BEYOND`)."""
     fitting = likeliest_value(evidence, axis, delay_mean, list(np.geomspace(SHORTEST_S, LONGEST_S, 24)), False)
     starts = starts_for_lateness(evidence, axis, fitting, LONGEST_S)
     beside = tuple(_across_nearest_step(late, 1 / evidence.sample_rate_hz) for late in starts[:1])
@@ -32,7 +39,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _across_nearest_step(late_s: float, held_s: float) -> float:
-    """A delay on the other side of the nearest whole number of hold times."""
+    """A delay (s) on the other side of the nearest whole number, at least 1, of hold times. held_s: sample period."""
     whole = max(round(late_s / held_s), 1)
     return (whole + (BEYOND if late_s < whole * held_s else -BEYOND)) * held_s
 

@@ -1,4 +1,9 @@
-"""Viscous damping beyond the model's, as of a bearing, eddy currents, or a motor on a voltage drive."""
+"""Viscous damping in addition to the model's, F = -damping v, as of a bearing, eddy currents, or a motor on a voltage
+drive (back-EMF).
+
+`damping` is in N s/m (N m s/rad in a rotational model); v is the velocity along a driven axis d, so that the damping
+matrix grows by damping d d'.
+"""
 
 from dataclasses import replace
 
@@ -11,15 +16,18 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _GUESS = 0.3
-"""Starting value as a share of the model's own damping, used where re-tuning has absorbed the missing damping."""
+"""Second starting value, relative to the model's own damping along the axis, for a missing damping that re-tuning has
+absorbed. Heuristic."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+    """The model with the damping matrix D + damping d d', d the unit vector of the driven axis."""
     along = driven_axes(model)[:, axis]
     return replace(model, damping=model.damping + values["damping"] * np.outer(along, along))
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Positive ones of two values: regression of the missing force on -v, and `_GUESS` of the model's damping."""
     motion = axis_motion(evidence, axis)
     nuisances = np.column_stack([motion.position, motion.acceleration, np.ones_like(motion.position)])
     fit = PartialRegression(motion.force, nuisances).fit(-motion.velocity)

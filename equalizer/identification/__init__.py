@@ -1,6 +1,7 @@
 """System identification: from recordings to models of the device.
 
-`frequency_response` (recordings -> measured lines with their errors) -> `state_space` (lines -> A, B, C, D by
-subspace identification and maximum likelihood) or `mechanical` (lines -> masses, dampers, springs). Begin at
-`state_space/identify_recordings.py` or `mechanical/mechanical_fit.py`.
+`frequency_response`: nonparametric estimates with their noise variance, from recordings. `state_space`: A, B, C, D,
+fitted to such an estimate by subspace identification and maximum likelihood. `mechanical`: masses, dampers and springs,
+fitted to the spectra of recordings directly. Begin at `state_space/identify_recordings.py` or
+`mechanical/mechanical_fit.py`.
 """

@@ -1,4 +1,8 @@
-"""Evaluates a law along samples, with the compiled code that a simulation uses."""
+"""Evaluates a law along samples, with the compiled stack machine (`kernel`) that simulations use too.
+
+`evaluate`: signals are straight lines between samples, as measured motion. `evaluate_held`: signals are held over each
+step, as commands are.
+"""
 
 from collections.abc import Mapping
 
@@ -12,12 +16,12 @@ from equalizer.signals.signal import FloatArray
 
 
 def evaluate(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> FloatArray:
-    """(n,): the law's value at each sample. columns: (n,) each, by the signals' names, SI; `t` is counted from the
-    first sample where it is not among them. Between samples signals are interpolated linearly. Operators with memory
-    start in the steady state of the signals' first values, integrals at zero. Outside its domain a function gives NaN
-    or inf.
+    """(n,): the law's value at each sample. columns: (n,) each, by the signals' names, in SI units; where the time `t`
+    is not among them, it is counted in seconds from the first sample. Between samples signals are interpolated
+    linearly. Operators with memory start in the steady state of the signals' first values, integrals at zero. Outside
+    its domain a function returns NaN or inf.
 
-    Raises LawError for a signal that is not there.
+    Raises LawError where a signal is missing, there are no columns, or their lengths differ.
     """
     program, signals = _bind_signals(law, columns, sample_rate_hz)
     value, memory = np.empty(len(signals)), np.zeros(program.memory)
@@ -26,8 +30,8 @@ def evaluate(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float)
 
 
 def evaluate_held(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> FloatArray:
-    """(2, n): at the start and at the end of each step, over which the signals (n,) are held, as commands are. Before
-    the first sample all signals are zero. Raises LawError."""
+    """(2, n): the law's value at the start and at the end of each step, over which the signals (n,) are held, as
+    commands are. Before the first sample all signals are zero. Raises LawError as `evaluate` does."""
     program, signals = _bind_signals(law, columns, sample_rate_hz)
     values, memory = np.empty((2, len(signals))), np.zeros(program.memory)
     memory[0] = FROM_ZERO
@@ -36,6 +40,7 @@ def evaluate_held(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: f
 
 
 def _bind_signals(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> tuple[Program, FloatArray]:
+    """The law's program, and its signals as an array (n, k), column by column in the program's order."""
     if not columns:
         raise LawError("a law is evaluated along signals, and there are none")
     lengths = {len(column) for column in columns.values()}

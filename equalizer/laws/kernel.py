@@ -1,7 +1,8 @@
-"""Stack machine that runs a law's program at one instant or along samples, compiled.
+"""Compiled stack machine that runs a law's program (postfix code, see `program`) at an instant or along samples.
 
-A step has a start and an end. Between them the signals of operators with memory are straight lines; at a start they may
-jump, as commands do. The memory advances when a step is kept.
+A step has a start and an end. Between them the signals of operators with memory (lag, play, delay, integral) are
+straight lines; at a start they may jump, as commands do. `run` may be called several times for a step; `commit_step`
+then stores its end as the start of the next step. Times are in seconds.
 """
 
 from typing import Any
@@ -13,12 +14,14 @@ from equalizer.laws.program import CELLS, CODE, DEEPEST, KEPT
 from equalizer.signals.signal import FloatArray
 
 START, END = 0, 1
+"""Phase of a step at which a value is computed."""
 SETTLED, BEGUN, FROM_ZERO = 0.0, 1.0, 2.0
-"""First number of the memory: empty, to be started in the steady state of the signals' first values; started; empty, to
-be started with all signals zero."""
+"""State of the memory, its first number. SETTLED: not started, begins in the steady state of the signals' first values;
+BEGUN: started; FROM_ZERO: not started, begins with all signals zero."""
 UNCOUNTED: Any = {"_nrt": False}
-"""Compiles without reference counts of arrays, which all belong to the caller: their atomic operations took two thirds
-of the time of a short law, and three quarters of a step of a mechanism. Such a function allocates nothing."""
+"""Option of Numba to compile without reference counts of arrays, permitted because all arrays belong to the caller and
+the function allocates none. Their atomic operations took two thirds of the time of a short law, and three quarters of a
+step of a mechanism."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 _NUMBER, _VARIABLE = CODE["number"], CODE["variable"]
@@ -30,10 +33,12 @@ _LAG, _PLAY, _DELAY, _INTEGRAL = (CODE[name] for name in ("lag", "play", "delay"
 _SAME = 1e-9
 """Tolerance for equal instants, relative to the delay (rounding)."""
 _RING = (KEPT["delay"] - 4) // 2
+"""Number of instants in the ring buffer of a delay."""
 
 
 @njit(inline="always")
 def _binary(code: int, left: float, right: float) -> float:
+    """Operator with two arguments; minimum and maximum return NaN if an argument is NaN."""
     if code == _MULTIPLY:
         return left * right
     if code == _ADD:
@@ -76,8 +81,8 @@ def _apply_unary(code: int, operand: float) -> float:  # noqa: C901 - a table, i
 
 @njit(inline="always")
 def _lag(signal: float, tau_s: float, memory: FloatArray, at: int, phase: int, step_s: float) -> float:
-    """First-order lag, y' = (s - y) / tau, exact for signals s that are straight lines. memory: y and s at the start,
-    and at the end."""
+    """First-order lag, y' = (s - y) / tau, exact for signals s that are straight lines over a step. memory: y and s at
+    the start, then y and s at the end."""
     if not tau_s > 0:
         return signal
     if phase == START:
@@ -93,6 +98,8 @@ def _lag(signal: float, tau_s: float, memory: FloatArray, at: int, phase: int, s
 
 @njit(inline="always")
 def _integral(signal: float, memory: FloatArray, at: int, phase: int, step_s: float) -> float:
+    """Integral over time by the trapezoidal rule, exact for straight lines. memory: value and signal at the start, then
+    at the end."""
     if phase == START:
         memory[at + 1] = signal
         return float(memory[at])
@@ -103,6 +110,8 @@ def _integral(signal: float, memory: FloatArray, at: int, phase: int, step_s: fl
 
 @njit(inline="always")
 def _apply_play(signal: float, half_width: float, memory: FloatArray, at: int, phase: int) -> float:
+    """Play (backlash) operator: the output moves only as far as it takes to stay within half_width of the signal.
+    memory: output at the start, at the end."""
     width = max(half_width, 0.0)
     follows = min(max(memory[at], signal - width), signal + width)
     memory[at + 1] = follows
@@ -118,9 +127,9 @@ def _apply_play(signal: float, half_width: float, memory: FloatArray, at: int, p
 def _interpolate_delayed(
     signal: float, delay_s: float, memory: FloatArray, at: int, phase: int, time_s: float
 ) -> float:
-    """The signal at time_s - delay_s, interpolated in the ring buffer. memory: number of instants written, index of the
-    oldest that counts, their times and values; then the last signal and delay, which are not written yet. At a jump, a
-    step starts after it and ends before it."""
+    """The signal at time_s - delay_s, interpolated linearly in the ring buffer. memory: number of instants written,
+    index of the oldest in use, their times and values; then the latest signal and delay, which are not yet in the
+    buffer. At a jump of the signal, the start of a step reads the value after it, the end the value before it."""
     times, values, wanted = at + 2, at + 2 + _RING, time_s - delay_s
     first, last = int(memory[at + 1]), int(memory[at]) - 1
     passed = wanted + (_SAME if phase == START else -_SAME) * delay_s
@@ -142,7 +151,7 @@ def _interpolate_delayed(
     **UNCOUNTED,
 )
 def _store_instant(signal: float, delay_s: float, memory: FloatArray, at: int, time_s: float) -> None:
-    """Append an instant to the ring buffer; replace the newest one while it is too close to its predecessor."""
+    """Append an instant to the ring buffer; replace the newest instant while it is too close to its predecessor."""
     times, values, count = at + 2, at + 2 + _RING, int(memory[at])
     if count < 2 or time_s - memory[times + (count - 2) % _RING] >= delay_s / CELLS * (1 - _SAME):
         count += 1
@@ -155,6 +164,7 @@ def _store_instant(signal: float, delay_s: float, memory: FloatArray, at: int, t
 
 @njit(inline="always")
 def _delay(signal: float, delay_s: float, memory: FloatArray, at: int, phase: int, time_s: float) -> float:
+    """Delay by delay_s seconds; a jump at the start of a step is stored as a second instant of the same time."""
     if not delay_s > 0:
         return signal
     newest = at + 2 + _RING + (int(memory[at]) - 1) % _RING
@@ -177,6 +187,7 @@ def _initialise_memory(code: int, signal: float, memory: FloatArray, at: int, ti
 def _run_with_memory(  # noqa: PLR0913 - a kernel takes flat arrays
     code: int, signal: float, number: float, memory: FloatArray, at: int, phase: int, time_s: float, step_s: float
 ) -> float:
+    """Value of an operator with memory. number: its second argument (constant); at: index of its memory."""
     if memory[0] != BEGUN:
         _initialise_memory(code, 0.0 if memory[0] == FROM_ZERO else signal, memory, at, time_s)
     if code == _LAG:
@@ -196,7 +207,8 @@ def run(  # noqa: PLR0913 - a kernel takes flat arrays
     program: FloatArray, signals: FloatArray, memory: FloatArray, stack: FloatArray, phase: int, time_s: float,
     step_s: float,
 ) -> float:  # fmt: skip
-    """The value at a step's start or end. program: (2 k,). time_s: of this instant. stack: (DEEPEST,), scratch."""
+    """The law's value at a step's start or end (`phase`). program: (2 k,), code and operand in turn; signals:
+    (columns,), at this instant; time_s: time of this instant; stack: (DEEPEST,), work space."""
     top = -1
     for row in range(0, program.shape[0], 2):
         code = int(program[row])
@@ -221,7 +233,7 @@ def run(  # noqa: PLR0913 - a kernel takes flat arrays
 
 @njit(types.void(_VECTOR, _VECTOR, types.float64), cache=True, nogil=True, **UNCOUNTED)
 def commit_step(program: FloatArray, memory: FloatArray, time_s: float) -> None:
-    """Store the end of the step that was run last as the start of the next one. time_s: of that end."""
+    """Store the end of the step that was run last as the start of the next step. time_s: time of that end."""
     for row in range(0, program.shape[0], 2):
         code, at = int(program[row]), int(program[row + 1])
         if code in (_LAG, _INTEGRAL):
@@ -234,7 +246,8 @@ def commit_step(program: FloatArray, memory: FloatArray, time_s: float) -> None:
 
 @njit(types.void(_VECTOR, _MATRIX, _VECTOR, types.float64, _VECTOR), cache=True, nogil=True, error_model="numpy")
 def run_along(program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, out: FloatArray) -> None:
-    """Fills out (n,). signals: (n, k), on straight lines from sample to sample."""
+    """Writes the law's values to out (n,). signals: (n, k), straight lines from sample to sample, step_s seconds
+    apart."""
     stack = np.empty(DEEPEST)
     for k in range(signals.shape[0]):
         out[k] = run(program, signals[k], memory, stack, END if k > 0 else START, k * step_s, step_s)
@@ -247,7 +260,8 @@ def run_along(program: FloatArray, signals: FloatArray, memory: FloatArray, step
 def run_along_held(
     program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, out: FloatArray
 ) -> None:
-    """Fills out (2, n): at the start and at the end of each step, over which the signals (n, k) are held."""
+    """Writes the law's values at the start and at the end of each step to out (2, n); signals (n, k) are held over a
+    step of step_s seconds."""
     stack = np.empty(DEEPEST)
     for k in range(signals.shape[0]):
         out[0, k] = run(program, signals[k], memory, stack, START, k * step_s, step_s)

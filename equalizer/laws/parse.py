@@ -1,7 +1,8 @@
-"""Parses a formula: the arithmetic, names and functions below in Python's syntax. No code is executed.
+"""Parses a formula in Python's expression syntax, restricted to numbers, names, + - * / ** and the functions below. The
+text is parsed to a syntax tree by Python's `ast` and never executed.
 
-Numbers with a point or an exponent (`4.1`, `1e-3`) are free: a fit may move them. Whole numbers (`2`) and `pi` are part
-of the form. Instead of free numbers a template holds their names `p0`, `p1`, …
+Numbers with a point or an exponent (`4.1`, `1e-3`) are free parameters, which a fit may change. Whole numbers (`2`) and
+`pi` are part of the form. A template contains the names `p0`, `p1`, … of the free parameters instead of their values.
 """
 
 import ast
@@ -22,21 +23,24 @@ FUNCTIONS: Mapping[str, int] = {
 }  # fmt: skip
 """Number of arguments of each function."""
 MEMORY = ("lag", "play", "delay", "integral")
-"""Operators with memory: lag(s, tau_s), play(s, half_width), delay(s, delay_s), integral(s)."""
+"""Operators with memory, of a signal s: lag(s, tau_s), play(s, half_width), delay(s, delay_s), integral(s)."""
 LONGEST, LARGEST = 2000, 200
-"""Most characters and most parts of a formula."""
+"""Largest number of characters, and of nodes of the syntax tree, of a formula."""
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"
 }  # fmt: skip
 ALLOWED = "allowed are numbers, signals, pi, + - * / ** and " + ", ".join(FUNCTIONS)
+"""Description of the language, for error messages."""
 
 
 class LawError(ValueError):
-    """The text is not a formula of this language. The message says what is wrong, and where."""
+    """The text is not a formula of this language. The message states the error and, where known, its position."""
 
 
 @dataclass(slots=True)
 class _Reader:
+    """Converts Python's syntax tree to the tree of a law, and collects the free numbers. Methods raise LawError."""
+
     text: str
     template: bool
     numbers: list[float] = field(default_factory=list)
@@ -105,7 +109,8 @@ class _Reader:
 
 @lru_cache(maxsize=4096)
 def parse_formula(text: str, template: bool = False) -> tuple[Node, tuple[float, ...]]:
-    """The tree and its free numbers. template: the text names its free numbers; others are form. Raises LawError."""
+    """The expression tree of a formula, and the values of its free parameters p0, p1, … in the order of the text.
+    template: the text contains the parameters' names, and all numbers in it are part of the form. Raises LawError."""
     text = text.strip()
     if not text:
         raise LawError("the law is empty")
@@ -130,7 +135,8 @@ def _not_python(text: str, error: BaseException) -> str:
 
 
 def _column(text: str, node: ast.expr) -> int:
-    """Column in characters; Python's syntax tree counts bytes, line by line."""
+    """Position of a node in the text in characters, from 0; Python's syntax tree counts lines, and bytes of UTF-8 in
+    each line."""
     lines = text.splitlines(keepends=True)
     before = sum(len(line) for line in lines[: node.lineno - 1])
     return before + len(lines[node.lineno - 1].encode()[: node.col_offset].decode(errors="replace"))

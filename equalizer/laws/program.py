@@ -1,4 +1,8 @@
-"""Compiles a formula to a flat program for the stack machine in `equalizer.laws.kernel`."""
+"""Compiles the expression tree of a formula to postfix code for the stack machine in `equalizer.laws.kernel`.
+
+Each row of the code is an operation and an operand; arguments precede their operator. Operators with memory get a
+region of a memory array, whose first number is its state.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,28 +18,30 @@ CODES = (
     "neg", "sin", "cos", "tan", "exp", "log", "sqrt", "abs", "sign", "tanh", "atan",
     "lag", "play", "delay", "integral",
 )  # fmt: skip
+"""Operations in the order of their codes, on which the kernel relies: operands, binary operators, unary operators,
+operators with memory."""
 CODE: Mapping[str, int] = {name: number for number, name in enumerate(CODES)}
 CELLS = 256
-"""Most instants over which a delayed signal is stored."""
+"""Resolution of a delay: every second instant in its ring buffer is at least delay / CELLS later."""
 KEPT: Mapping[str, int] = {"lag": 4, "play": 2, "delay": 4 + 2 * (2 * CELLS + 8), "integral": 4}
-"""Size of each operator's memory."""
+"""Numbers in the memory of each operator; its layout is described at the operators in `kernel`."""
 DEEPEST = 32
-"""Largest depth of the stack."""
+"""Largest number of values on the stack."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
-    """Formula as a program for a stack machine (postfix notation); made by `program_of`."""
+    """Formula in postfix notation for the stack machine; result of `program_of`."""
 
     codes: FloatArray
-    """(k, 2): operation, and its number, column of a signal, or index in the memory."""
+    """(k, 2): operation, and its operand: a number, the column of a signal, or the index of its memory."""
     free: tuple[tuple[int, int], ...]
-    """Rows whose number is free, and index of that free number."""
+    """Row of each free parameter's occurrence, and the parameter's index."""
     memory: int
-    """Size of the memory; its first number is its state, see `equalizer.laws.kernel`."""
+    """Size of the memory, which starts with its state (`SETTLED`, ... in `equalizer.laws.kernel`)."""
 
     def with_numbers(self, numbers: Sequence[float]) -> FloatArray:
-        """(2 k,): the flat program with the free numbers inserted."""
+        """(2 k,): the program as a vector, with the values of the free parameters inserted."""
         codes = self.codes.copy()
         for row, place in self.free:
             codes[row, 1] = numbers[place]
@@ -44,13 +50,14 @@ class Program:
 
 def program_of(tree: Node, signals: Mapping[str, int]) -> Program:
     """Compile a formula's tree for the stack machine. signals: column of each signal. Raises LawError for an unknown
-    signal, and for a formula that is too deep."""
+    signal, and for a formula that needs more than `DEEPEST` values on the stack."""
     program = _append_formula(tree, Program(np.empty((0, 2)), (), 1), signals)
     _check_depth(program.codes[:, 0])
     return program
 
 
 def _append_formula(tree: Node, to: Program, signals: Mapping[str, int]) -> Program:
+    """The program with the code of a tree appended, arguments first."""
     match tree:
         case Number(value):
             return _append_row(to, "number", value)
@@ -74,6 +81,7 @@ def _append_row(program: Program, name: str, operand: float) -> Program:
 
 
 def _check_depth(codes: FloatArray) -> None:
+    """Raises LawError where the stack overflows. Each code changes the stack's height by 1, 0 or -1."""
     taken = np.ones(len(codes))
     taken[(codes >= CODE["+"]) & (codes <= CODE["maximum"])] = -1
     taken[codes >= CODE["neg"]] = 0

@@ -1,23 +1,26 @@
-"""Expression tree of a formula, and its formatting as text."""
+"""Expression tree of a formula, and its formatting as text in Python's syntax, with parentheses where operator
+precedence needs them.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 _SUM, _PRODUCT, _SIGN, _POWER, _ATOM = 1, 2, 3, 4, 5
+"""Operator precedence, ascending."""
 DIGITS = 5
 """Significant digits of displayed numbers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A number that is part of the form: no fit changes it."""
+    """A number that is part of the formula's form and is not fitted."""
 
     value: float
 
 
 @dataclass(frozen=True, slots=True)
 class Free:
-    """A number that a fit may change: `p0`, `p1`, …"""
+    """A free parameter `p0`, `p1`, …, whose value a fit may change. place: its index."""
 
     place: int
 
@@ -34,7 +37,7 @@ class Apply:
     """An operator or a function applied to its arguments."""
 
     name: str
-    """An operator + - * / **, `neg`, or a function, with its arguments."""
+    """Name of an operator (+ - * / **, `neg`) or a function; `parts` are its arguments."""
     parts: tuple["Node", ...]
 
 
@@ -42,20 +45,20 @@ Node = Number | Free | Variable | Apply
 
 
 def nodes(tree: Node) -> Iterator[Node]:
-    """All nodes in the order of the text, each before its parts."""
+    """All nodes of a tree, each before its arguments (preorder)."""
     yield tree
     for part in tree.parts if isinstance(tree, Apply) else ():
         yield from nodes(part)
 
 
 def format_formula(tree: Node, numbers: Sequence[float] | None = None, digits: int | None = DIGITS) -> str:
-    """Python syntax. numbers: in place of `p0`, `p1`, …; without them these names are written. digits: of the numbers;
-    None = all that are needed to read the same numbers back."""
+    """The formula in Python's syntax. numbers: values of `p0`, `p1`, …; without them these names are written. digits:
+    significant digits of the values; None = as many as are needed to read the same values back."""
     return _format_node(tree, numbers, digits)[0]
 
 
 def _format_node(tree: Node, numbers: Sequence[float] | None, digits: int | None) -> tuple[str, int]:
-    """The text, and its operator precedence, which decides where parentheses are needed."""
+    """Text of a node, and the precedence of its outermost operator, which decides where parentheses are needed."""
     match tree:
         case Number(value):
             return _format_signed(repr(float(value)).removesuffix(".0"))
@@ -74,7 +77,7 @@ def _format_node(tree: Node, numbers: Sequence[float] | None, digits: int | None
 
 
 def _format_free_number(value: float, digits: int | None) -> str:
-    """The number with a point or an exponent, which mark it as free; see `equalizer.laws.law.law_of`."""
+    """The value with a point or an exponent, which mark it as a free parameter; see `equalizer.laws.law.law_of`."""
     return repr(float(value) if digits is None else float(f"{value:.{digits}g}"))
 
 

@@ -1,4 +1,9 @@
-"""Dimensional analysis: units of a law's free numbers from the units of its signals."""
+"""Dimensional analysis: units of a law's free parameters from the units of its signals and of its value.
+
+Terms of a sum have the same dimension, in a product the exponents of the dimensions add, and arguments of functions
+such as sin and exp are dimensionless. The dimension wanted of the value is passed down the expression tree to each
+parameter.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,15 +11,15 @@ from equalizer.laws.tree import Apply, Free, Node, Number, Variable
 from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 Dimension = tuple[float, float, float]
-"""Powers of the unit of force, of position, and of the second."""
+"""Exponents of force, of length (or angle) and of time."""
 NONE: Dimension = (0.0, 0.0, 0.0)
-"""Dimensions as exponents of force, length and time."""
+"""Dimensionless."""
 FORCE: Dimension = (1.0, 0.0, 0.0)
 SECOND: Dimension = (0.0, 0.0, 1.0)
 
 
 def motion_dimension(order: int) -> Dimension:
-    """Dimension of the position's derivative of this order."""
+    """Dimension of the time derivative of the position of this order: 0 position, 1 velocity, 2 acceleration."""
     return 0.0, 1.0, -float(order)
 
 
@@ -25,10 +30,10 @@ def units_of(
     wanted: Dimension,
     system: UnitSystem = LINEAR,
 ) -> tuple[str, ...]:
-    """Units of p0, p1, …; `?` where the formula does not determine one, such as that of one of two factors. wanted:
-    unit of the law's value."""
+    """Units of p0, p1, …; `?` where the formula does not determine the unit, as of two parameters that are factors of
+    each other. numbers: values of the parameters; wanted: dimension of the law's value."""
     reader = _Reader(numbers, signals)
-    for _ in range(2):  # A second pass: what the right side determined may determine the left side.
+    for _ in range(2):  # Two passes: a parameter found on the right of an operator may determine another on the left.
         reader.assign(tree, wanted)
     symbols = (system.force, system.length, system.time)
     return tuple(
@@ -70,14 +75,16 @@ def _scale_dimension(dimension: Dimension | None, factor: float | None) -> Dimen
 
 
 class _Reader:
+    """Dimensions of a formula's parameters, collected in `found` by index; the first dimension found counts."""
+
     def __init__(self, numbers: Sequence[float], signals: Mapping[str, Dimension]) -> None:
         self.numbers = numbers
         self.signals = signals
         self.found: dict[int, Dimension] = {}
 
     def dimension_of(self, node: Node, literal: Dimension | None = NONE) -> Dimension | None:
-        """Dimension of an expression; None where it is not known. literal: dimension of numbers in the formula; None =
-        not known, since a number may have a unit of its own."""
+        """Dimension of an expression; None where it is not known. literal: dimension of the numbers that are part of
+        the formula; None = not known, because such a number may have a unit."""
         match node:
             case Number() | Variable("pi"):
                 return literal
@@ -102,6 +109,7 @@ class _Reader:
         return NONE
 
     def _value(self, node: Node) -> float | None:
+        """Value of an exponent that is a number or a parameter, with or without sign; None for any other expression."""
         match node:
             case Number(value):
                 return value
@@ -113,6 +121,7 @@ class _Reader:
         return None
 
     def assign(self, node: Node, wanted: Dimension | None) -> None:
+        """Pass the dimension that an expression must have (None: not known) down to its parameters."""
         match node:
             case Free(place):
                 if wanted is not None:
@@ -134,13 +143,14 @@ class _Reader:
                 self._assign_arguments(name, parts, wanted)
 
     def _tells_more(self, part: Node, factor: Node) -> bool:
-        """Whether the signals in a sum determine its dimension better than the dimension wanted of the product: a
-        number that multiplies the sum is part of the form, and may have a unit."""
+        """Whether the signals in a sum (or power) determine its dimension better than the dimension wanted of the
+        product: the other factor is a number that is part of the form, and may have a unit."""
         is_sum = isinstance(part, Apply) and part.name in ("+", "-", "minimum", "maximum", "**")
         stated = self.dimension_of(factor, None) is None and self.dimension_of(factor) is not None
         return is_sum and stated and self.dimension_of(part, None) is not None
 
     def _assign_arguments(self, name: str, parts: tuple[Node, ...], wanted: Dimension | None) -> None:
+        """Pass dimensions to a function's arguments; those of functions such as sin and exp are dimensionless."""
         first = parts[0]
         match name:
             case "lag" | "delay" | "play":

@@ -1,5 +1,7 @@
-"""The linkage of a device as its library reports it: Jacobian, inertia and gravity over a grid of positions.
+"""The linkage of a haptic device as its software library reports it: Jacobian, inertia and gravity over a grid of
+positions.
 
-In order: `grid` (where), `calibration` (what was read, what is refused, inertia between the positions), `mirror_lines`
-(how far the readings are from the linkage's symmetry, and what that fills in).
+Order of the data: `grid` (positions that are read, and the Jacobian by finite differences) -> `calibration` (the
+readings, conditions under which they are refused, inertia between positions) -> `mirror_lines` (deviation from the
+symmetry of a delta linkage, and readings completed by it). Begin at `calibration.py`.
 """

@@ -1,7 +1,8 @@
-"""Calibration of a linkage: what a device reports over a grid of positions, and which readings are refused.
+"""Calibration of a linkage: the Jacobian, inertia and gravity that a device reports over a grid of positions, and the
+conditions under which such readings are refused.
 
-J is of the forward kinematics: handle velocity = J joint speeds, joint torques = J^T handle force (Spong, Hutchinson,
-Vidyasagar, Robot Modeling and Control, chapter 4).
+J is the Jacobian of the forward kinematics: handle velocity = J joint speeds, joint torques = J^T handle force (Spong,
+Hutchinson, Vidyasagar, Robot Modeling and Control, chapter 4). Inertia M(x) is that at the handle (operational space).
 """
 
 import itertools
@@ -15,33 +16,34 @@ from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray
 
 MOST_CONDITION = 50.0
-"""Largest condition number of J. At usable places of a delta device it is a few units; the simulated omega.3 stays
-below 2.2."""
+"""Largest condition number of J. At usable positions of a delta device it is a few units; that of the simulated omega.3
+stays below 2.2."""
 MOST_SKEW = 1e-3
-"""|M - M^T| over |M|: more than rounding."""
+"""Upper limit of the largest entry of |M - M^T| over that of |M|; rounding errors are smaller."""
 MASSES_KG = (1e-3, 20.0)
-"""Range of plausible effective masses of a handle on a desk, along any direction."""
+"""Range of plausible effective masses (kg) of the handle of a desktop device, along any direction. Heuristic."""
 MOST_DIFFERENCE = 0.05
-"""J against finite differences. Another unit or convention gives at least 40 %, a forgotten arm's length some 10 %."""
+"""Largest relative difference of J from finite differences. Another unit or convention gives at least 40 %, a neglected
+arm's length some 10 %."""
 
 DEGREES = (4, 3, 2, 1)
-"""Degrees of the polynomial, tried from the highest: the first with enough positions is taken."""
+"""Degrees of the polynomial, tried from the highest: the first that the positions determine is used."""
 SPARE = 2
-"""Times as many positions as terms: below it a lower degree is taken."""
+"""Least ratio of positions to terms of the polynomial; below it a lower degree is used."""
 NEAR_SHARE = 0.3
-"""Standard deviation of the Gaussian weight around a place, as a share of the calibration's reach. Without a weight,
-far positions bend the slope at the centre of the simulated omega.3 by 20 %; with it, by 2 %."""
+"""Standard deviation of the Gaussian weight around a position, relative to the calibration's reach. Without a weight,
+far positions change the slope at the centre of the simulated omega.3 by 20 %; with it, by 2 %."""
 MOST_TOLD = 10
-"""Number of problems at positions that are listed one by one."""
+"""Largest number of problems at positions that are listed one by one; further ones are only counted."""
 
 
 class CalibrationError(ListedProblemsError):
-    """Readings that cannot be those of a linkage. `problems`: one sentence each."""
+    """Readings that cannot be those of a linkage. `problems`: a sentence for each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkageReading:
-    """What a device says of its linkage at one position of the handle."""
+    """Readings of a device's linkage at a position of the handle."""
 
     position_m: FloatArray
     """(3,)"""
@@ -50,14 +52,14 @@ class LinkageReading:
     jacobian: FloatArray
     """(3, 3), m/rad"""
     inertia_kg: FloatArray
-    """(3, 3), at the handle"""
+    """(3, 3), at the handle: force = inertia times acceleration, without gravity and velocity terms."""
     gravity_n: FloatArray
-    """(3,), the force at the handle that holds it against gravity"""
+    """(3,), force at the handle that holds it against gravity."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkageCalibration:
-    """n positions. Raises CalibrationError."""
+    """Readings at n positions. Raises CalibrationError for values that cannot be those of a linkage."""
 
     device: str
     details: str
@@ -67,19 +69,19 @@ class LinkageCalibration:
     position_m: FloatArray
     """(n, 3)"""
     joint_angle_rad: FloatArray
-    """(n, 3)"""
+    """(n, 3), in the order of the arms"""
     jacobian: FloatArray
     """(n, 3, 3), m/rad"""
     inertia_kg: FloatArray
     """(n, 3, 3)"""
     gravity_n: FloatArray
-    """(n, 3); NaN where neither a reading nor a mirror line gives it."""
+    """(n, 3); NaN where neither a reading nor a mirrored reading exists."""
     filled: FloatArray
-    """(n,), 1 where a mirror line gave what could not be read, else 0."""
+    """(n,), 1 where the values are those of a mirrored position, because this position could not be read, else 0."""
     line_deg: FloatArray
-    """(3,), azimuth of the mirror lines from y towards z, in the order of the arms."""
+    """(3,), azimuth of the mirror lines in degrees, from y towards z, in the order of the arms."""
     asymmetry: FloatArray
-    """(3,), largest relative difference between inertia and mirrored inertia, by line."""
+    """(3,), largest relative difference between inertia and mirrored inertia, for each mirror line."""
     difference: float
     """Largest relative difference between J and finite differences of the positions."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -90,7 +92,7 @@ class LinkageCalibration:
 
 
 def calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
-    """One sentence each; none for a calibration that can be used."""
+    """Problems of a calibration, a sentence for each; none for a calibration that can be used."""
     count = len(calibration.position_m)
     shapes = {"position_m": (3,), "joint_angle_rad": (3,), "jacobian": (3, 3), "inertia_kg": (3, 3), "gravity_n": (3,)}
     wrong = [name for name, shape in shapes.items() if getattr(calibration, name).shape != (count, *shape)]
@@ -115,8 +117,7 @@ def calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
 
 
 def difference_problems(difference: float) -> Iterator[str]:
-    """Problems of a Jacobian against finite differences of positions. difference: relative, of J from finite
-    differences."""
+    """Problem of a Jacobian that differs from finite differences of positions, as a sentence. difference: relative."""
     if not 0 <= difference <= MOST_DIFFERENCE:
         yield (
             f"the Jacobian differs from finite differences of its own positions by {difference:.0%}; "
@@ -125,7 +126,8 @@ def difference_problems(difference: float) -> Iterator[str]:
 
 
 def check_reading(reading: LinkageReading, gravity_known: bool = True) -> Iterator[str]:
-    """One sentence each."""
+    """Problems of a reading, a sentence for each: values that are not finite, a singular Jacobian, an inertia that is
+    not symmetric, not positive definite or not plausible. gravity_known: whether the gravity force must be a number."""
     where = "(" + ", ".join(f"{1000 * each:.0f}" for each in reading.position_m) + ") mm"
     jacobian, inertia = reading.jacobian, reading.inertia_kg
     vectors = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
@@ -150,10 +152,11 @@ def check_reading(reading: LinkageReading, gravity_known: bool = True) -> Iterat
 
 
 def inertia_about(calibration: LinkageCalibration, place_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Inertia (3, 3) at a place, kg, and its slopes (3, 3, 3), kg/m: entry [a] is the derivative along axis a.
+    """Inertia (3, 3) at a position place_m (3,), kg, and its derivatives (3, 3, 3), kg/m: entry [a] is that along axis
+    a.
 
-    A polynomial of the position, by least squares with weights that fall with the distance. Raises ValueError for fewer
-    than eight positions, or such that lie in a plane.
+    A polynomial of the position is fitted by least squares with weights that fall with the distance (local regression).
+    Raises ValueError for fewer than eight positions, or for positions in a plane.
     """
     reach_m = float(np.linalg.norm(calibration.position_m, axis=1).max())
     away = (calibration.position_m - place_m) / (reach_m or 1.0)

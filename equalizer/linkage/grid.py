@@ -1,7 +1,8 @@
-"""Positions that the symmetry of a delta linkage maps onto each other, and the derivative of positions by joint angles
-in finite differences.
+"""Grid of positions for the calibration of a delta linkage, which its mirror symmetries map onto itself, and a test of
+its Jacobian by finite differences.
 
-Axes as everywhere: x from the base towards the operator, y right, z up. Azimuths from y towards z.
+Axes as in the whole package: x from the base towards the operator, y to the right, z up. Azimuths are angles from y
+towards z.
 """
 
 import math
@@ -12,17 +13,19 @@ from equalizer.linkage.calibration import CalibrationError
 from equalizer.signals.signal import FloatArray
 
 STEP_M = 2e-3
-"""Half the distance of a difference: some 200 counts of an encoder, and still a small part of an arm."""
+"""Step (m) of the central differences: some 200 counts of an encoder, so that its resolution matters little, and still
+a small part of an arm's length."""
 
 MOST_OFF_DEG = 5.0
-"""Largest deviation of an arm from its nominal place at a third of a turn."""
+"""Largest deviation (degrees) of an arm's azimuth from three azimuths at 120 degrees to each other. Heuristic."""
 
 
 def arm_azimuths(jacobian: FloatArray) -> FloatArray:
-    """Azimuths (3,) of the arms, rad, in the order of the joints, from J (3, 3) at a place on the base's axis.
+    """Azimuths (3,) of the arms, rad, in the order of the joints, from J (3, 3) at a position on the base's axis.
 
-    There each row of the inverse of J lies along its forearm, in the plane of its arm; forearms point inwards and
-    towards the operator. Raises CalibrationError where these are no three planes a third of a turn apart.
+    There each row of the inverse of J is parallel to its forearm, in the plane of its arm; forearms point inwards and
+    towards the operator. The result is the nearest triple at exactly 120 degrees to each other. Raises CalibrationError
+    where an azimuth deviates from it by more than `MOST_OFF_DEG`.
     """
     rows = np.linalg.inv(jacobian)
     rows = rows * np.sign(rows[:, :1])
@@ -39,9 +42,11 @@ def arm_azimuths(jacobian: FloatArray) -> FloatArray:
 
 
 def symmetric_grid(azimuths: FloatArray, radius_m: float, depth_m: float) -> FloatArray:
-    """Positions (185, 3), m: twelve directions at three radii, and the axis, in five planes.
+    """Positions (185, 3), m: twelve directions at three radii up to radius_m, and the axis, in five planes at depths
+    (x) of -depth_m to depth_m. The first is the centre.
 
-    Every mirror line maps the grid onto itself. The first is the centre.
+    The directions are multiples of 30 degrees from the first arm, so that the reflection about each arm's plane maps
+    the grid onto itself. azimuths: (3,), of the arms, rad.
     """
     points = [(0.0, 0.0, 0.0)]
     for depth in np.linspace(-depth_m, depth_m, 5):
@@ -55,16 +60,14 @@ def symmetric_grid(azimuths: FloatArray, radius_m: float, depth_m: float) -> Flo
 
 
 def beside(position_m: FloatArray) -> FloatArray:
-    """Positions (6, 3) a step before and behind along x, y, z: for `jacobian`."""
+    """Positions (6, 3), m: a step `STEP_M` forwards along x, y and z, then a step backwards; for `difference_error`."""
     steps: FloatArray = STEP_M * np.vstack([np.eye(3), -np.eye(3)])
     return position_m + steps
 
 
 def difference_error(jacobian: FloatArray, positions_m: FloatArray, angles_rad: FloatArray) -> float:
-    """Largest relative difference between J (3, 3) and the inverse of d angle / d position in central differences.
-
-    positions_m, angles_rad: (6, 3), at the places of `beside`.
-    """
+    """Largest difference between an entry of J (3, 3) and that of d position / d angle by central differences, relative
+    to the largest entry of the latter. positions_m, angles_rad: (6, 3), at the positions of `beside`."""
     moved, turned = positions_m[:3] - positions_m[3:], angles_rad[:3] - angles_rad[3:]
     by_differences = np.linalg.lstsq(turned, moved, rcond=None)[0].T
     return float(np.abs(jacobian - by_differences).max() / np.abs(by_differences).max())

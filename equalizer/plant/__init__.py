@@ -1,6 +1,7 @@
-"""Models of the device, as values.
+"""Models of the device, as immutable values.
 
-`mechanical_model`: masses, dampers and springs as a lab writes them down, with effects named from `effect_vocabulary`;
-its text is `mechanical_model_toml`, its linear part `linear_simulation`. `identified_model`: A, B, C, D fitted to
-recordings, with its `model_quality` and `model_response`. Begin at `mechanical_model.py` and `identified_model.py`.
+`mechanical_model`: masses, dampers and springs, with effects named in `effect_vocabulary`; `mechanical_model_toml`
+reads and writes it as text, `linear_simulation` simulates its linear part. `identified_model`: matrices A, B, C, D
+fitted to recordings; `model_quality` holds its errors, `model_response` computes its frequency response and simulates
+it. Begin at `mechanical_model.py` or `identified_model.py`.
 """

@@ -1,9 +1,9 @@
-"""Names of physical effects that a model may lack: a vocabulary shared with every file, data alone.
+"""Vocabulary of physical effects that a model may lack: their names, places, parameters and units, as in model files.
 
-Here are only the name, the place and the parameters of each effect; its physics is in `equalizer.effects`, one file
-each. Meanings: `gap` is the total play, `width` half the dead band, `gain` a factor (1 = none), `degrees` the total
-rotation angle, `ppm` > 0 takes the response at t (1 + ppm 1e-6), `per_m` is M (1 + per_m x); `total` and the hum's
-`amplitude` are those of the largest channel, where all share the effect.
+The equations are in `equalizer.effects`, a file for each effect. Meanings of parameters: `gap` is the total play,
+`width` half the dead band, `gain` a factor (1 = no effect), `degrees` the total rotation angle; `ppm` > 0 takes the
+response at t (1 + ppm 1e-6); `per_m` is in the mass M (1 + per_m x); `total` of a drift and `amplitude` of a hum are
+those of the largest channel, where all channels share the effect.
 """
 
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from typing import Literal
 from equalizer.signals.unit_system import ROTATIONAL, UnitSystem
 
 Place = Literal["mechanism", "hand", "actuator", "sensor"]
+"""Part of the device in which an effect acts."""
 
 RESPONSE = "response"
 """Placeholder for the response's unit in `EffectParameter.unit`."""
@@ -23,13 +24,14 @@ class EffectParameter:
 
     name: str
     unit: str
-    """SI unit in a translational model; RESPONSE stands for that of the response."""
+    """SI unit in a translational model; RESPONSE is replaced by the unit of the response."""
     rotational_unit: str
+    """SI unit in a rotational model."""
     optional: bool = False
-    """Optional in a file, but needed to reproduce an effect exactly as it was fitted."""
+    """Whether a file may omit it; it is needed to reproduce an effect exactly as it was fitted."""
 
     def unit_in(self, system: UnitSystem, response_unit: str) -> str:
-        """The unit in a model of these units whose response is in `response_unit`."""
+        """Unit of the parameter in a model with this unit system whose response is in `response_unit`."""
         unit = {False: self.unit, True: self.rotational_unit, None: system.express(self.unit)}[system.rotational]
         if system.rotational is None and self.unit == ROTATIONAL.force:
             unit = system.force
@@ -45,16 +47,16 @@ class EffectName:
     name: str
     place: Place
     parameters: tuple[EffectParameter, ...]
-    """Parameters, the main one first."""
+    """Parameters; the first is the main parameter, see `main`."""
 
     @property
     def main(self) -> EffectParameter:
-        """The parameter that measures the effect's strength, which comes first."""
+        """The first parameter, which measures the effect's strength."""
         return self.parameters[0]
 
 
 def _required(name: str, unit: str, rotational: str = "") -> EffectParameter:
-    """A parameter that every file states; rotational: its unit in a rotational model, empty where it is the same."""
+    """A parameter that a file must state. rotational: its unit in a rotational model, empty where it is the same."""
     return EffectParameter(name, unit, rotational or unit)
 
 
@@ -87,6 +89,7 @@ def matrix_unit(part: str, system: UnitSystem) -> str:
     return MATRIX_UNITS[part].unit_in(system, "1")
 
 
+# Units are SI; `_level` is a force or a torque.
 EFFECT_NAMES: tuple[EffectName, ...] = (
     EffectName("coulomb_friction", "mechanism", (_level("level"),)),
     EffectName("asymmetric_friction", "mechanism", (_level("level_positive"), _level("level_negative"))),
@@ -193,9 +196,9 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
 )
 
 DISCOVERED_LAW = "discovered_law"
-"""A law without a name: a formula with free parameters p0, p1, …; see `equalizer.laws`. Its place follows from what it
-acts on."""
+"""Name of an effect that is a formula with free parameters p0, p1, …; see `equalizer.laws`. Its place follows from the
+quantity on which it acts (`LAW_PLACES`)."""
 LAW_PLACES: dict[str, Place] = {"force": "mechanism", "command": "actuator", "response": "sensor"}
-"""Place of a law, by what it acts on."""
+"""Place of a law, by the quantity on which it acts (`equalizer.laws.law.ActsOn`)."""
 
 EFFECTS_BY_NAME: dict[str, EffectName] = {effect.name: effect for effect in EFFECT_NAMES}

@@ -1,4 +1,9 @@
-"""A discrete linear model fitted to recordings: x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k]."""
+"""A discrete linear state-space model fitted to recordings, with its validity and uncertainty:
+
+    x[k+1] = A x[k] + B u[k],    y[k] = C x[k] + D u[k]         x (n,), u (m,) commands, y (p,) responses
+
+`equalizer.identification.state_space` makes such models.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -14,14 +19,15 @@ from equalizer.signals.units import UnknownUnitError, parse_unit
 
 
 class IdentifiedModelError(ListedProblemsError):
-    """A model that contradicts itself. `problems`: one sentence each."""
+    """Values of a model that are inconsistent. `problems`: a sentence for each."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
 class IdentifiedModel(Summarised):
-    """Sampled as recordings are: y[k] is taken just before u[k] is written, so D is zero for a causal device.
+    """A discrete state-space model in SI units. As in recordings, y[k] is taken just before u[k] is written, so that D
+    is zero for a causal device.
 
-    Raises IdentifiedModelError for inconsistent values. An unstable model is allowed: see `spectral_radius`.
+    Raises IdentifiedModelError for inconsistent values. An unstable model is permitted; see `spectral_radius`.
     """
 
     A: FloatArray
@@ -36,12 +42,14 @@ class IdentifiedModel(Summarised):
     band_hz: tuple[float, float]
     """Band of the fit in Hz; the model is not valid outside."""
     input_unit: str | tuple[str, ...]
-    """SI units; one for all channels, or one per channel."""
+    """SI unit of all commands, or the units channel by channel."""
     output_unit: str | tuple[str, ...]
+    """SI unit of all responses, or the units channel by channel."""
     input_channels: tuple[str, ...]
     output_channels: tuple[str, ...]
     delay_samples: float = 0.0
-    """Samples from a command to the first row that it can change. For information: A, B, C, D include the delay."""
+    """Samples from a command to the first response that it can change. For information: A, B, C, D include the
+    delay."""
     place_m: tuple[float, float, float] | None = None
     """Position of the handle in the workspace (m); None = not known."""
     covariance: FloatArray | None = None
@@ -69,11 +77,11 @@ class IdentifiedModel(Summarised):
 
     @property
     def parameters(self) -> FloatArray:
-        """(k,): the entries of A, B, C, D one after the other, each row by row."""
+        """(k,): the entries of A, B, C and D in this order, each matrix row by row."""
         return np.concatenate([matrix.ravel() for matrix in (self.A, self.B, self.C, self.D)])
 
     def with_parameters(self, parameters: FloatArray) -> Self:
-        """The same model with other numbers, shape (k,), in the order of `parameters`."""
+        """The model with other values (k,) of A, B, C, D, in the order of `parameters`."""
         shapes = [matrix.shape for matrix in (self.A, self.B, self.C, self.D)]
         stops = np.cumsum([rows * columns for rows, columns in shapes])[:-1]
         parts = np.split(np.asarray(parameters, dtype=np.float64), stops)
@@ -86,6 +94,7 @@ class IdentifiedModel(Summarised):
         return float(np.abs(np.linalg.eigvals(self.A)).max()) if self.order else 0.0
 
     def summary(self) -> Summary:
+        """Order, channels, band, rate and spectral radius, for printing."""
         low_hz, high_hz = self.band_hz
         return Summary(
             "Identified state-space model",
@@ -101,6 +110,7 @@ class IdentifiedModel(Summarised):
 
 
 def _problems(model: IdentifiedModel) -> Iterator[str]:
+    """Inconsistencies of a model, a sentence for each."""
     shape_problems = tuple(_shape_problems(model))
     yield from shape_problems
     yield from _channel_problems("input", model.input_channels, model.input_unit, model.B.shape[-1])

@@ -1,6 +1,9 @@
-"""A mechanical model: masses, dampers and springs between a driving force and a sensor, with known effects added.
+"""A mechanical model: masses, dampers and springs between a driving force and a sensor, with known effects.
 
-M a + D v + K q = B u, y = C q (or its rate of change, by `quantity`); plus sensor, actuator and effects.
+    M a + D v + K q = B u,     y = C q, C v or C a, by `quantity`
+
+q (n,) are the coordinates, v and a their first and second time derivatives, u (m,) the forces, y (p,) the responses.
+Limits of sensor and actuator, and nonlinear effects of `effect_vocabulary`, are stated in addition.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,26 +24,26 @@ DERIVATIVE_OF_QUANTITY = {
     "position": 0, "displacement": 0, "angle": 0, "velocity": 1, "speed": 1, "acceleration": 2,
     "angular velocity": 1, "angular speed": 1, "angular acceleration": 2, "voltage": 0,
 }  # fmt: skip
-"""Quantities that a response may have, as the order of the coordinates' time derivative."""
+"""Order of the coordinates' time derivative that a response measures, by the response's quantity."""
 
 
 class MechanicalModelError(ListedProblemsError):
-    """A model that contradicts itself or the format. `problems`: one sentence each."""
+    """A model with inconsistent values, or a text that is not in the format. `problems`: a sentence for each."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorLimits:
-    """Bandwidth of the sensor's low pass; 0 = none."""
+    """Low pass and measuring range of the sensor; 0 = none."""
 
     bandwidth_hz: float = 0.0
-    """One pole per channel, discrete at the sample rate: y += (1 - exp(-2 pi f / rate)) (x - y)."""
+    """Bandwidth f of a first-order low pass per channel, at the sample rate: y += (1 - exp(-2 pi f / rate)) (x - y)."""
     range: float = 0.0
-    """Largest magnitude that is read, in the response's SI unit."""
+    """Largest magnitude that the sensor measures, in the response's SI unit."""
 
 
 @dataclass(frozen=True, slots=True)
 class ActuatorLimits:
-    """Bandwidth of the actuator's low pass; 0 = none."""
+    """Delay, first-order low pass and largest force of the actuator; 0 = none."""
 
     delay_s: float = 0.0
     bandwidth_hz: float = 0.0
@@ -50,8 +53,8 @@ class ActuatorLimits:
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """Calibration uncertainty: one standard deviation at each driven axis; None = not stated. Rotational models: kg
-    m^2, N m s/rad, N m/rad."""
+    """Calibration uncertainty of mass, damping and stiffness at each driven axis, as a standard deviation; None = not
+    stated. Units in rotational models: kg m^2, N m s/rad, N m/rad."""
 
     mass_kg: float | None = None
     damping_n_s_per_m: float | None = None
@@ -62,12 +65,14 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True)
 class ModelEffect:
-    """An effect of the vocabulary with its parameters."""
+    """An effect of the vocabulary with the values of its parameters."""
 
     kind: str
+    """Name in the vocabulary, or DISCOVERED_LAW."""
     axis: str | None
     """Axis or channel name of the command or response; None where all share the effect."""
     parameters: Mapping[str, float]
+    """Values by name, in the units of the vocabulary."""
     law: Law | None = None
     """Formula of a discovered law, which contains its parameters."""
 
@@ -86,17 +91,18 @@ class MechanicalModel(Summarised):
     stiffness: FloatArray
     """(n, n), N/m or N m/rad"""
     input: FloatArray
-    """(n, m)"""
+    """(n, m), B: how each command drives the coordinates."""
     output: FloatArray
-    """(p, n); the same rows give the position where a position is recorded."""
+    """(p, n), C; its rows also give the position where a position is recorded in addition to the response."""
     sensor: SensorLimits = SensorLimits()
     actuator: ActuatorLimits = ActuatorLimits()
     effects: tuple[ModelEffect, ...] = ()
     tolerance: Tolerance | None = None
     rotational: bool = False
+    """Whether the coordinates are angles and the commands torques."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     units: UnitSystem | None = None
-    """Units of its parameters where these are not SI (commands that are currents); None = SI, by `rotational`."""
+    """Units of the parameters where these are not SI, as for commands that are currents; None = SI, by `rotational`."""
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness", "input", "output"):
@@ -109,7 +115,7 @@ class MechanicalModel(Summarised):
 
     @property
     def system(self) -> UnitSystem:
-        """Units of its parameters: `units`, else SI, linear or rotational."""
+        """Units of the parameters: `units` if stated, else SI, linear or rotational."""
         return self.units or (ROTATIONAL if self.rotational else LINEAR)
 
     @property
@@ -128,6 +134,7 @@ class MechanicalModel(Summarised):
         return int(self.output.shape[0])
 
     def summary(self) -> Summary:
+        """Numbers of coordinates, commands and responses, and the effects, for printing."""
         return Summary(
             f"Mechanical model {self.name}",
             (
@@ -142,8 +149,8 @@ class MechanicalModel(Summarised):
 def with_units_of(
     model: MechanicalModel, commands: Sequence[str], responses: Sequence[str], time: str = "s"
 ) -> MechanicalModel:
-    """The model with the units of its recordings: where its input and output matrices do not convert, its parameters
-    are in these units. commands, responses: units."""
+    """The model with the unit system of its recordings, where that is not SI and the input and output matrices (entries
+    of magnitude 0 or 1) do not convert units. commands, responses: units of the recordings' channels."""
     plain = all(np.isin(np.abs(matrix), (0.0, 1.0)).all() for matrix in (model.input, model.output))
     found = system_of(commands, responses, time)
     if model.units is not None or not plain or found.rotational is not None:
@@ -152,8 +159,9 @@ def with_units_of(
 
 
 def suggest_word(word: str, allowed: tuple[str, ...]) -> str:
-    """A suggestion to append to an error, or nothing."""
-    close = get_close_matches(word[:60], allowed, n=1)  # for longer words the comparison takes minutes
+    """Text that suggests the most similar of the allowed words, to be appended to a message; empty if none is
+    similar."""
+    close = get_close_matches(word[:60], allowed, n=1)  # the comparison of longer words takes minutes
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
@@ -192,7 +200,7 @@ def _matrix_problems(model: MechanicalModel) -> Iterator[str]:
 
 
 def _mass_problems(mass: FloatArray) -> Iterator[str]:
-    # Most matrices are symmetric to the last digit, which is checked in a tenth of the time.
+    # Most matrices are exactly symmetric, and the exact comparison takes a tenth of the time of the approximate one.
     exact = np.array_equal(mass, mass.T)
     if not exact and not np.allclose(mass, mass.T, rtol=1e-6, atol=1e-9 * float(np.abs(mass).max())):
         yield "model.mass is not symmetric; inertia acts alike both ways, so m[i][j] must equal m[j][i]"
@@ -201,7 +209,8 @@ def _mass_problems(mass: FloatArray) -> Iterator[str]:
 
 
 def effect_problems(effect: ModelEffect) -> Iterator[str]:
-    """Contradictions to the vocabulary, as sentences."""
+    """Deviations of an effect from the vocabulary (unknown or missing names, values that are not finite), a sentence
+    for each."""
     if effect.kind == DISCOVERED_LAW:
         yield from _law_problems(effect)
         return

@@ -1,4 +1,8 @@
-"""Mechanical models as TOML text, both ways."""
+"""Reads and writes mechanical models as TOML text.
+
+Tables: [model] (name, quantity, matrices as lists of rows), [sensor], [actuator], [[effect]] (kind, axis, parameters),
+[tolerance], [provenance]. The reader collects all problems of format before it raises an error.
+"""
 
 import re
 import tomllib
@@ -24,17 +28,19 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
 MATRICES = ("mass", "damping", "stiffness", "input", "output")
+"""Keys of the matrices in the table [model]."""
 _MODEL_KEYS = ("name", "quantity", *MATRICES, "rotational")
 _TABLES = ("model", "sensor", "actuator", "effect", "tolerance", "provenance", "rotational")
 
 UNITS = "units"
-"""Key of the provenance for the units of commands and motion, where the model's values are not in SI units."""
+"""Key of the table [provenance] for the units of force, length and time, where the model's values are not in SI
+units."""
 
 Numbers = TypeVar("Numbers", SensorLimits, ActuatorLimits, Tolerance)
 
 
 def parse_mechanical_model(text: str) -> MechanicalModel:
-    """Parse a mechanical model. Raises MechanicalModelError with every problem found, in words."""
+    """Parse a mechanical model. Raises MechanicalModelError with all problems found, a sentence for each."""
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -73,7 +79,7 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
 
 
 def mechanical_model_toml(model: MechanicalModel) -> str:
-    """Text that `parse_mechanical_model` reads back to the same numbers."""
+    """The model as TOML text, from which `parse_mechanical_model` reads the same values."""
     lines = ["[model]", f"name = {_format_value(model.name)}", f"quantity = {_format_value(model.quantity)}"]
     if model.rotational:
         lines.append("rotational = true")
@@ -95,7 +101,8 @@ def mechanical_model_toml(model: MechanicalModel) -> str:
 
 
 def _read_units(origin: Mapping[str, Any]) -> UnitSystem | None:
-    """The provenance with the units of numbers that are not in SI, as this program writes it."""
+    """The unit system in the provenance, as `mechanical_model_toml` writes it; None where there is none, that is for
+    SI."""
     stored = origin.get(UNITS)
     words = {key: value for key, value in stored.items() if isinstance(value, str)} if isinstance(stored, dict) else {}
     return (
@@ -124,6 +131,7 @@ def _read_table(document: Mapping[str, Any], name: str, problems: list[str]) -> 
 
 
 def _read_word(table: Mapping[str, Any], name: str, problems: list[str]) -> Any:
+    """Text of a required key; a missing, empty or other value adds to `problems`."""
     word = table.get(name)
     if not isinstance(word, str) or not word:
         problems.append(
@@ -133,6 +141,7 @@ def _read_word(table: Mapping[str, Any], name: str, problems: list[str]) -> Any:
 
 
 def _read_matrix(table: Mapping[str, Any], name: str, problems: list[str]) -> FloatArray:
+    """Matrix from a list of rows; empty, with an entry in `problems`, where it is not such a list."""
     rows = table.get(name)
     if rows is None:
         problems.append(f"model.{name} is missing")
@@ -159,6 +168,7 @@ def _read_numbers(document: Mapping[str, Any], name: str, kind: type[Numbers], p
 
 
 def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
+    """Effects from the tables [[effect]]; all entries that are not kind, axis or of a law must be numbers."""
     if not (isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)):
         problems.append("effects are written as tables: [[effect]]")
         return ()
@@ -207,14 +217,15 @@ def _with_float_parameters(effect: ModelEffect) -> ModelEffect:
 
 
 def _is_number(value: Any) -> bool:
-    """TOML's whole numbers have 64 bits; its parser also reads longer ones, which no float can hold."""
+    """Whether a value is a number, with whole numbers below 2^64 in magnitude: Python's parser also reads longer ones,
+    which TOML does not allow and a float may not hold."""
     return isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**64)
 
 
 def _quote_value(value: Any) -> str:
     try:
         text = repr(value)
-    except (ValueError, RecursionError):  # Python writes no number of more than 4300 digits
+    except (ValueError, RecursionError):  # Python does not print integers of more than 4300 digits
         return "a value that cannot be shown"
     return text if len(text) <= 80 else f"{text[:80]}…"
 

@@ -1,4 +1,7 @@
-"""Frequency response and simulation of a discrete state-space model."""
+"""Frequency response and simulation of a discrete state-space model, x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k].
+
+The frequency response is C (zI - A)^-1 B + D at z = exp(2 pi j f / rate), by back substitution in the Schur form of A.
+"""
 
 import numpy as np
 from scipy.linalg import schur
@@ -8,9 +11,10 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 def model_response(model: IdentifiedModel, frequency_hz: FloatArray) -> ComplexArray:
-    """Frequency response C (zI - A)^-1 B + D on the unit circle, shape (lines, p, m). frequency_hz: (lines,)."""
+    """Frequency response C (zI - A)^-1 B + D, (lines, p, m), in output unit per input unit. frequency_hz: (lines,). A
+    pole exactly at a line gives inf or NaN."""
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / model.sample_rate_hz)
-    # A = Q T Q^H, computed once: with triangular T, a line takes n^2 operations instead of n^3.
+    # Schur form A = Q T Q^H, computed once: with T upper triangular, a line takes n^2 operations instead of n^3.
     T, Q = schur(model.A, output="complex")
     driven = Q.conj().T @ model.B
     states = np.empty((model.order, len(z), model.B.shape[1]), dtype=np.complex128)
@@ -22,7 +26,7 @@ def model_response(model: IdentifiedModel, frequency_hz: FloatArray) -> ComplexA
 
 
 def simulate(model: IdentifiedModel, commands: FloatArray, state: FloatArray | None = None) -> FloatArray:
-    """Responses (N, p) to commands (N, m) from a state (n,); at rest if None."""
+    """Responses (N, p) to commands (N, m), sample by sample. state: (n,), initial state; None = at rest (zero)."""
     A, B, C, D = model.A, model.B, model.C, model.D
     x = np.zeros(model.order) if state is None else np.asarray(state, dtype=np.float64)
     states = np.empty((len(commands), model.order))

@@ -1,4 +1,8 @@
-"""Excitations that identification and ellipsoids need, as plain columns of samples."""
+"""Deterministic excitations as columns of samples: sinusoids, logarithmic sweeps, and fades at their ends.
+
+Recordings for identification use sweeps, which excite a band, and sinusoids; stimuli use the fades. A signal has the
+unit of its amplitude.
+"""
 
 import numpy as np
 
@@ -6,17 +10,17 @@ from equalizer.signals.signal import FloatArray
 
 
 def sine(frequency_hz: float, amplitude: float, n: int, sample_rate_hz: float) -> FloatArray:
-    """n samples of a sinusoid that starts at phase zero. Shape (n,)."""
+    """Sinusoid of n samples that starts at phase zero, (n,)."""
     wave: FloatArray = amplitude * np.sin(2 * np.pi * frequency_hz / sample_rate_hz * np.arange(n))
     return wave
 
 
 def log_sweep(from_hz: float, to_hz: float, amplitude: float, n: int, sample_rate_hz: float) -> FloatArray:
-    """One period of a logarithmic swept sine, shape (n,), which may be repeated without a jump.
+    """A period of a logarithmic swept sine, (n,), which may be repeated without a jump. Every octave takes equal time.
 
-    Equal time per octave. The end frequency is lowered by less than 1 / duration, so that the period holds a whole
-    number of cycles. Raises ValueError where the sweep would not be upwards, would pass half the rate, or would hold
-    less than a cycle.
+    Frequency f(t) = from_hz (to_hz / from_hz)^(t / T), T = n / sample_rate_hz; all frequencies are lowered by a common
+    factor, so that the period contains the next lower whole number of cycles. Raises ValueError where the sweep would
+    not rise, would exceed half the sample rate, or would contain less than a cycle.
     """
     if not 0 < from_hz < to_hz <= sample_rate_hz / 2:
         raise ValueError(
@@ -34,7 +38,8 @@ def log_sweep(from_hz: float, to_hz: float, amplitude: float, n: int, sample_rat
 
 
 def apply_fades(samples: FloatArray, fade_in: int, fade_out: int) -> FloatArray:
-    """Raised-cosine rise over the first `fade_in` and fall over the last `fade_out` samples. samples: (n, ...)."""
+    """Samples (n, ...) with a raised-cosine rise over the first `fade_in` and fall over the last `fade_out` of them.
+    Raises ValueError where both fades together are longer than the samples."""
     n = samples.shape[0]
     if fade_in + fade_out > n:
         raise ValueError(f"fades of {fade_in} and {fade_out} samples do not fit into {n}; shorten them")

@@ -1,8 +1,8 @@
-"""Base of the errors that list everything that is wrong with a document, a model or a table."""
+"""Base class of errors that list all problems of a document, a model or a table at once, not only the first."""
 
 
 class ListedProblemsError(ValueError):
-    """An object that cannot be used. `problems`: one sentence each."""
+    """Base class. `problems`: one sentence for each problem; the message joins them by semicolons."""
 
     def __init__(self, problems: tuple[str, ...]) -> None:
         super().__init__("; ".join(problems))

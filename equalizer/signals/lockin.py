@@ -1,4 +1,9 @@
-"""Lock-in: amplitude and phase of a known frequency in noisy samples, by least squares."""
+"""Lock-in detection: amplitude and phase of a sinusoid of known frequency in noisy samples, by linear least squares.
+
+Each channel is modelled as an offset, a linear drift, a fundamental and its harmonics, h = 1 to their number:
+
+    x(t) = c + d t + sum over h of Re(a_h exp(2 pi i h f t))
+"""
 
 import numpy as np
 
@@ -6,12 +11,12 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 def phasors(samples: FloatArray, sample_rate_hz: float, frequency_hz: float, harmonics: int = 1) -> ComplexArray:
-    """Least-squares amplitude phasors of the fundamental and its harmonics, offset and linear drift removed.
+    """Amplitude phasors a_h of the fundamental and its harmonics, fitted together with an offset and a linear drift.
 
-    samples: (n, channels). Returns (harmonics, channels): row h - 1 is a with x(t) = Re(a exp(2 pi i h f t)). Fitted
-    rather than summed over periods, so that the samples need not be a whole number of periods, and rows with a NaN
-    (missed ticks) are left out. Raises ValueError when less than one period is left, or a harmonic lies at or above
-    half the rate.
+    samples: (n, channels). Returns (harmonics, channels), in the unit of the samples: row h - 1 is a_h, time 0 at the
+    first sample. By a fit, not a sum over periods: the samples need not cover whole periods, and rows with a NaN
+    (missed ticks) are left out. Raises ValueError where the other rows cover less than one period, or a harmonic lies
+    at or above half the sample rate.
     """
     whole = np.isfinite(samples).all(axis=1)
     if not covers_a_period(int(whole.sum()), sample_rate_hz, frequency_hz):
@@ -31,5 +36,5 @@ def phasors(samples: FloatArray, sample_rate_hz: float, frequency_hz: float, har
 
 
 def covers_a_period(n: int, sample_rate_hz: float, frequency_hz: float) -> bool:
-    """Whether n samples hold one period, up to a fraction of a sample."""
+    """Whether n samples cover one period, rounded down to whole samples."""
     return n >= int(sample_rate_hz / frequency_hz)

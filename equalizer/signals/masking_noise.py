@@ -1,4 +1,8 @@
-"""Noise that hides the sound of a device, made so that it can be looped without a seam."""
+"""Pink noise that masks the sound of a device, as a periodic signal that can be repeated without a discontinuity.
+
+A participant who hears a vibration could answer by ear. The noise is made in the frequency domain: power density
+proportional to 1/f between two corner frequencies, random phases.
+"""
 
 import math
 
@@ -7,10 +11,11 @@ import scipy.fft
 from numpy.typing import NDArray
 
 SLOPE_DB_PER_OCTAVE = -3.0103
-"""Slope of the power density (1/f): the same power in every octave between the corners, none outside them."""
+"""Slope of the power density, 10 log10(1/2) for 1/f: equal power in every octave between the corners, none outside
+them."""
 
 HEADROOM_DB = 3.0
-"""Headroom of the highest sample below full scale, for converters that overshoot between samples."""
+"""Headroom of the highest sample below full scale, because the analog signal may exceed it between samples."""
 
 FULL_SCALE = 2**15 - 1
 """Largest value of a 16 bit sample."""
@@ -21,9 +26,10 @@ def make_masking_noise(
 ) -> NDArray[np.int16]:
     """Pink noise, mono, 16 bit, shape (seconds * sample_rate_hz,).
 
-    It is one period of a periodic signal: its last sample leads to its first as to any other. Every line of its
-    spectrum has the stated size and a random phase, so the slope holds exactly; the values are distributed
-    normally. Raises ValueError where there is no time, or no frequency between the corners.
+    It is one period of a periodic signal, so that its end continues into its beginning. Every line of its spectrum has
+    an amplitude proportional to 1 / sqrt(f) and a random phase: the slope holds exactly, and the samples are nearly
+    normally distributed. Raises ValueError for less than 1 s, corners that are not rising or exceed half the sample
+    rate, and a band without a line.
     """
     if seconds < 1:
         raise ValueError(f"seconds is {seconds}; noise lasts at least 1 s")
@@ -37,7 +43,7 @@ def make_masking_noise(
     if last < first:
         raise ValueError(f"no multiple of 1 / {seconds} Hz lies between {low_hz:g} and {high_hz:g} Hz")
     n = seconds * sample_rate_hz
-    # Single precision is far finer than 16 bit and halves the memory of minutes.
+    # Single precision is far finer than 16 bit and halves the memory that minutes of noise need.
     phases = 2 * np.pi * np.random.default_rng(seed).random(last - first + 1, dtype=np.float32)
     spectrum = np.zeros(n // 2 + 1, dtype=np.complex64)
     spectrum[first : last + 1] = np.exp(1j * phases) / np.sqrt(np.arange(first, last + 1, dtype=np.float32))

@@ -3,11 +3,11 @@ phases.
 
     w(t) = sum over lines k of cos(2 pi k t / T + phi_k),        phi_k uniform in [0, 2 pi)
 
-scaled to a given peak. Phases are random, not optimised for a low peak (as Schroeder's are), because odd distortion
+scaled to a given peak. Phases are random, not optimised for a low peak as Schroeder's are, because odd distortion
 averages out of an estimate only over random phases. The crest factor (peak over rms) is kept low by taking the best of
-several draws. With m axes at once, every m experiments form a group that is orthogonal at every line (Dobrowiecki,
-Schoukens and Guillaume, IEEE Transactions on Instrumentation and Measurement 55 (2006)): each axis has random phases of
-its own, and in experiment e the phases of axis a are turned by e a / m of a circle.
+several draws. With m axes driven at once, every m experiments form a group that is orthogonal at every line
+(Dobrowiecki, Schoukens and Guillaume, IEEE Transactions on Instrumentation and Measurement 55 (2006)): each axis has
+its own random phases, and in experiment e (from 0) the phases of axis a (from 0) are advanced by 2 pi e a / m.
 """
 
 from collections.abc import Callable
@@ -18,10 +18,11 @@ import numpy.typing as npt
 from equalizer.signals.signal import FloatArray
 
 IntArray = npt.NDArray[np.int64]
+"""Numbers k of spectral lines, (lines,)."""
 
 DRAWS = 32
-"""Draws of the phases, of which the one with the lowest peak is kept. Crest factor on one axis with 76 or 239 odd
-lines, 60 seeds each: 2.5 to 3.0; of single draws 2.6 to 4.9."""
+"""Number of draws of the phases, of which the draw with the lowest peak is kept. Crest factor on one axis with 76 or
+239 odd lines, 60 seeds each: 2.5 to 3.0; with a single draw 2.6 to 4.9."""
 
 
 def lines_between(from_hz: float, to_hz: float, n: int, sample_rate_hz: float, *, odd_only: bool) -> IntArray:
@@ -50,10 +51,11 @@ def lines_between(from_hz: float, to_hz: float, n: int, sample_rate_hz: float, *
 def multisines(
     lines: IntArray, n: int, amplitude: float, axes: int, realisations: int, seed: int
 ) -> tuple[FloatArray, ...]:
-    """One period, (n, axes), for each of `realisations` experiments, which may be repeated without a jump.
+    """One period, (n, axes), for each of `realisations` experiments; it may be repeated without a discontinuity.
 
-    The norm over the axes peaks at `amplitude` in each, in its unit. Every `axes` experiments are a group, orthogonal
-    at every line. An experiment depends on the seed and its own number only, not on how many are asked for.
+    The norm over the axes peaks at `amplitude` in each experiment, in the unit of `amplitude`. Every `axes` experiments
+    are a group, orthogonal at every line. An experiment depends on the seed and its own number only, not on the number
+    of realisations.
     """
     groups = -(-realisations // axes)
     waves = [
@@ -63,12 +65,13 @@ def multisines(
 
 
 def _draw_group(lines: IntArray, n: int, axes: int, random: np.random.Generator) -> FloatArray:
-    """(experiments, n, axes), with as many experiments as axes: one group, from the draw whose highest peak is
-    lowest."""
-    # (experiments, axes): a discrete Fourier matrix, whose rows are orthogonal.
+    """One group, (experiments, n, axes), with as many experiments as axes: the draw whose highest peak over all its
+    experiments is lowest."""
+    # (experiments, axes): phase factors exp(2 pi i e a / m), a discrete Fourier matrix, whose rows are orthogonal.
     turns = np.exp(2j * np.pi * np.outer(np.arange(axes), np.arange(axes)) / axes)
 
     def draw() -> FloatArray:
+        """One group with random phases, not scaled."""
         phases = random.uniform(0, 2 * np.pi, (len(lines), axes))
         spectrum = np.zeros((axes, n // 2 + 1, axes), dtype=complex)
         spectrum[:, lines] = np.exp(1j * phases) * turns[:, None, :]
@@ -78,11 +81,12 @@ def _draw_group(lines: IntArray, n: int, axes: int, random: np.random.Generator)
 
 
 def make_interleaved_multisine(lines: IntArray, n: int, axes: int, seed: int) -> FloatArray:
-    """One period, (n, axes), whose norm over the axes peaks at 1. Each line drives one axis alone (axis a the lines a,
-    a + axes, a + 2 axes, … of `lines`), so that a single period shows the response to every axis."""
+    """One period, (n, axes), whose norm over the axes peaks at 1. Each line drives a single axis (axis a the lines a,
+    a + axes, a + 2 axes, … of `lines`), so that one experiment measures the response to every axis."""
     random, axis = np.random.default_rng(seed), np.arange(len(lines)) % axes
 
     def draw() -> FloatArray:
+        """One period with random phases, not scaled."""
         spectrum = np.zeros((n // 2 + 1, axes), dtype=complex)
         spectrum[lines, axis] = np.exp(2j * np.pi * random.uniform(size=len(lines)))
         return np.fft.irfft(spectrum, n, axis=0)
@@ -92,5 +96,5 @@ def make_interleaved_multisine(lines: IntArray, n: int, axes: int, seed: int) ->
 
 
 def _best_of_draws(draw: Callable[[], FloatArray]) -> FloatArray:
-    """Of `DRAWS` draws, the one whose norm over its last dimension, the axes, has the lowest peak."""
+    """The draw, of `DRAWS`, whose norm over its last dimension (the axes) has the lowest peak."""
     return min((draw() for _ in range(DRAWS)), key=lambda waves: float(np.linalg.norm(waves, axis=-1).max()))

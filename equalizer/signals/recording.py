@@ -1,7 +1,7 @@
-"""A recording: the commands that entered the plant, the responses that were measured, and under which conditions.
+"""A recording: the commands that entered the plant, the measured responses, and the conditions of the measurement.
 
-Time convention: `response[k]` and `position[k]` are taken at t_k just before `command[k]` is written, which is held
-until t_(k+1). A plant with direct feedthrough therefore answers `command[k-1]` in `response[k]`.
+Time convention: `response[k]` and `position[k]` are sampled at t_k, just before `command[k]` is written, which is held
+until t_(k+1). The response of a plant with direct feedthrough to `command[k-1]` therefore appears in `response[k]`.
 """
 
 from collections.abc import Mapping
@@ -19,10 +19,10 @@ class Hold(Enum):
     ZERO_ORDER = "zero-order"
     """Held until the next sample, as a digital controller writes it."""
     BAND_LIMITED = "band-limited"
-    """A continuous signal without power above half the sample rate, as one that was measured behind an anti-aliasing
+    """A continuous signal without power above half the sample rate, such as a signal measured behind an anti-aliasing
     filter."""
     LINEAR = "linear"
-    """Straight lines between the samples."""
+    """Straight lines between the samples (first-order hold)."""
 
 
 SEGMENT_KINDS = (
@@ -31,17 +31,17 @@ SEGMENT_KINDS = (
 """Kinds of excitation of a segment: periodic multisine, swept sine, single sine, slow movement, random noise, random
 binary signal, steps, impacts, free motion after a release, rest without a command."""
 SEGMENT_ROLES = ("fit", "test", "")
-"""Use of a segment: to fit a model, to test it on data that it has not seen, or as the identification decides."""
+"""Use of a segment: to fit a model, to test it on held-out data, or (empty) as the identification decides."""
 
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """Samples with one kind of excitation. Outside all segments the device rests."""
+    """A range of samples with a single kind of excitation. Outside all segments the device is at rest."""
 
     start: int
-    """First sample."""
+    """Index of the first sample."""
     stop: int
-    """Sample after the last."""
+    """Index after the last sample."""
     kind: str
     """One of `SEGMENT_KINDS`."""
     amplitude: float = 0.0
@@ -54,7 +54,7 @@ class Segment:
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
 class Recording(Summarised):
-    """One recording of a device: n samples. All signals share rate and length; each states its own units."""
+    """One recording of a device: n samples. All signals have the same sample rate and length, and their own units."""
 
     device: str
     """Name of the device; may be empty."""
@@ -72,10 +72,12 @@ class Recording(Summarised):
     hold: Hold = Hold.ZERO_ORDER
     """Course of the command between samples."""
     segments: tuple[Segment, ...] = ()
+    """Ranges of samples by kind of excitation; empty where not known."""
     meta: Mapping[str, Any] = field(default_factory=dict)
-    """JSON values: place, sensor and its frame, feedback, grip, operator, provenance."""
+    """JSON values: place, sensor and its frame, feedback, grip, operator, provenance. `time` = "unknown" marks a
+    recording whose sample rate is not known."""
     condition: Signal | None = None
-    """(n, q): measured conditions, such as a temperature, a pressure, a setting."""
+    """(n, q): measured conditions, such as a temperature, a pressure or a setting; None without any."""
 
     @property
     def is_timed(self) -> bool:
@@ -84,6 +86,7 @@ class Recording(Summarised):
 
     @property
     def sample_rate_hz(self) -> float:
+        """Sample rate (Hz) of all signals."""
         return self.response.sample_rate_hz
 
     @property
@@ -95,6 +98,7 @@ class Recording(Summarised):
         return len(self.response)
 
     def summary(self) -> Summary:
+        """Length, channels with units, and number of segments."""
         signals = {"command": self.command, "response": self.response, "position": self.position}
         return Summary(
             f"Recording of {self.device or 'a device'}",
@@ -107,4 +111,5 @@ class Recording(Summarised):
 
 
 def _channels_text(signal: Signal) -> str:
+    """Channel names with their units, such as "fx [N], fy [N]"."""
     return ", ".join(f"{name} [{unit}]" for name, unit in zip(signal.channels, signal.units, strict=True))

@@ -1,8 +1,9 @@
 """Resampling to a uniform time grid: zero-order hold, linear or band-limited interpolation.
 
-It matters which: a command that stays until the next one is right when it is held and smeared when it is
-interpolated; a signal that was sampled behind a filter is right when it is band-limited and gets images when it is
-held. Missing samples (NaN, gaps in the stamps) stay missing.
+The method must fit the signal. Zero-order hold is exact for a command that is held until the next command, which
+interpolation would smear. Band-limited interpolation (a Kaiser-windowed low-pass) is exact up to `FLAT_TO` for a signal
+that was sampled behind an anti-aliasing filter, to which a hold would add spectral images. Missing samples (NaN, gaps
+in the time stamps) remain missing.
 """
 
 from dataclasses import dataclass
@@ -16,34 +17,37 @@ from equalizer.signals.signal import FloatArray
 
 BoolArray = npt.NDArray[np.bool_]
 Method = Literal["held", "linear", "band-limited"]
+"""Interpolation method; "held" is a zero-order hold."""
 
 FLAT_TO = 0.88
-"""Share of the lower Nyquist frequency up to which band-limited resampling is flat; the stop band begins at 1."""
+"""Edge of the flat passband of band-limited resampling, relative to the lower of both Nyquist frequencies, at which the
+stopband begins."""
 SAME_INSTANT = 1e-3
-"""Times closer than this share of a sample are the same."""
+"""Largest difference of times that count as equal, in sample periods of the grid."""
 ON_A_SAMPLE = 1e-5
-"""Closer than this share of a sample to one, band-limited values are those of the samples: at four fifths of Nyquist
-the error is that of the filter."""
+"""Largest offset, in sample periods, of grid instants from samples that is ignored in band-limited resampling. At four
+fifths of the Nyquist frequency it causes an error of about the stopband level of the filter."""
 _HALF_LENGTH = 48
-"""Half the length of the low-pass, in periods of the lower rate."""
+"""Half the length of the low-pass, in sample periods of the lower rate."""
 _BETA = 8.6
-"""Shape of the Kaiser window: about 90 dB of attenuation."""
+"""Shape parameter of the Kaiser window, beta = 0.1102 (A - 8.7) by Kaiser's formula: A = 87 dB of attenuation."""
 _UPSAMPLED = 8
-"""Factor of the dense grid between whose samples values are interpolated."""
+"""Oversampling factor of the samples through which a spline is laid, where the rates have no simple ratio or the grid
+begins between samples."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """Values at growing times. NaN is a missing value."""
+    """One channel: values at increasing times. NaN is a missing value."""
 
     times_s: FloatArray
-    """(n,)"""
+    """(n,), s."""
     values: FloatArray
-    """(n,)"""
+    """(n,), in any unit."""
     rate_hz: float
-    """0 where the stamps are not uniform."""
+    """Sample rate; 0 where the time stamps are not uniform."""
     gap_s: float
-    """Times further apart than this have something missing between them."""
+    """Neighbouring times further apart than this have missing samples between them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +59,14 @@ class Grid:
     count: int
 
     def times_s(self) -> FloatArray:
-        """(count,): the instants, in s."""
+        """(count,): the instants (s)."""
         return self.start_s + np.arange(self.count) / self.rate_hz
 
 
 def resample(samples: Samples, grid: Grid, method: Method) -> FloatArray:
-    """Values at the grid's times, (count,); NaN where samples are missing. method: "held" (zero-order hold), "linear"
-    or "band-limited". Raises ValueError where fewer than two samples are known, or the grid exceeds the samples."""
+    """Values at the grid's times, (count,), in the unit of the samples; NaN where samples are missing. Raises
+    ValueError where fewer than two samples are known, or the grid begins before the first or ends after the last
+    sample."""
     times_s = grid.times_s()
     near = SAME_INSTANT / grid.rate_hz
     if times_s[0] < samples.times_s[0] - near or times_s[-1] > samples.times_s[-1] + near:
@@ -84,7 +89,8 @@ def resample(samples: Samples, grid: Grid, method: Method) -> FloatArray:
 
 
 def _is_missing(samples: Samples, good: BoolArray, times_s: FloatArray, near: float, held: bool) -> BoolArray:
-    """(count,): which of the times lie in a gap between two good samples that are not neighbours."""
+    """(count,): times before the first or after the last known sample, or between two known samples with missing
+    samples between them. held: a value remains known for one median sample period. near: tolerance, s."""
     stamps, places = samples.times_s[good], np.flatnonzero(good)
     step = float(np.median(np.diff(samples.times_s)))
     hole = (np.diff(stamps) > samples.gap_s) | (np.diff(places) > 1)
@@ -96,6 +102,8 @@ def _is_missing(samples: Samples, good: BoolArray, times_s: FloatArray, near: fl
 
 
 def _resample_band_limited(samples: Samples, grid: Grid) -> FloatArray:
+    """Polyphase filter where the rates have a simple ratio and the grid begins at a sample; else a spline on samples
+    that are oversampled first."""
     if not samples.rate_hz:
         return _resample_uneven(samples, grid)
     first = (grid.start_s - samples.times_s[0]) * samples.rate_hz
@@ -110,7 +118,8 @@ def _resample_band_limited(samples: Samples, grid: Grid) -> FloatArray:
 
 
 def _resample_uneven(samples: Samples, grid: Grid) -> FloatArray:
-    """Through a quintic spline; gaps are bridged by straight lines first, or the spline would swing in them."""
+    """Quintic spline through samples at uneven times. Gaps are bridged by straight lines first, because the spline
+    would oscillate in them."""
     times_s, values = samples.times_s, samples.values
     steps = np.diff(times_s)
     median_s = float(np.median(steps))
@@ -123,8 +132,9 @@ def _resample_uneven(samples: Samples, grid: Grid) -> FloatArray:
 
 
 def _resample_spline(times_s: FloatArray, values: FloatArray, grid: Grid, source_rate_hz: float) -> FloatArray:
-    """The spline on the grid, or on a finer one and then filtered, where the grid is slower than the source."""
-    # Here and below: SciPy's signals and splines take longer to import than a diagnosis that does without them.
+    """Quintic spline through the samples, at the times of the grid. Where the grid is slower than the source, the
+    spline is evaluated on a finer grid and low-pass filtered, against aliasing."""
+    # Imported here, as below: SciPy's signal and interpolation modules take long to import, and most runs need neither.
     from scipy.interpolate import make_interp_spline
 
     order = min(5, (len(values) - 1) // 2 * 2 + 1)
@@ -137,7 +147,8 @@ def _resample_spline(times_s: FloatArray, values: FloatArray, grid: Grid, source
 
 
 def _resample_by_ratio(values: FloatArray, ratio: Fraction, first: int, count: int) -> FloatArray:
-    """`ratio` times the rate, from the sample `first` on; ends are continued by their point reflection."""
+    """Polyphase FIR resampling to `ratio` times the rate, `count` values from the sample `first` on. Ends are continued
+    by point reflection."""
     from scipy import signal as sg
 
     up, down = ratio.numerator, ratio.denominator

@@ -1,4 +1,4 @@
-"""A signal: samples that know their rate, quantity, unit and channels. Immutable."""
+"""A signal: uniformly sampled channels with sample rate, quantity, unit and channel names. Immutable."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,16 +13,22 @@ ComplexArray = npt.NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signal:
-    """Samples of shape (n, channels): time first, always. SI units once inside the program."""
+    """Samples with their meaning; the array is read-only. Units inside the program are SI.
+
+    Raises ValueError for samples that are not (n, channels), numbers of names, units or quantities that do not match
+    the channels, and a sample rate that is not a positive number.
+    """
 
     samples: FloatArray
+    """(n, channels): time along the first dimension."""
     sample_rate_hz: float
     quantity: str | tuple[str, ...]
     """One word for all channels ("force", "acceleration", "position", "torque", "angle", ...), or one per channel
-    where they differ. Equal words are folded into one, so a mixed signal never equals a plain word."""
+    where they differ. Equal words are replaced by a single word: only signals of mixed quantity have a tuple."""
     unit: str | tuple[str, ...]
-    """Likewise."""
+    """Unit in ASCII: one for all channels, or one per channel where they differ."""
     channels: tuple[str, ...]
+    """Channel names."""
 
     def __post_init__(self) -> None:
         samples = np.ascontiguousarray(self.samples, dtype=np.float64)
@@ -44,29 +50,29 @@ class Signal:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """One per channel."""
+        """The quantity of each channel."""
         return (self.quantity,) * len(self.channels) if isinstance(self.quantity, str) else self.quantity
 
     @property
     def units(self) -> tuple[str, ...]:
-        """One per channel."""
+        """The unit of each channel."""
         return (self.unit,) * len(self.channels) if isinstance(self.unit, str) else self.unit
 
     @property
     def duration_s(self) -> float:
-        """Number of samples over the rate: from the first sample to one step after the last."""
+        """Number of samples over the sample rate, in s: from the first sample to one period after the last."""
         return len(self) / self.sample_rate_hz
 
     def times_s(self) -> FloatArray:
-        """(n,): time of each sample in s, the first at 0."""
+        """(n,): time of each sample (s), 0 at the first."""
         return np.arange(len(self), dtype=np.float64) / self.sample_rate_hz
 
     def part(self, start: int, stop: int) -> Self:
-        """Samples start (included) to stop (excluded)."""
+        """The signal from sample `start` (included) to `stop` (excluded)."""
         return replace(self, samples=self.samples[start:stop])
 
     def select_channels(self, places: Sequence[int]) -> Self:
-        """The channels at these places, in this order."""
+        """The signal with only the channels of these indices, in this order."""
         kept = list(places)
         return replace(
             self,
@@ -78,6 +84,7 @@ class Signal:
 
 
 def _fold_equal_words(name: str, words: str | tuple[str, ...], channels: int) -> str | tuple[str, ...]:
+    """A single word where all channels have the same. Raises ValueError for another number of words than channels."""
     if isinstance(words, str):
         return words
     if len(words) != channels:
@@ -86,6 +93,6 @@ def _fold_equal_words(name: str, words: str | tuple[str, ...], channels: int) ->
 
 
 def runs_of(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Start and stop of each run of true values in a mask (n,)."""
+    """Start (included) and stop (excluded) of each run of true values in a mask (n,)."""
     edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).tolist()
     return list(zip(edges[::2], edges[1::2], strict=True))

@@ -1,7 +1,7 @@
 """Spectral density by Welch's method: averaged windowed segments (Welch 1967, IEEE Trans. Audio Electroacoust. 15:70).
 
-The same numbers as `welch` and `csd` of SciPy at their defaults; `scipy.signal` is not used because its import takes
-longer than most spectra.
+The results equal those of SciPy's `welch` and `csd` at their defaults. `scipy.signal` is not used because its import
+takes longer than the computation of most spectra.
 """
 
 import numpy as np
@@ -12,15 +12,16 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 def spectral_density(signal: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, FloatArray]:
     """Frequencies (lines,) and the one-sided power spectral density of (n,) or (n, c), in units squared per hertz.
 
-    length: samples of a segment; segments are freed of their mean, Hann-windowed, and overlap by half.
+    length: samples of a segment, at most n. The mean of each segment is removed; segments are Hann-windowed and overlap
+    by half.
     """
     frequency_hz, power = _welch_average(signal, signal, rate_hz, length)
     return frequency_hz, np.asarray(power.real)
 
 
 def cross_density(first: FloatArray, other: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, ComplexArray]:
-    """Frequencies (lines,) and the one-sided cross-spectral density of two signals of the same shape, the mean of the
-    first's conjugate times the other; segments as in `spectral_density`."""
+    """Frequencies (lines,) and the one-sided cross-spectral density of two signals of the same shape: the mean of
+    conj(first) * other, per hertz. rate_hz, length: as in `spectral_density`."""
     return _welch_average(first, other, rate_hz, length)
 
 
@@ -30,8 +31,8 @@ def hann(length: int) -> FloatArray:
 
 
 def line_spectra(periods: FloatArray) -> ComplexArray:
-    """Spectra (periods, lines, channels) of samples (periods, length, channels), rfft / length without the mean and
-    without half the rate: white noise of variance s² has s² / length per line."""
+    """Spectra (periods, lines, channels) of samples (periods, length, channels): rfft / length, without the lines at
+    zero and at half the sample rate. White noise of variance s² has the mean power s² / length per line."""
     length = periods.shape[1]
     return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
 
@@ -39,6 +40,7 @@ def line_spectra(periods: FloatArray) -> ComplexArray:
 def _welch_average(
     first: FloatArray, other: FloatArray, rate_hz: float, length: int
 ) -> tuple[FloatArray, ComplexArray]:
+    """Frequencies (lines,) and one-sided density, averaged over windowed segments; (lines,) or (lines, c)."""
     length = min(length, len(first))
     window = hann(length).reshape(-1, *[1] * (first.ndim - 1))
     starts = range(0, len(first) - length + 1, length - length // 2)
@@ -49,10 +51,12 @@ def _welch_average(
             lines if other is first else _transform_windowed(other[start : start + length], window)
         )
     density = total / (len(starts) * rate_hz * float(np.sum(window**2)))
-    # Each line but those at zero and at half the rate stands for its negative frequency, too.
+    # One-sided: each line except those at zero and at half the sample rate includes the power at its negative
+    # frequency.
     density[1 : len(density) - (length % 2 == 0)] *= 2
     return np.asarray(np.fft.rfftfreq(length, 1 / rate_hz), dtype=np.float64), np.asarray(density)
 
 
 def _transform_windowed(stretch: FloatArray, window: FloatArray) -> ComplexArray:
+    """Spectrum of one segment, without its mean and windowed."""
     return np.asarray(np.fft.rfft(window * (stretch - stretch.mean(axis=0)), axis=0))

@@ -1,4 +1,5 @@
-"""Short summaries of results, a title and a few rows, in a terminal and in a notebook (`__repr__`, `_repr_html_`)."""
+"""Short summaries of results: a title and a few rows, printed as text in a terminal (`__repr__`) and as an HTML table
+in a notebook (`_repr_html_`), because a dataclass of long arrays has no readable default."""
 
 from dataclasses import dataclass
 from html import escape
@@ -10,7 +11,7 @@ class Summary:
 
     title: str
     rows: tuple[tuple[str, str], ...]
-    """What it is, and its value with its unit."""
+    """Name of each row, and its value with unit."""
 
     def __str__(self) -> str:
         width = max((len(name) for name, _ in self.rows), default=0)
@@ -24,22 +25,22 @@ class Summary:
 
 
 class Summarised:
-    """Base of results that print as their summary: their fields hold arrays too long to print."""
+    """Base class of results that print as their summary, because their fields hold arrays too long to print."""
 
     __slots__ = ()
 
     def summary(self) -> Summary:
-        """Title and main numbers, for printing. Every subclass defines it; else TypeError is raised."""
+        """Title and main numbers, for printing. Every subclass overrides it; this method raises TypeError."""
         raise TypeError(f"{type(self).__name__} has no summary")
 
     def __repr__(self) -> str:
         return str(self.summary())
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
+        """HTML that a Jupyter notebook displays."""
         return self.summary().html
 
 
 def span_text(low: float, high: float, unit: str) -> str:
-    """ "0.3 to 45 Hz"."""
+    """Text of a range with its unit, such as "0.3 to 45 Hz"; four significant digits."""
     return f"{low:.4g} to {high:.4g} {unit}"

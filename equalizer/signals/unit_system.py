@@ -1,9 +1,9 @@
-"""Units of a mechanical model: those of force, length and time, from which all others follow.
+"""Unit system of a mechanical model: its units of force, length and time determine all others.
 
 In M a + B v + K x = force, the unit of mass is force time² / length, that of damping force time / length, and that of
 stiffness force / length. In SI: N s^2/m = kg, N s/m, N/m; for a rotation N m s^2/rad and so on. Where a command is a
-current (A) or a plain number, the force constant of the motor is unknown and part of every parameter: a "mass" then has
-the unit A s^2/m, not kg.
+current (A) or a plain number, the force constant of the motor is unknown and contained in every parameter: a "mass"
+then has the unit A s^2/m, not kg.
 """
 
 import re
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 _FACTOR = re.compile(r"(kg|N|m|s)(?:\^(\d+))?$")
 _RATES = ("/s^2", "/s")
 FORCES = ("N", "N m")
-"""Units of a command that is a force or a torque."""
+"""SI units of a command that is a force or a torque."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class UnitSystem:
     force: str = "N"
     """Unit of a command; ASCII."""
     length: str = "m"
-    """Unit of the position of a motion; ASCII, "1" for a plain number."""
+    """Unit of the position; ASCII, "1" for a plain number."""
     time: str = "s"
     """Unit of time; "sample" where no time is known."""
 
@@ -70,21 +70,23 @@ class UnitSystem:
 
 
 LINEAR, ROTATIONAL = UnitSystem(), UnitSystem("N m", "rad")
+"""The SI systems of translational and rotational models."""
 
 
 def system_of(commands: Sequence[str], motions: Sequence[str], time: str = "s") -> UnitSystem:
     """The unit system of a recording. commands, motions: units of its commands and of its responses (position, velocity
-    or acceleration); where they differ among themselves, those of the first channel count."""
+    or acceleration); those of the first channel are used where channels differ. time: unit of time."""
     motion = next((motions[0].removesuffix(rate) for rate in _RATES if motions[0].endswith(rate)), motions[0])
     return UnitSystem(commands[0], motion, time)
 
 
 def _base_powers(name: str) -> tuple[tuple[str, int], ...]:
-    """A unit as powers of N, m and s: kg = N s^2/m."""
+    """A base unit (N, m, s or kg) as powers of N, m and s; kg = N s^2/m."""
     return (("N", 1), ("s", 2), ("m", -1)) if name == "kg" else ((name, 1),)
 
 
 def _format_power(name: str, power: int) -> str:
+    """A unit to a power, such as "s^2"; a name of several units gets parentheses."""
     if power == 1:
         return name
     return f"{f'({name})' if ' ' in name else name}^{power}"

@@ -1,11 +1,15 @@
-"""Parses ASCII units and converts them to SI: `N`, `m/s^2`, `N m`, `mm/s`, `deg`, `in`, `g` (standard gravity)."""
+"""Parses ASCII units and converts them to SI: `N`, `m/s^2`, `N m`, `mm/s`, `deg`, `in`, `g` (standard gravity).
+
+A unit is a product of symbols with exponents; each symbol after a slash divides. Factors are exact by definition: inch,
+pound, standard gravity (9.80665 m/s^2), and angles as multiples of pi.
+"""
 
 import math
 import re
 from dataclasses import dataclass
 
 Dimension = tuple[int, ...]
-"""Exponents of kg, m, s, A, K, rad. The angle counts, or N m and N m/rad could not be distinguished."""
+"""Exponents of kg, m, s, A, K, rad. The angle is a dimension of its own: otherwise N m and N m/rad would be equal."""
 
 
 class UnknownUnitError(ValueError):
@@ -13,7 +17,7 @@ class UnknownUnitError(ValueError):
 
 
 class _NotAUnitError(UnknownUnitError):
-    """Created with the text and the reason; the suggestion takes long, and is made only where the error is shown."""
+    """Arguments: the text and the reason. The suggestion takes long, so that it is computed only for display."""
 
     def __str__(self) -> str:
         text, why = self.args
@@ -25,16 +29,16 @@ class _NotAUnitError(UnknownUnitError):
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What a unit means: a value in it, times `factor`, plus `offset`, is in `si`."""
+    """Conversion of a unit to SI: value in `si` = value in this unit * factor + offset."""
 
     si: str
     factor: float
     dimension: Dimension
     offset: float = 0.0
-    """Only of a temperature that stands alone: in a product, `degC` is a difference."""
+    """Not zero only for a temperature in `degC` or `degF` by itself: in a product these are temperature differences."""
 
 
-# Decimal prefixes, and the symbols that take them: of others, such as `g` or `min`, a prefix would change the meaning.
+# Decimal prefixes, and the symbols that take them. Other symbols take none: `kg` is a mass, not a multiple of gravity.
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
 _PREFIXABLE: dict[str, Dimension] = {
     "N": (1, 1, -2, 0, 0, 0),
@@ -54,8 +58,9 @@ _PREFIXABLE: dict[str, Dimension] = {
 _FORCE, _LENGTH = _PREFIXABLE["N"], _PREFIXABLE["m"]
 _TORQUE: Dimension = (1, 2, -2, 0, 0, 0)
 _POUND, _INCH = 0.45359237, 0.0254
-"""Kilograms in a pound, metres in an inch (exact by definition)."""
+"""Kilograms in an avoirdupois pound, metres in an inch (exact by definition)."""
 _POUND_FORCE = _POUND * 9.80665
+"""Newtons in a pound-force: a pound at standard gravity, 9.80665 m/s^2 (exact by definition)."""
 _FIXED: dict[str, Unit] = {
     "1": Unit("1", 1.0, (0, 0, 0, 0, 0, 0)),
     "%": Unit("1", 1e-2, (0, 0, 0, 0, 0, 0)),
@@ -97,13 +102,14 @@ KNOWN_UNITS = (
     "deg", "mdeg", "arcmin", "arcsec", "g", "rpm", "rev", "turn", "min", "h", "%", "in", "ft", "lbf", "ozf", "kgf",
     "gf", "daN", "lb", "oz", "psi", "bar", "mbar", "hPa", "degC", "degF", "Nm", "mNm", "Ncm", "Nmm", "kNm", "counts",
 )  # fmt: skip
-"""Accepted beside SI; `g` is standard gravity, never a gram; `lb` and `oz` are masses, `lbf` and `ozf` forces; `counts`
-are plain numbers of unknown scale."""
+"""Units accepted in addition to SI. `g` is standard gravity, never a gram; `lb` and `oz` are masses, `lbf` and `ozf`
+forces; `counts` are plain numbers of unknown scale."""
 
 ALLOWED = (
     "allowed are SI symbols in ASCII (N, N m, m, rad, m/s, m/s^2, rad/s^2, V, A, kg, s, Hz, 1 ...; "
     f"prefixes n u m c k M) and {', '.join(KNOWN_UNITS)}"
 )
+"""Clause of error messages that lists the accepted units."""
 
 QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
     "force": ("N", "N m"),
@@ -118,24 +124,24 @@ QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
     "current": ("A",),
     "time": ("s",),
 }
-"""SI units that a well-known quantity may have; any other word may be used with any unit."""
+"""SI units that a well-known quantity may have. A quantity that is not listed may have any unit."""
 
 UNSTATED = "1"
-"""Unit where a file states none: its numbers stay as they are."""
+"""Unit of a column for which a file states none; its numbers are not converted."""
 
 LONGEST_UNIT = 100
-"""Characters, of a unit that is read in another spelling."""
+"""Largest number of characters of a text for which other spellings are tried."""
 
 _SYMBOLS = frozenset(_FIXED) | {prefix + base for prefix in ("", *_PREFIXES) for base in _PREFIXABLE}
 
 
 def parse_unit(text: str) -> Unit:
-    """Read a product such as `N m s/rad`. Raises UnknownUnitError with what is allowed."""
+    """Parse a unit: a product such as `N m s/rad`. Raises UnknownUnitError, whose message lists the accepted units."""
     if not text.strip():
         raise UnknownUnitError(f"the unit is missing; {ALLOWED}")
     if text.strip() in _FIXED:
         return _FIXED[text.strip()]
-    if re.fullmatch(r"ms\^-[12]", text.strip()):  # meant is m/s, not one over milliseconds
+    if re.fullmatch(r"ms\^-[12]", text.strip()):  # m/s is meant, but would be read as 1/ms
         raise _NotAUnitError(text, "")
     symbols: dict[str, int] = {}
     factor = 1.0
@@ -150,8 +156,8 @@ def parse_unit(text: str) -> Unit:
 
 
 def check_quantity(quantity: str, unit: Unit) -> None:
-    """Check that a quantity has a unit of its kind. Raises UnknownUnitError where a well-known quantity has a unit of
-    something else. A quantity of unknown scale (unit 1) may be any."""
+    """Check that the unit fits the quantity. Raises UnknownUnitError where a quantity of `QUANTITY_UNITS` has a unit
+    that is not listed there. The unit 1 (unknown scale) fits every quantity."""
     fitting = QUANTITY_UNITS.get(quantity)
     if fitting and unit.si not in (*fitting, UNSTATED):
         raise UnknownUnitError(
@@ -161,7 +167,7 @@ def check_quantity(quantity: str, unit: Unit) -> None:
 
 
 def force_hint(quantity: str, unit: Unit) -> str:
-    """What to write for a force that is stated as a mass, or in grams; empty for others."""
+    """Advice for a force or torque that is stated in units of mass, or in `g`; empty for other units."""
     grams = unit.si == "m/s^2" and unit.factor == _FIXED["g"].factor
     if quantity == "force" and (grams or unit.si == "kg"):
         return "; grams as a force are written gf" if grams else "; as a force write lbf, ozf or kgf"
@@ -171,7 +177,7 @@ def force_hint(quantity: str, unit: Unit) -> str:
 
 
 def quantity_of(si: str) -> str:
-    """The usual word for what is measured in an SI unit; the unit itself where there is none."""
+    """The usual quantity of an SI unit, such as "force" for N; the unit itself where there is none."""
     return _QUANTITY_OF.get(si, si)
 
 
@@ -183,7 +189,7 @@ _QUANTITY_OF = {
 
 
 def _parse_factors(text: str) -> list[tuple[str, int]]:
-    """Symbols with their exponents; what follows a slash is divided by."""
+    """Symbols with their exponents; a symbol after a slash has a negative exponent. Raises UnknownUnitError."""
     numerator, *denominators = text.replace("*", " ").split("/")
     found = [_parse_power(factor, 1, text) for factor in numerator.split()]
     for part in denominators:
@@ -198,6 +204,8 @@ def _parse_factors(text: str) -> list[tuple[str, int]]:
 
 
 def _parse_power(factor: str, sign: int, text: str) -> tuple[str, int]:
+    """Symbol and signed exponent of a factor such as `s^2`. text: the whole unit, for the error. Raises
+    UnknownUnitError."""
     match = re.fullmatch(r"([A-Za-z%]+|1)(?:\^(-?[1-9]))?", factor)
     if not match:
         raise _NotAUnitError(text, "")
@@ -205,6 +213,7 @@ def _parse_power(factor: str, sign: int, text: str) -> tuple[str, int]:
 
 
 def _parse_symbol(symbol: str, text: str) -> Unit:
+    """Unit of a symbol with or without prefix. text: the whole unit, for the error. Raises UnknownUnitError."""
     if symbol in _FIXED:
         return _FIXED[symbol]
     if symbol in _PREFIXABLE:
@@ -216,6 +225,7 @@ def _parse_symbol(symbol: str, text: str) -> Unit:
 
 
 def _format_symbols(symbols: dict[str, int]) -> str:
+    """Text of a product from the exponents of its symbols."""
     above = [_format_power(symbol, power) for symbol, power in symbols.items() if power > 0 and symbol != "1"]
     below = [_format_power(symbol, -power) for symbol, power in symbols.items() if power < 0 and symbol != "1"]
     return "/".join([" ".join(above) or "1", *below])
@@ -226,7 +236,7 @@ def _format_power(symbol: str, power: int) -> str:
 
 
 def suggest_unit(text: str) -> str:
-    """The nearest unit for one that is not known; empty where nothing is near."""
+    """The accepted unit nearest to an unknown text; empty where none is near."""
     plain = plain_unit(text)
     if plain != text:
         return plain
@@ -237,11 +247,11 @@ def suggest_unit(text: str) -> str:
 
 
 def plain_unit(text: str) -> str:
-    """Spell a unit as this project does (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`); text that is no unit is
-    returned unchanged."""
+    """Rewrite a unit in the spelling of this module (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`); text that is
+    not a unit is returned unchanged."""
     if len(text) > LONGEST_UNIT:
         return text
-    # Here, for only files of others spell units in other ways.
+    # Imported here, because only files of other origin need it.
     from equalizer.signals.unit_spellings import respell
 
     plain = respell(text, _SYMBOLS)
@@ -249,6 +259,7 @@ def plain_unit(text: str) -> str:
 
 
 def _is_known(text: str) -> bool:
+    """Whether `parse_unit` accepts the text."""
     try:
         parse_unit(text)
     except UnknownUnitError:
@@ -256,7 +267,7 @@ def _is_known(text: str) -> bool:
     return True
 
 
-# The spelling of a product's SI unit: kg m/s^2 is shown as N, m/s/s as m/s^2.
+# Preferred spelling of a product in SI units, by dimension: kg m/s^2 is written as N, m/s/s as m/s^2.
 _PREFERRED: dict[Dimension, str] = {}
 for _text in ("N", "N m", "m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "V", "A", "s", "kg", "1"):
     _PREFERRED[parse_unit(_text).dimension] = _text

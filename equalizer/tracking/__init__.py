@@ -1,6 +1,7 @@
-"""Equalization: from the acceleration wanted at the handle to the forces to be commanded.
+"""Equalization: computes the forces to command from the acceleration that is wanted at the handle.
 
-`lqr` (the finite-horizon tracker, and its check by one large least-squares problem) -> `feedforward` (one model, one
-table of accelerations) -> `bands` (three bands, two models), `learning` (iterative learning control), `compensation`
-(known nonlinear physics) -> `workspace` (models of several places). Begin at `feedforward/feedforward.py`.
+`lqr` (finite-horizon linear-quadratic tracker) -> `feedforward` (forces of a single model for a table of accelerations)
+-> `bands` (three frequency bands), `learning` (iterative learning control), `compensation` (known nonlinear physics) ->
+`workspace` (models identified at several places). `realtime` exports the tracker to loops in other languages. Begin at
+`feedforward/feedforward.py`.
 """

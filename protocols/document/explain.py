@@ -1,4 +1,8 @@
-"""Every number and choice of a protocol with its default and the reason for it."""
+"""List of all fields of a protocol: value, default, the reason for the default, and the allowed values.
+
+The texts come from the JSON Schema of the protocol (`protocols.document.schema`), so that they are written only once,
+in `protocols.definition`.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,7 +15,7 @@ from protocols.document.schema import Node, Place, describe_allowed, node_at, pr
 from protocols.document.validation_messages import key_path
 
 Plain = str | int | float | bool | list[Any] | dict[str, str]
-"""A table of texts is a value of its own."""
+"""Value of a field as TOML has it. A table of texts (key to text) counts as a single value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,17 +28,19 @@ class ExplainedField:
     default: Plain | None
     """None where every protocol must state the value itself."""
     description: str
-    """What it is, and why the default is what it is."""
+    """Meaning of the field, and the reason for its default."""
     allowed: str
+    """Allowed values, in words."""
 
 
 def explain(protocol: StudyProtocol | RecordingProtocol) -> tuple[ExplainedField, ...]:
-    """All fields in the order of the schema, tables flattened."""
+    """All fields of a protocol, in the order of its values, with nested tables flattened to dotted keys."""
     root = protocol_schema(protocol.kind)
     return tuple(_fields(root, protocol_values(protocol), ()))
 
 
 def _fields(root: Node, value: Any, place: Place) -> Iterator[ExplainedField]:
+    """Fields of a value at its place: of a table key by key, of a list of tables entry by entry, else the value."""
     node = resolve_reference(root, node_at(root, place) or {})
     if isinstance(value, dict) and ("properties" in node or "oneOf" in node):
         # An entry of a mixed list: its kind picks the schema.

@@ -1,4 +1,7 @@
-"""Lock of a protocol: its hash, fixed before data are collected, and the check against it."""
+"""Lock of a protocol: its hash, stored before data are collected, and the check that the protocol is still the same.
+
+With a lock, a change of the settings after the start of data collection is detected. A lock is a JSON document.
+"""
 
 import json
 from dataclasses import dataclass
@@ -9,6 +12,7 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.hashing import protocol_hash
 
 FORMAT = "hapteq-protocol-lock"
+"""Value of the key `format`, by which a lock is recognised."""
 VERSION = 1
 """Version of the lock's format."""
 
@@ -23,9 +27,9 @@ class ProtocolLock:
 
     name: str
     hash: str
-    """As `protocol_hash` gives it."""
+    """Hash of all settings (`protocols.document.hashing.protocol_hash`)."""
     locked_utc: str
-    """ISO 8601."""
+    """Time of the lock, UTC, ISO 8601."""
     hapteq: str
     """Version of hapteq that locked it."""
 
@@ -66,7 +70,7 @@ def lock_to_json(lock: ProtocolLock) -> str:
 
 
 def lock_from_json(text: str) -> ProtocolLock:
-    """Parse a lock. Raises LockError that says what is wrong with the document."""
+    """Parse a lock from JSON. Raises LockError for a document that is no lock of this version; its message says why."""
     try:
         document: Any = json.loads(text)
     except (ValueError, RecursionError) as error:

@@ -1,4 +1,8 @@
-"""Pydantic's validation errors in the words of a protocol file's author: key, what is wrong, what is allowed."""
+"""Translates pydantic's validation errors for the author of a protocol file: key, what is wrong, what is allowed.
+
+Keys are written as in the file, with list entries counted from 1. A misspelt key is reported once, with the known key
+that was probably meant.
+"""
 
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -12,12 +16,14 @@ _LONGEST_WORD = 60
 
 
 def problems_in(root: Node, errors: Sequence[Any]) -> tuple[Problem, ...]:
-    """Every problem once. root: schema of the protocol's kind; errors: from pydantic's ValidationError."""
+    """Problems of a protocol, each once. root: schema of the protocol's kind; errors: from pydantic's
+    ValidationError."""
     unknown = [error["loc"] for error in errors if error["type"] == "unexpected_keyword_argument"]
     meant = {(*place[:-1], nearest_key(str(place[-1]), _keys_beside(root, place))) for place in unknown}
     found: list[Problem] = []
     for error in errors:
-        # A key under a wrong name is one problem, not two; and a list is not empty because its entries are wrong.
+        # Pydantic reports a misspelt required key twice (as unknown and as missing), and a list with invalid entries
+        # also as too short: the second report is dropped.
         wrong_name = error["type"] == "missing" and error["loc"] in meant
         wrong_entries = error["type"] == "too_short" and len(error["input"]) > 0
         if not wrong_name and not wrong_entries:
@@ -49,7 +55,7 @@ def nearest_key(key: str, known: Sequence[str]) -> str | None:
 
 
 def shown(value: Any) -> str:
-    """A value as the file would write it, with its type where the type is the problem."""
+    """A value for a message: numbers and texts as in the file, other types by name."""
     match value:
         case bool():
             return f"{str(value).lower()}, a truth value"
@@ -64,6 +70,7 @@ def shown(value: Any) -> str:
 
 
 def _translate_error(root: Node, error: Any) -> tuple[Problem, ...]:
+    """Problems for one error of pydantic: key in the file, text, allowed values."""
     place: Place = error["loc"]
     if error["type"] == "json_invalid":  # nested too deeply
         return (Problem("The text", f"cannot be read: {error['msg']}", "numbers and nesting of ordinary size"),)
@@ -80,6 +87,7 @@ def _translate_error(root: Node, error: Any) -> tuple[Problem, ...]:
 
 
 def _problem_text(error: Any) -> str:
+    """What is wrong with the value, as the predicate of a sentence whose subject is the key."""
     value = error["input"]
     match error["type"]:
         case "missing":
@@ -101,6 +109,7 @@ def _problem_text(error: Any) -> str:
 
 
 def _report_unknown_key(root: Node, place: Place) -> Problem:
+    """Problem for an unknown key, with the table in which it belongs or the known key that was probably meant."""
     key, known = str(place[-1]), _keys_beside(root, place)
     table = key_path(root, place[:-1])
     problem = f"is no key of {f'[{table}]' if table else 'a protocol'}"
@@ -115,6 +124,7 @@ def _report_unknown_key(root: Node, place: Place) -> Problem:
 
 
 def _wrong_kind_of_entry(root: Node, place: Place, error: Any) -> Problem:
+    """Problem for an entry of a mixed list whose kind is missing or unknown."""
     node = resolve_reference(root, node_at(root, place) or {})
     tag, choices = node["discriminator"]["propertyName"], node["discriminator"]["mapping"]
     given = error["input"].get(tag)
@@ -125,6 +135,7 @@ def _wrong_kind_of_entry(root: Node, place: Place, error: Any) -> Problem:
 
 
 def _keys_beside(root: Node, place: Place) -> tuple[str, ...]:
+    """Keys that the schema allows in the table that contains this place."""
     table = node_at(root, place[:-1])
     return keys_of(root, table) if table else ()
 

@@ -1,4 +1,8 @@
-"""A short practice at a fixed level: when it ends, and whether it was passed."""
+"""Short practice run around a fixed level, before the test: when it ends, and whether it was passed.
+
+Criterion: `right_needed` correct answers among the last `of_last`, within `trial_limit` trials (`PracticeSettings`).
+The state is a value: `add_answer` returns the next one.
+"""
 
 from dataclasses import dataclass
 
@@ -19,15 +23,15 @@ def add_answer(state: PracticeState, correct: bool) -> PracticeState:
 
 
 def right_of_last(settings: PracticeSettings, state: PracticeState) -> int:
-    """Number of right answers among the last `of_last`."""
+    """Number of correct answers among the last `of_last`."""
     return sum(state.correct[-settings.of_last :])
 
 
 def practice_passed(settings: PracticeSettings, state: PracticeState) -> bool:
-    """Whether enough of the last answers are right."""
+    """Whether at least `right_needed` of the last `of_last` answers are correct."""
     return right_of_last(settings, state) >= settings.right_needed
 
 
 def practice_over(settings: PracticeSettings, state: PracticeState) -> bool:
-    """Whether the practice is passed or its trial limit reached."""
+    """Whether the practice has ended: it is passed, or its trial limit is reached."""
     return practice_passed(settings, state) or len(state.correct) >= settings.trial_limit

@@ -1,8 +1,8 @@
 """Order of the runs and random draw of every trial, each from its own key (counter-based random numbers).
 
-A draw depends only on its key (seed, run, trial, attempt), not on earlier draws: a repeated trial, a resumed session or
-a replay shifts no later one. The words come directly from numpy's SeedSequence, whose output is guaranteed never to
-change, so that a session can be checked years later.
+A draw depends only on the seed and its key (run, trial, attempt), not on earlier draws: a repeated trial, a resumed
+session or a replay changes no later draw. The random words come directly from numpy's SeedSequence, whose output is
+guaranteed never to change, so that a session can be checked years later.
 """
 
 from dataclasses import dataclass
@@ -17,17 +17,19 @@ from protocols.trial import Phase
 
 
 def williams_rows(conditions: int) -> tuple[tuple[int, ...], ...]:
-    """Rows of places 0 … conditions - 1, one row per participant.
+    """Williams design (Latin square balanced for first-order carry-over): orders of conditions 0 … conditions - 1.
 
-    Over all rows each condition stands in each position equally often, and each follows each other equally often:
-    once in the `conditions` rows of an even number, twice in the 2 x `conditions` rows of an odd one.
+    One row per participant. Over all rows each condition occurs in each position equally often, and follows each other
+    condition equally often: once in the `conditions` rows of an even number of conditions, twice in the 2 x
+    `conditions` rows of an odd number. Raises ValueError for fewer than one condition.
 
     Source: E. J. Williams, Experimental designs balanced for the estimation of residual effects of treatments,
     Australian Journal of Scientific Research A 2 (1949), 149-168.
     """
     if conditions < 1:
         raise ValueError(f"a Williams design needs one condition at the least, not {conditions}")
-    # 0, 1, n-1, 2, n-2, …: no two neighbours are the same distance apart.
+    # 0, 1, n-1, 2, n-2, …: for an even n all successive differences modulo n are different, so that the shifted rows
+    # contain each ordered pair of neighbours once. For an odd n the reversed rows supply the missing pairs.
     first = [0]
     for place in range(1, conditions):
         first.append((place + 1) // 2 if place % 2 else conditions - place // 2)
@@ -43,14 +45,14 @@ BLOCK = 8
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run: a staircase, or a practice."""
+    """One run of a session: a staircase, or a practice."""
 
     index: int
-    """From 0: training, practice, test, detection."""
+    """Number of the run in the session, from 0; the order is training, practice, test, detection."""
     phase: Phase
     frequency_hz: float
     practice: bool = False
-    """A training run without a staircase, with a criterion to pass."""
+    """True for a training run without a staircase, which ends by a criterion (`protocols.procedure.practice`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +60,7 @@ class Draw:
     """Random choices for one presentation of a stimulus: its direction and its polarity."""
 
     direction: int
-    """1 or 2 as in the protocol; `label_of` gives the number on the screen."""
+    """1 or 2, in the order of the protocol; `label_of` gives the number on the screen."""
     polarity: int
     """Sign of the first half-wave, 1 or -1."""
 
@@ -97,15 +99,16 @@ def draw_trial(settings: ScheduleSettings, onset_polarity: str, seed: int, run: 
     side, sign = (int(word) >> 63 for word in draw_words(seed, (run, trial, attempt), 2))
     direction = 1 + side
     if settings.directions == "balanced" and attempt == 0:
-        # First rules only (`study.session.state.rules`): a trial drawn again leaves the block's plan, or its first
-        # attempt would tell the second.
+        # A repeated trial (attempt > 0, only in sessions under version 1 of `study.session.state.rules`) is drawn
+        # independently of the block: otherwise its direction would be that of the first attempt, already felt.
         block, place = divmod(trial, BLOCK)
         direction = 1 + _permutation(seed, (run, block), BLOCK)[place] % 2
     return Draw(direction, 1 if onset_polarity == "positive" else 1 - 2 * sign)
 
 
 def is_catch_trial(settings: CatchSettings, seed: int, run: int, trial: int) -> bool:
-    """Whether this trial of a test run is a catch trial: one in each block of `one_in` trials, at a random place."""
+    """Whether this trial of a test run is a catch trial: one in each block of `one_in` trials, at a random place; none
+    where `one_in` is 0."""
     if not settings.one_in:
         return False
     block, place = divmod(trial, settings.one_in)
@@ -133,22 +136,25 @@ def demo_level_n(settings: DemoSettings, seed: int, played: int) -> float:
 
 
 def _draw_level_n(level_n: float, rove_db: float, seed: int, key: tuple[int, ...]) -> float:
-    """Roved level (N): uniform in dB over `rove_db`, centred on `level_n`."""
+    """Roved level (N): uniform in dB over a range of `rove_db`, centred on `level_n` (N)."""
     if rove_db == 0:
         return level_n
+    # The upper 53 bits, as a number in the open interval (0, 1).
     share = ((draw_words(seed, key, 1)[0] >> 11) + 0.5) * 2.0**-53
     return to_newton(to_db(level_n) + rove_db * (share - 0.5))
 
 
 _CATCH, _DETECTION, _ROVE = 0, 1, 2
-"""Last element of keys that are one longer than a trial's."""
+"""Last element of the keys of four elements, by purpose: catch trial, direction in detection, roving. A key of four
+elements never gives the same words as a trial's key of three."""
 
 
 def labels_swapped(settings: ScheduleSettings, frequencies: int, participant_number: int) -> bool:
     """Whether the numbers 1 and 2 are exchanged for this participant.
 
-    Every second participant, and the other half on the next pass through the Williams rows, so that each order of the
-    frequencies occurs with both labellings. frequencies: number of stimulus frequencies.
+    True for every second participant, and for the other half on the next pass through the Williams rows, so that each
+    order of the frequencies occurs with both labellings. frequencies: number of stimulus frequencies;
+    participant_number: from 0.
     """
     if settings.labels == "fixed":
         return False
@@ -159,17 +165,18 @@ def labels_swapped(settings: ScheduleSettings, frequencies: int, participant_num
 
 
 def label_of(direction: int, swapped: bool) -> int:
-    """Number on the screen for a direction; the mapping is its own inverse."""
+    """Number on the screen, 1 or 2, for a direction; the mapping is its own inverse."""
     return 3 - direction if swapped else direction
 
 
 def draw_words(seed: int, key: tuple[int, ...], count: int) -> tuple[int, ...]:
-    """`count` pseudo-random 64-bit words for a key. Keys of different lengths never collide."""
+    """`count` pseudo-random 64-bit words for a key. The length is part of the key, so that keys of different lengths
+    give different words."""
     sequence = np.random.SeedSequence(entropy=seed, spawn_key=(len(key), *key))
     return tuple(int(word) for word in sequence.generate_state(count, np.uint64))
 
 
 def _permutation(seed: int, key: tuple[int, ...], size: int) -> tuple[int, ...]:
-    """Random permutation by sorting independent words; ties have a probability of 1 in 10^17."""
+    """Random permutation by sorting independent 64-bit words; the probability of a tie is below size² / 2^65."""
     words = draw_words(seed, key, size)
     return tuple(sorted(range(size), key=words.__getitem__))

@@ -1,8 +1,8 @@
 """Transformed up-down staircase: the next level, and the end of a run.
 
-Read `step` first: it is the whole rule, but for runs whose levels Psi chooses (`psi`). The state is a value: `begin`
-makes it, `step` returns the next one. Levels are kept in dB re 1 N, because after contact with the cap they leave the
-1 dB grid.
+Read `step` first: it is the complete rule, except for runs whose levels the Psi method chooses
+(`protocols.procedure.psi`). The state is a value: `begin` makes it, `step` returns the next one. Levels are in dB re
+1 N and not restricted to a grid of steps, because a level that was limited to the cap need not be on that grid.
 
 Source: H. Levitt, Transformed up-down methods in psychoacoustics, J. Acoust. Soc. Am. 49 (1971), 467-477.
 """
@@ -16,7 +16,7 @@ from protocols.procedure.psi import Answered, estimate, next_level_db, posterior
 
 
 class Heading(Enum):
-    """Direction of the last movement of the level; NONE before the first, which is therefore no reversal."""
+    """Direction of the last change of level; NONE before the first change, which is therefore no reversal."""
 
     NONE = "none"
     UP = "up"
@@ -28,13 +28,16 @@ class StaircaseState:
     """State of one run before its next trial."""
 
     level_db: float
+    """Level of the next trial, dB re 1 N."""
     right_in_a_row: int = 0
     wrong_in_a_row: int = 0
     heading: Heading = Heading.NONE
     reversal_levels_db: tuple[float, ...] = ()
+    """Level presented in the trial that made each reversal, dB re 1 N."""
     reversal_trials: tuple[int, ...] = ()
     """Index of the trial whose answer made each reversal, from 0."""
     trials: int = 0
+    """Number of trials answered."""
     trials_at_cap: int = 0
     pushes_against_cap: int = 0
     """Number of times the rule asked for a level above the cap."""
@@ -42,7 +45,7 @@ class StaircaseState:
     answered: tuple[Answered, ...] = ()
     """All answers of a run whose levels are chosen by Psi; empty for other rules."""
     spread_db: float = math.inf
-    """Standard deviation of the threshold's posterior, for a run whose levels are chosen by Psi."""
+    """Standard deviation of the threshold's posterior (dB), for a run whose levels are chosen by Psi."""
 
     @property
     def reversals(self) -> int:
@@ -81,28 +84,30 @@ def is_finished(rule: StaircaseRule, state: StaircaseState) -> bool:
 
 
 def is_complete(rule: StaircaseRule, state: StaircaseState) -> bool:
-    """Whether the run has a threshold: all its reversals, or what Psi was to find out."""
+    """Whether the run yields a threshold: it has all its reversals or, under Psi, all its trials or a posterior
+    standard deviation of at most `bayesian.spread_db`."""
     if rule.is_bayesian:
         return state.trials >= rule.bayesian.trials or state.spread_db <= rule.bayesian.spread_db
     return state.reversals >= rule.reversals
 
 
 def level_n(rule: StaircaseRule, state: StaircaseState) -> float:
-    """Level to present (N); never above the cap, not even by rounding of the dB."""
+    """Level to present (N); never above the cap, not even by rounding in the conversion from dB."""
     return min(to_newton(state.level_db), rule.cap_n)
 
 
 def to_db(level_n: float) -> float:
-    """Level in dB re 1 N."""
+    """Level in dB re 1 N: 20 log10(level_n)."""
     return 20.0 * math.log10(level_n)
 
 
 def to_newton(level_db: float) -> float:
-    """Level in N from dB re 1 N."""
+    """Level in N: 10^(level_db / 20)."""
     return float(10.0 ** (level_db / 20.0))
 
 
 def _count(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
+    """Count the answer: trials, trials at the cap, and consecutive right or wrong answers."""
     return replace(
         state,
         right_in_a_row=state.right_in_a_row + 1 if correct else 0,
@@ -113,7 +118,7 @@ def _count(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Stairca
 
 
 def _apply_psi(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
-    """The level that Psi chooses after this answer."""
+    """State with the level that Psi chooses after this answer, at most the cap, and the new posterior's spread."""
     cap_db, answered = to_db(rule.cap_n), (*state.answered, (state.level_db, correct))
     probability = posterior(answered, cap_db)
     level_db = min(next_level_db(probability, cap_db), cap_db)
@@ -146,11 +151,12 @@ def _move(rule: StaircaseRule, state: StaircaseState, heading: Heading) -> Stair
 
 
 def _step_db(rule: StaircaseRule, reversals_before: int, turned: bool) -> float:
-    """Size of the next movement (dB): the phase of the schedule is found by the number of reversals."""
+    """Size of the next change of level (dB). The phase of `rule.steps` follows from the number of reversals so far;
+    `rule.step_change` determines whether the present reversal counts already."""
     reversals_now = reversals_before + turned
     match rule.step_change:
         case StepChange.AFTER_REVERSAL:
-            # The reversal that completes a phase is still answered with that phase's step.
+            # The movement at the reversal that completes a phase still has that phase's step.
             counted = reversals_before
         case StepChange.AT_REVERSAL:
             counted = reversals_now
@@ -164,14 +170,17 @@ def _step_db(rule: StaircaseRule, reversals_before: int, turned: bool) -> float:
 
 
 def _wrong_needed(rule: StaircaseRule, state: StaircaseState) -> int:
+    """Consecutive wrong answers that raise the level."""
     return 1 if _in_initial_phase(rule, state) else rule.up_after_wrong
 
 
 def _right_needed(rule: StaircaseRule, state: StaircaseState) -> int:
+    """Consecutive right answers that lower the level."""
     return 1 if _in_initial_phase(rule, state) else rule.down_after_right
 
 
 def _in_initial_phase(rule: StaircaseRule, state: StaircaseState) -> bool:
+    """Whether the 1 up, 1 down rule applies: until the first reversal, if the protocol asks for it."""
     return rule.initial_one_up_one_down and state.reversals == 0
 
 
@@ -180,4 +189,5 @@ _SAME_DB = 1e-9
 
 
 def _at_cap(rule: StaircaseRule, level_db: float) -> bool:
+    """Whether the level is the cap, within rounding."""
     return level_db >= to_db(rule.cap_n) - _SAME_DB

@@ -1,5 +1,6 @@
-"""Every text that a participant reads: the English ones, and how a protocol's own language replaces them.
+"""Every text that a participant reads: the English texts, and their replacement by those of a protocol's language.
 
-`english_screens`, `english_help`, `english_forms`, `english_facts` -> `english` (all keys) -> `words` (what is shown);
-`in_language` resolves a table such as `de.toml` into a protocol and says what is wrong with one. Begin at `words.py`.
+`english_screens`, `english_help`, `english_forms` and `english_facts` contain the English texts by key; `english`
+merges them; `words` looks up the text to show. `in_language` checks a table of translations such as `de.toml` and
+inserts it into the values of a protocol. Begin at `words.py`.
 """

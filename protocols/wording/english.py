@@ -1,4 +1,4 @@
-"""All English texts by key, and what may stand in a translation of each."""
+"""All English texts by key, and the placeholders that a translation of each must contain."""
 
 from string import Formatter
 
@@ -8,13 +8,15 @@ from protocols.wording.english_help import HELP
 from protocols.wording.english_screens import SCREENS
 
 ENGLISH: dict[str, str] = {**SCREENS, **FORMS, **FACTS, **HELP, **PROTOCOLS}
+"""English text of every key; a complete translation has exactly these keys."""
 
 LANGUAGES = {"en": "English", "de": "German", "es": "Spanish"}
-"""Languages that come with hapteq, by their code (ISO 639-1)."""
+"""Names of the languages supplied with hapteq, by code (ISO 639-1)."""
 
 
 def placeholders(text: str) -> frozenset[str] | None:
-    """The names in braces; None where the braces are not in pairs, or hold more than a name."""
+    """Names of the placeholders `{name}` in a text; None where braces are unpaired or contain more than a name, such as
+    a format or a conversion."""
     try:
         parts = [(name, spec, conversion) for _, name, spec, conversion in Formatter().parse(text) if name is not None]
     except ValueError:

@@ -1,4 +1,8 @@
-"""English texts of the forms, and the sentences of the shipped protocols that a participant reads."""
+"""English texts of the forms (consent, exclusion, set-up, questions), and of the shipped protocols, by key.
+
+A key that ends in `_1` is the singular, in `_n` the form for any other count. Names in braces are placeholders that the
+program fills in; every translation has the same keys and placeholders (`in_language`).
+"""
 
 FORMS: dict[str, str] = {
     "yes": "yes",
@@ -80,6 +84,7 @@ FORMS: dict[str, str] = {
     "line_form_confirm": "y if that is right, b to answer again: ",
     "line_form_confirm_letter": "y",
 }
+"""Texts of the forms by key, on the screen and in line mode (plain text in a terminal)."""
 
 PROTOCOLS: dict[str, str] = {
     "protocol_title_threshold": "Force thresholds for telling two directions apart, 5 to 45 Hz",
@@ -115,4 +120,5 @@ PROTOCOLS: dict[str, str] = {
     "protocol_not_at_all": "not at all",
     "protocol_very": "very",
 }
-"""Sentences of the shipped protocols by key: where a protocol has one of them, its language replaces it too."""
+"""Sentences of the shipped protocols by key. A protocol that contains one of them word by word gets the translation of
+that key (`in_language`)."""

@@ -1,4 +1,8 @@
-"""A protocol's values in a language: its table of texts becomes part of them, and so of the hash and of every log."""
+"""Inserts a language's table of texts into the values of a protocol, and checks such a table.
+
+The texts become part of the protocol, and thereby of its hash and of every session log: what a participant read is
+recorded.
+"""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -8,25 +12,27 @@ from protocols.wording.english import ENGLISH, LANGUAGES, placeholders
 from protocols.wording.english_forms import PROTOCOLS
 
 LONGEST = 4000
-"""Characters of a text."""
+"""Largest length of a text, in characters."""
 
 
 def language_of(values: Mapping[str, Any]) -> str:
-    """The language that plain values of a protocol ask for. Strange values are refused elsewhere."""
+    """Code of the language that unvalidated values of a protocol name; "en" without a valid one. Invalid values are
+    refused by the validation of the protocol."""
     text = values.get("text")
     language = text.get("language", "en") if isinstance(text, dict) else "en"
     return language if isinstance(language, str) else "en"
 
 
 def own_words(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The single texts that a protocol states itself."""
+    """Texts by key that a protocol itself contains; empty without a valid table."""
     text = values.get("text")
     words = text.get("words", {}) if isinstance(text, dict) else {}
     return dict(words) if isinstance(words, dict) else {}
 
 
 def table_problems(table: Mapping[str, Any], whole: bool) -> tuple[Problem, ...]:
-    """What is wrong with a table of texts. whole: it must have every key, as that of a language has."""
+    """Problems of a table of texts. whole: every key is required, as for a language; False for a protocol's own
+    texts."""
     problems = [problem for key, text in table.items() if (problem := _problem(key, text)) is not None]
     if whole:
         problems += [Problem(key, "is missing", f'its translation of "{_short(ENGLISH[key])}"') for key in ENGLISH
@@ -35,8 +41,9 @@ def table_problems(table: Mapping[str, Any], whole: bool) -> tuple[Problem, ...]
 
 
 def in_language(values: Mapping[str, Any], table: Mapping[str, str], name: str) -> dict[str, Any]:
-    """The values with all texts in them, those that the protocol states itself first. The sentences of the shipped
-    protocols are replaced where they stand; a lab's own stay as they are written. name: of the language."""
+    """The values of a protocol with all texts of a table; texts of the protocol itself have priority. Sentences of the
+    shipped protocols (`PROTOCOLS`) are translated in place; a laboratory's own sentences are left unchanged. name: of
+    the language."""
     sentences = {PROTOCOLS[key]: table[key] for key in PROTOCOLS if key in table}
 
     def translate(text: Any) -> Any:
@@ -66,10 +73,12 @@ def _question(question: Any, translate: Callable[[Any], Any]) -> Any:
 
 
 def _translate_each(value: Any, translate: Callable[[Any], Any]) -> Any:
+    """Translate a value, or each entry of a list."""
     return [translate(each) for each in value] if isinstance(value, list) else translate(value)
 
 
 def _problem(key: str, text: Any) -> Problem | None:
+    """Problem of one text: unknown key, not a text of allowed length, or other placeholders than the English text."""
     if key not in ENGLISH:
         return Problem(key, "is no text of hapteq", "the keys that `hapteq protocol texts` lists")
     if not isinstance(text, str) or not text.strip() or len(text) > LONGEST:
@@ -83,10 +92,11 @@ def _problem(key: str, text: Any) -> Problem | None:
 
 
 def _short(text: str) -> str:
+    """A text on a single line of at most 60 characters."""
     line = " ".join(text.split())
     return line if len(line) <= 60 else f"{line[:59]}…"
 
 
 def known_languages() -> str:
-    """The known languages in words, for a message."""
+    """Codes and names of the supplied languages, for a message."""
     return ", ".join(f'"{code}" ({name})' for code, name in LANGUAGES.items())

@@ -1,4 +1,8 @@
-"""Lookup of every text that is shown: a protocol's own texts, and the English ones where it has none."""
+"""Lookup of every text that is shown to a participant: the protocol's own text, or the English one where it has none.
+
+Sentences that a session composes itself are logged in English; `Words.fact` recognises them by pattern and gives their
+translation.
+"""
 
 import re
 from collections.abc import Mapping
@@ -9,12 +13,12 @@ from protocols.wording.english_facts import FACTS
 from protocols.wording.english_screens import SCREENS
 
 KEYS = {text: key for key, text in SCREENS.items() if key.startswith("key_")}
-"""Key of a footer's word, by its English text."""
+"""Key of each word in the footer (what a keyboard key does), by its English text."""
 
 
 def _pattern(text: str) -> re.Pattern[str]:
-    """Pattern of a fact with its braces filled in: each brace becomes a group of its name."""
-    parts = re.split(r"\{(\w+)\}", text)  # plain text and names of braces in turn
+    """Regular expression for a fact whose placeholders are filled in; each placeholder becomes a named group."""
+    parts = re.split(r"\{(\w+)\}", text)  # plain text and names of placeholders alternate
     groups = (f"(?P<{part}>.+?)" if place % 2 else re.escape(part) for place, part in enumerate(parts))
     return re.compile("".join(groups), re.DOTALL)
 
@@ -31,14 +35,14 @@ class Words:
     """The texts of one protocol in one language."""
 
     own: Mapping[str, str] = field(default_factory=dict, hash=False)
-    """A protocol's own texts by key. A key that is missing has its English text."""
+    """The protocol's own texts by key. The English text is used for a missing key or an empty text."""
 
     def __getitem__(self, key: str) -> str:
         return self.own.get(key) or ENGLISH[key]
 
     def fill(self, key: str, values: Mapping[str, object]) -> str:
-        """The text with its braces filled in. A text whose braces do not fit (of another version) is shown in English,
-        because a participant must not lose a sentence."""
+        """The text with its placeholders filled in. The English text is shown where the placeholders of the own text
+        differ (from another version of hapteq), so that no sentence is missing on the screen."""
         fitting = placeholders(self[key]) == placeholders(ENGLISH[key])
         return (self[key] if fitting else ENGLISH[key]).format_map(values)
 
@@ -47,11 +51,12 @@ class Words:
         return self[f"{key}_1"] if count == 1 else self.fill(f"{key}_n", {"count": count})
 
     def key(self, english: str) -> str:
-        """The footer's word for a key; unchanged where it is not a participant's."""
+        """The footer's word for a keyboard key; unchanged where it is not in `KEYS`, as on the experimenter's
+        screens."""
         return self[KEYS[english]] if english in KEYS else english
 
     def fact(self, english: str) -> str:
-        """A sentence of the session; unchanged where it is not meant for participants."""
+        """Translation of a sentence that a session composed in English; unchanged where it matches no pattern."""
         for key, pattern in PATTERNS.items():
             found = pattern.fullmatch(english)
             if found is not None:
@@ -59,8 +64,10 @@ class Words:
         return english
 
     def _fill_part(self, part: str) -> str:
-        """What is filled into a fact: facts themselves, or a number."""
+        """Translation of a value in a fact: itself a fact, a list of facts separated by commas, or unchanged (a
+        number)."""
         return ", ".join(self.fact(each) for each in part.split(", ")) if self.fact(part) == part else self.fact(part)
 
 
 ENGLISH_WORDS = Words()
+"""The English texts, without any of a protocol's own."""

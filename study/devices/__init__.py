@@ -1,8 +1,8 @@
-"""Devices behind a common safety layer.
+"""Haptic devices behind a common safety layer.
 
-`opening.open_device` is the only door; an import contract keeps it so. It finds a driver by name (`rigs_by_name`),
-asks for `admission`, and puts the device behind `safe`. `device` is the port that a study sees, `rig` the one that a
-driver fills: a simulated device (`simulated`), Force Dimension's (`force_dimension`) and a recording (`replay`) alike.
-`governor` keeps every force within its limits, `drive` runs it once a millisecond; of a real device all that is in a
-process of its own (`loop_process`). Begin at `device.py`.
+`opening.open_device` is the only access to a device, enforced by an import contract. It finds a driver by name
+(`rigs_by_name`) and returns the device behind the safety layer (`safe`), which checks requests in `admission`. `device`
+is the interface that a study uses; `rig` is the interface that a driver implements: `simulated`, `force_dimension`,
+`replay` (a recording). At each tick `governor` limits the force; `drive` runs the ticks, for a real device at 1 kHz in
+a separate process (`loop_process`). Begin at `device.py`.
 """

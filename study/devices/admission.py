@@ -1,4 +1,8 @@
-"""Requests that the safety layer refuses before anything moves, each with a sentence that says why."""
+"""Checks of the safety layer before anything moves: settings, hardware and stimuli that it refuses, with the reason.
+
+This is the first of two barriers; the second is the control tick (`governor.govern`), which limits every force
+independent of these checks. Reasons for the limits: docs/safety.md.
+"""
 
 import math
 
@@ -11,12 +15,13 @@ from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.limits import Limits
 
 HAND_STIMULUS_CAP_N = 3.0
-"""Upper limit of the stimulus's cap with a hand on the handle (N); docs/safety.md."""
+"""Upper limit of the stimulus's force cap with a hand on the handle (N); docs/safety.md."""
 HAND_TOTAL_CAP_N = 6.0
-"""Upper limits with a hand on the handle; without one, settings may declare higher ones."""
+"""Upper limit of the caps on the total and on the feedback force with a hand on the handle (N). Without a hand,
+`DeviceSettings.beyond_hand_ceiling` allows caps up to the device's own maximum."""
 
 TOLERANCE = 1 + 1e-9
-"""Rounding, when a stimulus is exactly at its cap."""
+"""Factor on caps and slew limit that allows for rounding, for a stimulus exactly at its cap."""
 
 HIGHEST = {
     "slew_n_per_s": 1e5,
@@ -25,7 +30,7 @@ HIGHEST = {
     "release_s": 1.0,
     "keep_s": 600.0,
 }
-"""Upper bounds of settings (N/s, s), for those that come from no protocol too."""
+"""Upper bounds of settings (N/s, s). They also apply to settings that do not come from a validated protocol."""
 
 HIGHEST_PLAUSIBLE = {
     "workspace_m": 0.5,
@@ -37,24 +42,26 @@ HIGHEST_PLAUSIBLE = {
     "stale_s": 5.0,
     "still_s": 60.0,
 }
-"""Bounds as in `protocols.definition.plausibility`, repeated for settings that come from no protocol."""
+"""Upper bounds of the plausibility limits (m, m/s, m/s², N, s), as in `protocols.definition.plausibility`; repeated for
+settings that do not come from a validated protocol."""
 
 RATES_HZ = (100.0, 10_000.0)
-"""Accepted rates of a device's loop (Hz)."""
+"""Lowest and highest accepted rate of a device's control loop (Hz)."""
 
 HEAVIEST_KG = 10.0
-"""The spring's stiffness rests on the mass that the device says: no handle on a desk weighs so much."""
+"""Largest accepted effective mass (kg), above that of any handle of a desktop device. The stiffness of the centring
+spring is proportional to the mass that the device reports."""
 
 LONGEST_DROP_S = 1.0
-"""Longest time after which the hardware must drop the force when nothing writes any more."""
+"""Longest accepted time (s) after the last command until the hardware itself drops the force."""
 
 FADE_SHAPES = ("raised_cosine", "linear")
-"""Shapes of a stimulus's fades that the control tick knows."""
+"""Shapes of a stimulus's fades that the control tick implements."""
 
 
 def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
-    """Check limits and device before opening. Raises `DeviceError` for limits that are no limits, or weaker than may
-    be, and for a device of no known kind."""
+    """Check settings and device before opening. Raises `DeviceError` for a limit outside its bounds or not finite, and
+    for a device that reports an implausible rate or mass."""
     _check_info(info)
     limits = settings.limits
     times = {name: getattr(limits, name) for name in HIGHEST if name != "keep_s"} | {"keep_s": settings.keep_s}
@@ -70,8 +77,8 @@ def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
 
 
 def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: DeviceSettings) -> None:
-    """Check that the hardware releases its force by itself. Raises `DeviceError` for a real device in a hand that would
-    hold its force when this program is gone."""
+    """Check that the hardware drops its force by itself, `drops_force_after_s` after the last command. Raises
+    `DeviceError` for a real device in a hand that would keep its force after this program has ended."""
     if info.simulated or not settings.hand_on_handle or 0 < drops_force_after_s <= LONGEST_DROP_S:
         return
     raise DeviceError(
@@ -83,7 +90,8 @@ def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: Devic
 
 
 def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> None:
-    """Check that a stimulus can be held. Raises `DeviceError` for a loop that cannot be held within the limits."""
+    """Check fades, format, force and slew rate of a repeated stimulus, also from the loop's last sample to its first
+    and from zero through the onset. Raises `DeviceError` for a stimulus that is not within the limits."""
     if stimulus.fade_shape not in FADE_SHAPES:
         raise _refusal(f"its fade shape is {stimulus.fade_shape!r}; known are {' and '.join(FADE_SHAPES)}")
     for name, seconds in (("fade_in_s", stimulus.fade_in_s), ("fade_out_s", stimulus.fade_out_s)):
@@ -98,13 +106,14 @@ def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> No
 
 
 def check_commands(commands: Signal, limits: Limits, rate_hz: float) -> None:
-    """Check that commands can be played once. Raises `DeviceError` for commands that cannot be played within the
-    limits, from zero force on."""
+    """Check format, force and slew rate of commands that are played once, starting from zero force. Raises
+    `DeviceError` for commands that are not within the limits."""
     _check_forces(commands, limits, rate_hz)
     _check_steps(np.diff(commands.samples, axis=0, prepend=0.0), limits, rate_hz)
 
 
 def _check_forces(force: Signal, limits: Limits, rate_hz: float) -> None:
+    """Require the device's rate, the shape (n, 3), force in N, finite samples, and norms within the stimulus's cap."""
     if force.sample_rate_hz != rate_hz:
         raise _refusal(f"it was made for {force.sample_rate_hz:g} Hz, the device runs at {rate_hz:g} Hz")
     if force.samples.shape[1] != 3 or not len(force):
@@ -119,13 +128,14 @@ def _check_forces(force: Signal, limits: Limits, rate_hz: float) -> None:
 
 
 def _check_steps(steps: FloatArray, limits: Limits, rate_hz: float) -> None:
+    """Require steps (n, 3), N per tick, within the slew limit."""
     steepest = float(np.linalg.norm(steps, axis=1).max()) * rate_hz
     if steepest > limits.slew_n_per_s * TOLERANCE:
         raise _refusal(f"it changes by {steepest:.4g} N/s; the slew limit is {limits.slew_n_per_s:g} N/s")
 
 
 def _check_info(info: DeviceInfo) -> None:
-    """Require properties of the device within their ranges: spring, fades and all times depend on them."""
+    """Require rate and mass of the device within their ranges: spring, fades and all times in ticks depend on them."""
     ranges = (
         ("sample_rate_hz", info.sample_rate_hz, *RATES_HZ),
         ("effective_mass_kg", info.effective_mass_kg, 1e-3, HEAVIEST_KG),
@@ -140,6 +150,7 @@ def _check_info(info: DeviceInfo) -> None:
 
 
 def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
+    """Require force caps within the device's maximum and, unless lifted without a hand, within those for a hand."""
     limits, beyond = settings.limits, settings.beyond_hand_ceiling
     if beyond and settings.hand_on_handle:
         raise _settings_error("beyond_hand_ceiling is set while a hand is on the handle.")
@@ -151,12 +162,14 @@ def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
 
 
 def _check_within(name: str, value: float, highest: float, *, zero: bool = False) -> None:
+    """Require 0 < value <= highest, or 0 <= value where `zero`; NaN is refused."""
     if not (0 < value <= highest or (zero and value == 0)):
         allowed = "at least 0" if zero else "above 0"
         raise _settings_error(f"{name} is {value:g}; it must be {allowed} and at most {highest:g}.")
 
 
 def _settings_error(happened: str) -> DeviceError:
+    """Error for settings that are refused. happened: a sentence."""
     return DeviceError(
         "The device was not opened: its limits are not safe",
         happened,
@@ -165,6 +178,7 @@ def _settings_error(happened: str) -> DeviceError:
 
 
 def _refusal(why: str) -> DeviceError:
+    """Error for a stimulus or commands that are refused. why: a clause without a full stop."""
     return DeviceError(
         "The device did not play this: it is not within the limits",
         f"Nothing has moved. The stimulus was refused because {why}.",

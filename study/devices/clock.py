@@ -1,4 +1,8 @@
-"""Clock port: real time, or virtual time in which a session of half an hour runs in a second."""
+"""Clock of a session: real time, or virtual time, in which a simulated session of half an hour runs in a second.
+
+`Clock` is the interface. The code of a session takes the clock as an argument, so that the same code runs in real time
+and in virtual time.
+"""
 
 import time
 from collections.abc import Callable
@@ -15,15 +19,15 @@ class Clock(Protocol):
         ...
 
     def now_s(self) -> float:
-        """Seconds from an arbitrary start; never goes back."""
+        """Time (s) from an arbitrary origin; never decreases."""
         ...
 
     def sleep(self, seconds: float) -> None:
-        """Let this much time pass (s); none for zero or less."""
+        """Wait for this time (s); returns at once for zero or less."""
         ...
 
     def utc(self) -> str:
-        """Date and time, ISO 8601."""
+        """Date and time, UTC, ISO 8601."""
         ...
 
 
@@ -44,7 +48,7 @@ class RealClock:
 
 
 class VirtualClock:
-    """Time that passes only when the program sleeps. What must act meanwhile (a device) listens."""
+    """Time that passes only when the program calls `sleep`. A device that must act meanwhile registers a listener."""
 
     virtual = True
 
@@ -69,14 +73,14 @@ class VirtualClock:
 
     @classmethod
     def not_before(cls, utc: str) -> "VirtualClock":
-        """The same clock from this time on, or from now where that is later: a simulated session runs ahead of real
-        time."""
+        """A virtual clock that starts at `utc` (ISO 8601), or at the present time if that is later. The time in the log
+        of a simulated session may be later than real time, and must not go back when the session is resumed."""
         return cls(max(datetime.now(UTC), datetime.fromisoformat(utc)))
 
     def listen(self, listener: Callable[[float], None]) -> None:
-        """`listener(now_s)` is called after every passing of time."""
+        """Call `listener(now_s)` after each `sleep` that advances the time."""
         self._listeners.append(listener)
 
     def forget(self, listener: Callable[[float], None]) -> None:
-        """Call this listener no more. Raises ValueError for an unknown one."""
+        """Remove a listener. Raises ValueError for an unknown one."""
         self._listeners.remove(listener)

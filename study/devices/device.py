@@ -1,7 +1,8 @@
-"""Device port: the interface through which the rest of the program uses a device.
+"""Device port: the interface through which the rest of the program uses a haptic device.
 
-Every call and every answer is a value: a real device's 1 kHz loop lives in a process of its own (`loop_process`).
-`hold` has no end because a participant feels a trial as long as wanted.
+Arguments and results are plain values that can be sent between processes, because a real device's 1 kHz loop runs in a
+separate process (`loop_process`). `hold` has no fixed duration, because a participant may feel a stimulus until the
+answer.
 """
 
 from collections.abc import Callable
@@ -17,11 +18,11 @@ from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.limits import Limits
 
 REPLAY = "replay:"
-"""Begins a device's name, before the path of a recording: its handle moves as it once did, independent of the force
-asked for."""
+"""Prefix of a device's name, followed by the path of a recording: the handle moves as recorded, independent of the
+commanded force."""
 CALIBRATED = "simulated:"
-"""Begins a device's name, before the path of a calibration: the simulated device with the linkage and the inertia that
-it tells."""
+"""Prefix of a device's name, followed by the path of a calibration: the simulated device with the linkage and inertia
+of that calibration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,41 +33,44 @@ class DeviceInfo:
     simulated: bool
     sample_rate_hz: float
     max_force_n: float
+    """Largest norm of the force (N)."""
     effective_mass_kg: float
-    """Apparent mass at the handle in the centre of the workspace, to which the virtual spring's natural frequency
-    refers."""
+    """Apparent mass at the handle in the centre of the workspace, from which the stiffness of the centring spring is
+    computed."""
     details: str = ""
     """Serial number, firmware, or the simulation's parameter set."""
     has_sensor: bool = True
-    """Whether there is an accelerometer: a real device's is named by the lab's file."""
+    """Whether there is an accelerometer; for a real device it is configured in the laboratory's settings file."""
     moved_by_force: bool = True
-    """False for a replay alone: its position may stand still under any force. Ignored for a device that is not
-    simulated."""
+    """False only for a replay, whose position does not depend on the force, so that a constant position is no fault.
+    Ignored for a device that is not simulated."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceSettings:
-    """Settings from opening to closing: limits, spring, and recorded part of each stimulus."""
+    """Settings that are fixed from opening to closing: limits, centring spring, and recorded part of each stimulus."""
 
     limits: Limits
     spring_frequency_hz: float
-    """Natural frequency of the centring spring with the device's effective mass; 0 = no spring."""
+    """Natural frequency of the centring spring with the device's effective mass: K = m (2 pi f)²; 0 = no spring."""
     spring_damping_n_s_per_m: float
     keep_s: float
+    """Longest recorded part of a held stimulus: the last `keep_s` of its steady part."""
     hand_on_handle: bool
     """Whether a hand holds the handle. A simulated device then carries a simulated hand."""
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Centre of the spring, x, y, z."""
+    """Centre of the spring, x, y, z, in the device's axes."""
     beyond_hand_ceiling: bool = False
-    """Without a hand on the handle: caps up to the device's own maximum, not only up to what a hand may feel. Never
-    set by a protocol; refused with a hand."""
+    """Allows force caps up to the device's own maximum instead of the limits for a hand. Never set by a protocol;
+    refused with a hand on the handle."""
     with_sensor: bool = True
-    """Whether a real device's accelerometer is read, where the lab's file names one. Without it there is no
-    acceleration."""
+    """Whether a real device's accelerometer is read, where the laboratory's settings file configures one. Without it no
+    acceleration is measured."""
 
 
 class Fault(Enum):
-    """Why the device let go by itself. Each ends a trial."""
+    """Why the safety layer released the force without a request. Each fault ends a trial; its value is part of a
+    sentence for messages. Codes in the same order: `governor.cells`."""
 
     @property
     def sentence(self) -> str:
@@ -88,28 +92,34 @@ class Fault(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """Counters of the safety layer since `hold` or `play`, in ticks."""
+    """Counters of the safety layer since `hold` or `play`, in ticks where not said otherwise."""
 
     fault: Fault
     ticks: int
     missed_ticks: int
+    """Ticks that were not run in time; the device held its last force meanwhile."""
     stimulus_clipped: int
-    """The stimulus itself was above its cap."""
+    """Ticks in which the stimulus itself exceeded its cap and was limited."""
     total_clipped: int
-    """Stimulus, spring and damper together were above the total cap."""
+    """Ticks in which the sum of stimulus, spring and damper exceeded the total cap."""
     slew_limited: int
+    """Ticks in which the change of the force was limited."""
     sensor_clipped: int
+    """Ticks with an accelerometer channel at its limit."""
     peak_command_n: float
+    """Largest norm of a written force (N)."""
     feedback_clipped: int = 0
-    """Spring, damper, or both together were above their cap (a lean on the spring)."""
+    """Ticks in which spring, damper or their sum exceeded the feedback cap, as when a hand leans on the spring."""
     late_ticks: int = 0
-    """Ticks of a real-time loop whose work ended after the next was due. Missed ticks are counted separately."""
+    """Ticks of a real-time loop that ended after the next tick was due. Missed ticks are counted separately."""
     latest_s: float = 0.0
-    """The longest from when a tick was due until its work, or that of the one that came in its place, was done."""
+    """Longest time (s) from when a tick was due to the end of its work; for a missed tick, to the end of the tick that
+    was run in its place."""
     sensor: SensorFacts | None = None
-    """Known when it is over. None where the acceleration is read with each tick, as in a simulation, or not at all."""
+    """Facts about an accelerometer with its own clock, known after the end of the stimulus. None where the acceleration
+    is read with each tick, as in a simulation, or not at all."""
     why: str = ""
-    """Of a lost device, in its driver's words: a sentence without a full stop. Empty where the fault says it all."""
+    """Cause of the loss of a device as its driver reports it, a sentence without a full stop; empty without one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,22 +127,22 @@ class Played:
     """Recording and counters of the device between `hold` and `release`, or during `play`."""
 
     recording: Recording | None
-    """For `hold`: the last of the steady part, whole loops, at most `DeviceSettings.keep_s` long; of a loop longer
-    than that, its last `keep_s`. None if it was not steady for so long. For `play`: all of it, or None if a fault
-    ended it."""
+    """For `hold`: the end of the steady part, whole loops, at most `DeviceSettings.keep_s` long; of a longer loop the
+    last `keep_s`. None if the steady part was shorter than a loop or `keep_s`, the shorter one. For `play`: all of it,
+    or None after a fault or where it was ended early."""
     health: Health
     truth: Signal | None = None
-    """The handle's true acceleration, beside the recording: for tests and benchmarks of simulated devices."""
+    """True acceleration of a simulated handle at the same ticks, for tests and benchmarks. None for real devices."""
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Current state of the handle. Position and acceleration are both None without a reading."""
+    """Present state of the handle. Position and acceleration are both None without a reading."""
 
     position_m: tuple[float, float, float] | None
     """x, y, z; None where the encoders gave no numbers."""
     acceleration_mps2: tuple[float, float, float] | None
-    """Acceleration by the accelerometer, in the device's axes; None without a valid reading."""
+    """Acceleration by the accelerometer, x, y, z in the device's axes; None without a valid reading."""
     sensor_clipped: bool
     buttons: frozenset[int]
     """Numbers of the device's own buttons that are pressed, as its driver counts them."""
@@ -150,69 +160,69 @@ class Device(Protocol):
 
     @property
     def telemetry(self) -> str:
-        """Path of the ring into which its loop writes every tick (`study.devices.telemetry`); empty if there is none,
-        as in virtual time."""
+        """Path of the ring buffer into which the loop writes every tick (`study.devices.telemetry`); empty where there
+        is none, as in virtual time."""
         ...
 
     def hold(self, stimulus: HeldStimulus) -> None:
-        """Fade in and repeat until `release`. Returns at once.
+        """Fade the stimulus in and repeat its loop until `release`. Returns at once.
 
         Raises `DeviceError`, before anything moves, for a stimulus that is not within the limits.
         """
         ...
 
     def keep_alive(self) -> None:
-        """A sign of life. Without one for `watchdog_s` the force fades to zero and the fault is STALLED.
+        """Sign of life of the program. Without one for `watchdog_s` the force fades to zero and the fault is STALLED.
 
-        Looks for the device's own sign of life too: if it hangs, the force goes off and the fault is LOST.
+        Also checks that the control loop responds: if it hangs, the force is switched off and the fault is LOST.
         """
         ...
 
     def fault(self) -> Fault:
-        """The fault that ended the present stimulus, if any. Cheap: may be asked at every key press."""
+        """The fault that ended the present stimulus, `Fault.NONE` without one. Fast enough for every key press."""
         ...
 
     def health(self) -> Health:
-        """Counters of the safety layer since `hold`, so far. Fast, like `fault`."""
+        """Counters of the safety layer since `hold`, up to now. Fast, like `fault`."""
         ...
 
     def release(self) -> Played:
-        """Fade out, wait until the device is still, and say what happened. To be called after a fault as well.
+        """Fade out, wait until no force acts, and return recording and counters. To be called after a fault as well.
 
         Does not raise for a lost device, so that the trial can be logged as void; the next `hold` or `play` does.
-        After FORCE_LEFT the force may still be on: the program says so to the person at the handle.
+        After FORCE_LEFT the force may still be on: the program then warns the person at the handle.
         """
         ...
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
-        """Play once through: identification and recordings. Returns when it is over; gives its own signs of life.
-
-        `on_progress(share)` is called now and then with the share that is over; what it raises ends the playing,
-        as Ctrl-C does, with a fade. Raises `DeviceError` for commands that are not within the limits, before
+        """Play commands once, for identification and recordings. Returns when all are played; gives its own signs of
+        life. `on_progress(share)` is called repeatedly with the share played so far, 0 to 1; an exception from it, or
+        Ctrl-C, ends the playing with a fade. Raises `DeviceError` for commands that are not within the limits, before
         anything moves, and for a lost device.
         """
         ...
 
     def look(self) -> Look:
-        """What the handle does right now, at any time and from any thread: no force is commanded for it.
+        """Present state of the handle, at any time and from any thread; no force is commanded for it.
 
-        Cheap enough for twenty times a second. A device that is lost, closed or late gives a `Look` without reading;
-        one that hangs makes the first caller wait for 0.1 s, and no later one.
+        Fast enough for 20 calls per second. A device that is lost, closed or late gives a `Look` without a reading; a
+        loop that hangs delays only the first caller, by 0.1 s.
         """
         ...
 
     def simulate_hand(self, on_handle: bool) -> None:
-        """The simulated hand of a simulated device lets go of the handle, or takes it again. Only while nothing is
-        played. Nothing at any other device; limits stay as they are in every case."""
+        """Let the simulated hand of a simulated device take or release the handle. To be called only while nothing is
+        played. No effect on other devices; the limits do not change."""
         ...
 
     def stop(self) -> None:
         """Emergency stop: no force from the next tick on, until the device is opened again.
 
-        From any thread. Waits some milliseconds for the loop, and where that hangs, writes zero past it.
+        May be called from any thread. Waits a few milliseconds for the loop; if the loop hangs, another thread writes
+        the zero force.
         """
         ...
 
     def close(self) -> None:
-        """Let go and disconnect. Never raises; may be called twice."""
+        """Fade the force out and disconnect. Never raises; may be called twice."""
         ...

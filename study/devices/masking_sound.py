@@ -1,7 +1,7 @@
-"""Masking noise from the computer's sound output, in a seamless loop, while a participant sits at the device.
+"""Masking noise from the computer's sound output, in a seamless loop, so that participants do not hear the device.
 
-The library (PortAudio by sounddevice) is imported only where a protocol asks for noise, and takes the samples in a
-thread of its own.
+The library (PortAudio through sounddevice) is imported only where a protocol asks for noise. It requests the samples in
+its own thread.
 """
 
 import contextlib
@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from study.errors import DeviceError
 
 Samples = NDArray[np.int16]
+"""Samples of the noise, (n,), 16-bit PCM, a single channel."""
 Fill = Callable[[Any, int, Any, Any], None]
-"""fill(out, frames, time, status): the next frames into out (frames, 1)."""
+"""fill(out, frames, time, status): write the next samples into out (frames, 1). Called by the library's thread."""
 
 DO_NOW = (
     "Install the extra (pip install '.[audio]'; on Linux also the package libportaudio2), connect a sound output and "
@@ -24,7 +25,7 @@ DO_NOW = (
 
 
 class Stream(Protocol):
-    """An output of the library."""
+    """An output stream of the library."""
 
     @property
     def active(self) -> bool:
@@ -32,21 +33,22 @@ class Stream(Protocol):
         ...
 
     def start(self) -> None:
-        """Begin to take samples."""
+        """Begin to request samples."""
         ...
 
     def abort(self) -> None:
-        """End at once; samples that wait are dropped."""
+        """End at once and drop the buffered samples."""
         ...
 
     def close(self) -> None:
-        """Give the output back."""
+        """Release the output."""
         ...
 
 
 class MaskingSound:
-    """samples (n,), looped. open_stream(rate_hz, fill) gives the output and its name, and raises what the library
-    raises. Raises `DeviceError` where there is no output."""
+    """Masking noise on an opened output. samples (n,): repeated without a gap; rate_hz: their sample rate;
+    open_stream(rate_hz, fill): opens the output, returns it and its name, and raises what the library raises. The
+    constructor raises `DeviceError` where there is no output."""
 
     def __init__(self, samples: Samples, rate_hz: int, open_stream: Callable[[int, Fill], tuple[Stream, str]]) -> None:
         self._samples, self._next = samples, 0
@@ -63,14 +65,14 @@ class MaskingSound:
         self.check()
 
     def check(self) -> None:
-        """Raises `DeviceError` where it is not heard: never begun, stopped, or on an output that was unplugged."""
+        """Raise `DeviceError` where no noise is played: not started, stopped, or the output was unplugged."""
         with _as_device_error("has stopped"):
             if not self._playing or not self._stream.active:
                 raise OSError(f"{self.output} plays no more" if self._playing else f"{self.output} plays nothing")
 
     def stop(self) -> bool:
-        """Stop at once, without what the output still holds in its buffers. Returns whether it played until now. Never
-        raises."""
+        """Stop at once and drop the buffered samples. Returns whether the noise was started and not stopped before.
+        Never raises."""
         played, self._playing = self._playing, False
         if played:
             with contextlib.suppress(Exception):
@@ -78,19 +80,21 @@ class MaskingSound:
         return played
 
     def close(self) -> None:
-        """Never raises."""
+        """Stop and release the output. Never raises."""
         self.stop()
         with contextlib.suppress(Exception):
             self._stream.close()
 
     def _fill(self, out: Any, frames: int, time: Any, status: Any) -> None:
+        """Write the next samples, continuing at the beginning after the last one."""
         places = (self._next + np.arange(frames)) % len(self._samples)
         out[:, 0] = self._samples[places]
         self._next = (self._next + frames) % len(self._samples)
 
 
 def open_stream(rate_hz: int, fill: Fill) -> tuple[Stream, str]:
-    """The system's default output. Raises what the library raises."""
+    """Open the system's default output: the stream and its name. Raises ImportError without the library, and what the
+    library raises."""
     import sounddevice
 
     stream: Stream = sounddevice.OutputStream(samplerate=rate_hz, channels=1, dtype="int16", callback=fill)
@@ -99,7 +103,7 @@ def open_stream(rate_hz: int, fill: Fill) -> tuple[Stream, str]:
 
 @contextlib.contextmanager
 def _as_device_error(happened: str) -> Iterator[None]:
-    """The library's own errors have no common kind."""
+    """Context that converts any exception to a `DeviceError`, because the library's errors have no common class."""
     try:
         yield
     except Exception as error:

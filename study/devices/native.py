@@ -1,7 +1,7 @@
-"""Functions of the system and of C libraries, called from compiled code that holds no interpreter lock.
+"""Calls of C functions (system, device libraries) from numba code without the interpreter lock: clock, sleep, lock.
 
-A function is an address in an array of int64. Arguments are int32, int64 (addresses too) and float64: on every
-computer of 64 bits they go where C expects char, int, pointers and double.
+A function is given by its address, in an array of int64. Arguments are int32, int64 (also addresses) and float64; on
+64-bit computers these are passed as C expects char, int, pointers and double.
 """
 
 import ctypes
@@ -22,10 +22,10 @@ Addresses = npt.NDArray[np.int64]
 """Addresses of C functions and objects, as 64-bit integers."""
 
 CLOCK, SLEEP, MONOTONIC, ACQUIRE, RELEASE, LOCK, SYSTEM_SIZE = range(7)
-"""Places of `system_calls`. CLOCK and SLEEP are 0 where this system's are not used."""
+"""Indices into `system_calls`. The addresses at CLOCK and SLEEP are 0 on systems whose own functions are not used."""
 
 _intrinsic: Any = intrinsic
-"""numba and llvmlite without types: neither declares them."""
+"""These functions of numba as `Any`, because numba declares no types for them."""
 _cgutils: Any = cgutils
 
 _CLOCK_MONOTONIC, _TIMER_ABSTIME, _INTERRUPTED = 1, 1, 4
@@ -33,6 +33,9 @@ _CLOCK_MONOTONIC, _TIMER_ABSTIME, _INTERRUPTED = 1, 1, 4
 
 
 def _caller(result: Any) -> Any:
+    """Make a numba function call(address, arguments) that calls the C function at an address. result: numba type of its
+    return value; arguments: a tuple."""
+
     @_intrinsic
     def call(context: Any, address: Any, arguments: Any) -> Any:
         def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
@@ -46,12 +49,14 @@ def _caller(result: Any) -> Any:
 
 
 call_int = _caller(types.int32)
-"""call_int(address, arguments): the C function's answer, an int."""
+"""call_int(address, arguments): call a C function that returns an int."""
 call_float = _caller(types.float64)
-"""call_float(address, arguments): the C function's answer, a double."""
+"""call_float(address, arguments): call a C function that returns a double."""
 
 
 def _room(words: int) -> Any:
+    """Make a numba function that reserves this many words of 8 bytes on the stack and returns their address."""
+
     @_intrinsic
     def room(context: Any) -> Any:
         def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
@@ -64,13 +69,13 @@ def _room(words: int) -> Any:
 
 
 room_for_2, room_for_16 = _room(2), _room(16)
-"""The address of so many words of 8 bytes on the stack of the function that asks: zero at its start, and gone at its
-end."""
+"""Return the address of 2 or 16 words of 8 bytes on the stack of the calling function: zero at the start of that
+function, and invalid after its end."""
 
 
 @_intrinsic
 def word(context: Any, address: Any, place: Any) -> Any:
-    """The word of 8 bytes at this place behind the address."""
+    """Read the 64-bit word with index `place` of an array at `address`."""
 
     def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
         start = builder.inttoptr(values[0], ir.IntType(64).as_pointer())
@@ -81,7 +86,7 @@ def word(context: Any, address: Any, place: Any) -> Any:
 
 @_intrinsic
 def set_word(context: Any, address: Any, place: Any, value: Any) -> Any:
-    """Write a 64-bit word at `address`, `place` words on."""
+    """Write the 64-bit word with index `place` of an array at `address`."""
 
     def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
         start = builder.inttoptr(values[0], ir.IntType(64).as_pointer())
@@ -93,7 +98,7 @@ def set_word(context: Any, address: Any, place: Any, value: Any) -> Any:
 
 @part
 def now_s(system: Addresses) -> float:
-    """The time in s, as `time.monotonic` gives it, to the last bit."""
+    """Monotonic time (s), equal to that of `time.monotonic` to the last bit."""
     if system[CLOCK] == 0:
         return float(call_float(system[MONOTONIC], ()))
     time_now = room_for_2()
@@ -106,7 +111,8 @@ def now_s(system: Addresses) -> float:
 
 @part
 def sleep_until(system: Addresses, until_s: float) -> None:
-    """Sleep until a time. Call it only where `system[SLEEP]` is not 0."""
+    """Sleep until until_s (s, by `now_s`); resumed after interruptions by signals. To be called only where
+    `system[SLEEP]` is not 0."""
     until = room_for_2()
     whole_s = int(until_s)
     set_word(until, 0, whole_s)
@@ -118,36 +124,36 @@ def sleep_until(system: Addresses, until_s: float) -> None:
 
 @part
 def acquire(system: Addresses, patience_s: float) -> bool:
-    """The lock of this system. False where it was not free within that time."""
+    """Take the lock at `system[LOCK]`. Returns False where it was not free within patience_s (s)."""
     asked = (system[LOCK], np.int64(patience_s * 1e6), np.int32(0))
     return bool(call_int(system[ACQUIRE], asked) == 1)
 
 
 @part
 def release(system: Addresses) -> None:
-    """Release the lock of this system."""
+    """Release the lock at `system[LOCK]`."""
     call_int(system[RELEASE], (system[LOCK],))
 
 
 class SharedLock:
-    """A lock that compiled code can take too: the interpreter's own, by its stable C interface, which needs no
-    interpreter lock. It is never freed: a call that hangs may still want it."""
+    """A lock for Python and compiled code: a lock of the interpreter's C interface, whose functions need no interpreter
+    lock. Its memory is never freed, because a call that hangs may still use it."""
 
     def __init__(self) -> None:
         interpreter = ctypes.pythonapi
         interpreter.PyThread_allocate_lock.restype = ctypes.c_void_p
         self.address = int(interpreter.PyThread_allocate_lock())
-        # As functions that let go of the interpreter while they wait, unlike those of `pythonapi`.
+        # As CFUNCTYPE functions, which release the interpreter lock while they wait, unlike those of `pythonapi`.
         take = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_longlong, ctypes.c_int)
         self._acquire = take(address_of(interpreter.PyThread_acquire_lock_timed))
         self._release = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address_of(interpreter.PyThread_release_lock))
 
     def acquire(self, patience_s: float) -> bool:
-        """Take the lock. False where it was not free within patience_s."""
+        """Take the lock. Returns False where it was not free within patience_s (s)."""
         return bool(self._acquire(self.address, int(patience_s * 1e6), 0) == 1)
 
     def release(self) -> None:
-        """Free the lock, from any thread. Only while it is held."""
+        """Release the lock; may be called from any thread, but only while the lock is held."""
         self._release(self.address)
 
     def __enter__(self) -> None:
@@ -158,11 +164,11 @@ class SharedLock:
 
 
 _monotonic = ctypes.CFUNCTYPE(ctypes.c_double)(time.monotonic)
-"""Clock for systems whose own is not read here: it takes the interpreter lock."""
+"""Clock for systems whose own is not used: `time.monotonic` as a C function, which takes the interpreter lock."""
 
 
 def address_of(function: Any) -> int:
-    """Address of a function of a loaded library."""
+    """Address of a function of a loaded library; 0 for a null pointer."""
     return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
 
 

@@ -1,7 +1,8 @@
-"""Electrical pulse at the onset of each trial's force, for an external recorder (EEG, EMG, a camera).
+"""Trigger pulse at the onset of each trial's force, for an external recorder (EEG, EMG, a camera).
 
-A byte or a control line of a serial port, or the data lines of a parallel one, behind one small port. A line that hangs
-or is gone costs no trial: the pulse is told as lost, and the next one tries to open the line anew.
+The pulse is a byte or a control line (DTR, RTS) of a serial port, or the data lines of a parallel port; the interface
+`Line` covers all of them. A line that fails does not interrupt a trial: the pulse is reported as lost
+(`Pulse.at_s` is None), and the next pulse tries to open the line again.
 """
 
 import contextlib
@@ -21,21 +22,21 @@ from protocols.definition.staircase_rule import STRICT
 from study.errors import DeviceError
 
 PATIENCE_S = 0.05
-"""Timeout for a pulse; a healthy line takes well below a millisecond."""
+"""Longest wait for a pulse (s); a working line takes well below a millisecond."""
 
 CLAIM, WRITE_DATA, RELEASE = 0x708B, 0x40017086, 0x708C
-"""Requests of Linux' parallel port driver (ppdev)."""
+"""Requests (ioctl) of Linux' parallel port driver: PPCLAIM, PPWDATA and PPRELEASE of linux/ppdev.h."""
 
 
 class Line(Protocol):
-    """An open line. Where it is gone, any call raises OSError, as pyserial does."""
+    """Interface of an open line. Every call raises OSError where the hardware is missing, as pyserial does."""
 
     def raise_level(self) -> None:
-        """Set the line or the data lines, or send the byte."""
+        """Begin the pulse: set the control line or the data lines, or send the byte."""
         ...
 
     def lower_level(self) -> None:
-        """Set the line or the data lines back, or send a zero byte."""
+        """End the pulse: reset the control line or the data lines, or send a zero byte."""
         ...
 
     def close(self) -> None:
@@ -48,37 +49,40 @@ class Pulse:
     """Result of a request for a trigger pulse."""
 
     line: str
-    """Which line, in words."""
+    """Description of the line."""
     at_s: float | None
-    """Monotonic clock of this program as the line had taken it; None: it is not known to have gone out."""
+    """Time at which the driver had accepted the pulse, on this program's monotonic clock (s); None: it may not have
+    been sent."""
     trouble: str = ""
-    """Why not; empty where it did."""
+    """Reason why the pulse is lost; empty where it was sent."""
 
 
 @checked_dataclass(frozen=True, config=STRICT)
 class PulseSettings:
-    """`[pulse]` of the lab's file."""
+    """Table `[pulse]` of the lab's file: kind of line, port and pulse."""
 
     kind: Literal["serial-byte", "serial-dtr", "serial-rts", "parallel"]
     port: str
-    """/dev/ttyUSB0, COM3; of a parallel port /dev/parport0."""
+    """Such as /dev/ttyUSB0 or COM3 (serial), /dev/parport0 (parallel)."""
     code: Annotated[int, Field(ge=1, le=255)] = 1
-    """The byte that is sent, or what the data lines of a parallel port show. The control lines have no code."""
+    """Byte that is sent, or value of the data lines of a parallel port. The control lines do not use it."""
     width_s: Annotated[float, Field(gt=0, le=0.1)] = 0.005
-    """After it, the byte 0 is sent, or the line is lowered."""
+    """Duration of the pulse (s). After it, the byte 0 is sent, or the line is lowered."""
     baud: Annotated[int, Field(gt=0)] = 115_200
+    """Baud rate of a serial port (bit/s)."""
 
     @property
     def words(self) -> str:
-        """Which line, in words, for the log."""
+        """Description of the line for the log."""
         how = {"serial-byte": f"byte {self.code}", "serial-dtr": "DTR", "serial-rts": "RTS"}
         return f"{how.get(self.kind, f'data lines {self.code}')} of {self.port}"
 
 
 class OnsetLine:
-    """`pulse` gives a pulse and never raises; a thread of its own talks to the line.
+    """Sends trigger pulses. Only a separate thread calls the line, so that `pulse` never raises and waits at most
+    `PATIENCE_S`.
 
-    open_line raises OSError. line: one that is open already, else the first pulse opens it."""
+    open_line: opens the line; raises OSError. line: the line if it is open already; None: the first pulse opens it."""
 
     def __init__(
         self, settings: PulseSettings, open_line: Callable[[PulseSettings], Line], line: Line | None = None
@@ -92,7 +96,8 @@ class OnsetLine:
         self._thread.start()
 
     def pulse(self) -> Pulse:
-        """Waits until it has gone out, at most `PATIENCE_S`."""
+        """Send a pulse, and wait at most `PATIENCE_S` until the driver has accepted it. A lost pulse states its
+        reason."""
         if self._busy.locked():
             return self._lost_pulse("the pulse before it still hangs")
         answer: SimpleQueue[Pulse] = SimpleQueue()
@@ -103,7 +108,7 @@ class OnsetLine:
             return self._lost_pulse(f"the line took none within {1000 * PATIENCE_S:g} ms")
 
     def close(self) -> None:
-        """Lowers the line. Never raises."""
+        """Lower and close the line; waits at most 1 s for its thread. Never raises."""
         self._asked.put(None)
         self._thread.join(1.0)
 
@@ -114,6 +119,7 @@ class OnsetLine:
         self._hang_up()
 
     def _hand_over(self, answer: SimpleQueue[Pulse]) -> None:
+        """Raise the line, put the result into `answer`, and lower the line after `width_s`."""
         try:
             self._line = self._line or self._open_line(self._settings)
             self._line.raise_level()
@@ -123,10 +129,11 @@ class OnsetLine:
             return
         answer.put(Pulse(self._settings.words, time.monotonic()))
         time.sleep(self._settings.width_s)
-        with contextlib.suppress(Exception):  # the next pulse finds out
+        with contextlib.suppress(Exception):  # a failure shows at the next pulse
             self._line.lower_level()
 
     def _hang_up(self) -> None:
+        """Lower and close the line, if it is open, and ignore errors."""
         line, self._line = self._line, None
         if line is not None:
             for last in (line.lower_level, line.close):
@@ -138,7 +145,7 @@ class OnsetLine:
 
 
 def open_onset_line(settings: PulseSettings) -> OnsetLine:
-    """Opened once, before a session: opening it resets some boards, which then take no byte for a second or two.
+    """Open the line before a session: opening resets some boards, which then accept no byte for a second or two.
     Raises `DeviceError` for a line that cannot be opened."""
     try:
         line = open_port(settings)
@@ -152,7 +159,7 @@ def open_onset_line(settings: PulseSettings) -> OnsetLine:
 
 
 def open_port(settings: PulseSettings) -> Line:
-    """Open a serial line for onset pulses. Raises OSError, ValueError, and `DeviceError` where pyserial is missing."""
+    """Open the serial or parallel line. Raises OSError, ValueError, and `DeviceError` where pyserial is missing."""
     if settings.kind == "parallel":
         return _Parallel(settings)
     try:
@@ -165,13 +172,15 @@ def open_port(settings: PulseSettings) -> Line:
         ) from error
     line = serial.Serial(baudrate=settings.baud, write_timeout=PATIENCE_S, exclusive=True)
     if settings.kind != "serial-byte":
-        line.dtr = line.rts = False  # else opening it would be a pulse
+        line.dtr = line.rts = False  # before `open`, which would otherwise send a pulse
     line.port = settings.port
     line.open()
     return _SerialByte(line, settings.code) if settings.kind == "serial-byte" else _SerialControl(line, settings.kind)
 
 
 class _SerialByte:
+    """A byte on a serial port; a zero byte ends the pulse."""
+
     def __init__(self, line: Any, code: int) -> None:
         self._line, self._code = line, code
 
@@ -189,7 +198,7 @@ class _SerialByte:
 
 
 class _SerialControl:
-    """kind: serial-dtr or serial-rts."""
+    """A control line of a serial port. kind: serial-dtr or serial-rts."""
 
     def __init__(self, line: Any, kind: str) -> None:
         self._line, self._name = line, kind.removeprefix("serial-")
@@ -205,7 +214,7 @@ class _SerialControl:
 
 
 class _Parallel:
-    """The data lines of a parallel port by Linux' ppdev. Tested against a scripted driver only."""
+    """The data lines of a parallel port through Linux' ppdev. Tested with a scripted driver only."""
 
     def __init__(self, settings: PulseSettings) -> None:
         if sys.platform != "linux":

@@ -1,6 +1,8 @@
-"""Opens devices: the only access to one, and every device that is opened stands behind the safety layer.
+"""Opens devices by name. The rest of the program reaches a device only through this module, and every device that it
+opens is behind the safety layer (`study.devices.safe`).
 
-The heavy parts (numba above all) are imported when a device is opened, so that the command line starts at once.
+Modules that take long to import (numba above all) are imported when a device is opened, so that the command line starts
+at once.
 """
 
 import contextlib
@@ -30,19 +32,20 @@ SIMULATED = "simulated"
 """Name of the simulated omega.3, as `--device` takes it."""
 
 REAL = tuple(MODELS)
-"""Devices that move: they need the vendor's library, and real time."""
+"""Names of the real devices, which need the vendor's library and real time."""
 
 STRONGEST_N = max(model.max_force_n for model in MODELS.values())
-"""Largest force of the strongest of them: a higher one is a mistake."""
+"""Largest force of the strongest real device (N): a setting above it is a mistake."""
 
 DEVICES = (SIMULATED, *REAL)
-"""Devices on which a study or a recording may be made."""
+"""Names of the devices on which a study or a recording may be made."""
 
 FRICTIONLESS = "simulated-frictionless"
-"""The simulated device with no friction in its drives: what friction costs is seen by comparing. Offered nowhere."""
+"""Name of the simulated omega.3 without dry friction in its drives: the comparison shows the effect of friction. Not
+among `DEVICES`."""
 
 SIMULATIONS = (SIMULATED, FRICTIONLESS)
-"""Those that need no real clock."""
+"""Names of the simulated devices, which need no real clock."""
 
 
 def needs_real_time(name: str) -> bool:
@@ -51,7 +54,7 @@ def needs_real_time(name: str) -> bool:
 
 
 class LinkageSource(Protocol):
-    """A device's own knowledge of its linkage."""
+    """Interface to the linkage (kinematics and inertia) that a device reports of itself."""
 
     @property
     def info(self) -> DeviceInfo:
@@ -59,26 +62,27 @@ class LinkageSource(Protocol):
         ...
 
     def at(self, position_m: "FloatArray") -> "LinkageReading | None":
-        """The linkage at a position of the handle (3,), wherever the handle is; None out of reach. Raises
+        """The linkage at a position (3,), m, also where the handle is elsewhere; None out of reach. Raises
         `DeviceError`."""
         ...
 
     def angles_at(self, position_m: "FloatArray") -> "FloatArray | None":
-        """Joint angles (3,) at a position of the handle (3,), rad; None out of reach. Raises `DeviceError`."""
+        """Joint angles (3,), rad, at a position of the handle (3,), m; None out of reach. Raises `DeviceError`."""
         ...
 
     def check_frame(self) -> None:
-        """Check the axes of the positions that a linkage's calibration uses. Raises `DeviceError` where the positions
-        above are not in the axes of the device's readings."""
+        """Raises `DeviceError` where the positions of `at` and `angles_at` are not in the axes of the device's
+        readings, in which a calibration of the linkage needs them."""
         ...
 
 
 def open_device(
     name: str, settings: DeviceSettings, clock: Clock, seed: int, *, own_process: bool = True, telemetry: str = ""
 ) -> Device:
-    """`seed` drives what is random in a simulated device. own_process: a real device's loop in a process of its own,
-    the only one that holds it; False is for that process, and for tests. telemetry: path of the
-    caller's ring for it. Raises `DeviceError`."""
+    """Open a device behind the safety layer. seed: of the random numbers of a simulated device. own_process: run the
+    loop of a real device in a separate process, which alone holds the device; False within that process, and in tests.
+    telemetry: path of the caller's telemetry ring; empty: a new ring, if in real time and own_process. Raises
+    `DeviceError`."""
     if name not in SIMULATIONS and name not in REAL and not name.startswith((REPLAY, CALIBRATED)):
         raise _unknown_device(name)
     if name in REAL and clock.virtual:
@@ -107,16 +111,16 @@ def open_device(
 
 
 def _check_hand(name: str, info: DeviceInfo, settings: DeviceSettings) -> None:
-    """Raises `DeviceError` where a hand is to hold what was not accepted, also where its driver is a lab's own and says
-    that it is simulated: whether it is, the name decides."""
+    """Raises `DeviceError` where a hand is to hold a device without a valid acceptance. Only a device that is simulated
+    by its name and by its driver needs none: the statement of a lab's own driver alone does not suffice."""
     if settings.hand_on_handle and (needs_real_time(name) or not info.simulated):
         find_accepted_baseline(info, datetime.now(UTC).date())
 
 
 @contextlib.contextmanager
 def linkage_of(name: str) -> "Iterator[LinkageSource]":
-    """Source of a device's linkage: joint angles, Jacobian and inertia by position. Nothing moves, and a real device
-    stays braked. Raises `DeviceError`."""
+    """Context with the source of a device's linkage: joint angles, Jacobian and inertia by position. Nothing moves, and
+    a real device stays braked. Raises `DeviceError`."""
     if name in REAL:
         from study.devices.force_dimension.linkage import vendor_linkage
 
@@ -147,14 +151,15 @@ def _unknown_device(name: str) -> DeviceError:
 
 
 def telemetry_of(path: str) -> "TelemetryReader":
-    """Reads what a running loop writes, from now on. Raises `StudyError` where it has ended or cannot be read."""
+    """Reader of the telemetry ring of a running loop. path: of the ring. Raises `StudyError` where the loop has ended
+    or its ring cannot be read."""
     from study.devices.telemetry import TelemetryReader
 
     return TelemetryReader(Path(path))
 
 
 def onset_line() -> "OnsetLine | None":
-    """The line for onset pulses that the lab's file names; None where it names none. Raises `DeviceError`."""
+    """Open the line for onset pulses that the lab's file names; None where it names none. Raises `DeviceError`."""
     from study.devices.force_dimension.lab import read_lab
     from study.devices.onset_line import open_onset_line
 
@@ -163,21 +168,23 @@ def onset_line() -> "OnsetLine | None":
 
 
 def masking_sound(samples: "Samples", rate_hz: int) -> "MaskingSound":
-    """Noise in a loop from the system's sound output, silent as yet. Raises `DeviceError` where there is none."""
+    """Masking noise: `samples`, repeated on the system's sound output, not yet started. Raises `DeviceError` where
+    there is no sound output."""
     from study.devices.masking_sound import MaskingSound, open_stream
 
     return MaskingSound(samples, rate_hz, open_stream)
 
 
 def raise_thread_priority() -> AbstractContextManager[object]:
-    """The calling thread, until it ends, as a real device's loop: before all other programs where that is allowed."""
+    """Context in which the calling thread has the real-time priority of a real device's loop, where the system allows
+    it."""
     from study.devices.drive.real_time_class import real_time_class
 
     return real_time_class()
 
 
 def loop_priority() -> DeviceFinding:
-    """Whether this account's loops may go before other programs."""
+    """Finding on whether the system grants real-time priority to this account's loops."""
     from study.devices.drive.real_time_class import real_time_finding
 
     return real_time_finding()
@@ -193,7 +200,8 @@ def examine_device(name: str) -> tuple[DeviceFinding, ...]:
 
 
 def calibrate_device(name: str, patience_s: float) -> None:
-    """Wait until a person has brought the handle into its calibration position. Raises `DeviceError`."""
+    """Wait, at most `patience_s`, until a person has moved the handle of a real device into its calibration position.
+    Raises `DeviceError`."""
     if name not in REAL:
         raise DeviceError("There is nothing to calibrate", f"{name!r} is no real device.", "Leave --calibrate out.")
     from study.devices.force_dimension.findings import calibrate
@@ -204,15 +212,16 @@ def calibrate_device(name: str, patience_s: float) -> None:
 def calibrate_accelerometer(
     port: str, baud: int, before_each: Callable[[str, tuple[float, float, float] | None], None]
 ) -> str:
-    """Six positions under gravity, as `six_positions.calibrate_on_table`. TOML for the lab's file. Raises
-    `DeviceError`."""
+    """Calibrate an accelerometer by gravity in six positions (`six_positions.calibrate_on_table`). Returns the table
+    for the lab's file, as TOML. Raises `DeviceError`."""
     from study.devices.accelerometer.six_positions import calibrate_on_table
 
     return calibrate_on_table(port, baud, before_each)
 
 
 def keep_accelerometer(table: str) -> Path:
-    """Put the table of a calibration into the lab's file. Raises `DeviceError`; then nothing was changed."""
+    """Write the table of an accelerometer's calibration into the lab's file. Raises `DeviceError`, and then leaves the
+    file unchanged."""
     from study.devices.force_dimension.lab import keep_sensor
 
     return keep_sensor(table)
@@ -226,23 +235,20 @@ def lab_file_path() -> Path:
 
 
 def device_folder() -> Path:
-    """Folder in which this computer keeps what it knows of its device: settings, acceptance, baseline and daily
-    checks."""
+    """Folder of this computer's data about its device: settings, acceptance, baseline and daily checks."""
     return lab_file_path().parent
 
 
 def find_accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
-    """Name in `device_folder` and SHA-256 of the recording that was accepted; empty where none was made.
-
-    Raises `DeviceError` where this device was not accepted.
-    """
+    """File name (in `device_folder`) and SHA-256 of the baseline recording of the acceptance; both empty where none was
+    made. Raises `DeviceError` where this device was not accepted, or too long ago."""
     from study.devices.force_dimension.acceptance import check_accepted
 
     return check_accepted(info, today)
 
 
 def limit_test_force_n() -> float:
-    """Force with which `accept_device` pushes the handle."""
+    """Force with which `accept_device` pushes the handle (N)."""
     from study.devices.force_dimension.force_limit_check import FORCE_N
 
     return FORCE_N
@@ -251,10 +257,10 @@ def limit_test_force_n() -> float:
 def accept_device(
     name: str, settings: DeviceSettings, clock: Clock, operator: str, baseline: tuple[str, str] = ("", "")
 ) -> str:
-    """Accept a device with no hand on the handle: ask for more than the cap, hold a small force, stop the loop on
-    purpose, and sign that the device got no more than the cap and let go. Returns a sentence on what was written.
-    Raises `DeviceError`. The caller has checked everything else before. baseline: name and SHA-256 of the recording
-    that the daily check is to compare with."""
+    """Acceptance test of the force limit, with no hand on the handle: command more than the cap, hold a small force,
+    stop the loop on purpose; write the acceptance if the device got no more than the cap and dropped the force. Returns
+    a sentence with the results. Raises `DeviceError`. The caller has made all other checks before. baseline: file name
+    and SHA-256 of the recording for the daily check."""
     from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
     from study.devices.force_dimension.force_limit_check import (
         COMMANDED_TO_CAP,

@@ -1,9 +1,9 @@
-"""The rig port: a bare device, without limits. Only the safety layer (`study.devices.safe`) may drive one.
+"""Rig port: the interface of a bare device, without limits. Only the safety layer (`study.devices.safe`) may drive it.
 
-A tick of the 1 kHz loop is: `sense` (at t_k), spring and limits, `write` (held until t_(k+1)).
+A tick of the 1 kHz loop is: `sense` (at t_k), spring and limits (by the safety layer), `write` (held until t_(k+1)).
 
-The places below are compiled into the safety layer, which watches this file, and into the simulated devices, whose
-code kept on disk does not: after a change of them, delete the compiled files (`*.nbi`, `*.nbc`) of those.
+The indices below are compiled into the safety layer and the drivers. A change of this file compiles them anew, because
+its fingerprint is part of theirs (`study.devices.governor.compiling`).
 """
 
 from collections.abc import Callable
@@ -18,23 +18,23 @@ from study.devices.device import DeviceInfo
 from study.session.facts.sensor_facts import SensorFacts
 
 POSITION = slice(0, 3)
-"""Slice of a reading with the encoders' position of the handle, m."""
+"""Slice of a reading: position of the handle by the encoders, m."""
 ACCELERATION = slice(3, 6)
-"""The accelerometer's reading, m/s², in the device's axes as mounted, zeroed at rest."""
+"""Slice of a reading: acceleration by the accelerometer, m/s², in the device's axes as mounted, zeroed at rest."""
 TRUE_ACCELERATION = slice(6, 9)
-"""The handle's true acceleration, m/s²: known for a simulated device only, NaN for others."""
+"""Slice of a reading: true acceleration of the handle, m/s², known for a simulated device only; NaN for others."""
 SENSOR_CLIPPED = 9
-"""1 if a channel of the accelerometer was at its limit, else 0."""
+"""Index in a reading: 1 if a channel of the accelerometer was at its limit, else 0."""
 READING_SIZE = 10
 """Numbers in a reading."""
 
 
 class Rig(Protocol):
-    """Driven tick by tick from Python: a real or a scripted device.
+    """Interface of a device that is driven tick by tick from Python: a real or a scripted device.
 
-    One thread calls `sense`, `write` and `buttons` in turn. While one of these hangs, another thread calls `write`
-    with a zero force, and `close`: a driver that is not made for that must serve them all the same, and release no
-    force after.
+    A single thread calls `sense`, `write` and `buttons` in turn. While any of these hangs, another thread calls `write`
+    with zero force, and `close`. A driver must serve these calls even if its library is not made for threads, and must
+    exert no force after them.
     """
 
     @property
@@ -44,10 +44,10 @@ class Rig(Protocol):
 
     @property
     def drops_force_after_s(self) -> float:
-        """How long without a `write` until the hardware lets go by itself; 0 or infinite: it never does.
+        """Time (s) without a `write` after which the hardware drops the force by itself; 0 or infinite: never.
 
-        The only thing that turns the force off when this program is killed or the computer hangs. As set in the
-        device, not as asked for.
+        Only this turns the force off when the program is killed or the computer hangs. The value that is set in the
+        device, which may differ from the value requested.
         """
         ...
 
@@ -56,93 +56,97 @@ class Rig(Protocol):
         ...
 
     def buttons(self) -> frozenset[int]:
-        """Numbers of the buttons that are down. Asked after every reading, in the same thread: as cheap as one."""
+        """Numbers of the pressed buttons. Called after every reading in the same thread, so it must be as fast."""
         ...
 
     def write(self, force_n: FloatArray) -> None:
-        """Command a force, shape (3,), x, y, z; held until the next one."""
+        """Command a force (x, y, z), shape (3,), N; held until the next command."""
         ...
 
     def close(self) -> bool | None:
-        """Force off, disconnect. False where the device did not take it. Never raises; may be called again."""
+        """Force off, then disconnect. False where the device did not accept it. Never raises; may be called again."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CompiledIo:
-    """The same driver compiled: a `Rig` that has an attribute `halves` is driven without the interpreter.
+    """Compiled version of a rig's driver: a `Rig` with an attribute `halves` is driven without the interpreter.
 
-    Both do exactly what the rig's own `sense` and `write` do, errors too; the rig's `buttons` is then asked from any
-    thread. See `study.devices.drive.compiled_drive` for the signatures.
+    Both functions do exactly what the rig's own `sense` and `write` do, including errors; the rig's `buttons` may then
+    be called from any thread. See `study.devices.drive.compiled_drive` for the signatures.
     """
 
     sense: Callable[..., Any]
-    """sense(calls, cells, samples, reading): fills reading, shape (READING_SIZE,). 0, or a code above it."""
+    """sense(calls, cells, samples, reading): fills reading, shape (READING_SIZE,). Returns 0, or an error code > 0."""
     write: Callable[..., Any]
-    """write(calls, cells, force_n): force_n, shape (3,). 0, or a code above it."""
+    """write(calls, cells, force_n): force_n, shape (3,). Returns 0, or an error code > 0."""
     calls: npt.NDArray[np.int64]
-    """Addresses in `study.devices.native.system_calls`, followed by the driver's own."""
+    """Addresses of C functions: `study.devices.native.system_calls`, followed by the driver's own."""
     cells: FloatArray
+    """State of the driver, as `sense` and `write` use it."""
     samples: FloatArray
     """Samples of the accelerometer, shape (rows, columns)."""
     error: Callable[[int], Exception]
-    """error(code): what the rig's own methods raise; asked for in the thread that got the code."""
+    """error(code): the exception that the rig's own method raises; called in the thread that got the code."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SensedAcceleration:
-    """What an accelerometer measured that is read apart from the ticks."""
+    """Acceleration by an accelerometer that is read separately from the ticks."""
 
     acceleration_mps2: FloatArray
-    """(k, 3), as in `ACCELERATION`, at the ticks that were asked for; NaN where it is not known."""
+    """(k, 3), m/s², as in `ACCELERATION`, at the requested ticks; NaN where it is not known."""
     health: SensorFacts
+    """Quality of the readings."""
 
 
 @runtime_checkable
 class OwnClockSensor(Protocol):
-    """A rig whose accelerometer has a clock of its own. Its newest value stands in each reading; what belongs to a
-    tick is known only later."""
+    """A rig whose accelerometer has a separate clock. Each reading holds its newest sample; the acceleration at a tick
+    is known only later."""
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
-        """tick_s (k,): when the ticks were due, 1 / rate_hz apart, by the clock of the loop; since_s: from when on is
-        counted. None without such a sensor. In any thread, while nothing moves; may take 0.1 s."""
+        """Acceleration at past ticks. tick_s (k,): due times of the ticks, 1 / rate_hz apart, on the loop's clock (s);
+        since_s: start of the interval that `health` describes. None without such a sensor. May be called in any thread
+        while nothing moves; may take 0.1 s."""
         ...
 
 
 def no_buttons() -> frozenset[int]:
-    """Buttons pressed on a device that has none: always empty."""
+    """Pressed buttons of a device without buttons: always empty."""
     return frozenset()
 
 
 def no_hand(on_handle: bool) -> None:
-    """A device with no simulated hand."""
+    """`CompiledRig.simulate_hand` of a device without a simulated hand: does nothing."""
 
 
 def not_prepared(rows: FloatArray, repeats: bool, wait: int) -> None:
-    """A device knows nothing of what is to come."""
+    """`CompiledRig.prepare` of a device that does not use the coming stimulus: does nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CompiledRig:
-    """A simulated device whose two halves of a tick are compiled, so that whole blocks run without Python."""
+    """A simulated device whose `sense` and `advance` are compiled, so that blocks of ticks run without Python."""
 
     info: DeviceInfo
     state: FloatArray
-    """Changed in place by `advance`."""
+    """State of the simulation, changed in place by `advance`."""
     parameters: FloatArray
+    """Parameters of the simulation."""
     noise: npt.NDArray[np.uint64]
     """State of the sensor's random numbers, changed in place by `sense`."""
     sense: Callable[..., Any]
     """sense(state, parameters, noise, reading): fills reading, shape (READING_SIZE,)."""
     advance: Callable[..., Any]
-    """advance(state, parameters, force_n): holds force_n, shape (3,), for one tick."""
+    """advance(state, parameters, force_n): moves by a tick under the constant force_n, shape (3,), N."""
     buttons: Callable[[], frozenset[int]] = no_buttons
-    """Numbers of the buttons that are down."""
+    """Numbers of the pressed buttons."""
     prepare: Callable[[FloatArray, bool, int], None] = not_prepared
-    """prepare(rows, repeats, wait): told before a stimulus begins, for a rig that only acts as if it were driven. rows
-    (n, 3), N: played once or, if it `find_repeats`, again and again; the first comes after `wait` ticks."""
+    """prepare(rows, repeats, wait): called before a stimulus begins, for a replay, which does not respond to force.
+    rows (n, 3), N: played once or, if `repeats`, repeatedly; the first row comes after `wait` ticks."""
     simulate_hand: Callable[[bool], None] = no_hand
-    """simulate_hand(on_handle): the simulated hand lets go, or takes the handle again."""
+    """simulate_hand(on_handle): True: the simulated hand takes the handle; False: it lets go."""
 
     def close(self) -> None:
         """Nothing to disconnect."""

@@ -1,5 +1,7 @@
-"""Drivers by name: builds the bare device for `study.devices.opening`, which alone may ask for one. Heavy to import:
-loaded when a device is opened."""
+"""Drivers by device name: builds the bare rig for `study.devices.opening`, the only module that may request it.
+
+Imports compiled code, which takes time: `opening` imports this module only when a device is opened.
+"""
 
 from collections.abc import Callable
 from functools import partial
@@ -17,18 +19,18 @@ from study.store.formats.calibration_file import read_calibration
 
 
 def make_simulated_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
-    """The simulated omega.3. Raises `DeviceError` for a place where there is no workspace."""
+    """The simulated omega.3. Raises `DeviceError` where `settings.place_m` is outside the workspace."""
     return _build_simulated(settings, seed, friction=True)
 
 
 def frictionless_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
-    """The simulated omega.3 without friction. Raises as `make_simulated_rig`."""
+    """The simulated omega.3 without dry friction in its drives. Raises as `make_simulated_rig`."""
     return _build_simulated(settings, seed, friction=False)
 
 
 def make_calibrated_rig(path: Path, settings: DeviceSettings, seed: int) -> CompiledRig:
-    """The simulated device with the linkage and the inertia of a calibration. Raises `StudyError` for a file that
-    cannot be used."""
+    """The simulated device with the linkage and the inertia of the calibration file `path`. Raises `StudyError` for a
+    file that cannot be used, `DeviceError` where no linkage of its kind fits."""
     calibration = read_calibration(path)
     try:
         fitted = fit_linkage(calibration)
@@ -44,6 +46,7 @@ def make_calibrated_rig(path: Path, settings: DeviceSettings, seed: int) -> Comp
 def _build_simulated(
     settings: DeviceSettings, seed: int, friction: bool, parameters: Omega3Parameters | None = None
 ) -> CompiledRig:
+    """`build_omega3`, whose ValueError becomes a `DeviceError`."""
     try:
         return build_omega3(seed, settings.hand_on_handle, settings.place_m, friction, parameters)
     except ValueError as error:
@@ -53,7 +56,7 @@ def _build_simulated(
 
 
 def _real_rig(name: str, settings: DeviceSettings, seed: int) -> Rig:
-    """The rig of a real device. The seed is not used: nothing in it is random."""
+    """The rig of a real device. `seed` is not used, because nothing in the driver is random."""
     return force_dimension_rig(name, settings)
 
 
@@ -62,13 +65,14 @@ RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {
     "simulated-frictionless": frictionless_rig,
     **{name: partial(_real_rig, name) for name in MODELS},
 }
-"""Rig of a name, its settings and a seed; the same names as in `study.devices.opening`."""
+"""Builder of a rig from settings and seed, by device name; the same names as in `study.devices.opening`."""
 
 
 def find_rig(name: str, settings: DeviceSettings, seed: int) -> Rig | CompiledRig:
-    """The rig of a known name, a replay, or a simulation as calibrated. Raises `StudyError`."""
+    """Build the rig of a name in `RIGS_BY_NAME`, of a replay (`REPLAY` and a path) or of a calibrated simulation
+    (`CALIBRATED` and a path). Raises `StudyError`."""
     if name.startswith(REPLAY):
-        # Imported here: its compiled code is loaded then.
+        # Imported only here: the import loads compiled code, which other devices do not need.
         from study.devices.replay.replay_rig import replay_rig
 
         return replay_rig(Path(name.removeprefix(REPLAY)))

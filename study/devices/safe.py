@@ -1,7 +1,7 @@
-"""Safety layer: the `Device` port over any rig, compiled or stepped, in real or virtual time.
+"""Safety layer: implements the `Device` port over any rig, compiled or driven from Python, in real or virtual time.
 
-What a force may be is decided in `governor.govern`, what is refused beforehand in `admission`, when ticks run in
-`drive.virtual_drive` and `drive.realtime_drive`.
+`governor.govern` limits the force at each tick; `admission` refuses unsafe settings and stimuli before anything moves;
+`drive.virtual_drive` and `drive.realtime_drive` decide when ticks run. The limits and their reasons: docs/safety.md.
 """
 
 import atexit
@@ -28,10 +28,10 @@ from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 BLOCK_S = 0.05
-"""The longest stretch in real time during which Python is not asked."""
+"""Longest block of a compiled rig's ticks in real time, and longest pause between signs of life in `play` (s)."""
 
 VIRTUAL_BLOCK_S = 5.0
-"""Largest block of ticks that virtual time runs at once (s)."""
+"""Longest block of a compiled rig's ticks in virtual time (s)."""
 
 NOT_CLOSED = (
     "the device did not say that it brakes when it was closed: it got zero force, and its brakes may be off; what was "
@@ -40,16 +40,17 @@ NOT_CLOSED = (
 """Written to stderr where the device did not confirm that it was closed."""
 
 PATIENCE_S = 1.0
-"""Time granted beyond all fades, before a device that does not become still counts as lost."""
+"""Time after the end of all fades until a device that still moves counts as lost (s)."""
 
 
 class SafeDevice:
-    """Raises `DeviceError` from the start for settings that are not safe, and later as the port says."""
+    """The `Device` port (`study.devices.device.Device`) over a rig. The constructor raises `DeviceError` for settings
+    that are not safe; all calls raise as the port states."""
 
     def __init__(
         self, rig: Rig | CompiledRig, settings: DeviceSettings, clock: Clock, ring: Ring | None = None
     ) -> None:
-        """ring: where each tick is told; removed at the end by the program that made it."""
+        """ring: telemetry ring into which every tick is written; `close` removes a ring that this program made."""
         check_settings(settings, rig.info)
         if not isinstance(rig, CompiledRig):
             check_hardware(rig.drops_force_after_s, rig.info, settings)
@@ -66,7 +67,7 @@ class SafeDevice:
         self._drive = self._drive_of(clock)
         self._held: HeldStimulus | None = None
         self._closing = self._closed = False
-        # Twice: an interruption that waits as the first begins ends it before its first line.
+        # Registered twice: a KeyboardInterrupt that is pending at exit ends the first call before its first line.
         atexit.register(self._close_at_exit)
         atexit.register(self._close_at_exit)
 
@@ -85,8 +86,8 @@ class SafeDevice:
         self._held = stimulus
 
     def hold_unchecked(self, stimulus: HeldStimulus) -> None:
-        """Hold a stimulus of the right shape that `hold` refuses: shows, with no hand on the handle, that the caps of
-        each tick hold."""
+        """Hold a stimulus of valid shape that `hold` refuses, to test that the caps hold at each tick. Raises
+        `DeviceError` with a hand on the handle."""
         if self._hand_on_handle:
             raise _refusal("A hand is on the handle.", "Open it without.")
         self._must_be_idle()
@@ -106,6 +107,7 @@ class SafeDevice:
         return self._with_missed_ticks(replace(self._governor.health(), fault=self.fault()))
 
     def _with_missed_ticks(self, health: Health) -> Health:
+        """The counters with the reason of a lost device (`why`), if the rig has failed."""
         failure = self._runner.failure
         if failure is None:
             return health
@@ -135,7 +137,7 @@ class SafeDevice:
         return record_commands(self._governor, self._info, self._apart)
 
     def look(self) -> Look:
-        """Waits for the loop's next reading, at most `realtime_drive.PATIENCE_S`."""
+        """Wait for the loop's next reading, at most `realtime_drive.PATIENCE_S`."""
         self._drive.check()
         fresh = not self._closing and self._drive.refresh()
         missed_ticks = self._governor.missed if self._held is not None or self._runner.moving else 0
@@ -150,8 +152,8 @@ class SafeDevice:
         self._drive.stop()
 
     def close(self) -> None:
-        """Lets go with a fade where a stimulus is under way. A device that did not confirm its zero force or its
-        closing is told on stderr."""
+        """Fade out a stimulus that is playing, then disconnect. Warns on stderr where the device did not confirm zero
+        force or its closing."""
         if self._closed:
             return
         self._closing = True
@@ -164,26 +166,27 @@ class SafeDevice:
                 self._runner.disconnect()
                 if self._ring is not None:
                     self._ring.remove()
-        # Last, so that a close that was interrupted is made good for when the program ends.
+        # Set last: a close that was interrupted is repeated when the program ends.
         self._closed = True
         atexit.unregister(self._close_at_exit)
         if not (self._runner.force_off and self._runner.disconnected):
-            # Closing never raises and may be the last thing a program does: the person at the handle must hear it.
+            # `close` never raises and may be the program's last action, so stderr must warn the person at the handle.
             said = NOT_CLOSED if self._runner.force_off else Fault.FORCE_LEFT.value
             with contextlib.suppress(OSError):
                 sys.stderr.writelines([f"{said}\n"])
 
     def _close_at_exit(self) -> None:
-        """The program's last chance: it ignores Ctrl-C, for the interpreter stops all threads next, the one that writes
-        the zero force among them. `close` has time limits of its own."""
+        """Close when the program ends, and ignore Ctrl-C: the interpreter stops all threads next, including the thread
+        that writes zero force. `close` cannot block forever: its waits have time limits."""
         while not self._closed:
             try:
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
                 self.close()
-            except KeyboardInterrupt:  # came before it was ignored
+            except KeyboardInterrupt:  # Ctrl-C came before the line above took effect
                 continue
 
     def _attend_play(self, duration_s: float, on_progress: Callable[[float], None] | None) -> None:
+        """Wait until the commands are played, at most `PATIENCE_S` longer than duration_s; give signs of life."""
         nap_s = min(BLOCK_S, self._limits.watchdog_s / 4)
         started_s = self._clock.now_s()
         while self._governor.playing and (elapsed_s := self._clock.now_s() - started_s) < duration_s + PATIENCE_S:
@@ -195,14 +198,16 @@ class SafeDevice:
             on_progress(1.0)
 
     def _let_go(self) -> None:
+        """Fade out within `release_s` and wait; if interrupted, stop without a fade."""
         self._governor.ask_let_go()
         try:
             self._wait_until_still(0.0)
-        except BaseException:  # impatient: then without a fade
+        except BaseException:  # interrupted
             self._governor.ask_stop()
             raise
 
     def _wait_until_still(self, fade_out_s: float) -> None:
+        """Wait until no force is commanded; a device that takes too long counts as lost."""
         patience_s = fade_out_s + self._limits.release_s + self._limits.watchdog_s + PATIENCE_S
         until_s = self._clock.now_s() + patience_s
         nap_s = 5 / self._info.sample_rate_hz
@@ -214,6 +219,7 @@ class SafeDevice:
             self._clock.sleep(nap_s)
 
     def _must_be_idle(self) -> None:
+        """Raises `DeviceError` where the device is closed, lost, stopped or holds a stimulus."""
         if self._closing:
             raise _refusal("The device is closed.", "Open it again.")
         self._must_be_there()
@@ -223,11 +229,13 @@ class SafeDevice:
             raise _still_playing()
 
     def _start(self, begin: Callable[[], None]) -> None:
+        """Start the ticks of a stimulus that `begin` gives to the governor. Raises `DeviceError` for a lost device."""
+
         def begin_both() -> None:
             try:
                 begin()
                 self._runner.prepare()
-            except BaseException:  # its ticks would fall due, of a stimulus that the caller believes was never begun
+            except BaseException:  # the caller believes that nothing began, so none of its ticks may run
                 self._governor.abandon(Fault.NONE)
                 raise
 
@@ -237,6 +245,7 @@ class SafeDevice:
             raise _still_playing()
 
     def _must_be_there(self) -> None:
+        """Raises `DeviceError` for a lost device; the message says whether its force may still be on."""
         failure = self._runner.failure
         if failure is None:
             return

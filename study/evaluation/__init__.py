@@ -1,6 +1,6 @@
-"""How well the product does its work: banks of concealed faults, real recordings, a lab's own test, the paper.
+"""Evaluation of the diagnosis and the equalizer: blind tests on simulated and real recordings, and published figures.
 
-`challenge` (the reality of concealed cases; knows nothing of the diagnosis) -> `bank` (seal, answer, reveal, score:
-`hapteq prove`) -> `real` (folders of recordings, faults injected under a seal: `hapteq real`); `kit` (a lab's own blind
-test) and `reproduction` (the published figures) stand alone. Begin at `bank/prove.py`.
+`challenge` (simulated devices with concealed faults; does not use the diagnosis) -> `bank` (seal, diagnose, reveal,
+score: `hapteq prove`); `real` (folders of recordings, with faults injected under a seal: `hapteq real`); `kit` (a
+laboratory's own blind test) and `reproduction` (the published figures) are independent. Begin at `bank/prove.py`.
 """

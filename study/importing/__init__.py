@@ -1,7 +1,8 @@
-"""Import foreign recordings through a map that says which array is what.
+"""Import of recordings of other programs, by a map (TOML) that states the channel, unit and clock of each array.
 
-`arrays` (files -> arrays by name) and `map_format` (map text -> ImportMap) -> `expressions` (definitions over arrays)
--> `uniform_stamps`, `time_base`, `alignment` (clocks) -> `part_signals` -> `build_recording`. `map_library` and
-`model_library` are what is shipped (`maps/`, `models/`); `header_map` and `map_skeleton` make a map where there is
-none. Begin at `build_recording.py`.
+`arrays` (files -> arrays by name) and `map_format` (map text -> ImportMap) -> `expressions` (arithmetic over arrays) ->
+`uniform_stamps`, `time_base`, `alignment` (clocks) -> `part_signals` (one time grid) -> `build_recording` (SI units).
+`map_library` and `model_library` find maps and models, shipped ones in `maps/` and `models/`. For a file without a map,
+`header_map` makes a map from names and units, and `map_skeleton` an incomplete one; `surplus_arrays` and
+`imposed_roles` decide for both. Begin at `build_recording.py`.
 """

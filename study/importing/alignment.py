@@ -18,14 +18,15 @@ from study.importing.time_base import TimeBase
 
 @dataclass(frozen=True, slots=True)
 class Logger:
-    """A clock, and the arrays recorded with it."""
+    """A clock, the arrays recorded with it, and its time base."""
 
     clock: ClockMap
     names: Namespace
     base: TimeBase
 
     def line(self, text: str) -> Value:
-        """Values (n,) of an expression. Raises ImportProblemError."""
+        """Values (n,) of an expression. Raises ImportProblemError for another shape, or a length other than that of the
+        stamps."""
         values = self.names.value_of(text, self.base)
         if values.ndim != 1:
             raise ImportProblemError(f"clock '{self.clock.name}': {text} has the shape {values.shape}, not one row")
@@ -37,12 +38,14 @@ class Logger:
 
 
 def align_signals(loggers: tuple[Logger, ...], say: Callable[[str], None]) -> tuple[Logger, ...]:
-    """The loggers with their offsets; `say` is called with a sentence for each offset. Raises ImportProblemError."""
+    """The loggers with the offsets (s) of their clocks to the clock of the first. `say` is called with a sentence for
+    each offset. Raises ImportProblemError."""
     first, *others = loggers
     return (first, *(_with_offset(first, other, say) for other in others))
 
 
 def _with_offset(first: Logger, other: Logger, say: Callable[[str], None]) -> Logger:
+    """The logger with the offset that the map asks for: by correlation, by a trigger, or as stated."""
     clock = other.clock
     if clock.align:
         offset_s, how = _align_by_correlation(first, other)
@@ -56,6 +59,8 @@ def _with_offset(first: Logger, other: Logger, say: Callable[[str], None]) -> Lo
 
 
 def _align_by_correlation(first: Logger, other: Logger) -> tuple[float, str]:
+    """Offset (s) from the cross-correlation of one motion on both clocks, and how it was found, in words. Raises
+    ImportProblemError."""
     clock = other.clock
     reference = first.base.samples(first.line(clock.align_to))
     own = other.base.samples(other.line(clock.align))
@@ -70,6 +75,7 @@ def _align_by_correlation(first: Logger, other: Logger) -> tuple[float, str]:
 
 
 def _align_by_trigger(first: Logger, other: Logger) -> tuple[float, str]:
+    """Offset (s) between the crossings of the trigger levels on both clocks, and how it was found, in words."""
     clock = other.clock
     here_s = _find_crossing_s(other, clock.trigger, clock.trigger_level)
     there_s = _find_crossing_s(first, clock.reference_trigger, clock.reference_level)
@@ -77,7 +83,8 @@ def _align_by_trigger(first: Logger, other: Logger) -> tuple[float, str]:
 
 
 def _find_crossing_s(logger: Logger, text: str, level: float) -> float:
-    """Time (s) at which the signal first crosses the level, by linear interpolation."""
+    """Time (s) at which the signal first crosses the level, upwards or downwards, by linear interpolation. Raises
+    ImportProblemError without a crossing."""
     values: Any = logger.line(text)
     times_s = logger.base.times_s(len(values))
     above = values >= level

@@ -1,4 +1,9 @@
-"""Build one recording in SI units from files and a map, with a report of every conversion."""
+"""Build one recording in SI units from files and a map, with a report of every conversion.
+
+For each part (one file, or one run in it): arrays are read, the clocks of its loggers aligned, and its channels put
+onto one time grid (`part_signals`). The parts are then concatenated and converted to SI units, and segments are found
+if the map states none.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -25,23 +30,24 @@ from study.importing.part_signals import Key, PartSignals, part_signals
 from study.importing.time_base import NUMBERED_HZ, time_base, without_doubled_rows
 
 _NAMED = 3
-"""Parts that a message names."""
+"""Most parts that a sentence names."""
 
 
 class ImportNotes:
-    """Sentences about an import, each reported once: those that hold for all parts are not repeated for each."""
+    """Sentences about an import, each reported once: a sentence that holds for all parts is not repeated for each."""
 
     def __init__(self) -> None:
         self._parts: dict[str, list[str]] = {}
 
     def add(self, part: str, sentence: str) -> None:
-        """Add a sentence about a part, by the part's label; the same one only once."""
+        """Add a sentence about a part, by its label; a repeated sentence counts once."""
         parts = self._parts.setdefault(sentence, [])
         if part not in parts:  # channels of the same name, with several roles
             parts.append(part)
 
     def sentences(self, every_part: Sequence[str]) -> tuple[str, ...]:
-        """every_part: labels of all parts, to recognise sentences that hold for all of them."""
+        """All sentences; a sentence that does not hold for all parts begins with its parts. every_part: labels of all
+        parts."""
         return tuple(
             sentence if len(parts) == len(every_part) else f"{_abbreviate_list(parts)}: {sentence}"
             for sentence, parts in self._parts.items()
@@ -49,6 +55,7 @@ class ImportNotes:
 
 
 def _abbreviate_list(parts: Sequence[str]) -> str:
+    """The first parts, and the number of further ones."""
     shown = ", ".join(parts[:_NAMED])
     return shown + (f" and {len(parts) - _NAMED} more" if len(parts) > _NAMED else "")
 
@@ -64,6 +71,8 @@ class BuiltRecording:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
+    """Signals of one part, and the facts about it for the metadata of the recording."""
+
     signals: PartSignals
     facts: dict[str, Any]
 
@@ -71,8 +80,8 @@ class _Part:
 def build_recording(
     wanted: ImportMap, files: Sequence[Path], on_progress: Callable[[float], None] = lambda share: None
 ) -> BuiltRecording:
-    """Read, align, resample and convert. on_progress: share done, 0 to 1. Raises CannotReadError,
-    ImportRefusedError."""
+    """Read, align, resample and convert. on_progress: called with the fraction done, 0 to 1. Raises CannotReadError;
+    ImportRefusedError where map and files do not agree or the recording is invalid."""
     what = files[0].name if len(files) == 1 else f"{files[0].name} with {len(files) - 1} more"
     import_notes = ImportNotes()
     try:
@@ -94,6 +103,8 @@ def build_recording(
 
 
 class _Counter:
+    """Progress: channels done, out of those of all parts."""
+
     def __init__(self, done: float, steps: int, on_progress: Callable[[float], None]) -> None:
         self.done = done
         self.steps = steps
@@ -107,6 +118,8 @@ class _Counter:
 def _build_part(
     wanted: ImportMap, files: PartFiles, import_notes: ImportNotes, counter: _Counter, budget: Budget
 ) -> _Part:
+    """Read one part, and put its channels onto its time grid. Raises ImportProblemError, ImportRefusedError,
+    CannotReadError."""
     read: dict[Path, Arrays] = {}
     loggers = []
     notes: list[str] = []
@@ -133,6 +146,8 @@ def _build_part(
 
 @dataclass(frozen=True, slots=True)
 class _ChannelUnit:
+    """Conversion of a channel to SI: value * factor + offset, in the unit `si`; and its quantity."""
+
     si: str
     factor: float
     offset: float
@@ -140,12 +155,13 @@ class _ChannelUnit:
 
 
 def _units(wanted: ImportMap) -> dict[Key, _ChannelUnit]:
-    """Units of all channels; helpers need none. Raises ImportProblemError."""
+    """Units of all channels; helpers are not written and need none. Raises ImportProblemError."""
     every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
     return {(channel.role, channel.name): _unit(channel) for channel in every if channel.role != "helper"}
 
 
 def _unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
+    """Unit of one channel. Raises ImportProblemError where it is unknown or does not fit the quantity."""
     try:
         unit = parse_unit(channel.unit.strip() or UNSTATED)
         check_quantity(channel.quantity, unit)
@@ -155,7 +171,7 @@ def _unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
 
 
 def _unit_remark(wanted: ImportMap) -> Iterator[str]:
-    """Remarks on units that cannot be verified: those of computed channels, and channels without one."""
+    """Remarks on what cannot be verified: units of computed channels, channels without a unit, an unknown time."""
     for computed in (entry for entry in wanted.computed if entry.role != "helper"):
         yield f"Computed: {computed.role} '{computed.name}' = {computed.value}, in {computed.unit.strip() or UNSTATED}."
     every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
@@ -167,6 +183,8 @@ def _unit_remark(wanted: ImportMap) -> Iterator[str]:
 
 
 def _concatenate(wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Recording:
+    """The recording of all parts, one after another. Raises ImportProblemError for different rates, or without command
+    or response."""
     _require_one_rate(parts)
     command = _signal("command", wanted, parts, units)
     response = _signal("response", wanted, parts, units)
@@ -187,16 +205,19 @@ def _concatenate(wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _Ch
 
 
 def _odd_rate(recording: Recording) -> str:
+    """A sentence on an implausible sample rate; empty for a plausible or unknown one."""
     return "" if recording.meta.get("time") == "unknown" else rate_objection(recording.sample_rate_hz)
 
 
 def _time_facts(wanted: ImportMap) -> dict[str, str]:
+    """Origin of the times, for the metadata: `unknown`, `stamps`, or nothing for a stated rate."""
     if any(clock.unknown for clock in wanted.clock):
         return {"time": "unknown"}
     return {"time": "stamps"} if wanted.clock[0].time else {}
 
 
 def _require_one_rate(parts: Sequence[_Part]) -> None:
+    """Raises ImportProblemError where parts have different sample rates."""
     first = parts[0]
     for part in parts[1:]:
         if part.signals.grid.rate_hz != first.signals.grid.rate_hz:
@@ -207,6 +228,7 @@ def _require_one_rate(parts: Sequence[_Part]) -> None:
 
 
 def _signal(role: str, wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Signal | None:
+    """All channels of a role in SI units, with parts concatenated; None without a channel of the role."""
     every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
     names = tuple(channel.name for channel in every if channel.role == role)
     if not names:
@@ -228,6 +250,8 @@ def _signal(role: str, wanted: ImportMap, parts: Sequence[_Part], units: dict[Ke
 def _facts_and_segments(
     wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]
 ) -> tuple[list[dict[str, Any]], tuple[Segment, ...]]:
+    """Facts of each part with its range of samples, and segments of all parts by samples of the recording. Amplitudes
+    are converted to SI where all commands have the same factor."""
     every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
     commands = [(channel.role, channel.name) for channel in every if channel.role == "command"]
     factors = {units[key].factor for key in commands}

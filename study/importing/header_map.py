@@ -1,5 +1,9 @@
-"""Make a map from a table's header, or from array names of equal length, if they state quantities and units: `time
-[s], force [N], displacement_mm`."""
+"""Make a map from the header of a table, or from names of arrays of equal length, that state quantities and units, as
+in `time [s], force [N], displacement_mm`.
+
+`header_problems` lists what the names leave open; without problems, `header_map` makes the map and `header_notes`
+reports the choices.
+"""
 
 import re
 from collections import Counter
@@ -34,9 +38,9 @@ _TIME = re.compile(
 )
 """Name of a time column, with or without a unit."""
 _NUMBER = re.compile(r"\d+")
-"""A number in a prefix: prefixes that differ by it alone are runs of one measurement."""
+"""A number in a prefix: prefixes that differ only by their numbers are runs of one measurement."""
 _NAMED = 3
-"""Most names that an error lists."""
+"""Most names that a message lists."""
 
 
 def read_without_map(path: Path) -> Arrays:
@@ -53,12 +57,13 @@ def read_without_map(path: Path) -> Arrays:
 
 
 def _find_fault(array: Array) -> str:
+    """Problem of a column with an invalid field; empty for all other arrays."""
     reason = left_out(array)
     return reason if isinstance(reason, FaultyColumn) else ""
 
 
 def header_map(arrays: Arrays) -> ImportMap | None:
-    """The map; None if the header does not identify every column, or does not distinguish commands from responses."""
+    """The map; None where `header_problems` lists any problem."""
     if header_problems(arrays):
         return None
     table, prefixes = _table(arrays)
@@ -92,7 +97,7 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     others = [
         name
         for name, array in arrays.by_name.items()
-        if not array.ndim and name != rate and not _find_fault(array)  # it has a remark of its own
+        if not array.ndim and name != rate and not _find_fault(array)  # a faulty column has a separate remark
     ]
     left_out += [f"Left out: '{name}' is no column." for name in others]
     peaks = [f"'{channel.value}'" for channel in wanted.channel if is_peak_value(_text_in_brackets(channel.value))]
@@ -101,6 +106,7 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
 
 
 def _text_in_brackets(header: str) -> str:
+    """Unit in the brackets of a header, as in the file."""
     return header.partition("[")[2].removesuffix("]") or header.partition("(")[2].removesuffix(")")
 
 
@@ -116,8 +122,8 @@ def _direction_notes(table: Arrays, wanted: ImportMap) -> tuple[str, ...]:
 
 
 def _table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
-    """The columns, without single numbers and texts; of several tables of the same form, such as sheets of a workbook,
-    those of the first, and the prefix of each."""
+    """The columns, without single values. Of several tables of the same form, such as sheets of a workbook: the columns
+    of the first, and the prefixes of all."""
     columns = {name: array for name, array in arrays.by_name.items() if array.ndim}
     groups = groups_in(columns, LEAST_SAMPLES)
     members = len(groups.prefixes) * len(groups.names)
@@ -129,7 +135,7 @@ def _table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
 
 
 def header_problems(arrays: Arrays) -> tuple[str, ...]:
-    """What the names leave open, one clause each with the column; empty if `header_map` gives a map."""
+    """What the names leave open, as clauses that name the column; empty if `header_map` gives a map."""
     if not any(array.dtype.kind in "fiub" and array.ndim for array in arrays.by_name.values()):
         reasons = {name: what for name, array in arrays.by_name.items() if (what := left_out(array))}
         kinds = ", ".join(f"'{name}' is {what}" for name, what in reasons.items())
@@ -158,7 +164,7 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
 
 
 def _columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
-    """Time columns with their unit, and all others; repeated time columns are left out."""
+    """Time columns with a unit, and all others. Arrays that `surplus_arrays` finds are left out."""
     surplus = surplus_arrays(arrays)
     columns = [name_signal(header) for header in arrays.by_name if header not in surplus]
     times = [
@@ -170,11 +176,12 @@ def _columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
 
 
 def _is_time(column: ParsedName) -> bool:
+    """Whether a column is named as a time, with or without a unit."""
     return bool(_TIME.fullmatch(column.name) or _TIME.fullmatch(unit_at_end(column.name)[0]))
 
 
 def _rates(arrays: Arrays) -> list[str]:
-    """Expressions for the sample rate, from single numbers in hertz, or in seconds per step."""
+    """Expressions for the sample rate (Hz): single numbers in hertz, or else the inverse of a step in seconds."""
     found = rates_in(arrays)
     stated = {rate: unit_in(name)[1] or unit_at_end(name)[1] for rate, name in found.items()}
     rates = [rate for rate, name in found.items() if rate == name and stated[rate] == "Hz"]
@@ -182,6 +189,7 @@ def _rates(arrays: Arrays) -> list[str]:
 
 
 def _open_time(times: Sequence[ParsedName], rest: Sequence[ParsedName], arrays: Arrays) -> Iterator[str]:
+    """A clause where time column, unit of the time, or sample rate are missing or ambiguous."""
     single, rates = rates_in(arrays), _rates(arrays)
     bare = [column.header for column in rest if _is_time(column)]
     if len(times) > 1:

@@ -1,4 +1,7 @@
-"""Finds which of force and position was commanded, where names leave it open, by a test for imposed motions."""
+"""Decide which of force and position was commanded, where names leave it open, by a test for imposed motions.
+
+A motion that follows ramps or sines, while the force does not, was imposed (`analysis.look.imposed_motion`).
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -13,13 +16,13 @@ IMPOSED = (
     "force does not. If the force was commanded, import by a map with the roles the other way round: role = "
     '"command" for the force, role = "response" for the motion'
 )
-"""Said where the test finds that the motion was imposed."""
+"""Remark where the test finds that the motion was imposed."""
 NOT_IMPOSED = (
     "The force is taken for the command. If the motion was imposed and the force was measured, as on a testing "
     'machine, import by a map with the roles the other way round: role = "command" for the motion, role = "response" '
     "for the force"
 )
-"""Said where it finds none."""
+"""Remark where the test does not find an imposed motion."""
 _TURNED: dict[str, SignalRole] = {"command": "response", "response": "command", "position": "command"}
 """Role of a signal where the motion was imposed, by its role where the force is the command."""
 
@@ -28,8 +31,8 @@ Role = SignalRole | Literal[""]
 
 
 def turn_imposed(columns: Sequence[ParsedName], by_name: Mapping[str, Array], roles: Sequence[Role]) -> list[Role]:
-    """The roles, forces as responses where the data show that each motion was imposed. columns: of one-dimensional
-    arrays in by_name."""
+    """The roles; where the data show that each motion was imposed, motions become commands and forces responses.
+    columns: of one-dimensional arrays in by_name."""
     kept = list(roles)
     if not may_be_imposed(columns):
         return kept

@@ -1,4 +1,7 @@
-"""Find maps by name, by path, and for a folder of recordings."""
+"""Find the map for files: by its name or path, in a folder of recordings, or from the headers of the files.
+
+A map in the folder comes first, then shipped maps (`maps/`) that fit file names and arrays, then `map_by_header`.
+"""
 
 import re
 import tomllib
@@ -24,44 +27,47 @@ from study.store.disk.text_file import read_toml_text
 from study.store.formats.recording_layout import FORMAT
 
 NO_DATA = (".toml", ".md")
-"""File types beside data that are not data."""
+"""Endings of files in a folder of recordings that hold no data."""
 _NUMBER = re.compile(r"\d+")
-"""A number in a file's name: files that differ by it alone are parts of one recording."""
+"""A number in a file name: files whose names differ only by their numbers are parts of one recording."""
 _SHOWN = 4
-"""Files that a message names."""
+"""Most files that a message names."""
 
 
 @dataclass(frozen=True, slots=True)
 class MapFile:
-    """A map and its origin."""
+    """A map, its text, and its origin."""
 
     name: str
     map: ImportMap
     text: str
+    """TOML text; empty for a map that was made from headers."""
     path: Path
+    """File of the map; the folder of the data for a map that was made from headers."""
 
 
 @dataclass(frozen=True, slots=True)
 class FoundMap:
-    """A map, and the files of a folder that make one recording with it."""
+    """A map, and the files of a folder that make one recording by it."""
 
     source: MapFile
     files: tuple[Path, ...]
 
     @property
     def name(self) -> str:
-        """Name of the recording: that of the map, plus the file's if each file is a recording of its own."""
+        """Name of the recording: the name of the map, followed by that of the file if each file is a separate
+        recording."""
         return f"{self.source.name}_{self.files[0].stem}" if self.source.map.separate else self.source.name
 
 
 def list_shipped_maps() -> tuple[str, ...]:
-    """Names of the maps that come with hapteq."""
+    """Names of the maps that come with hapteq, sorted."""
     entries = resources("study.importing").joinpath("maps").iterdir()
     return tuple(sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml")))
 
 
 def read_map(name: str) -> MapFile:
-    """A shipped map by its name, or any by its path. Raises WrongUseError, CannotReadError, UnusableFileError."""
+    """A shipped map by its name, or any map by its path. Raises WrongUseError, CannotReadError, UnusableFileError."""
     if name in list_shipped_maps():
         shipped = resources("study.importing").joinpath("maps").joinpath(f"{name}.toml")
         text = shipped.read_text("utf-8")
@@ -79,8 +85,8 @@ def read_map(name: str) -> MapFile:
 
 
 def find_map(folder: Path) -> tuple[FoundMap, ...]:
-    """Maps for the recordings in a folder: those found there, otherwise shipped ones that fit file names and arrays.
-    Raises CannotReadError, UnusableFileError (an invalid map)."""
+    """Maps for the recordings in a folder: maps in the folder, otherwise shipped maps that fit file names and arrays.
+    Raises CannotReadError; UnusableFileError for an invalid map."""
     paths = sorted(path for path in folder.iterdir() if path.is_file())
     own = [path for path in paths if path.suffix == ".toml" and _is_map_file(path)]
     if own:
@@ -102,7 +108,7 @@ def map_of_files(paths: Sequence[Path]) -> MapFile | None:
 
 
 def map_by_header(folder: Path) -> FoundMap:
-    """A map from headers, for a folder without one; the file names must be alike except for numbers. Raises
+    """A map from headers, for a folder without a map; the names of its files may differ only by numbers. Raises
     WrongUseError, MapNeededError, CannotReadError, ImportRefusedError."""
     data = sorted((path for path in folder.iterdir() if path.is_file() and path.suffix not in NO_DATA), key=_in_order)
     none = f"No map is for the files of the folder {folder.name}: there is none in it, and no shipped map fits"
@@ -126,16 +132,18 @@ def map_by_header(folder: Path) -> FoundMap:
 
 
 def _unclear(happened: str, do_now: str) -> WrongUseError:
+    """The error that asks which recording is meant."""
     return WrongUseError("Which recording is meant?", happened, do_now, saved=NOTHING_WRITTEN)
 
 
 def _in_order(path: Path) -> tuple[tuple[bool, int, str], ...]:
-    """Sort key with rec_2 before rec_10."""
+    """Sort key by which rec_2 precedes rec_10."""
     pieces = re.split(r"(\d+)", path.name)
     return tuple((piece.isdigit(), int(piece) if piece.isdigit() else 0, piece) for piece in pieces)
 
 
 def _is_map_file(path: Path) -> bool:
+    """Whether a TOML file declares that it is a map; False for a damaged file."""
     try:
         return is_map(tomllib.loads(read_toml_text(path, KIND)))
     except (StudyError, ValueError, RecursionError):
@@ -143,7 +151,8 @@ def _is_map_file(path: Path) -> bool:
 
 
 def _recordings(source: MapFile, paths: Sequence[Path]) -> Iterator[FoundMap]:
-    """Recordings that the map makes; every pattern must match a file, or the recording is incomplete."""
+    """Recordings that a map makes of the files. Without `separate`, every pattern of the map must match a file;
+    otherwise the recording is incomplete and not given."""
     data = [path for path in paths if path.suffix not in NO_DATA]
     by_pattern = [[path for path in data if fnmatchcase(path.name, pattern)] for pattern in source.map.files]
     fitting = tuple(dict.fromkeys(path for found in by_pattern for path in found))
@@ -154,7 +163,7 @@ def _recordings(source: MapFile, paths: Sequence[Path]) -> Iterator[FoundMap]:
 
 
 def _fits(found: FoundMap) -> bool:
-    """Whether the first part has all arrays that the map names."""
+    """Whether the first part of a recording has all arrays that the map names."""
     wanted = found.source.map
     try:
         part = part_files(wanted, found.files)[0]

@@ -1,4 +1,8 @@
-"""Make an incomplete map for a file of which only the arrays are known, to be completed by its owner."""
+"""Make an incomplete map for a file of which only the arrays are known, to be completed by the owner of the file.
+
+Clocks, channels and runs are proposed from names, units, shapes and data. What is not known is left empty or described
+in a comment.
+"""
 
 import json
 import re
@@ -24,9 +28,9 @@ from study.importing.surplus_arrays import (
 )
 
 _FORCES = ("force", "torque")
-"""Quantities that are forces; of rotation, torques."""
+"""Quantities of forces: in rotation, torques."""
 _NAMED = 4
-"""Most further runs that a comment of the skeleton names; dots stand for more."""
+"""Most further runs that a comment of the skeleton names; dots stand for the rest."""
 _SHARE = re.compile(r"(?i)_(test|tst|train|trn|est|estimation|fit|val|vad|valid|validation)(?=_|$)")
 """Parts of a name that state the role of the data, as in `u_test`."""
 _TIME_UNITS = ("s", "ms", "us", "min")
@@ -34,11 +38,12 @@ _TIME_UNITS = ("s", "ms", "us", "min")
 
 
 def map_skeleton(arrays: Arrays) -> str:
-    """The map as TOML. Values that cannot be filled in are empty texts, which an import refuses by name."""
+    """The map as TOML text. Unknown values are empty texts, which an import refuses with the name of the key."""
     return "\n".join(_lines(arrays)) + "\n"
 
 
 def _lines(whole: Arrays) -> Iterator[str]:
+    """Lines of the map: head, clocks, channels, parts, segment."""
     groups = groups_in(whole.by_name, LEAST_SAMPLES)
     beside = _runs_beside(whole, groups)
     arrays = _first_run(whole, groups, beside)
@@ -73,14 +78,14 @@ def _lines(whole: Arrays) -> Iterator[str]:
 
 
 def _runs_beside(whole: Arrays, groups: Groups) -> list[str]:
-    """Runs in cells that are not among the groups; a cell of single numbers holds constants."""
+    """Arrays of runs in cells that belong to no group. Cells of single numbers hold constants and do not count."""
     long_ones = [name for name, array in whole.by_name.items() if OF_CELL.match(name) and array.size >= LEAST_SAMPLES]
     return [name for name in long_ones if not name.startswith(groups.prefixes)] if groups.prefixes else []
 
 
 def _first_run(whole: Arrays, groups: Groups, beside: Sequence[str]) -> Arrays:
-    """Arrays of the first of several runs and those that belong to none, without those of cells beside them; the time
-    of a table [time, value ...] separately."""
+    """Arrays of the first of several runs and those that belong to no run, except `beside`; the times of tables [time,
+    value ...] as separate arrays."""
     inside = [name for name in whole.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
     common = {name: array for name, array in whole.by_name.items() if name not in (*inside, *beside)}
     found = {**{name: whole.by_name[full] for name, full in groups.names.items()}, **common}
@@ -89,8 +94,8 @@ def _first_run(whole: Arrays, groups: Groups, beside: Sequence[str]) -> Arrays:
 
 
 def _clock_of(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
-    """The clock with the same number of samples whose name has the longest common prefix; of equal clocks the one that
-    is kept."""
+    """The clock with the same number of samples whose name has the longest common prefix; of equal clocks, the one that
+    is kept. Empty without a clock of this length."""
     fitting = [clock for clock in clocks if len(arrays.by_name[clock]) == max(arrays.by_name[name].shape, default=0)]
 
     def alike(clock: str) -> int:
@@ -101,7 +106,7 @@ def _clock_of(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
 
 
 def _direction(roles: Mapping[str, str]) -> Iterator[str]:
-    """Which of force and motion is the command, where names leave it open."""
+    """A comment on which of force and motion is taken for the command, where names leave it open."""
     columns = [name_signal(_stem(name)) for name in roles]
     if may_be_imposed(columns):
         forces = [roles[name] for name, column in zip(roles, columns, strict=True) if column.quantity in _FORCES]
@@ -112,6 +117,8 @@ def _direction(roles: Mapping[str, str]) -> Iterator[str]:
 
 
 def _no_channel(name: str, array: Array) -> Iterator[str]:
+    """A comment on an array that is not a channel: invalid, without numbers, constant, or of more than two
+    dimensions."""
     what = left_out(array)
     if isinstance(what, FaultyColumn):
         yield f"\n# Left out: {what}"
@@ -125,28 +132,32 @@ def _no_channel(name: str, array: Array) -> Iterator[str]:
 
 
 def _stem(name: str) -> str:
-    """`force` for `force.signals.values`, as Simulink stores a signal."""
+    """Name without the ending under which Simulink stores the values of a signal: `force` for
+    `force.signals.values`."""
     for end in (".signals.values", ".values", ".Data", ".data"):
         name = name.removesuffix(end)
     return name
 
 
 def _line(name: str, array: Array, number: int) -> str:
+    """Expression for one line of a table, along its longer side."""
     return f"{quote(name)}[{number}]" if array.shape[0] < array.shape[1] else f"{quote(name)}[:, {number}]"
 
 
 def _line_0(array: Array) -> Array:
+    """First line of a table, along its longer side."""
     return array[0] if array.shape[0] < array.shape[1] else array[:, 0]
 
 
 def _roles(arrays: Arrays, others: list[str]) -> dict[str, str]:
-    """Roles by name, where names and units determine them; others: arrays that are not channels."""
+    """Roles by name, where names, units and data determine them. others: arrays that are not channels."""
     channels = [name for name, array in arrays.by_name.items() if array.size >= LEAST_SAMPLES and name not in others]
     columns = [replace(name_signal(_stem(name)), header=name) for name in channels]
     return dict(zip(channels, turn_imposed(columns, arrays.by_name, propose_roles(columns)), strict=True))
 
 
 def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
+    """A [[part]] for each run."""
     if prefixes:
         yield "\n# Several runs are in the file: their arrays are named without the prefix above."
     for prefix in prefixes:
@@ -155,7 +166,7 @@ def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
 
 
 def _cells_beside(beside: Sequence[str], groups: Groups) -> Iterator[str]:
-    """Runs of cells of another length, and how to add them where their names identify the arrays."""
+    """Comments on runs in cells of another length, and on how to add them where their names identify the arrays."""
     if beside:
         shown = ", ".join(beside[:_NAMED]) + (" ..." if beside[_NAMED:] else "")
         yield f"\n# Also in the file, in cells of another length: {shown}"
@@ -169,6 +180,7 @@ def _cells_beside(beside: Sequence[str], groups: Groups) -> Iterator[str]:
 
 
 def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
+    """A [[clock]] for each time column; without one, a clock with the rate of the file, or with a comment."""
     for name in clocks:
         plain, unit = unit_in(name) if name in arrays.by_name and name_signal(name).quantity == "time" else (name, "")
         last = plain.rpartition("_")[2]
@@ -188,7 +200,7 @@ def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
 
 
 def _table(name: str, array: Array, clock: str, role: str) -> Iterator[str]:
-    """One channel per line; of [time, value], the value gets its name and role from the table's name."""
+    """A channel per line of a table; a table [time, value] gives one channel, with the name and role of the table."""
     timed = time_in_table(array)
     for number in range(int(timed), min(array.shape)):
         single = timed and min(array.shape) == 2
@@ -199,7 +211,7 @@ def _table(name: str, array: Array, clock: str, role: str) -> Iterator[str]:
 
 
 def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> Iterator[str]:
-    """names: of the channel, its value, the array's own."""
+    """A [[channel]]. names: of the channel, of its value (an expression), and of the array."""
     name, value, header = names
     parsed = name_signal(header)
     yield ""
@@ -214,4 +226,5 @@ def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> 
 
 
 def _shape(shape: tuple[int, ...]) -> str:
+    """Shape of an array in words."""
     return f"{' x '.join(str(count) for count in shape)} samples" if shape else "one number"

@@ -1,4 +1,5 @@
-"""Simple models of the devices of the shipped maps."""
+"""Find a mechanical model by name: a shipped model (`models/`) of a device of the shipped maps, or a file next to a
+map."""
 
 from importlib.resources import files as resources
 from pathlib import Path
@@ -8,13 +9,14 @@ from study.importing.map_format.map_errors import suggestion
 
 
 def list_shipped_models() -> tuple[str, ...]:
-    """Names of the models that come with hapteq."""
+    """Names of the models that come with hapteq, sorted."""
     entries = resources("study.importing").joinpath("models").iterdir()
     return tuple(sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml")))
 
 
 def model_for(name: str, folder: Path) -> Path:
-    """A file beside a map, or a shipped model by its name. Raises WrongUseError."""
+    """Path of a model: a file in the folder of the map, otherwise a shipped model. Raises WrongUseError where neither
+    exists."""
     if (beside := folder / name).is_file():
         return beside
     if name in list_shipped_models():

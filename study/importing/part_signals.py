@@ -1,4 +1,8 @@
-"""Channels of one part of a recording, resampled to one uniform grid."""
+"""Channels of one part of a recording, resampled to one uniform time grid.
+
+The grid covers the time range in which all clocks have samples. Channels whose samples lie on the grid are copied; all
+others are resampled as the map states. Computed channels are then evaluated on the grid.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,7 +22,7 @@ _OF_COMMANDS = (
     'A command that moves in straight lines between its samples has resample = "linear" and, at the top of the map, '
     'hold = "linear"; one that stays until the next has "held" and hold = "zero-order"'
 )
-"""Advice on the resampling of commands, beside their `hold`."""
+"""Advice on the resampling of commands and on the matching `hold` of the map."""
 
 Key = tuple[str, str]
 """Role and name of a channel."""
@@ -26,18 +30,21 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PartSignals:
-    """Signals in the units of the map."""
+    """Signals of one part on one grid, in the units of the map."""
 
     grid: Grid
     columns: Mapping[Key, FloatArray]
-    """Samples by role and name, each (grid.count,); computed ones included."""
+    """Samples by role and name, each (grid.count,); computed channels included."""
 
 
 @dataclass(frozen=True, slots=True)
 class _GridClock:
+    """Clock of computed channels: the times of the grid."""
+
     grid: Grid
 
     def times_s(self, count: int) -> Value:
+        """(count,) times (s). Raises ValueError unless count is that of the grid."""
         if count != self.grid.count:
             raise ValueError(f"{count} samples are not the recording's {self.grid.count}")
         return self.grid.times_s()
@@ -46,8 +53,8 @@ class _GridClock:
 def part_signals(
     wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], say: Callable[[str], None], step: Callable[[], None]
 ) -> PartSignals:
-    """`say` is called with a sentence for every deviation from the file; `step` after each channel. Raises
-    ImportProblemError."""
+    """Channels of one part on its grid. `say` is called with a sentence for each deviation from the file, `step` after
+    each channel. Raises ImportProblemError."""
     by_clock = {logger.clock.name: logger for logger in loggers}
     first = loggers[0].clock.name
     sources: list[tuple[ChannelMap, Samples]] = []
@@ -64,7 +71,7 @@ def part_signals(
         for remark in filter(None, (logger.base.gaps(), logger.base.wander())):
             say(remark)
     for computed in wanted.computed:
-        # Of several channels with the same name, the first counts.
+        # Of several channels with the same name, the first is used.
         named = {name: column for (_, name), column in reversed(columns.items())}
         columns[computed.role, computed.name] = _compute_channel(
             computed.name, computed.value, named, grid, loggers[0].names
@@ -74,6 +81,8 @@ def part_signals(
 
 
 def _values(channel: ChannelMap, logger: Logger, wanted: ImportMap) -> Value:
+    """Samples of a channel on its own clock; a single number is repeated. Raises ImportProblemError for another shape
+    or length, or infinite values."""
     where = f"channel '{channel.name}'"
     try:
         values = logger.names.value_of(channel.value, logger.base)
@@ -95,7 +104,8 @@ def _values(channel: ChannelMap, logger: Logger, wanted: ImportMap) -> Value:
 
 
 def _count(logger: Logger, wanted: ImportMap) -> int:
-    """Number of samples of a clock: of its stamps, or of its first non-constant channel."""
+    """Number of samples of a clock: that of its stamps, otherwise of its first channel that is not constant; 0 without
+    one."""
     if logger.base.stamps_s is not None:
         return len(logger.base.stamps_s)
     first = wanted.clock[0].name
@@ -108,7 +118,8 @@ def _count(logger: Logger, wanted: ImportMap) -> int:
 
 
 def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources: list[Samples]) -> Grid:
-    """Common time range of all channels, at the stated rate or the highest."""
+    """Grid over the time range common to all channels, at the stated rate or the highest of the clocks. Raises
+    ImportProblemError for uneven stamps without a stated rate, and for too many or too few samples."""
     uneven = [logger for logger in loggers if not logger.base.rate_hz]
     if uneven and not wanted.rate_hz:
         steps_ms = np.diff(uneven[0].base.times_s(0)) * 1e3
@@ -124,7 +135,7 @@ def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources
     if part.stop_s:
         end_s = min(end_s, begin_s + part.stop_s - (1 - SAME_INSTANT) / rate_hz)
     begin_s += np.ceil(part.start_s * rate_hz - SAME_INSTANT) / rate_hz
-    # On the samples of a clock with this rate, so that its channels are not resampled.
+    # The grid lies on the samples of a clock with this rate, so that its channels need no resampling.
     for logger in [logger for logger in loggers if logger.base.rate_hz == rate_hz][:1]:
         origin_s = float(logger.base.times_s(1)[0]) + logger.base.offset_s
         begin_s = origin_s + np.ceil((begin_s - origin_s) * rate_hz - SAME_INSTANT) / rate_hz
@@ -142,6 +153,8 @@ def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources
 
 
 def _on_grid(channel: ChannelMap, samples: Samples, grid: Grid, say: Callable[[str], None]) -> FloatArray:
+    """Samples of a channel on the grid (grid.count,): copied where they lie on it, otherwise resampled. Raises
+    ImportProblemError where the map does not state how to resample."""
     first = (grid.start_s - float(samples.times_s[0])) * grid.rate_hz
     if _same_rate(samples, grid) and abs(first - round(first)) < SAME_INSTANT:
         column = samples.values[round(first) : round(first) + grid.count]
@@ -159,13 +172,14 @@ def _on_grid(channel: ChannelMap, samples: Samples, grid: Grid, say: Callable[[s
 
 
 def _same_rate(samples: Samples, grid: Grid) -> bool:
+    """Whether two rates differ by less than `SAME_INSTANT` periods over the whole grid."""
     return abs(samples.rate_hz / grid.rate_hz - 1) * grid.count < SAME_INSTANT
 
 
 def _resample(
     channel: ChannelMap, method: Method, samples: Samples, grid: Grid, say: Callable[[str], None]
 ) -> FloatArray:
-    """Resample to the grid and report how."""
+    """Resample a channel to the grid and report how. Raises ImportProblemError."""
     try:
         column = resample(samples, grid, method)
     except ValueError as error:
@@ -180,7 +194,8 @@ def _resample(
 def _compute_channel(
     name: str, text: str, columns: Mapping[str, FloatArray], grid: Grid, file: Namespace
 ) -> FloatArray:
-    """Evaluate a computed channel on the grid."""
+    """Evaluate a computed channel on the grid (grid.count,). Raises ImportProblemError for another shape or infinite
+    values."""
     own = {**file.arrays, "clock_s": grid.times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
     try:
         value = Namespace(own, file.definitions, file.where, file.budget).value_of(text, _GridClock(grid))

@@ -1,4 +1,7 @@
-"""Arrays that a proposed map leaves out: those without any number, and duplicates of the time column."""
+"""Arrays that a proposed map leaves out: arrays without any number, row numbers, and repeated time columns.
+
+The module also recognises time columns, tables whose first column is the time, and sample rates.
+"""
 
 import re
 from collections.abc import Mapping
@@ -10,34 +13,34 @@ from study.importing.arrays.arrays import Array, Arrays
 from study.importing.map_format.signal_words import FOREIGN_WORDS, unit_in
 
 LEAST_SAMPLES = 16
-"""Shorter arrays are constants."""
+"""Arrays with fewer samples are constants."""
 CLOCK_WORDS = {
     *(word for word, quantity in FOREIGN_WORDS.items() if quantity == "time"),
     "t", "time", "timestamp", "timestamps", "datetime", "zeit", "zeitstempel", "temps", "tiempo", "tempo",
     "tout", "date",
 }  # fmt: skip
-"""Words of a time column's name, in lower case."""
+"""Words in the name of a time column, in lower case."""
 _INDEX = re.compile(
     r"column1|#|unnamed: 0|(index|idx|i|n|nr|no|number|row|record|sample|scan|point)[ _.]?(nr|no|number|#)?\.?",
     re.IGNORECASE,
 )
-"""Name of a column that numbers the rows, or of one without a name."""
+"""Name of a column of row numbers, or of a column without a name."""
 _RATE = re.compile(
     r"((.* )?(fs|(sampl(e|es|ing)|scan|acquisition|logging) ?(rate|freq|frequency)|sampling)|rate)(( in)? ?k?hz)?"
 )
-"""Words of the name of a sample rate; not of an excitation rate."""
+"""Words in the name of a sample rate; the rate of an excitation does not match."""
 _STEP_WORDS = {"ts", "dt"}
-"""Names of a sampling interval (s)."""
+"""Names of a sampling interval."""
 _USUAL_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
 """Ratios of the units of two clocks that are tried where a name states no unit."""
 _EVEN = 0.02
 """Largest range of a clock's steps, relative to their median, for them to count as even."""
 SAME_CLOCK = 0.5
-"""Stamps that differ by at most this fraction of a step, when both begin at 0, are one clock."""
+"""Stamps that both begin at 0 are one clock if they differ by at most this fraction of a step."""
 
 
 def surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
-    """Why arrays are left out, by name."""
+    """Reason for leaving an array out, as a clause, by name of the array."""
     empty = {name: "holds no numbers at all" for name, array in arrays.by_name.items() if _is_empty(array)}
     empty |= {
         name: "holds no numbers" for name, array in arrays.by_name.items() if array.dtype.kind in "SU" and array.ndim
@@ -49,7 +52,7 @@ def surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
 
 @np.errstate(all="ignore")
 def is_growing_time(name: str, array: Array) -> bool:
-    """Whether an array is named as a time and never decreases; coarse stamps may repeat."""
+    """Whether an array is named as a time, never decreases, and grows overall; coarse stamps may repeat."""
     grows = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
     return (
         grows
@@ -59,11 +62,12 @@ def is_growing_time(name: str, array: Array) -> bool:
 
 
 def name_words(name: str) -> set[str]:
-    """Words of a name without its unit, in small letters."""
+    """Words of a name without its unit, in lower case."""
     return set(_split_words(unit_in(name)[0]))
 
 
 def _split_words(plain: str) -> list[str]:
+    """Words of a text in lower case, in order."""
     return "".join(letter if letter.isalnum() else " " for letter in plain.lower()).split()
 
 
@@ -73,8 +77,8 @@ def _last_part(name: str) -> str:
 
 
 def rates_in(arrays: Arrays) -> Mapping[str, str]:
-    """Single numbers named as a sample rate, or as the step between samples, by the expression that gives the rate;
-    rates first."""
+    """Single numbers named as a sample rate or sampling interval: name by the expression for the rate; rates come
+    first."""
     single = [name for name, array in arrays.by_name.items() if array.size == 1 and array.dtype.kind in "fiu"]
     rates = {name: name for name in single if _RATE.fullmatch(" ".join(_split_words(_last_part(name))))}
     steps = {f"1 / {quote(name)}": name for name in single if name_words(name) & _STEP_WORDS}
@@ -82,23 +86,24 @@ def rates_in(arrays: Arrays) -> Mapping[str, str]:
 
 
 def quote(name: str) -> str:
-    """Expression for an array."""
+    """Expression for an array by its name."""
     return name if name.isidentifier() else f"array('{name}')"
 
 
 def _is_empty(array: Array) -> bool:
+    """Whether all values of an array are NaN."""
     return array.dtype.kind == "f" and array.size >= LEAST_SAMPLES and bool(np.isnan(array).all())
 
 
 @np.errstate(all="ignore")
 def _is_index(name: str, array: Array) -> bool:
-    """Whether an array is unnamed or called a number of rows, and counts them."""
+    """Whether an array has no name or one of a row number, and counts the rows."""
     plain = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
     return plain and bool(_INDEX.fullmatch(name)) and bool((np.diff(array.astype(float)) == 1).all())
 
 
 def equal_clocks(arrays: Arrays) -> Mapping[str, str]:
-    """Time columns that repeat another, each with the other's name."""
+    """Time columns that repeat another time column, each with the name of the other."""
     kept: list[str] = []
     found = {}
     clocks = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
@@ -113,7 +118,8 @@ def equal_clocks(arrays: Arrays) -> Mapping[str, str]:
 
 @np.errstate(all="ignore")
 def time_in_table(array: Array) -> bool:
-    """Whether the first row or column of a table, along its short side, increases like a time: [time, value ...]."""
+    """Whether a table has the form [time, value ...]: its first line along the longer side increases, and either has
+    even steps or is the only line that increases."""
     if array.ndim != 2 or array.dtype.kind not in "fiu" or max(array.shape) < LEAST_SAMPLES:
         return False
     lines = array if array.shape[0] < array.shape[1] else array.T
@@ -125,7 +131,8 @@ def time_in_table(array: Array) -> bool:
 
 @np.errstate(all="ignore")
 def _is_same_clock(by_name: Mapping[str, Array], first: str, second: str) -> bool:
-    """Whether both increase at the same rate; where one has no unit, in any usual unit."""
+    """Whether two time columns are equal, apart from their starts and from the ratio of their units. Where a name
+    states no unit, usual ratios are tried."""
     one, other = (by_name[name].astype(float) for name in (first, second))
     if one.shape != other.shape or one.ndim != 1 or not np.isfinite([one[[0, -1]], other[[0, -1]]]).all():
         return False
@@ -138,7 +145,7 @@ def _is_same_clock(by_name: Mapping[str, Array], first: str, second: str) -> boo
 
 
 def _seconds(name: str) -> float | None:
-    """Factor to seconds of the unit in brackets; None where there is none."""
+    """Factor from the unit in brackets to seconds; None without a unit of time."""
     try:
         unit = parse_unit(unit_in(name)[1])
     except UnknownUnitError:

@@ -1,8 +1,8 @@
 """Time base of a logger's channels: a stated rate, or time stamps, which are checked and brought to a uniform grid.
 
-Stamps are refused with the key of the map that corrects them where they are missing, run backwards (a counter that
-wraps around, a clock that is set back), stand still, or jump. Stamps that are uniform apart from rounding and skipped
-rows give a rate and the index of each sample (`uniform_stamps`). Rows that a logger wrote twice are taken out
+Stamps are refused where they are missing, run backwards (a counter that wraps around, a clock that is set back),
+repeat, or jump; the message names the key of the map that corrects them. Stamps that are uniform apart from rounding
+and skipped rows give a rate and the index of each sample (`uniform_stamps`). Rows that a logger wrote twice are removed
 (`without_doubled_rows`).
 """
 
@@ -21,11 +21,11 @@ from study.importing.map_format.map_errors import ImportProblemError
 from study.importing.uniform_stamps import UNEVEN, IntArray, fit_uniform_rate, last_decimal
 
 _USUAL_GAP = 3
-"""A step of so many median steps, or more, is a gap."""
+"""A step longer than this many median steps is a gap, unless the map states `gap_s`."""
 _HOUR_S = 3600.0
 """Step (s) of a clock that is set to summer time or back."""
 _COUNTERS = (2**16, 2**24, 2**31, 2**32, 10**6, 10**9)
-"""Values at which counters of loggers wrap around to 0, in units of the file."""
+"""Values at which counters of loggers wrap around to 0, in the unit of the file."""
 NUMBERED_HZ = 1.0
 """Placeholder rate (Hz) of samples whose time is unknown."""
 MOST_SAMPLES = 10**8
@@ -42,21 +42,22 @@ class TimeBase:
     rate_hz: float
     """Sample rate (Hz); 0 if stamps are not uniform."""
     stamps_s: Value | None
-    """(n,) as logged; None for a clock with a rate only."""
+    """(n,) as logged, in seconds; None for a clock with a rate only."""
     places: IntArray | None
     """(n,): index of each stamp's sample at the uniform rate; None if stamps are not uniform."""
     gap_s: float
-    """A longer step of the stamps is a gap, in which samples are missing (s)."""
+    """A step of the stamps longer than this is a gap, in which samples are missing (s)."""
     offset_s: float = 0.0
-    """Offset that is added to give the reference clock's time."""
+    """Offset that is added to give the time of the reference clock (s)."""
 
     @property
     def fastest_hz(self) -> float:
-        """The stated rate, else that of the median step of the stamps (Hz)."""
+        """The sample rate; for stamps that are not uniform, the rate of their median step (Hz)."""
         return self.rate_hz or 1 / float(np.median(np.diff(self.times_s(0))))
 
     def times_s(self, count: int) -> Value:
-        """(count,) times by the logger's own clock; with stamps, as many as there are."""
+        """(count,) times by the clock of the logger (s). With stamps, `count` is ignored: there are as many times as
+        stamps."""
         if self.stamps_s is None:
             return np.arange(count) / self.rate_hz
         if self.places is not None:
@@ -65,7 +66,7 @@ class TimeBase:
         return self.stamps_s
 
     def gaps(self) -> str:
-        """Sentence with the number of gaps in the stamps, and the key that declares that nothing is missing; empty
+        """Sentence with the number of gaps in the stamps, and with the key that declares that nothing is missing; empty
         without gaps."""
         steps_s = np.diff(self.times_s(0)) if self.stamps_s is not None else np.zeros(0)
         wide_s = steps_s[steps_s > self.gap_s]
@@ -79,7 +80,8 @@ class TimeBase:
         )
 
     def wander(self) -> str:
-        """Sentence with the deviation of the stamps from the uniform grid that was fitted; empty where negligible."""
+        """Sentence with the deviation of the stamps from the uniform grid that was fitted; empty where it is
+        negligible."""
         if self.stamps_s is None or self.places is None:
             return ""
         off_s = float(np.max(np.abs(self.times_s(0) - self.stamps_s)))
@@ -139,6 +141,7 @@ def _base_from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
             "them missing. Correct the stamps, or cut the file there into several, which are imported together"
         )
     gap_s = clock.gap_s or _USUAL_GAP * float(np.median(np.diff(stamps_s)))
+    # On a uniform grid, one skipped row is a gap.
     if places is not None and not clock.gap_s:
         gap_s = min(gap_s, 1.5 / rate_hz)
     return TimeBase(clock.name, rate_hz, stamps_s, places, gap_s)
@@ -191,8 +194,8 @@ def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
 
 
 def without_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, str]:
-    """The arrays without rows that repeat the row above, and a sentence with their number; unchanged where time stands
-    still in a row whose other values differ. Raises ImportProblemError."""
+    """The arrays without rows that repeat the row above, and a sentence with their number. Nothing is removed if any
+    row with a repeated stamp has other values than the row above. Raises ImportProblemError."""
     if not clock.time:
         return names, ""
     stamps: Value = names.value_of(clock.time, NoTime())
@@ -216,7 +219,7 @@ def _repeats(array: Array, rows: npt.NDArray[np.intp]) -> bool:
 
 @np.errstate(all="ignore")
 def _counts(array: Array) -> bool:
-    """Whether an array is a row counter, which differs also where a row was logged twice."""
+    """Whether an array is a row counter, which grows even where a row was logged twice."""
     return array.ndim == 1 and array.dtype.kind in "fiu" and bool((array[1:] - array[:-1] == 1).all())
 
 

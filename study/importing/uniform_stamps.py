@@ -29,8 +29,9 @@ _PLAIN_DIGITS = (4, 5, 6)
 def fit_uniform_rate(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | None]:
     """Rate (Hz) and sample index of each stamp (n,); 0 and None for stamps that are not uniform.
 
-    Tried are the mean rate, which is right where no row is missing, and that of the median step, which is right where
-    some are; each first rounded (1000 for 1000.0003). unit_s: unit of the stamps' last decimal place.
+    Two estimates are tried: the mean rate, which is right where no row is missing, and the rate of the median step,
+    which is right where some are. Each is first rounded to a few digits (1000 for 1000.0003). unit_s: unit of the last
+    decimal place of the stamps.
     """
     since_s = stamps_s - stamps_s[0]
     mean_hz = (len(stamps_s) - 1) / float(since_s[-1])

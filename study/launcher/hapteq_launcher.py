@@ -1,7 +1,8 @@
-"""Start hapteq after checking that its four packages are its own.
+"""Start hapteq after checking that its four packages are not hidden by other files of the same name.
 
-Their names are generic. A foreign `analysis.py` or `study.py` on the import path would be imported instead, and the
-program would fail with a confusing error. This module has a unique name, so that it can report that.
+The names of the packages are generic. A foreign `analysis.py` or `study.py` on the import path would be imported
+instead, and the program would fail with a confusing error. This module has a unique name, so that it can report the
+problem.
 """
 
 import importlib.util
@@ -13,7 +14,7 @@ PACKAGES = ("study", "analysis", "equalizer", "protocols")
 
 
 def home() -> Path | None:
-    """The one folder on the import path that contains all four packages."""
+    """The first folder on the import path that contains all four packages; None without such a folder."""
     for entry in sys.path:
         folder = Path(entry or ".").resolve()
         if all((folder / name / "__init__.py").is_file() for name in PACKAGES):
@@ -22,7 +23,7 @@ def home() -> Path | None:
 
 
 def foreign_packages() -> list[Path]:
-    """Modules that would be imported under one of our names without being ours."""
+    """Files that would be imported under the name of one of the packages without belonging to hapteq."""
     ours = home()
     found = []
     for name in PACKAGES:

@@ -1,7 +1,7 @@
-"""Simulated participants. Stateless: an answer depends on the trial and the seed only, not on earlier answers.
+"""Simulated participants. They are stateless: an answer depends on the trial and the seed, not on earlier answers.
 
-`observer` (the interface) -> `direction_feeler` (signal detection over a `psychometric_curve`; `detection` for
-intervals), `delivered_feeler`, `intensity_cue`, `unsure` and `strategies` (answers without feeling) -> `population`
-(many, drawn) -> `observers` (by the names of `--observer`). `chance` draws by trial. Begin at `observer.py`, then
-`direction_feeler.py`.
+`observer` (interface) -> `chance` (random draws by trial) and `psychometric_curve` -> `direction_feeler` (signal
+detection; `detection` has its thresholds for intervals) -> `delivered_feeler` and `unsure`, which build on it;
+`intensity_cue` and `strategies` (answers without a sense of direction) -> `population` (individual thresholds) ->
+`observers` (by the names of `--observer`). Begin at `observer.py`, then `direction_feeler.py`.
 """

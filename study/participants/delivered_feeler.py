@@ -1,14 +1,14 @@
-"""Simulated participant whose answers depend on the acceleration that the device delivered, not on the commanded force.
+"""Simulated participant who answers to the acceleration that the device delivered, not to the commanded force.
 
-Model. With a and c the delivered amplitudes along and across the played direction, h that of the harmonics (m/s²), k
-the trial within the run and T the threshold of the undisturbed direction (m/s²), the participant answers as a
-`direction_feeler` would to
+Model. Let a and c be the delivered amplitudes along and across the played direction, h that of the harmonics (m/s²), k
+the index of the trial within the run, from 0, and T the undisturbed direction threshold (m/s²). The participant answers
+as a `direction_feeler` would to the amplitude
 
     sqrt(a² - c²) / sqrt(1 + (m h / T)²) · 10^(-A (1 - exp(-k / tau)) / 20)
 
-* Direction: motion across takes direction away; where both are equally strong (a circle) the motion has no direction.
-* Masking: harmonics act as independent noise, which adds to the threshold in squares (factor m).
-* Adaptation: vibration numbs, so that the threshold rises by up to A dB within a run and is back after the rest.
+* Direction: motion across the played direction reduces the sense of it; for c = a (a circle) no direction is felt.
+* Masking: harmonics act as independent noise with weight m; the threshold becomes sqrt(T² + (m h)²).
+* Adaptation: the threshold rises by up to A dB within a run, and begins at T again in the next run.
 
 The amplitude is converted to newtons by what the simulated omega.3 delivers per newton (`MPS2_PER_N`), because the
 thresholds of `direction_feeler` are forces. The model and its numbers m, A and tau are assumptions of the authors.
@@ -37,14 +37,14 @@ class DeliveredFeeler:
     feeler: DirectionFeeler
     """Thresholds, slope, lapses and criterion."""
     masking: float = 1.0
-    """m: weight of the harmonics' amplitude in the threshold; 0: harmonics do not mask."""
+    """m: weight of the amplitude of the harmonics in the threshold; 0: harmonics do not mask."""
     adaptation_db: float = 1.0
     """A: rise of the threshold in a long run (dB)."""
     adaptation_trials: float = 20.0
     """tau: time constant of adaptation, in trials of a run."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """The answer to one presentation."""
+        """Answer (1 or 2) and response time (s) for one presentation."""
         return self.feeler.reply(replace(felt, level_n=self.felt_n(felt)), seed)
 
     def share_right(self, felt: PerceivedStimulus) -> float:
@@ -52,8 +52,7 @@ class DeliveredFeeler:
         return self.feeler.share_right(replace(felt, level_n=self.felt_n(felt)))
 
     def felt_n(self, felt: PerceivedStimulus) -> float:
-        """The force (N) which, delivered without disturbance and before adaptation, would be felt as well as this
-        trial."""
+        """Force (N) which, delivered without disturbance and before adaptation, would be felt as well as this trial."""
         delivered = felt.delivered
         if felt.phase is Phase.DETECTION or delivered is None:
             return felt.level_n

@@ -1,16 +1,16 @@
 """Simulated participant without a sense of direction, who uses the difference in strength between the directions.
 
 A device rarely delivers both directions equally strongly. A participant who remembers the average strength at this
-level can take "stronger" for direction 1 and "weaker" for direction 2. The level changes rarely, so the memory is
-assumed perfect: an upper bound of this cue.
+level can answer 1 for a stronger and 2 for a weaker vibration. The level changes rarely, so the memory is assumed
+perfect, which gives an upper bound of this cue.
 
 Model: the felt strength in dB is normal around +difference_db/2 (direction 1) or -difference_db/2 (direction 2)
 relative to the memory, with standard deviation noise_db sqrt(1 + (detection_n / level)^2): a constant Weber fraction
-well above the detection level, and rising noise towards it. So d' = difference_db / standard deviation; without a
-difference the answers are at chance. A level that was roved adds to the felt strength, while the memory is that of the
-staircase's level: then the strength tells of the draw as much as of the direction.
+well above the detection level, and rising noise towards it. Therefore d' = difference_db / standard deviation; without
+a difference the answers are at chance. With roving, the change of level in dB is added to the felt strength, while the
+memory remains that of the staircase's level: the strength then depends on the random level as well as on the direction.
 
-Detection is that of other participants, with `detection_n` as threshold.
+In detection trials the participant is like the others, with `detection_n` as threshold.
 """
 
 import math
@@ -26,18 +26,18 @@ from study.participants.psychometric_curve import WeibullCurve
 
 @dataclass(frozen=True, slots=True)
 class IntensityCue:
-    """An `Observer` who tells the two directions apart only by the strength of the vibration."""
+    """An `Observer` who distinguishes the two directions only by the strength of the vibration."""
 
     name: str
     difference_db: float = 3.0
-    """Level, as delivered, of the direction with the number 1 on the screen, above that of the other."""
+    """Delivered level of the direction with the number 1 on the screen, relative to the other direction (dB)."""
     noise_db: float = 1.0
-    """Standard deviation of one judgement of strength; about the difference limen of vibration."""
+    """Standard deviation of one judgement of strength (dB); about the difference limen of vibration."""
     detection_n: float = 0.1
-    """Level at which the noise has grown by the square root of two, and threshold of detection."""
+    """Threshold of detection, and level at which the noise has grown by the square root of two (N)."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """The answer to one presentation."""
+        """Answer (1 or 2) and response time (s) for one presentation."""
         luck, delay = uniform(felt, seed, 2)
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         detection = WeibullCurve(self.detection_n, DETECTION_SLOPE)
@@ -46,12 +46,13 @@ class IntensityCue:
         return Reply(1 if luck < share_of_1 else 2, response_time_s(delay))
 
     def _rove_deviation(self, felt: PerceivedStimulus) -> float:
-        """Felt strength beyond the memory, in standard deviations; a detection trial asks for no direction."""
+        """Change of the felt strength by roving, in standard deviations; 0 without roving and in detection trials."""
         if felt.nominal_n is None or felt.phase is Phase.DETECTION:
             return 0.0
         return 20.0 * math.log10(felt.level_n / felt.nominal_n) / self._noise_db(felt.level_n)
 
     def _noise_db(self, level_n: float) -> float:
+        """Standard deviation of the felt strength at this level (dB)."""
         return self.noise_db * math.hypot(1.0, self.detection_n / level_n)
 
     def d_prime(self, level_n: float) -> float:

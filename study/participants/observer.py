@@ -1,4 +1,4 @@
-"""Interface of simulated participants: what is felt, what is answered."""
+"""Interface of simulated participants: the stimulus that is perceived, and the reply to it."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -9,7 +9,8 @@ from study.session.stimulus.delivered import Delivered
 
 @dataclass(frozen=True, slots=True)
 class PerceivedStimulus:
-    """One stimulus as far as a participant could perceive it, and its place in the session."""
+    """One stimulus as far as a participant can perceive it, and its place in the session. Runs, trials and attempts
+    count from 0."""
 
     run: int
     trial: int
@@ -17,12 +18,14 @@ class PerceivedStimulus:
     phase: Phase
     frequency_hz: float
     level_n: float
+    """Level (N): amplitude of the commanded force; with an equalizer, see `study.session.facts.level_scale`."""
     direction_shown: int
-    """Number of the direction on the screen, 1 or 2; in a detection trial, of the interval in which it shook."""
+    """Number of the direction on the screen, 1 or 2; in a detection trial, number of the interval with the
+    vibration."""
     trials_before: int
     """Trials answered so far in this session, training included."""
     nominal_n: float | None = None
-    """Level of the staircase, where `level_n` was roved around it."""
+    """Level of the staircase (N), where `level_n` was roved around it."""
     delivered: Delivered | None = None
     """The stimulus as delivered by the device; None where it was not felt or not measured."""
 
@@ -34,18 +37,19 @@ class Reply:
     answer: int
     """1 or 2."""
     response_time_s: float
-    """Time from the onset to the answer."""
+    """Time from the onset to the answer (s)."""
     ask_again: bool = False
-    """The same trial is asked for once more, if that is allowed; else the answer counts."""
+    """Whether the participant asks for the same trial again. Where that is not allowed, the answer counts."""
 
 
 class Observer(Protocol):
-    """A stateless participant: the reply depends on the stimulus and the seed, not on earlier answers. So a resumed
-    session gets the same replies as an uninterrupted one."""
+    """A stateless participant: the reply depends on the stimulus and the seed, not on earlier answers. A resumed
+    session therefore gets the same replies as an uninterrupted one."""
 
     @property
     def name(self) -> str:
-        """The name that `--observer` takes."""
+        """The name by which `--observer` selects this participant."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """The reply to this stimulus. seed: of the session; with the stimulus's place in it, it gives all draws."""
+        """The reply to this stimulus. seed: of the session; together with the place of the stimulus in the session it
+        determines all random draws."""

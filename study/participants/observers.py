@@ -1,4 +1,4 @@
-"""The simulated participants that `--observer` knows by name."""
+"""Find a simulated participant by the name that `--observer` takes."""
 
 import re
 from difflib import get_close_matches
@@ -29,16 +29,17 @@ OBSERVERS = {
     "scripted": "right or wrong by the trial's number alone",
     "person": "one of the simulated population, picked by the seed",
 }
-"""Name and one line about it, for help texts. Beside these, person_7_seed_1 is the seventh of population 1,
-and so are delivered_7_seed_1, repeating_7_seed_1 and criterion_drift_7_seed_1, with the same thresholds."""
+"""Name and description, for help texts. Further names select a member of a simulated population: `person_7_seed_1` is
+the seventh of population 1; `delivered_7_seed_1`, `repeating_7_seed_1` and `criterion_drift_7_seed_1` have the same
+thresholds."""
 
 _MEMBER = re.compile(rf"(?P<kind>{'|'.join(KINDS)})_(?P<number>[1-9]\d*)_seed_(?P<seed>\d+)")
-"""Name of a person of a simulated population: kind, number from 1, and seed of the population."""
+"""Name of a member of a simulated population: kind, number from 1, and seed of the population."""
 
 
 def find_observer(name: str, seed: int) -> Observer:
-    """The simulated participant of this name. seed: chooses the person for "person" only. Raises WrongUseError for
-    an unknown name."""
+    """The simulated participant of this name. seed: selects the person for the name "person"; unused for other names.
+    Raises WrongUseError for an unknown name."""
     known = name.replace("-", "_")
     if found := _MEMBER.fullmatch(known):
         return member(found["kind"], int(found["number"]), int(found["seed"]))

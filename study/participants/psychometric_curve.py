@@ -1,4 +1,4 @@
-"""Psychometric function of a two-alternative task: fraction of right answers over level."""
+"""Psychometric function of a task with two alternatives: fraction of right answers as a function of level (Weibull)."""
 
 import math
 from dataclasses import dataclass
@@ -6,13 +6,14 @@ from itertools import pairwise
 from statistics import NormalDist
 
 TARGET = 0.5 ** (1 / 3)
-"""Convergence point of the one-up three-down rule: 79.37 % right (Levitt 1971)."""
+"""Convergence point of the one-up three-down rule: 79.37 % right (H. Levitt, J. Acoust. Soc. Am. 49 (1971),
+467-477)."""
 
 
 @dataclass(frozen=True, slots=True)
 class WeibullCurve:
-    """Fraction right = 0.5 + 0.5 F(x) with F(x) = 1 - exp(-(x / a)^slope); a is chosen so that `threshold_n` gives
-    TARGET."""
+    """Fraction right = 0.5 + 0.5 F(x) with F(x) = 1 - exp(-(x / a)^slope), x the level (N); a is chosen so that
+    `threshold_n` (N) gives TARGET."""
 
     threshold_n: float
     slope: float
@@ -22,15 +23,16 @@ class WeibullCurve:
         return 1.0 - 0.5 * math.exp(-_AT_TARGET * (level_n / self.threshold_n) ** self.slope)
 
     def distance(self, level_n: float) -> float:
-        """d' (distance of the two alternatives in standard deviations) that gives this fraction without bias."""
+        """d' (distance of the two alternatives in standard deviations) that gives this fraction without bias: d' = 2
+        Phi^-1(fraction)."""
         return 2.0 * NormalDist().inv_cdf(min(self.share_right(level_n), _SUREST))
 
 
 _SUREST = 1.0 - 1e-12
-"""Largest fraction for which the inverse normal distribution is finite."""
+"""Largest fraction that is inserted in the inverse normal distribution, which is infinite at 1."""
 
 _AT_TARGET = -math.log(2.0 * (1.0 - TARGET))
-"""(x / a)^slope at the threshold."""
+"""Value of (x / a)^slope at the threshold: -ln(2 (1 - TARGET))."""
 
 
 def threshold_at(thresholds_n: tuple[tuple[float, float], ...], frequency_hz: float) -> float:

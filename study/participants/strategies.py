@@ -1,4 +1,5 @@
-"""Simulated participants who answer without feeling: controls that an analysis must recognise."""
+"""Simulated participants who answer without feeling anything: controls that an analysis must recognise, and a
+participant with scripted answers."""
 
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ class Guesser:
     name: str
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
+        """1 or 2 with equal probability."""
         luck, delay = uniform(felt, seed, 2)
         return Reply(1 if luck < 0.5 else 2, response_time_s(delay))
 
@@ -37,22 +39,24 @@ class Constant:
     answer: int
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
+        """The same answer to every stimulus."""
         _, delay = uniform(felt, seed, 2)
         return Reply(self.answer, response_time_s(delay))
 
 
 @dataclass(frozen=True, slots=True)
 class Scripted:
-    """Answers right or wrong by run and trial number only, for any direction drawn: after an interruption the
-    levels must equal those of an uninterrupted session."""
+    """Answers right or wrong by run and trial number only, for any direction drawn. The levels of an interrupted
+    session must therefore equal those of an uninterrupted one."""
 
     name: str
     script: str = "111111011101110011111101110011101110"
-    """1 = right, 0 = wrong; repeated, and begun one place later in every run. The default ends a published staircase
-    at its 36th answer in run 0, slightly earlier or later in others."""
+    """1 = right, 0 = wrong; repeated, and begun one place later in every run. The default ends a published staircase at
+    its 36th answer in run 0, slightly earlier or later in other runs."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """The character of the script at run + trial, modulo its length: a void trial gets the same answer again."""
+        """The character of the script at run + trial, modulo its length. A repetition of a void trial gets the same
+        answer."""
         _, delay = uniform(felt, seed, 2)
         right = self.script[(felt.run + felt.trial) % len(self.script)] == "1"
         return Reply(felt.direction_shown if right else 3 - felt.direction_shown, response_time_s(delay))

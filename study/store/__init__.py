@@ -1,5 +1,6 @@
-"""Files: each format is read with all checks and written atomically.
+"""Files: each format is checked completely when it is read, and written atomically.
 
-`disk` (text, JSON, TOML, HDF5 on the disk, actionable errors) -> `formats` (one file per format) -> `sessions` (folders
-of sessions: log, lock, seal, live state, withdrawal). Begin at `formats/recording_file.py` and `sessions/event_log.py`.
+In the order of dependence: `disk` (text, CSV, JSON, TOML and HDF5 on the disk; errors with advice) -> `formats` (the
+file formats of hapteq, one module each) -> `sessions` (folders of sessions: log, lock, seal, live state, withdrawal).
+Begin at `formats/recording_file.py` and `sessions/event_log.py`.
 """

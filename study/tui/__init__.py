@@ -1,6 +1,7 @@
-"""User interface. Screens contain no rules: they turn views into words and keys into replies.
+"""Text user interface. Screens contain no rules of the study: they turn views into words, and keys into replies.
 
-`engine` (the process that does all work, and the pipe to it) -> `app` (the process that draws: which screen is shown)
--> `screens` (one file each) -> `widgets` and `drawing`. `line_mode` is the same in plain sentences, `watch` the
-experimenter's view, `keys` the meaning of key presses. Begin at `app/app.py` and `engine/engine_commands.py`.
+Data pass from `engine` (the process that runs sessions, and the pipe to it) to `app` (the process that draws, and
+chooses the screen), then to `screens` (one per file), which consist of `widgets` and `drawing`. `keys` interprets key
+presses; replies return through the pipe. `line_mode` is the same interface in plain sentences, `watch` the
+experimenter's view of a running session. Begin at `app/app.py` and `engine/engine_commands.py`.
 """

@@ -1,4 +1,7 @@
-"""Leave when asked from outside, or when the terminal is gone: the device must not run unattended."""
+"""End the application on a signal, or when its terminal has disappeared.
+
+Without a terminal, a participant can neither answer nor stop a stimulus, so that the device must not continue.
+"""
 
 import asyncio
 import os
@@ -13,13 +16,15 @@ from textual.app import App
 from study.errors import ExitCode
 
 POLL_EVERY_S = 0.5
-"""Interval at which the terminal is looked at (s)."""
+"""Interval at which the application checks whether its terminal still exists (s)."""
 LAST_RESORT_S = 10.0
-"""Longer than the engine ever takes to end. Writing to a closed terminal may block forever."""
+"""Time (s) after which the process exits without cleaning up, because writing to a closed terminal may block for ever.
+Longer than the engine takes to end."""
 
 
 def leave_with_the_terminal(app: App[Any], leave: Callable[[], None]) -> None:
-    """Call `leave` from the event loop on SIGTERM, on SIGHUP, and when the terminal vanished without a signal."""
+    """Call `leave` in the event loop on SIGTERM, on SIGHUP, and when the terminal has disappeared without a signal. If
+    the process still runs `LAST_RESORT_S` later, it exits with `ExitCode.INTERRUPTED`. Call from the event loop."""
 
     def depart() -> None:
         last_resort = threading.Timer(LAST_RESORT_S, os._exit, (ExitCode.INTERRUPTED,))
@@ -32,5 +37,5 @@ def leave_with_the_terminal(app: App[Any], leave: Callable[[], None]) -> None:
             asyncio.get_running_loop().add_signal_handler(number, depart)
     terminal = sys.__stdin__
     if not app.is_headless and terminal is not None and terminal.isatty():
-        # Without this, Textual's reading thread would spin on the end of the input for ever.
+        # At the end of its input, Textual's reading thread would otherwise loop for ever without waiting.
         app.set_interval(POLL_EVERY_S, lambda: None if os.isatty(terminal.fileno()) else depart())

@@ -1,4 +1,4 @@
-"""Dismiss a screen with its reply, exactly once."""
+"""Dismiss a screen with its reply exactly once, even if two keys that dismiss it arrive together."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import TypeVar
 from textual.screen import Screen
 
 Reply = TypeVar("Reply")
+"""Type of the value that a screen returns."""
 
 
 def dismiss_screen(screen: Screen[Reply], reply: Reply) -> None:
-    """Dismiss the screen if it is on top. Of two keys that arrive together, both are handled by the first key's
-    screen: with the second, Textual would remove the screen below, or end the program."""
+    """Dismiss the screen if it is on top; otherwise do nothing. Two keys that arrive together are both handled by the
+    same screen. If that screen were dismissed again for the second key, Textual would remove the screen below it, or
+    end the program."""
     if screen.is_active:
         screen.dismiss(reply)

@@ -1,6 +1,7 @@
-"""Requests of the screens outside a sitting. The application receives them and lets the engine do the work.
+"""Textual messages that screens outside a sitting post: requests of the user to the application.
 
-Values: none is changed after it was posted (Textual writes its own fields into a message, so they cannot be frozen).
+The application receives them and sends commands to the engine. They are not changed after they are posted, but
+cannot be frozen, because Textual stores fields of its own in a message.
 """
 
 from dataclasses import dataclass
@@ -12,45 +13,48 @@ from study.tui.engine.to_engine import Diagnose, ToEngine
 
 @dataclass(eq=False)
 class BeginWanted(Message):
-    """A new session."""
+    """Begin a new session."""
 
     subject: str
+    """Participant code."""
     protocol: str
-    """Name or path."""
+    """Name of a shipped protocol, or path of a protocol file."""
     device: str
+    """Name of the device."""
     model: str = ""
-    """File of the model that equalizes; empty where the protocol needs none."""
+    """File of the identified model that equalizes the stimuli; empty if the protocol needs none."""
 
 
 @dataclass(eq=False)
 class ResumeWanted(Message):
-    """Resume this session."""
+    """Resume a session."""
 
     path: str
-    """Path of the session's folder, here and below."""
+    """Path of the session's folder."""
 
 
 @dataclass(eq=False)
 class WatchWanted(Message):
-    """Follow it while it runs."""
+    """Show the experimenter's view of a running session."""
 
     path: str
+    """Path of the session's folder."""
 
 
 @dataclass(eq=False)
 class DiagnoseWanted(Message):
-    """Compare recordings with a model, and show how far that is."""
+    """Diagnose recordings against a model, and show the progress."""
 
     command: Diagnose
 
 
 @dataclass(eq=False)
 class CommandWanted(Message):
-    """A request that the engine takes as it is."""
+    """Any other request: a message that is passed to the engine unchanged."""
 
     command: ToEngine
 
 
 @dataclass(eq=False)
 class HomeWanted(Message):
-    """Back to the start screen, with its list read anew."""
+    """Return to the start screen, and read the list of sessions again."""

@@ -1,4 +1,7 @@
-"""Status of a session as a symbol and a word, so that neither depends on colour."""
+"""Status of a session in the list of past sessions: a symbol with a word, and a sentence.
+
+Symbol and word differ between states, so that the status can be read without seeing colour.
+"""
 
 from study.session.views.archive_views import TURNED_AWAY, SessionLine, Standing
 
@@ -11,7 +14,7 @@ SYMBOLS: dict[Standing, str] = {
     "withdrawn": "✕",
     "unreadable": "!",
 }
-"""A character for each standing."""
+"""Symbol of each status, a single character."""
 
 STYLES: dict[Standing, str] = {
     "finished": "$text-success",
@@ -22,11 +25,11 @@ STYLES: dict[Standing, str] = {
     "withdrawn": "$foreground 65%",
     "unreadable": "$text-error",
 }
-"""Style of the symbol and its word."""
+"""Style of symbol and word for each status, in Textual's notation."""
 
 
 def status_text(standing: Standing) -> str:
-    """Symbol and word."""
+    """Symbol and word of a status."""
     return f"{SYMBOLS[standing]} {standing}"
 
 

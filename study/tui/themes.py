@@ -1,6 +1,8 @@
-"""Light, dark and high contrast. Colours are those of Okabe and Ito, which stay apart for colour-blind eyes.
+"""Colour themes of the applications: dark, light and high contrast.
 
-Source: M. Okabe, K. Ito, Color Universal Design (2008), in shades that are dark or light enough on each ground.
+The hues are those of the palette of Okabe and Ito, which can be distinguished with colour vision deficiencies; where
+needed they are made darker or lighter to be legible on the background. Source: M. Okabe, K. Ito, Color Universal Design
+(2008).
 """
 
 from typing import Any
@@ -22,7 +24,7 @@ DARK = Theme(
     panel="#262C32",
     dark=True,
 )
-"""Theme of the applications at their start."""
+"""Light text on a dark background; the default theme."""
 
 LIGHT = Theme(
     name="hapteq-light",
@@ -38,6 +40,7 @@ LIGHT = Theme(
     panel="#E8E8E4",
     dark=False,
 )
+"""Dark text on a light background."""
 
 CONTRAST = Theme(
     name="hapteq-contrast",
@@ -53,15 +56,16 @@ CONTRAST = Theme(
     panel="#1A1A1A",
     dark=True,
 )
+"""High contrast: white text and bright colours on black."""
 
 THEMES = (DARK, LIGHT, CONTRAST)
 """All themes."""
 NEXT = {"hapteq-dark": "hapteq-light", "hapteq-light": "hapteq-contrast", "hapteq-contrast": "hapteq-dark"}
-"""The theme after each one, for a key that cycles through them."""
+"""Name of the theme that follows each theme, for a key that cycles through them."""
 
 
 def register_themes(app: App[Any], chosen: str = DARK.name) -> None:
-    """Make all themes known to the application, and choose one."""
+    """Register all themes with the application and select the theme named `chosen`."""
     for theme in THEMES:
         app.register_theme(theme)
     app.theme = chosen

@@ -1,4 +1,4 @@
-"""A screen in the language of the protocol: its texts, the words of its footer, and its help."""
+"""Base class of the participant's screens: texts, footer and help in the language of the protocol."""
 
 from dataclasses import replace
 from typing import ClassVar, TypeVar
@@ -12,10 +12,11 @@ Reply = TypeVar("Reply")
 
 
 class TranslatedScreen(Screen[Reply]):
-    """Bindings are written in English; what the footer shows of them is looked up, word by word."""
+    """A screen with the texts `words`. Descriptions and key names of its bindings are written in English in the code
+    and translated when the footer reads them."""
 
     PAGE: ClassVar[str] = ""
-    """Key of its help page."""
+    """Key of the screen's help page in the words."""
 
     def __init__(self, words: Words = ENGLISH_WORDS) -> None:
         super().__init__()

@@ -1,21 +1,26 @@
-"""Replies of a participant to a trial or stimulus other than an answer."""
+"""Replies of a participant to a trial other than an answer: pause, leave, repeat, no answer in time.
+
+Each makes the trial void. They are shared by the screens and by the line mode.
+"""
 
 from protocols.trial import VoidCause
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Unanswered
 
 PAUSE = Unanswered("asked for a pause", leave=False, asked=True, pause=True)
-"""The participant wants a pause: the trial is void and comes again after it."""
+"""The participant wants a pause: the trial is void and is presented again after the pause."""
 LEAVING = Unanswered("asked to leave", leave=False, asked=True, pause=True)
-"""A single key must not end a sitting: it starts a pause, in which leaving is the first choice."""
+"""The participant wants to leave. A single key must not end a sitting, so this reply starts a pause, in which leaving
+is the first choice."""
 REPEAT = Unanswered("asked to repeat", leave=False, asked=True)
-"""The participant wants to feel the trial again: it is void and comes again."""
+"""The participant wants to feel the trial again: the trial is void and is presented again."""
 TIME_OVER = Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
-"""The protocol's time limit for an answer passed."""
+"""No answer came within the protocol's time limit."""
 
 
 def repeat_words(repeats_left: int | None, words: Words = ENGLISH_WORDS) -> str:
-    """Text after a request to repeat. repeats_left: before that request."""
+    """Text after a request to repeat a trial. repeats_left: number of requests allowed before this request; None: no
+    limit."""
     if repeats_left is None:
         return words["repeat_new"]
     return words["repeat_last"] if repeats_left == 1 else words.counted("repeat", repeats_left - 1)

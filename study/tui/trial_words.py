@@ -1,4 +1,8 @@
-"""Position in a session in words, for line mode and screens: runs and counts, which do not reveal levels."""
+"""Texts for the participant, for line mode and screens, in the language of the protocol (`Words`).
+
+Heading and progress of a trial, outline of a sitting, void trials, exclusion, forms. The progress is stated in runs and
+counts, which do not reveal levels.
+"""
 
 from typing import Literal
 
@@ -10,7 +14,7 @@ from study.session.views.views import DemoMenu, Progress, Question, Task, Welcom
 
 
 def heading(question: Question, words: Words = ENGLISH_WORDS) -> str:
-    """Run and trial number."""
+    """Heading of a trial: kind and number of its run, number of the trial, and whether it is presented again."""
     place = {
         "run": words[run_key(question)],
         "number": question.run_number,
@@ -30,7 +34,7 @@ def run_key(question: Question) -> str:
 
 
 def progress_sentence(progress: Progress, words: Words = ENGLISH_WORDS) -> str:
-    """Share of the session that is done, and the minutes left where they are known."""
+    """Share of the session that is done (%), and the minutes left where they are known."""
     share, minutes = round(100 * progress.share_done), progress.minutes_left
     if minutes is None:
         return words.fill("done", {"share": share})
@@ -38,14 +42,14 @@ def progress_sentence(progress: Progress, words: Words = ENGLISH_WORDS) -> str:
 
 
 def plan(notice: Welcome, words: Words = ENGLISH_WORDS) -> str:
-    """How many runs the sitting has."""
+    """Number of runs of the sitting, and whether training is among them."""
     if not notice.runs:
         return words["plan_training"]
     return words.counted("plan_training_runs" if notice.training_runs else "plan_runs", notice.runs)
 
 
 def felt_so_far(menu: DemoMenu, vibration: int, words: Words = ENGLISH_WORDS) -> str:
-    """Which directions of a vibration were felt in the demonstration."""
+    """Which of the two directions were felt at a vibration in the demonstration. vibration: its number, from 1."""
     felt = [str(number) for number in (1, 2) if (vibration, number) in menu.felt]
     if not felt:
         return words["demo_none"]
@@ -54,7 +58,7 @@ def felt_so_far(menu: DemoMenu, vibration: int, words: Words = ENGLISH_WORDS) ->
 
 
 def void_words(reason: str, words: Words = ENGLISH_WORDS) -> str:
-    """Text for the participant after a void trial."""
+    """Text for the participant after a void trial. reason: as in the session log."""
     if computer_too_busy(reason):
         return words["void_busy"]
     if reason == SCREEN_SILENT:
@@ -65,17 +69,17 @@ def void_words(reason: str, words: Words = ENGLISH_WORDS) -> str:
 
 
 def refusal_words(outcome: Literal["refused", "excluded"], words: Words = ENGLISH_WORDS) -> tuple[str, ...]:
-    """Last words to a person who does not take part."""
+    """Last text for a person who does not take part, and a sentence on which data are kept."""
     return words[outcome], words[f"{outcome}_kept"]
 
 
 def origin(form: Form, words: Words = ENGLISH_WORDS) -> str:
-    """Version and ethics approval of a form; empty where it has neither."""
+    """Version of a form and number of its ethics approval; empty where the form states neither."""
     version = words.fill("form_version", {"version": form.version}) if form.version else ""
     ethics = words.fill("form_ethics", {"number": form.ethics_id}) if form.ethics_id else ""
     return " ".join(filter(None, (version, ethics)))
 
 
 def limits_words(limits: Limits, words: Words = ENGLISH_WORDS) -> str:
-    """The range of a number in a form."""
+    """Range of the numbers that a field of a form accepts."""
     return words.fill("form_number", {"lowest": f"{limits.lowest:g}", "highest": f"{limits.highest:g}"})

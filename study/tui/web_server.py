@@ -1,8 +1,9 @@
-"""The screen in a browser, by textual-serve: for one window at a time, and only for our own page.
+"""Web server of `hapteq serve`: the application in a browser by textual-serve, in a single window at a time.
 
-Any page in a browser can open a connection to this machine, and so can any local account: binding to localhost alone
-would let any website and user drive the device. So the address contains a random token, without which nothing is
-answered; the connection's origin is checked; and headers prevent other pages from framing it.
+The page drives a device, and a server bound to localhost can still be reached by any website that is open in a browser
+of this machine, and by any local account. So the address contains a random token, without which every request is
+refused (downloads excepted, whose random key is used once); the Origin header of the WebSocket connection is checked;
+and headers (content security policy, no framing) keep other pages away.
 """
 
 import asyncio
@@ -20,16 +21,17 @@ from rich.console import Console
 from textual_serve.server import Server
 
 RELOAD_S = 10.0
-"""Longest wait of a reloaded page for the sitting of the old one to end."""
+"""Longest time (s) for which a reloaded page waits until the application of the previous page has ended."""
 
 THIS_MACHINE = ("localhost", "127.0.0.1", "[::1]")
-"""Names of this machine in an address, each of which a browser may use for the page."""
+"""Names by which a browser may address this machine."""
 TOKEN_BYTES = 32
-"""Random bytes in the address: it cannot be guessed."""
+"""Number of random bytes of the token, too many to guess."""
 
 
 class ScreenServer(Server):
-    """Starts `command` for each visitor of the page. Closing the page ends it, as closing a terminal would."""
+    """Starts `command` for the page, at most once at a time. Closing the page ends it, as closing a terminal would.
+    host, port: where to listen; say: prints a line for the user."""
 
     def __init__(self, command: Sequence[str], host: str, port: int, say: Callable[[str], None]) -> None:
         super().__init__(
@@ -48,7 +50,7 @@ class ScreenServer(Server):
         self._being_taken: set[str] = set()
 
     def initialize_logging(self) -> None:
-        """No log of requests: it would hide important lines and show the token."""
+        """Log warnings only: a log of requests would hide important lines and show the token."""
         logging.basicConfig(level=logging.WARNING, format="%(message)s")
         logging.getLogger("aiohttp.access").disabled = True
 
@@ -57,6 +59,7 @@ class ScreenServer(Server):
         self._say("Keep this address to yourself: any browser that has it can take the study. It changes each time.")
 
     async def handle_websocket(self, request: web.Request) -> web.WebSocketResponse:
+        # A browser states the page that opens a WebSocket; other pages must not drive the device.
         if request.headers.get("Origin") not in self._origins:
             raise web.HTTPForbidden(text="Only the page of this server may drive the device.")
         try:
@@ -70,8 +73,8 @@ class ScreenServer(Server):
             self._seat.release()
 
     async def handle_download(self, request: web.Request) -> web.StreamResponse:
-        """Send the file to the first who asks: two would share its pieces between them, and neither would have the
-        whole."""
+        """Send a file to the first request only: two requests would each receive a part of its pieces. Raises
+        HTTPConflict for another method than GET, and while the file is being sent."""
         key = request.match_info["key"]
         if request.method != "GET" or key in self._being_taken:
             raise web.HTTPConflict(text="This report is sent once, and to one window.")
@@ -82,7 +85,7 @@ class ScreenServer(Server):
             self._being_taken.discard(key)
 
     async def _make_app(self) -> web.Application:
-        """Page, connection, downloads and page resources, all below the token."""
+        """The web application: page, WebSocket and resources below the path /TOKEN, downloads below /download."""
         app = web.Application(middlewares=[self._require_token])
         app.on_response_prepare.append(self._add_headers)
         app.router.add_get("/download/{key}", self.handle_download, allow_head=False)
@@ -93,8 +96,8 @@ class ScreenServer(Server):
     async def _require_token(
         self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
-        """Refuse a request without the token, also for unknown addresses, so that nothing can be distinguished without
-        it."""
+        """Refuse every request without the token in the same way (404), so that existing and unknown addresses cannot
+        be distinguished. The comparison takes constant time."""
         given = request.path.split("/")[1]
         if given == "download" and await self._is_offered(request.path.rpartition("/")[2]):
             return await handler(request)
@@ -105,8 +108,9 @@ class ScreenServer(Server):
         return await handler(request)
 
     async def _is_offered(self, key: str) -> bool:
-        """Whether a report was opened under this key, which is random, is told to our page alone, and is used once. The
-        page's script asks for it beside the token, not below it."""
+        """Whether a download is offered under this key, which is random, known to this server's page only, and used
+        once. It needs no token, because the page's script requests it at /download/KEY, outside the path of the
+        token."""
         try:
             await self.download_manager.get_download_metadata(key)
         except KeyError:
@@ -117,14 +121,15 @@ class ScreenServer(Server):
         response.headers.update(self._headers)
 
     def _safe_headers(self) -> dict[str, str]:
-        """The page's own scripts are allowed by their hashes; nothing is loaded from elsewhere, fonts included."""
+        """Security headers of each answer. The page's inline scripts are allowed by their hashes; nothing is loaded
+        from other servers, fonts included."""
         page = (self.templates_path / "app_index.html").read_text("utf-8")
         scripts = " ".join(f"'sha256-{_sha256(script)}'" for script in _inline_scripts(page))
-        own = " ".join(sorted(origin for origin in self._origins if "[" not in origin))  # a policy knows no IPv6
+        own = " ".join(sorted(origin for origin in self._origins if "[" not in origin))  # a policy holds no IPv6
         policy = (
             "default-src 'none'",
             f"script-src 'self' {own} 'unsafe-hashes' {scripts}",
-            f"style-src 'self' {own} 'unsafe-inline'",  # the terminal in the page writes styles as it goes
+            f"style-src 'self' {own} 'unsafe-inline'",  # the terminal in the page sets styles while it draws
             f"img-src 'self' {own} data:",
             f"font-src 'self' {own} data:",
             f"connect-src 'self' {own} {own.replace('http:', 'ws:')}",
@@ -142,13 +147,13 @@ class ScreenServer(Server):
 
 
 def origins(host: str, port: int) -> frozenset[str]:
-    """Origins of our page as a browser states them."""
+    """Origins (scheme, host, port) of the server's page, as a browser states them in the Origin header."""
     names = THIS_MACHINE if _url_host(host) in THIS_MACHINE else (_url_host(host),)
     return frozenset(_address(name, port) for name in names)
 
 
 def _url_host(host: str) -> str:
-    """The host as an address contains it."""
+    """The host as a URL contains it: an IPv6 address in brackets."""
     return f"[{host}]" if ":" in host else host
 
 
@@ -157,6 +162,7 @@ def _address(name: str, port: int) -> str:
 
 
 def _inline_scripts(page: str) -> Iterator[str]:
+    """Inline scripts and event handlers (on... attributes) of an HTML page, each of which needs its own hash."""
     yield from re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
     yield from dict.fromkeys(re.findall(r'\bon[a-z]+="([^"]*)"', page, re.IGNORECASE))
 

@@ -1,8 +1,8 @@
-"""Use cases: plain functions over ports, from a whole sitting to the validation of one file.
+"""Use cases of the commands and screens: functions over ports, from a whole sitting to the validation of a single file.
 
-Folders, in the order in which data pass: `checks` (is the set-up fit) -> `recording` (play and import recordings) ->
-`equalizer` (models, forces) -> `trial` (one stimulus and its answer) -> `results` (what a session log amounts to) ->
-`session` (a sitting from opening to end) -> `views` (read only) -> `diagnosis` -> `files` (what any file is). Modules
-beside the folders are used by several of them (free file names, pictures, worker processes). Begin at
-`session/conduct_session.py`, `equalizer/identify_model.py` or `diagnosis/diagnose_recordings.py`.
+Folders, in the order in which data pass: `planning` (power) -> `checks` (set-up) -> `recording` (play, import) ->
+`equalizer` (models, forces) -> `session` (a sitting) with `trial` (a stimulus and its answer) -> `results` (session
+logs to tables and analysis). `views` only reads sessions; `diagnosis` finds missing physics from recordings; `files`
+validates files. The modules at this level serve several folders. Begin at `session/conduct_session.py`,
+`equalizer/identify_model.py` or `diagnosis/diagnose_recordings.py`.
 """

@@ -1,4 +1,4 @@
-"""Device settings of a study protocol: limits, spring, recorded part of each trial."""
+"""Device settings that follow from a study protocol: force limits, centring spring, recorded part of each trial."""
 
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.device import DeviceSettings
@@ -6,7 +6,8 @@ from study.session.stimulus.limits import limits_of_study
 
 
 def device_settings(protocol: StudyProtocol, hand_on_handle: bool = True) -> DeviceSettings:
-    """The settings. hand_on_handle: whether a person holds the handle."""
+    """Settings with which a device is opened for a study. hand_on_handle: whether a person holds the handle; a
+    simulated device then carries a simulated hand."""
     return DeviceSettings(
         limits=limits_of_study(protocol),
         spring_frequency_hz=protocol.spring.natural_frequency_hz,

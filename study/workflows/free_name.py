@@ -1,4 +1,7 @@
-"""Check before any work that an output name is free and its folder exists."""
+"""Check of output names before any work: the files do not exist yet, and their folder does.
+
+Results are never overwritten; a long computation must not fail only when it writes them.
+"""
 
 from pathlib import Path
 
@@ -6,8 +9,11 @@ from study.errors import StudyError
 
 
 def require_free(out: Path, *beside: Path, title: str, kind: str, saved: str = "Nothing was written.") -> None:
-    """Raise StudyError unless `out` is free. `beside`: what else is written into the same folder. title: what fails
-    otherwise. kind: what is never overwritten, in the plural."""
+    """Raise StudyError if `out` or another path exists, or if the folder of `out` does not.
+
+    beside: further paths that will be written into the same folder. title, saved: of the error. kind: name of the files
+    that are never overwritten, in the plural, for the error.
+    """
     for path in (out, *beside):
         if path.exists():
             happened = f"{path} exists already, and {kind} are never overwritten."

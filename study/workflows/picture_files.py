@@ -1,4 +1,8 @@
-"""Figures of a report as files: SVG for editing, PNG for slides."""
+"""Figures of a report as files: SVG for editing, PNG for slides.
+
+Figures are drawn in parallel processes (`forked_map`). The same data give the same files: neither format contains a
+date or the version of Matplotlib.
+"""
 
 import io
 from collections.abc import Iterable, Sequence
@@ -17,7 +21,8 @@ FIGURE_DPI = 150
 
 
 def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
-    """Write into `folder`, which is created: SVG, and PNG where the picture asks for it. Raises CannotWriteError."""
+    """Draw the pictures and write them into `folder`, which is created if necessary: an SVG file each, and a PNG file
+    where `Picture.bitmap` is set. Existing files are replaced. Raises CannotWriteError."""
     drawn = map_forked(draw_picture, pictures)
     for picture, each in zip(pictures, drawn, strict=True):
         picture.drawn[:] = each.picture.drawn
@@ -26,26 +31,29 @@ def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnPicture:
-    """A drawn picture that can be sent from another process."""
+    """A picture as drawn in a worker process, without its Matplotlib figure, so that it can be sent between
+    processes."""
 
     picture: Picture
-    """With its SVG text; its figure is empty."""
+    """Picture with its SVG text and an empty figure."""
     png: bytes
+    """Content of the PNG file; empty if the picture is only written as SVG."""
 
 
 def draw_picture(picture: Picture) -> DrawnPicture:
-    """Draw SVG and PNG; for a worker process."""
+    """Draw a picture as SVG and, where `Picture.bitmap` is set, as PNG. Runs in a worker process."""
     svg, png = _draw_files(picture)
     picture.drawn[:] = [svg]
     return DrawnPicture(without_figure(picture), png)
 
 
 def _draw_files(picture: Picture) -> tuple[str, bytes]:
+    """Text of the SVG file and content of the PNG file; the latter is empty unless `Picture.bitmap` is set."""
     return picture_svg(picture), _png(picture) if picture.bitmap else b""
 
 
 def write_drawn(folder: Path, drawn: Iterable[DrawnPicture]) -> None:
-    """Write pictures that are drawn already, as `write_pictures`. Raises CannotWriteError."""
+    """Write pictures that are already drawn into `folder`, as `write_pictures` does. Raises CannotWriteError."""
     try:
         make_folder(folder)
     except OSError as problem:
@@ -57,6 +65,7 @@ def write_drawn(folder: Path, drawn: Iterable[DrawnPicture]) -> None:
 
 
 def _png(picture: Picture) -> bytes:
+    """Content of the PNG file at `FIGURE_DPI`."""
     drawn = io.BytesIO()
     # Without the version of matplotlib in the file, the same data give the same file.
     picture.figure.savefig(drawn, format="png", dpi=FIGURE_DPI, metadata={"Software": None})

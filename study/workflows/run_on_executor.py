@@ -1,4 +1,8 @@
-"""Pieces of work on an executor, on this computer or a cluster: each result is returned as soon as it is available."""
+"""Pieces of work on an executor (processes of this computer, or a cluster), with results in the order of finishing.
+
+The number of pieces in flight is bounded. Workers get the command line of the calling process, for the provenance of
+their results, and keep freed memory, which saves processor time.
+"""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -12,9 +16,10 @@ import numpy as np
 Key = TypeVar("Key")
 Result = TypeVar("Result")
 AHEAD = 100
-"""Largest number of pieces in flight, chosen by hand: it bounds the inputs and results in memory."""
+"""Largest number of pieces in flight, set by hand: it bounds the inputs and results in memory."""
 _FREED_BYTES = 30 * 2**20
-"""Size of the block that is allocated and freed: below the 32 MB up to which glibc raises its limit."""
+"""Size of the block that `keep_freed_memory` allocates and frees: below 32 MB, the largest size to which glibc adapts
+its thresholds."""
 
 
 def run_pieces(
@@ -23,10 +28,12 @@ def run_pieces(
     pieces: Iterable[tuple[Key, tuple[Any, ...]]],
     ahead: int = AHEAD,
 ) -> Iterator[tuple[Key, Result]]:
-    """Call `function(*arguments)` for each (key, arguments), and yield (key, result) in the order of finishing.
+    """Call `function(*arguments)` for each (key, arguments) of `pieces`, and yield (key, result) in the order of
+    finishing. Function, arguments and results are sent between processes; `pieces` is read as needed, at most `ahead`
+    in flight.
 
-    function, arguments and results are sent between processes. Exceptions of the function are raised here, after the
-    results that are there by then. An early end cancels what was not begun. pieces: taken as they are needed.
+    An exception of the function is raised here, after the results that finished at the same time. When the iteration
+    ends early, pieces that have not begun are cancelled.
     """
     waiting, running = iter(pieces), dict[Future[Result], Key]()
     try:
@@ -36,7 +43,7 @@ def run_pieces(
             if not running:
                 return
             done = wait(running, return_when=FIRST_COMPLETED).done
-            # Results first: an error ends this, and must not lose what finished beside it.
+            # Results before errors: an error ends the iteration, and results that finished with it would be lost.
             for future in sorted(done, key=lambda each: each.cancelled() or each.exception() is not None):
                 key = running.pop(future)
                 yield key, future.result()
@@ -47,15 +54,17 @@ def run_pieces(
 
 @cache
 def keep_freed_memory() -> None:
-    """Let the C library keep the memory of freed arrays. It gives back what is above a limit, page by page, and fits
-    ask for it again at once: that was a fourth of a simulated study's processor time. In glibc a freed block of up to
-    32 MB that had pages of its own raises the limit to twice its size (M_MMAP_THRESHOLD); elsewhere this does nothing.
+    """Let the C library keep the memory of freed arrays for reuse. By default it returns large blocks to the system,
+    and fits allocate them again at once, page by page: a fourth of a simulated study's processor time. In glibc,
+    freeing a separately mapped block of up to 32 MB raises M_MMAP_THRESHOLD to its size and M_TRIM_THRESHOLD to twice
+    that.
     """
     np.empty(_FREED_BYTES, np.uint8)
 
 
 def _run_in_worker(command: tuple[str, ...], function: Callable[..., Result], arguments: tuple[Any, ...]) -> Result:
-    """Runs in a worker. command: what was typed, which the provenance of results says, and not how a worker began."""
+    """Call the function in a worker process. command: command line of the calling process, which replaces the worker's
+    own in the provenance of results."""
     sys.argv = list(command)
     keep_freed_memory()
     return function(*arguments)

@@ -1,4 +1,8 @@
-"""The force balances of recordings, one per command: in the band that noise allows, and in that of the motion."""
+"""Entry of the force balance: one regression M a + B v + K x + laws = command per axis of the recordings.
+
+Each axis is first fitted in the band that noise allows (`band.py`). If no law is named there, the regression is
+repeated in the narrower band in which the device moves, and then with the samples in motion only.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -21,9 +25,9 @@ from equalizer.signals.recording import Recording
 def find_balances(
     recordings: Sequence[Recording], without: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> tuple[Balance, ...]:
-    """One force balance per command; empty where no motion was measured, or too little of it. Where no law is named in
-    the band that noise allows, the narrower band in which the device moves is tried: content of the command above it
-    hides laws."""
+    """One force balance per command; empty where no motion was measured, or too little of it. without: effects that are
+    left out. Where no law is named in the band that noise allows, the narrower band in which the device moves is tried,
+    because power of the command above that band hides laws; then the samples in motion alone."""
     try:
         records = observe_parts(recordings, len(recordings[0].response.channels))
         motions = motions_of(records)
@@ -38,7 +42,7 @@ def find_balances(
 
 
 Select = Callable[[Sequence[Observed], Sequence[Motion]], Sequence[Motion]]
-"""A further selection of band or samples; empty where it differs little from the first."""
+"""Maps records and their motions to motions with a narrower band or fewer samples; empty where little would change."""
 
 
 def look_again(
@@ -49,7 +53,7 @@ def look_again(
     time_left: TimeBudget,
     map_: Mapper,
 ) -> tuple[Balance, ...]:
-    """The balances of a selection; empty where no law is named."""
+    """The balances of the motions that `select` returns; empty where these name no law, or cannot be fitted."""
     try:
         kept = select(records, motions)
         recordings = [each.recording for each in records]
@@ -60,15 +64,15 @@ def look_again(
 
 
 def motions_in_own_band(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
-    """Filter the motions to the band in which the driven motions are; empty where that band is hardly narrower. A
-    further motion, such as the deflection of a beam, may be noise at high frequencies. Raises NoMotionError."""
+    """The motions filtered to the band of the driven motions; empty where that band is hardly narrower. A further
+    measured motion, such as the deflection of a beam, may be mere noise at high frequencies. Raises NoMotionError."""
     narrow_hz = motion_band_hz(motions, driven_motion(motions))
     return motions_of(records, narrow_hz) if narrow_hz < SECOND_BAND_NARROWER * motions[0].band_hz else ()
 
 
 def samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
-    """Masks of the samples in which the device moves; empty where it moves most of the time. At rest, friction balances
-    any force: no law predicts it, and linear terms would replace it."""
+    """The motions with masks of the samples in which the device moves; empty where it moves most of the time. At rest,
+    friction balances any applied force: no law predicts that force, and linear terms would be fitted to it."""
     moving = [_is_moving(motion, motions) for motion in motions]
     if np.mean(np.concatenate(moving)) > MOVES_MOST_OF_THE_TIME:
         return ()
@@ -79,7 +83,7 @@ def samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) ->
 
 
 def _is_moving(motion: Motion, motions: Sequence[Motion]) -> Mask:
-    """(n,): whether any channel is faster than the threshold for standstill."""
+    """(n,): whether the squared velocity of any channel exceeds `STILL_SHARE` of its mean square over all motions."""
     squares = np.concatenate([each.velocity[each.fit] ** 2 for each in motions]).mean(axis=0)
     return np.asarray((motion.velocity**2 > STILL_SHARE * squares).any(axis=1))
 
@@ -91,6 +95,7 @@ def _balances_per_axis(
     time_left: TimeBudget,
     map_: Mapper,
 ) -> tuple[Balance, ...]:
+    # With an imposed motion, the force is the response of the device, so that no actuator needs to be tested.
     turning = any(unit.startswith("rad") for unit in recordings[0].response.units)
     turning |= any(unit.startswith("N m") for unit in recordings[0].command.units)
     axes = range(len(recordings[0].command.channels))

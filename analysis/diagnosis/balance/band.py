@@ -1,4 +1,10 @@
-"""The band in which accelerations and positions can be computed from a measured motion, given its white noise."""
+"""The band in which accelerations and positions can be computed from a measured motion, given its white noise.
+
+With the power spectral density S(f) of the motion and the density N of its white noise, differentiation multiplies both
+by f^(2k), k = number of derivatives to the acceleration; double integration of an acceleration multiplies them by f^-4.
+The band ends (begins) where the noise power summed over the band is at most `ACCELERATION_NOISE_SHARE` (a hundredth) of
+the signal power. On a noisier regressor, least squares would underestimate the mass (errors in variables).
+"""
 
 from collections.abc import Sequence
 
@@ -10,15 +16,16 @@ from equalizer.signals.spectral_density import spectral_density
 
 
 def band_end_hz(samples: Sequence[FloatArray], rate_hz: float, order: int) -> float:
-    """The median over recordings and channels of the highest end that the noise allows."""
+    """Upper end of the band in Hz: median over recordings and channels, between limits set by length and sample rate.
+    samples: (n, d) each. order: time derivative of the position that was measured (0, 1 or 2)."""
     ends = [_end_hz(column, rate_hz, 2 * (2 - order)) for each in samples for column in each.T]
     longest = max(len(each) for each in samples)
     return float(np.clip(np.median(ends), BAND_NARROWEST_CYCLES * rate_hz / longest, BAND_WIDEST * rate_hz))
 
 
 def band_begin_hz(samples: Sequence[FloatArray], rate_hz: float) -> float:
-    """Beginning of the band of integrated accelerations: the median over recordings and channels of the lowest from
-    which noise makes a small share of the position's mean square."""
+    """Lower end in Hz of the band in which accelerations are integrated twice: median over recordings and channels, at
+    least two cycles per recording. samples: accelerations (n, d) each."""
     begins = []
     for column in (column for each in samples for column in each.T):
         frequency_hz, density, floor = _spectrum(column, rate_hz)
@@ -32,6 +39,7 @@ def band_begin_hz(samples: Sequence[FloatArray], rate_hz: float) -> float:
 
 
 def _end_hz(column: FloatArray, rate_hz: float, power: int) -> float:
+    """Highest frequency up to which noise is a small share of the power, both weighted by f^power, of a signal (n,)."""
     flat = column - np.linspace(column[0], column[-1], len(column))
     frequency_hz, density, floor = _spectrum(flat, rate_hz)
     signal = np.cumsum(np.maximum(density - floor, 0.0) * frequency_hz**power)
@@ -41,6 +49,6 @@ def _end_hz(column: FloatArray, rate_hz: float, power: int) -> float:
 
 
 def _spectrum(column: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, float]:
-    """Frequencies above zero, the density there, and that of white noise."""
+    """Frequencies above zero, the spectral density there, and that of white noise: the median of the upper quarter."""
     frequency_hz, density = spectral_density(column, rate_hz, 4096)
     return frequency_hz[1:], density[1:], float(np.median(density[1 + 3 * (len(density) - 1) // 4 :]))

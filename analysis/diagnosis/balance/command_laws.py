@@ -1,8 +1,9 @@
 """Static nonlinearities of an actuator, with their parameters on grids that span the amplitudes of the command.
 
-Laws of the motion are columns beside the commanded force; these change the force itself, so that they are tested in
-the balance solved for the acceleration (`inverse_balance`). All constants below are set by hand: a grid need only be so
-fine that the best of its laws is refined to the true one (`neighbours_of`).
+Laws of the motion are further columns of the regression of the commanded force. The laws in this file change that
+force itself, f = g(u), so that they are tested in the balance solved for the acceleration (`inverse_balance`). All
+constants below are set by hand: a grid need only be so fine that the best of its laws is refined to the true law
+(`neighbours_of`).
 
 Reference: Slotine and Li, Applied Nonlinear Control (1991), chapter 5 (dead zone, saturation, relay).
 """
@@ -30,8 +31,9 @@ POWERS = (0.3, 0.5, 0.7, 1.4, 2.0)
 SQUARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
 """Shares of the force at the largest command that grow with the square of the command."""
 GAPS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
-"""Smallest distance of a magnet from its armature, relative to the travel: beyond it, its force falls by less than half
-over the travel. A magnet held by a spring stays within a third of the gap, which is 2 here."""
+"""Smallest distances of a magnet from its armature, relative to the travel. Beyond the largest, the force falls by less
+than half over the travel. Against a linear spring, a magnet is stable over a third of its gap only (pull-in), where
+the smallest distance is twice the travel."""
 REFINING_FACTORS = (0.95, 0.98, 1.02, 1.05)
 """Factors on a parameter in a coordinate search."""
 REFINED_PARAMETERS = ("width", "limit", "square", "gap", "power", "rate")
@@ -49,11 +51,12 @@ class CommandLaw:
     effect: str
     """Name of the vocabulary, or a new one in the same style for physics that it lacks."""
     values: dict[str, float]
+    """Its fixed parameters by name, in SI units or relative."""
     columns: Callable[[FloatArray, dict[str, float]], FloatArray]
     """Columns (n, weights) of a command (n,): their weighted sum is the force; a single column is the force up to a
     gain."""
     factor_at: Callable[[FloatArray, dict[str, float]], FloatArray] | None = None
-    """(n,): factor of the force at each position; None = it does not depend on the position."""
+    """Maps positions (n,) and the values to the factor of the force (n,); None = it does not depend on the position."""
     flexible: bool = False
     """Whether it has more freedom than the other laws, and counts only with a clearly smaller error."""
     scale: float = 1.0
@@ -72,8 +75,8 @@ class CommandLaw:
         return columns if self.factor_at is None else columns * self.factor_at(position, self.values)[:, None]
 
     def scale_to(self, command: FloatArray, position: FloatArray) -> "CommandLaw":
-        """The law with its force as large as the command (least squares), where it has a formula: masses keep their
-        size then. command, position: (n,) each."""
+        """The law scaled so that its force fits the command (least squares), where it has a formula: a mass fitted with
+        it then keeps its size. command, position: (n,) each."""
         if self.formula is None:
             return self
         given = self.of(command, position)[:, 0]
@@ -108,9 +111,9 @@ def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
 
 
 def slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[CommandLaw]:
-    """A command followed at a limited rate, as by a positioning servo. commands: (n,) each; rates from the full stroke
-    in the longest of them to the fastest change, without rates that are hardly ever reached, and without those so low
-    that only the command's sign matters."""
+    """Slew-rate limits: the command is followed at a limited rate, as by a positioning servo. commands: (n,) each. The
+    rates range from the full stroke within the longest command to its fastest change. A rate is left out where the
+    limited output hardly ever reaches the command, so that only the sign of the command would matter."""
     fastest = max(float(np.abs(np.diff(each)).max(initial=0.0)) for each in commands) * rate_hz
     slowest = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(each) for each in commands)
     for rate in np.geomspace(slowest, fastest, RATES)[:-1] if 0 < slowest < fastest else ():
@@ -121,7 +124,7 @@ def slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[Comman
 
 
 def _compute_slewed_force(step_s: float, command: FloatArray, of: dict[str, float]) -> FloatArray:
-    # A servo stands at its first target when the recording begins.
+    # The output equals the first command when the recording begins.
     return limit_slew(command, step_s, of["rate"], float(command[0]))[:, None]
 
 
@@ -142,6 +145,7 @@ def _attraction_at(side: float, end: float, position: FloatArray, of: dict[str, 
 
 
 def _power_formula(of: dict[str, float], scale: float) -> Formula:
+    """Formula of `_power_force`: scale sgn(f) max(|f| - width, 0)^power of a command f."""
     if not of["width"]:
         return Formula(f"{scale:.6g}*sign(f)*abs(f)**p0", (of["power"],))
     return Formula(f"{scale:.6g}*sign(f)*maximum(abs(f) - p0, 0)**p1", (of["width"], of["power"]))
@@ -183,8 +187,8 @@ def _deadband_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PiecewiseCommandLaw:
-    """A sum of simple functions that approximates any law of a kind: where it is no better than the command itself,
-    none of the laws need be tried."""
+    """A sum of simple functions that approximates every law of a kind: where this sum fits no better than the command
+    itself, the laws of that kind need not be tried."""
 
     columns: Callable[[FloatArray, FloatArray], FloatArray]
     """(n, k) of command and position (n,) each; the command itself first."""
@@ -192,6 +196,7 @@ class PiecewiseCommandLaw:
     """See `inverse_balance.ForceOfCommand`."""
 
     def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
+        """(n, k): the columns at command and position (n,) each."""
         return self.columns(command, position)
 
 

@@ -1,7 +1,11 @@
 """Friction, damping, stiffness and force that depend on a recorded condition, such as a temperature or a setting.
 
-Each is linear in the condition's deviation from its mean, in units of its standard deviation. No catalogue effect
-plays them: simulations play them as formulas.
+With c the deviation of the condition from its mean, in units of its standard deviation, and q, v the motion of one
+axis, the force that resists the motion is
+
+    friction  (w1 + w2 c) tanh(v / width)      damping  w c v      stiffness  w c q      force  w c
+
+The catalogue has no such effects; simulations use the formulas of these laws.
 """
 
 import math
@@ -16,13 +20,13 @@ from equalizer.signals.signal import FloatArray
 
 
 def condition_laws(motions: Sequence[Motion], c: int, of: Scales) -> Iterator[Law]:
-    """Laws of one axis for every recorded condition. c: index of the axis, of: its ranges of motion."""
+    """Laws of one axis for every recorded condition. c: channel of the motion, of: the sizes of that motion."""
     for k, known in enumerate(motions[0].conditions):
         yield from _laws_of_condition(known, k, c, of)
 
 
 def _laws_of_condition(known: Condition, k: int, c: int, of: Scales) -> Iterator[Law]:
-    """Laws of one condition. k: its column in `Motion.condition`, c: index of the axis."""
+    """Laws of one condition. k: its column in `Motion.condition`; c and of: as in `condition_laws`."""
     sharp, spans = friction_widths(of)
     for width in sharp:
         yield Law(
@@ -68,9 +72,9 @@ def _formula(known: Condition, *factors: str) -> Callable[[dict[str, float]], Fo
 
 
 def _deviation(known: Condition) -> str:
-    """Formula of a condition's deviation from its mean, in standard deviations, with whole numbers: these are part of a
-    formula's form, and no fit changes them. The standard deviation is rounded to four digits or more, the mean to a
-    thousandth of it."""
+    """Formula of a condition's deviation from its mean, in standard deviations. Its numbers are integers, which belong
+    to the form of a formula and are not fitted. The standard deviation is rounded to about four digits, the mean to
+    the same decimal place."""
     finer = 10 ** max(0, min(3 - math.floor(math.log10(known.spread)), 15 - _digits(known.mean)))
     mean, spread = round(known.mean * finer), max(round(known.spread * finer), 1)
     scaled = known.name if finer == 1 else f"{finer}*{known.name}"

@@ -1,7 +1,7 @@
 """Dry friction and damping along one measured motion, over grids of speeds, widths and time constants.
 
-With sigma = tanh(v / width) in place of sgn v, tau = -1 to 1 over the part, and weights w, the force that resists the
-motion (equations and sources of each: the file of its name in `equalizer/effects`):
+With position q (x), velocity v, sigma = tanh(v / width) in place of sgn v, time tau = -1 to 1 over the part, and
+weights w, the force that resists the motion is (sources of each: the file of its name in `equalizer/effects`):
 
     coulomb_friction             w sigma
     stribeck_friction            w1 sigma + w2 sigma exp(-(v / v_s)^2)
@@ -35,12 +35,13 @@ from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 SHARP = RESTS
-"""Width of tanh(v / width), relative to the rms speed, unless the data show a wider one: as slow as an axis may move
-that counts as resting."""
+"""Least width of tanh(v / width), relative to the rms speed: the speed below which an axis may count as resting in a
+simulation. Larger widths are tried where the width is fitted."""
 
 
 def friction_widths(of: Scales) -> tuple[FloatArray, tuple[tuple[float, float]]]:
-    """Widths of the smoothed sign of dry friction, m/s, and bounds within which speeds of friction are refined."""
+    """Widths of the smoothed sign of dry friction in m/s (rad/s), and the bounds within which such speeds are
+    refined."""
     sharp = SHARP * of.speed
     return sharp * np.geomspace(1.0, 50.0, 7), ((0.1 * sharp, 0.5 * of.speed),)
 
@@ -49,8 +50,8 @@ def friction_laws(c: int, of: Scales) -> Iterator[Law]:
     """Coulomb, Stribeck, presliding, asymmetric, drifting and position-dependent friction along channel c, with start
     values on grids of its speed and travel."""
     sharp = SHARP * of.speed
-    # Stribeck velocities beyond these bounds, half the rms speed, stay as on their grid: there the law can hardly be
-    # distinguished from Coulomb friction with quadratic damping, and refining it gains nothing.
+    # Stribeck velocities above half the rms speed keep their grid values: the law can then hardly be distinguished from
+    # Coulomb friction with quadratic damping, and refining it gains nothing.
     widths_of_sign, spans = friction_widths(of)
     for width in widths_of_sign:
         yield Law(
@@ -136,7 +137,8 @@ def _position_dependent_values(w: FloatArray, n: Numbers, mass: float) -> dict[s
 
 
 def damping_laws(c: int, of: Scales) -> Iterator[Law]:
-    """Laws of the speed; none without a time axis, because the speed is then unknown."""
+    """Quadratic, drifting and viscoelastic damping along channel c; none without a time axis, because the speed is then
+    unknown."""
     if not np.isfinite(of.band_hz):
         return
     yield Law(

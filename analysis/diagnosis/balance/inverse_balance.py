@@ -1,8 +1,8 @@
 """The force balance solved for the acceleration: tests of laws of the actuator.
 
-The force balance M a + D v + K x + (laws of the motion) = f(u) predicts the force from the motion. A nonlinear actuator
-f(u) cannot be a column there, because the command u is on the predicted side. Solved for the acceleration,
-a = (f(u) - D v - K x - ...) / M, it can: functions of the command replace the command as a predictor.
+The force balance M a + D v + K x + (laws of the motion) = f(u) is a regression of the command u on the motion. A
+nonlinear actuator f(u) cannot be a regressor there, because u is the predicted quantity. Therefore the balance is
+solved for the acceleration, a = (f(u) - D v - K x - ...) / M: functions of the command then are regressors.
 """
 
 from collections.abc import Sequence
@@ -31,14 +31,14 @@ from equalizer.signals.signal import FloatArray
 
 
 class ForceOfCommand(Protocol):
-    """A law of the command, or a sum of functions that approximates a kind of laws."""
+    """A law of the command, or a sum of functions that approximates all laws of a kind."""
 
     @property
     def sloped(self) -> int:
-        """Number of its first columns that have their rate of change beside them, for a short lag."""
+        """Number of leading columns whose rate of change is a further regressor: to first order, a short lag."""
 
     def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
-        """(n, weights), of command and position (n,) each: the force is their weighted sum."""
+        """(n, weights): columns at command and position (n,) each, whose weighted sum is the force."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +46,7 @@ class InverseBalance:
     """A balance solved for the acceleration along its axis, or for the quantity that the command sets."""
 
     search: StructureSearch
+    """The search for laws of the motion, whose regression and base are used here."""
     map_: Mapper
     has_friction: bool
     """Whether friction is among the laws of the motion: samples at rest are then no evidence, because friction balances
@@ -62,11 +63,11 @@ class InverseBalance:
         return column if column < regression.matrices else own
 
     def total_errors(self, laws: Sequence[CommandLaw], beside: Sequence[int]) -> list[float]:
-        """Cross-validated sum of squares of each law."""
+        """Cross-validated sum of squares of each law. beside: indices of laws of the motion that are fitted with it."""
         return cast(list[float], list(self.map_(partial(self.total_error, beside=beside), laws)))
 
     def total_error(self, law: CommandLaw, beside: Sequence[int]) -> float:
-        """Cross-validated sum of squares of one law of the command, beside these laws of the motion."""
+        """Cross-validated sum of squares of one law of the command. beside: laws of the motion fitted with it."""
         return float(self.errors(law, beside, False).sum())
 
     def least_error(self, law: ForceOfCommand, beside: Sequence[int]) -> float:
@@ -77,7 +78,8 @@ class InverseBalance:
         return sum(compute_squared_error(own, weights, block.power) for own, block in zip(products, fit, strict=True))
 
     def errors(self, law: CommandLaw, laws: Sequence[int], judged: bool) -> FloatArray:
-        """(blocks,): sums of squares. judged: on the held-out blocks; else on each fold."""
+        """(blocks,): sums of squares of one law. judged: on the held-out blocks where there are any; else on each block
+        to fit, with weights fitted to the others (cross-validation)."""
         tested = judged and blocks_to_judge(self.search.regression) is self.search.regression.test
         fit, test = self._blocks(self._rows(law, laws), tested)
         columns = list(range(len(fit[0].cross)))
@@ -98,7 +100,7 @@ class InverseBalance:
         return np.array(found)
 
     def _blocks(self, rows: Sequence[FloatArray], tested: bool) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
-        """Blocks to fit and, where requested, to test by."""
+        """Blocks of the samples to fit and, if `tested`, of the held-out samples. rows: regressors per motion."""
         regression = self.search.regression
         motions, solved = regression.motions, self.solved
         aims = [columns[:, solved] for columns in regression.columns]
@@ -112,7 +114,7 @@ class InverseBalance:
         return blocks_of(rows, aims, fit, units), blocks_of(rows, aims, test, units) if tested else ()
 
     def _find_moving_samples(self) -> list[Mask]:
-        """(n,) per motion: samples that are evidence."""
+        """(n,) per motion: mask of the samples that are evidence; those at rest are not, where there is friction."""
         regression = self.search.regression
         speeds = [motion.velocity[:, regression.beside.own] for motion in regression.motions]
         used = np.concatenate([speed[motion.fit] for speed, motion in zip(speeds, regression.motions, strict=True)])
@@ -123,7 +125,7 @@ class InverseBalance:
         """Per motion the regression's columns (n, columns): the law's, their rates of change, the other axes' commands,
         and the laws of the motion."""
         regression, found = self.search.regression, []
-        # Filters of the quantity that it is solved for would reproduce it.
+        # Columns of the base that are filtered copies of the predicted quantity would reproduce it.
         filters = {self.solved, *range(regression.matrices, regression.base - 1)}
         beside = [column for column in regression.columns_of(laws) if column not in filters]
         for motion, columns in zip(regression.motions, regression.columns, strict=True):

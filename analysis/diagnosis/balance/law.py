@@ -49,13 +49,15 @@ class Law:
     numbers: Numbers
     """Values of its nonlinear parameters."""
     columns: Columns
+    """Makes the regressors (n, weights) of a motion."""
     values: Values
+    """Converts fitted weights to the parameters of the effect."""
     linear: bool = False
-    """Whether it is linear in the motion: a linear model of a higher order could replace it."""
+    """Whether it is linear in the motion, so that a linear model of a higher order could replace it."""
     bounded: tuple[tuple[float, float], ...] = ()
     """Bounds of each nonlinear parameter within which it is refined; empty: as given."""
     formula: Callable[[dict[str, float]], Formula] | None = None
-    """From its parameters to the formula that simulations use where the catalogue has no such effect."""
+    """Maps its parameters to the formula that simulations use where the catalogue has no such effect."""
 
     @property
     def key(self) -> tuple[str, int]:
@@ -65,7 +67,7 @@ class Law:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseTerms:
-    """The base of one axis's balance beyond mass, damping and stiffness."""
+    """Linear terms in the balance of one axis, in addition to mass, damping and stiffness."""
 
     own: int
     """Channel of the motion that the force drives."""
@@ -80,7 +82,7 @@ class Scales:
     """Sizes of one channel's motion on the fit samples, in m or rad and s."""
 
     speed: float
-    """rms"""
+    """rms speed"""
     travel: float
     """Peak to peak, from `low` to `high`."""
     low: float

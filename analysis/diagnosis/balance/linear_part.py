@@ -1,8 +1,8 @@
-"""The linear part of a force balance, found together with the laws: which motion a force drives, how late the force is,
-and dynamics of a higher order.
+"""The linear part of a force balance: the motion that a force drives, the delay between them, dynamics of higher order.
 
-A lag, a delay, a mode or a relaxation is not missing physics but part of a linear first model. Without it, laws are
-hidden or imitated; so the search is repeated with the linear terms found, until there are no more.
+A lag, a delay, a mode or a relaxation is not missing physics but part of a linear first model. If the balance lacks it,
+nonlinear laws are hidden, or others imitate it. Therefore the search for laws is repeated with the linear terms that it
+found as part of the base, up to `LINEAR_PART_ROUNDS` searches.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,11 +28,11 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 LATER = 2.0 ** np.arange(-5, 2)
-"""Delays that are tried, in periods of the band's end: up to two, beyond which signals repeat."""
+"""Delays that are tried, in periods of the upper end of the band: up to two, beyond which signals repeat."""
 FINER = 4
-"""Halvings of the step around the best delay."""
+"""Number of halvings of the step around the best delay."""
 LATE = ("amplifier_lag", "transport_delay")
-"""Laws that are equivalent to a delay."""
+"""Linear laws that are equivalent to a delay."""
 
 
 def search_beside_linear(
@@ -42,8 +42,8 @@ def search_beside_linear(
     without: frozenset[str],
     time_left: TimeBudget,
 ) -> StructureSearch:
-    """Search structures with `search_structures`, again beside the delay and the linear laws that the first search
-    finds."""
+    """Search for laws with `search_structures`; then again with the delay and the linear laws that this search finds as
+    part of the base. without: effects that are left out."""
     beside = BaseTerms(driven_motion(motions)[axis])
     found = search_structures(motions, axis, rotational, without, time_left, beside)
     for _ in range(LINEAR_PART_ROUNDS - 1):
@@ -58,8 +58,8 @@ def search_beside_linear(
 
 
 def driven_motion(motions: Sequence[Motion]) -> tuple[int, ...]:
-    """Per force, the channel of the motion that it drives: its own number, or, where more motions than forces were
-    measured, the one whose acceleration the regression needs most."""
+    """Per force, the channel of the motion that it drives: the channel of the same index, or, where more motions than
+    forces were measured, that whose acceleration the regression needs most (linear assignment)."""
     forces, places = motions[0].force.shape[1], len(motions[0].channels)
     if places <= forces:
         return tuple(min(axis, places - 1) for axis in range(forces))
@@ -82,8 +82,8 @@ def _error_without_each(motions: Sequence[Motion], axis: int, places: int) -> li
 
 
 def _extend_base(found: StructureSearch, beside: BaseTerms) -> BaseTerms:
-    """The base with a delay and, where the plainest structure has a linear law, with as many linear laws as
-    cross-validation supports. The delay is estimated before or after these laws, whichever gives the smaller error."""
+    """The base with a delay and, where the simplest structure has a linear law, with as many linear laws as
+    cross-validation supports. The delay is estimated before or after these laws; the smaller error decides."""
     regression, plain = found.regression, simplest_structure(found).laws
     bent = [k for k in plain if not regression.laws[k].linear]
     delay_s = 0.0 if beside.delay_s else _find_delay_s(keep_laws(regression, bent))
@@ -99,8 +99,8 @@ def _extend_base(found: StructureSearch, beside: BaseTerms) -> BaseTerms:
 def _complete_base(
     regression: Regression, beside: BaseTerms, bent: Sequence[int], delay_s: float
 ) -> tuple[BaseTerms, float]:
-    """The base with this delay and the linear laws that are then significant (or, where the delay is zero, with the
-    delay that is significant beside these), and its cross-validated error. bent: laws that are not linear."""
+    """The base with this delay and the linear laws that are significant with it, and its cross-validated error. Where
+    the delay is zero, a delay is estimated after these laws. bent: laws that are not linear."""
     held = tuple(law for law in beside.laws if not (delay_s and law.effect in LATE))
     others = [law for law in regression.laws if law.linear and not (delay_s and law.effect in LATE)]
     motions = [_delay_forces(each, delay_s) for each in regression.motions]
@@ -119,7 +119,8 @@ def _complete_base(
 
 
 def _add_linear_law(room: Regression, chosen: Structure) -> tuple[Regression, Structure] | None:
-    """One more linear law, that with the smallest error, its parameters refined; None where it is not significant."""
+    """The regression and the structure with the further linear law that gives the smallest error, its parameters
+    refined; None where that law is not significant."""
     best: Structure | None = None
     for number, law in enumerate(room.laws):
         if not law.linear or number in chosen.laws:
@@ -135,10 +136,12 @@ def _add_linear_law(room: Regression, chosen: Structure) -> tuple[Regression, St
 
 
 def _is_worth_it(plain: Structure, richer: Structure) -> bool:
+    """Whether a linear term removes `LINEAR_LAW_GAIN` of the error, and significantly."""
     return richer.error < (1 - LINEAR_LAW_GAIN) * plain.error and is_better(plain, richer)
 
 
 def _turns(regression: Regression) -> bool:
+    """Whether the base has two columns per motion, mass and damping: a shaft that turns freely has no stiffness."""
     return regression.matrices == 2 * len(regression.motions[0].channels)
 
 
@@ -162,8 +165,9 @@ def _find_delay_s(small: Regression) -> float:
 def _nearest_minimum(
     errors: Callable[[float], FloatArray], none: FloatArray, period_s: float
 ) -> tuple[float, FloatArray]:
-    """Descends from delay zero; returns zero where the minimum is beyond the range: the motion is then too uniform to
-    distinguish a delay from damping and stiffness. Negative delays are not causal and not tried."""
+    """Delay in s at the first minimum of the error from delay zero on, and the errors there. Zero where the minimum is
+    beyond the range: the motion is then too uniform to distinguish a delay from damping and stiffness. Negative delays
+    are not causal and not tried. none: errors at delay zero."""
     best_s, best = 0.0, none
     for share in LATER:
         left = errors(float(share) * period_s)
@@ -184,7 +188,7 @@ def _nearest_minimum(
 
 
 def _with_forces(regression: Regression, motions: Sequence[Motion]) -> Regression:
-    """The regression of the same columns on other forces. motions: the same but for their forces."""
+    """The regression with the same columns and other forces. motions: as in the regression, but with these forces."""
     aims = [each.decimate(each.force[:, [regression.axis]])[:, 0] for each in motions]
     fit, test = ([each.valid_samples(mask) for each, mask in zip(motions, masks, strict=True)] for masks in (
         [each.fit for each in motions], [each.test for each in motions],
@@ -198,7 +202,7 @@ def _with_forces(regression: Regression, motions: Sequence[Motion]) -> Regressio
 
 
 def _delay_forces(motion: Motion, seconds: float) -> Motion:
-    """The motion with its forces delayed."""
+    """The motion with its forces delayed: their spectra multiplied by exp(-i omega T), T = seconds."""
     if not seconds:
         return motion
     turned = filter_spectrum(motion.force, motion.rate_hz, lambda f: np.exp(-2j * np.pi * f * seconds))

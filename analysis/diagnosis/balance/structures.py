@@ -1,7 +1,7 @@
 """Sums of one to three laws that explain a force along a measured motion: a beam search over cross-validated errors.
 
 From the linear structure (mass, damping, stiffness) on, every structure in the beam is extended by each further law;
-weights are least squares, nonlinear parameters of the best are refined, and the best `STRUCTURES_BEAM` go on, while
+weights are least squares, nonlinear parameters of the best are refined, and the best `STRUCTURES_BEAM` are kept, while
 each size is significantly better than the one before (`is_better`). The error of a structure is the sum over folds of
 the squared force error with weights fitted to the other folds (`regression`). `simplest_structure` then selects, among
 all structures, the fewest parameters at about the least error.
@@ -39,7 +39,7 @@ from equalizer.signals.signal import FloatArray
 REFINED = (0.8, 0.93, 1.075, 1.25)
 """Factors on a nonlinear parameter in one pass of a coordinate search."""
 ROUNDS = 6
-"""Most passes of the search over the nonlinear parameters of a sum's laws."""
+"""Largest number of steps of the coordinate search over the nonlinear parameters of one law."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,11 +122,10 @@ def _beam(first: Regression, linear: Structure, time_left: TimeBudget) -> tuple[
 
 
 def is_better(plain: Structure, richer: Structure) -> bool:
-    """Whether more laws are significant. With errors p_i and r_i of the folds, the total must fall by
-    `FURTHER_LAW_GAIN`, and the sum of one of these must exceed its standard error `FURTHER_LAW_ERRORS` times: of
-    p_i - r_i; of log(p_i / r_i), because an end stop that is reached in one fold makes the differences unequal; of
-    p_i - r_i with the standard error of sum r / sum p, because an end stop that is reached in few folds gains nothing
-    in the others."""
+    """Whether further laws are significant. With the errors p_i and r_i of the folds, the total must fall by
+    `FURTHER_LAW_GAIN`, and any of three sums must exceed `FURTHER_LAW_ERRORS` standard errors: of p_i - r_i; of
+    log(p_i / r_i), because an end stop that is reached in one fold makes the differences unequal; of p_i - r_i with the
+    standard error of a ratio estimate, because an end stop that is reached in few folds gains nothing in others."""
     floor = 1e-12 * plain.error / len(plain.errors)
     shares = np.log(np.maximum(plain.errors, floor) / np.maximum(richer.errors, floor)) if floor > 0 else np.zeros(1)
     gains = plain.errors - richer.errors
@@ -137,7 +136,7 @@ def is_better(plain: Structure, richer: Structure) -> bool:
 
 
 def _is_significant(gains: FloatArray, residuals: FloatArray) -> bool:
-    """Whether the gains' sum is many standard errors. residuals: the gains less their expectation, if not constant."""
+    """Whether the sum of the gains exceeds `FURTHER_LAW_ERRORS` standard errors. residuals: gains less their mean."""
     standard_error = float(np.std(residuals, ddof=1) * np.sqrt(len(residuals))) if len(residuals) > 1 else np.inf
     return float(gains.sum()) > FURTHER_LAW_ERRORS * standard_error
 
@@ -177,7 +176,7 @@ def _is_physical(regression: Regression, laws: Sequence[int]) -> bool:
 
 
 def values_of(regression: Regression, laws: Sequence[int]) -> list[dict[str, float] | None]:
-    """Each law's parameters, all fitted together; None where signs are not physical."""
+    """Parameters of each law, all fitted together; None where the signs of its weights are not physical."""
     columns = regression.columns_of(laws)
     weights = regression.weights(columns)
     mass = float(weights[regression.beside.own]) if regression.mass is None else regression.mass
@@ -191,7 +190,7 @@ def values_of(regression: Regression, laws: Sequence[int]) -> list[dict[str, flo
 
 
 def _add_cogging_laws(first: Regression, scales: Sequence[Scales]) -> Regression:
-    """The regression with cogging at the pitches that the residual shows before any law, and beside the best one."""
+    """The regression with cogging at the pitches in the residual without laws, and in that with the best one."""
     first = _add_pitches(first, scales, ())
     grown = _add_law_to_each(first, [_linear_structure(first)])
     return _add_pitches(first, scales, grown[0].laws) if grown else first
@@ -251,11 +250,12 @@ def _neighbours(law: Law) -> Iterator[Law]:
 
 
 WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
-"""Laws whose only nonlinear number is the width of a smoothed sign."""
+"""Laws whose only nonlinear parameter is the width of a smoothed sign."""
 
 
 def simplest_structure(search: StructureSearch) -> Structure:
-    """The fewest parameters at about the smallest error, and further laws that explain most of the rest."""
+    """The structure with the fewest parameters at about the least error, extended by laws that explain most of the
+    remaining error."""
     allowed = search.best.error + PLAINER_LEAVES * (search.linear.error - search.best.error)
     enough = [each for each in search.ranked if each.error <= allowed]
     plain = min(
@@ -279,8 +279,8 @@ def _add_further_laws(search: StructureSearch, plain: Structure, least_error: fl
 
 
 def _extends(regression: Regression, plain: Sequence[int], richer: Sequence[int]) -> bool:
-    """Whether these laws are the given ones and more; dry friction may be replaced by one that depends on a
-    condition."""
+    """Whether `richer` contains all laws of `plain` and more; Coulomb friction may be replaced by friction that depends
+    on a condition."""
     covered, known = set(richer), {regression.laws[number].key for number in richer}
     for number in plain:
         effect, channel = regression.laws[number].key
@@ -290,8 +290,8 @@ def _extends(regression: Regression, plain: Sequence[int], richer: Sequence[int]
 
 
 def count_parameters(regression: Regression, laws: Sequence[int]) -> int:
-    """Number of parameters of these laws. The width of a friction's smoothed sign is not counted, and gravity torque
-    counts for one less, because it replaces the spring."""
+    """Number of parameters of these laws. The width of the smoothed sign of dry friction is not counted, and a gravity
+    torque counts as a parameter less, because it replaces the spring."""
     count = 0
     for number in laws:
         law, place = regression.laws[number], regression.places[number]

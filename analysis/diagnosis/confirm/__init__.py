@@ -1,7 +1,8 @@
 """Confirms laws of the force balance by simulation and held-out gain.
 
-`fitting_measures` and `force_balance_measures` select the error measures, `confirm_laws` fits the named laws by output
-error and withdraws names that this does not confirm; for a model from a file `balance_with_model` makes the balance,
-and `decide_with_model` judges its laws. All are judged by `held_out_gain`, effects of a search by `require_gain`. Begin
-at `confirm_laws.py`.
+Without a given model: `fitting_measures` and `force_balance_measures` select the error measures, `laws_for_simulation`
+converts the laws of the balance to hypotheses of a simulation, and `confirm_laws` fits them by output error and
+withdraws names that this does not confirm. With a model from a file: `balance_with_model` makes the force balance with
+that model as its base, and `decide_with_model` judges the laws. Both use the gain on held-out samples
+(`held_out_gain`); `require_gain` applies it to effects that a search named. Begin at `confirm_laws.py`.
 """

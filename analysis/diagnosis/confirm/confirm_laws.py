@@ -1,20 +1,20 @@
 """Confirms laws that a force balance named by fitting them by output error.
 
 Theory of operation. Used where the model itself was fitted to the recordings. Without a calibration the size of the
-model's errors is unknown: a residual in units of noise says nothing, and the evidence is the gain on held-out data. The
+model's errors is unknown, so that a residual in units of noise is no evidence, but the gain on held-out data is. The
 balance compares forces, where a wrong law may explain the model's own errors; a simulation compares responses.
 
 1. The named laws are added to the re-tuned model one after the other and fitted by output error, starting from the
    balance's parameters, or from the model's own where these fail (`_fit_from_starts`).
-2. With E the mean log error on held-out samples, the laws are confirmed if
+2. With E the mean over channels of the log rms error on held-out samples, the laws are confirmed if
 
        E(with laws) <= E(without) + ln(CONFIRMED_LEAVES)         (a tenth less error)
 
-   and if the motion is predicted better than by its mean (`held_out_gain`).
+   and if the model with the laws explains more than half of the held-out power (`held_out_gain.explains_half`).
 3. A law whose amplitude's 95 % interval contains zero is withdrawn, or replaced by the special case that lacks the
    undetermined parameter, and the remaining laws are fitted again (`_find_vague_law`, `_prefer_special_case`).
-4. `explained` needs noise that is known from repeats, and held-out errors of at most `HELD_OUT_ERROR`; else the verdict
-   is `partly_explained`.
+4. The verdict is `explained` only if the noise is known from repeats, the residual is as good as noise, and held-out
+   errors are at most `HELD_OUT_ERROR`; else `partly_explained`.
 
 References: Ljung, System Identification (1999), section 16.6 (validation on fresh data); Swevers and others, IEEE
 Control Systems 27(5):58 (2007) (laws by inverse dynamics, validated by simulation).
@@ -49,9 +49,10 @@ from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.signal import FloatArray
 
 VAGUE = 1.96 * INTERVAL_FACTOR
-"""Half-width of an interval in standard errors: a logarithm with a larger relative error leaves its parameter
-undetermined."""
+"""Half-width of a 95 % interval in standard errors, widened as in `identifiability`. A positive parameter is fitted as
+its logarithm: if the half-width exceeds 1, the parameter counts as undetermined."""
 _Named = list[tuple[int, JudgedLaw]]
+"""Index of the axis, and the law that was named on it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,17 +60,22 @@ class _Confirming:
     """Starting point of every fit of named laws."""
 
     whole: SearchContext
+    """Shared state of the search, with samples to fit and to choose by."""
     context: SearchContext
     """`whole`, fitted to all samples but the held-out ones."""
     balances: tuple[Balance, ...]
     repeats: bool
+    """Whether the noise is known from repeats."""
     constants: int
-    """Number of constants, which come before the laws."""
+    """Number of constant forces, which come before the laws."""
     before: FittedCandidate
+    """The model with constants only, as it was given."""
     retuned: FittedCandidate
+    """The same with its parameters fitted again."""
     confirmed: FittedCandidate
     """`retuned`, scored on the held-out samples."""
     plain: FittedCandidate
+    """The better of `before` and `confirmed` on the held-out samples."""
 
 
 def search_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> SearchResult | None:
@@ -131,6 +137,7 @@ def _prefer_special_case(begun: _Confirming, found: SearchResult, named: _Named)
 
 
 def _remove_law(named: _Named, place: int, instead: tuple[int, JudgedLaw] | None = None) -> _Named:
+    """The named laws without that at `place`, or with `instead` in its place."""
     return [*named[:place], *([] if instead is None else [instead]), *named[place + 1 :]]
 
 
@@ -140,10 +147,9 @@ def _fit_from_starts(
     without: tuple[FittedCandidate, FittedCandidate],
     named: Sequence[tuple[int, JudgedLaw]],
 ) -> tuple[list[FittedCandidate], FittedCandidate]:
-    """The fits after each law, and the last of them scored on all samples, started from the balance's linear
-    parameters, or, where these fail, from the model's own. without: the re-tuned model, and the model without new
-    physics on all samples.
-    """
+    """The fits after each law, and the last of them scored on the held-out samples too. They start from the linear
+    parameters of the balance, or, where that fit is not confirmed, from those of the model if these do better. without:
+    the re-tuned model, and the better model without laws on held-out samples."""
     retuned, plain = without
     released = parameters_beside_laws(context.tuning, balances, [law.place for _, law in named])
     steps = _steps(context, retuned, named, released)
@@ -159,7 +165,8 @@ def _fit_from_starts(
 def _steps(
     context: SearchContext, retuned: FittedCandidate, named: Sequence[tuple[int, JudgedLaw]], deviations: FloatArray
 ) -> list[FittedCandidate]:
-    """The fits with the laws added one after the other beside the constants."""
+    """The fits with the constants and the laws, added one after the other; for each constant, the re-tuned model.
+    deviations: where the model's parameters start, in standard deviations."""
     whole = retuned.fitted.hypothesis
     steps = [retuned for _ in whole.claims]
     recording = context.measure.records[0].recording
@@ -173,9 +180,10 @@ def _steps(
 
 
 def _find_vague_law(explained: Explanation, errors: FloatArray, constants: int) -> int | None:
-    """Place of a named law that may be absent: the intervals of all parameters that mean so hold it, or of all signed
-    ones that its special case lacks, or any parameter's is open where the law only refines another of its family or has
-    no name; None = there is none."""
+    """Index of a named law that may be absent; None = there is none. A law may be absent if the intervals of all
+    parameters that can make it vanish contain the vanishing value, or those of all signed parameters that its special
+    case lacks. Where the law only refines another of its family, or is outside the catalogue, one such parameter is
+    enough. errors: standard errors of the parameters; constants: number of constant forces before the laws."""
     begin, hypothesis = 0, explained.steps[-1].fitted.hypothesis
     families = [family_of(claim.effect.name) for claim in hypothesis.claims]
     for place, claim in enumerate(hypothesis.claims):
@@ -196,6 +204,7 @@ def _find_vague_law(explained: Explanation, errors: FloatArray, constants: int) 
 
 
 def _all_of_some(flags: Sequence[bool]) -> bool:
+    """Whether there are flags and all are true."""
     return bool(flags) and all(flags)
 
 
@@ -205,7 +214,8 @@ def leaves_open(result: SearchResult) -> bool:
 
 
 def open_refinements(result: SearchResult, constants: int) -> tuple[int, ...]:
-    """Places of the named laws with such a parameter that their special case lacks."""
+    """Indices of the named laws with a parameter whose interval reaches zero and which their special case lacks.
+    constants: number of constant forces before the laws."""
     hypothesis = result.found.steps[-1].fitted.hypothesis
     found, begin, left_open = [], 0, set(_open_parameters(result))
     for place, claim in enumerate(hypothesis.claims):
@@ -219,7 +229,7 @@ def open_refinements(result: SearchResult, constants: int) -> tuple[int, ...]:
 
 
 def _open_parameters(result: SearchResult) -> list[int]:
-    """Positive parameters of the laws, in their order, whose intervals reach zero."""
+    """Indices of the positive parameters, over all claims in their order, whose intervals reach zero."""
     assert result.errors is not None
     numbers = result.found.steps[-1].fitted.hypothesis.parameters
     errors = result.errors[len(result.context.tuning.names) :]
@@ -231,4 +241,5 @@ def _open_parameters(result: SearchResult) -> list[int]:
 
 
 def _is_borne_out(plain: FittedCandidate, after: FittedCandidate) -> bool:
+    """Whether the laws reduce the held-out error to `CONFIRMED_LEAVES` or less; True where nothing was held out."""
     return not np.isfinite(plain.held_out) or after.held_out <= plain.held_out + np.log(CONFIRMED_LEAVES)

@@ -3,8 +3,8 @@
 Used where residuals exceed the noise. Where repeats show that the noise is about as large as the residual, the
 likelihood decides (`verdict`). Otherwise the residual of a real device is far above its noise, and remains so even with
 a true law. An effect is then named if it removes enough of the held-out error power, with a 95 % interval by block
-bootstrap (`held_out_gain`): compared with the re-tuned model, with its best rival, and with the gain of all laws
-together. `objection` lists these conditions in their order.
+bootstrap (`held_out_gain`): compared with the model without it and with its best rival. An effect that removes less
+than half of the power must also be named by the force balance. `objection` tests these conditions in their order.
 """
 
 from collections.abc import Sequence
@@ -43,8 +43,8 @@ class ResultWithModel:
 def decide_with_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, result: SearchResult, time_left: TimeBudget
 ) -> ResultWithModel:
-    """The result after the decision, and the balances beside the model. result: of the search by simulation, sample by
-    sample, which leaves something unexplained."""
+    """The result after the decision, and the force balances with the model as their base. result: of the search by
+    simulation, with errors compared sample by sample, after which some error is unexplained."""
     known_noise = all(floor.how == "repeats" for floor in fitting.chosen.floors)
     balances = find_balances_beside_model(recordings, fitting.model, result.context.barred, time_left)
     near_noise = float(np.nanmax(result.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
@@ -68,7 +68,7 @@ def decide_with_model(
 
 
 def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
-    """Why the effects found are not named, as a sentence; empty where they are."""
+    """Reason not to name the effects that were found, as a sentence; empty where they are named."""
     context, found = result.context, result.found
     if not found.steps:
         return "it takes too little of the error to be added"
@@ -96,6 +96,7 @@ def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
 
 
 def _not_better(context: SearchContext, rival: FittedCandidate, after: FittedCandidate) -> bool:
+    """Whether the 95 % interval of the gain over the rival reaches zero, or the gain cannot be computed."""
     gain_over_rival = held_out_gain(context.whole, rival, after)
     return gain_over_rival is None or gain_over_rival.low <= 0
 
@@ -116,6 +117,7 @@ def _best_rival(context: SearchContext, result: SearchResult) -> FittedCandidate
 
 
 def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
+    """Whether the balance of the claim's axis names the effect, a law simulated as it, or a law that it rivals."""
     if claim.spread != "one" or claim.sites[0] >= len(balances):
         return False
     names = {
@@ -146,6 +148,7 @@ def _list_unconfirmed(result: SearchResult, why_not: str) -> tuple[Unconfirmed, 
 
 
 def _why_behind(gain: HeldOutGain) -> str:
+    """Reason, as a sentence, why a candidate other than the best is not named."""
     if gain.low <= 0:
         return "its gain on held-out data is not larger than what varies between stretches"
     return "another leaves less of what was fitted to"

@@ -1,8 +1,9 @@
 """Chooses the error measures in which the laws of a force balance are fitted, one after the other.
 
-A linear model that was fitted to changes has no constants: neither the command at the operating point nor the zero of a
-sensor. Without them, its simulation has an offset far larger than the errors of its dynamics; so a constant is added to
-the commands (`about_operating_point`).
+A linear model that was fitted to deviations from the mean has no constants: neither the command at the operating point
+nor the zero of a sensor. Without them, its simulation has an offset far larger than the errors of its dynamics.
+Therefore a constant is added to the commands: for positions K x = B u at rest (`about_operating_point`), for forces the
+mean error (`about_mean_force`).
 """
 
 from collections.abc import Sequence
@@ -47,8 +48,9 @@ def choose_fitting_measure(
     compared: Compared,
     about_mean: bool = False,
 ) -> FittingMeasure:
-    """The measure that the rule chooses. about_mean: the model was fitted to deviations from the mean, and a constant
-    command is added where that lowers the error."""
+    """The measure that `errors.choose_measure` selects. clean: recordings without the fault. compared: motion, force or
+    automatic. about_mean: the model was fitted to deviations from the mean, and a constant command is added where that
+    lowers the error."""
     fitting = FittingMeasure(model, measure_of(recordings, model, clean, compared))
     if not about_mean or clean:
         return fitting
@@ -71,8 +73,8 @@ def choose_fitting_measure(
 def about_mean_force(
     recordings: Sequence[Recording], model: MechanicalModel, measure: PredictedForce
 ) -> tuple[Recording, ...]:
-    """The recordings with a constant added to their commands, with which the force that the model needs is right on
-    average over the samples to fit and to choose by."""
+    """The recordings with a constant added to their commands, so that the mean error of the predicted force is zero
+    over the samples to fit and to choose by."""
     residuals = measure.residuals(model, ())
     missed = np.concatenate(
         [left[record.fit | record.choose] for left, record in zip(residuals, measure.records, strict=True)]
@@ -89,12 +91,13 @@ def _error_over_noise(model: MechanicalModel, chosen: MeasureChoice) -> float:
 
 
 LEAST_STIFFNESS_RATIO = 1e-6
-"""Least ratio of the smallest to the largest stiffness for which a position is held at all."""
+"""Least ratio of the smallest to the largest singular value of the stiffness at which a position is held. By hand."""
 
 
 def about_operating_point(recordings: Sequence[Recording], model: MechanicalModel) -> tuple[Recording, ...] | None:
-    """The recordings with a constant added to their commands, with which the model keeps the mean measured position of
-    the fit samples. None where the response is not a position, or no stiffness holds it."""
+    """The recordings with a constant added to their commands, for which the model at rest is at the mean measured
+    position: u = pinv(C K^-1 B) mean(y) - mean(command), over the samples to fit and to choose by. None where the
+    response is not a position, or no stiffness holds it."""
     if DERIVATIVE_OF_QUANTITY[model.quantity] != 0:
         return None
     size = np.linalg.svd(model.stiffness, compute_uv=False)

@@ -37,8 +37,8 @@ def list_fitting_measures(
 
     First a free simulation, or a simulation in windows, where the fitted model allows it. Then the force predicted
     along the measured motion with the linear parameters of the balances: in the band where noise is small, if that
-    holds most of the laws' power, and in the band of the balances. compared: "motion" or "force" where the user wants
-    only that compared.
+    holds most of the laws' power, and in the band of the balances. compared: "motion" or "force" restricts the measures
+    to that quantity.
     """
     if not any(balance.named for balance in balances):
         return

@@ -1,4 +1,8 @@
-"""Converts laws that a force balance named to hypotheses of a simulation, with starting parameters."""
+"""Converts laws that a force balance named to hypotheses of a simulation, with starting parameters.
+
+A law of the catalogue becomes the effect of the same name with the fitted parameters; a law outside the catalogue
+becomes a formula in the language of `equalizer.laws`. `confirm_laws` fits these hypotheses by output error.
+"""
 
 import re
 from collections.abc import Sequence
@@ -18,13 +22,15 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 _OWN = re.compile(r"\b[qvf]\b")
+"""Position, velocity and command of the own axis in a formula."""
 _PREFIX = {"q": "", "v": "v", "f": "f"}
-"""Signals of an axis in the language of laws, by their names in a balance's formula."""
+"""Prefix of an axis's name in the language of laws, by the symbol in a formula of the balance: on axis x, q becomes x,
+v becomes vx and f becomes fx."""
 
 
 def can_be_played(own: int, judged: JudgedLaw) -> bool:
-    """Whether a simulation can use the law: it has a formula, or is an effect of the catalogue on its own axis with all
-    parameters in their bounds. own: channel of the axis."""
+    """Whether a simulation can use the law: it has a formula, or is an effect of the catalogue that depends on the
+    motion of its own axis and has all parameters within their bounds. own: channel of that motion."""
     if judged.formula is not None:
         return True
     effect = EFFECTS.get(judged.law.effect)
@@ -51,6 +57,7 @@ def refit_laws(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw
 
 
 def _with_values(judged: JudgedLaw, values: dict[str, float]) -> JudgedLaw:
+    """The law with these parameters, also in its formula where there is a formula."""
     formula = judged.formula if judged.law.formula is None else judged.law.formula(values)
     return replace(judged, values=values, formula=formula)
 
@@ -58,8 +65,8 @@ def _with_values(judged: JudgedLaw, values: dict[str, float]) -> JudgedLaw:
 def find_special_case(
     balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]], refining: tuple[int, JudgedLaw]
 ) -> tuple[int, JudgedLaw] | None:
-    """The law of the same axis that another one refines, still with that one's parameters; None where the balance does
-    not hold it, or it is named."""
+    """The special case of a law on the same axis, such as Coulomb friction of Stribeck friction, with the parameters of
+    the refining law until `refit_laws`. None where the balance does not contain it, or it is named already."""
     axis, judged = refining
     effect = EFFECTS.get(judged.law.effect)
     taken = {law.law.effect for of, law in named if of == axis}
@@ -86,7 +93,7 @@ def constants_of(balances: Sequence[Balance]) -> Hypothesis:
 
 
 def hypothesis_of_judged(axis: int, judged: JudgedLaw, recording: Recording) -> Hypothesis:
-    """A named law of the balance as a hypothesis to simulate. recording: whose channels a formula's signals are."""
+    """A named law of the balance as a hypothesis to simulate. recording: has the channels that a formula refers to."""
     if judged.formula is not None:
         # Imported here: few diagnoses have such a law.
         from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
@@ -104,8 +111,9 @@ def hypothesis_of_judged(axis: int, judged: JudgedLaw, recording: Recording) -> 
 
 
 def parameters_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
-    """Deviations of mass, damping and stiffness to their values beside the laws of the only balance; zeros
-    otherwise."""
+    """Starting deviations of mass, damping and stiffness, in standard deviations: from the model's values to those that
+    the balance fits together with the laws. Zeros unless there is a single balance, without a given model, and the
+    model has one coordinate. A mass is at least a tenth of the model's; deviations are clipped to the bound of 4."""
     start = np.zeros(len(tuning.names))
     if any(balance.search.regression.prior is not None for balance in balances):
         return start
@@ -116,7 +124,7 @@ def parameters_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Se
     weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
     given = (model.mass, model.damping, model.stiffness)
     for place, (weight, matrix) in enumerate(zip(weights, given, strict=False)):
-        if tuning.deviation[place] == 0:  # it is not changed
+        if tuning.deviation[place] == 0:  # the parameter is not tuned
             continue
         if place == 0:
             weight = max(weight, matrix[0, 0] / 10)

@@ -1,8 +1,8 @@
 """Decides which effects of a search stay named where the model was fitted to the same recordings.
 
-Such a model has absorbed what it could of a missing law, and another law may stand in for the rest. So an effect must
-take a notable share of the held-out error power, as laws of a force balance must; effects of actuator and sensor become
-candidates, unless the signal itself shows them.
+The parameters of such a model have absorbed part of a missing law, and a wrong law may imitate the remainder. Therefore
+an effect must remove at least `FURTHER_LAW_OF_ALL` of the held-out error power, as the laws of a force balance must;
+effects of actuator and sensor become candidates, unless the signal itself shows them.
 """
 
 from dataclasses import replace
@@ -18,24 +18,25 @@ from analysis.diagnosis.settings import FURTHER_LAW_OF_ALL
 
 CONSTANT = "constant_force"
 CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
-"""Effects that a fitted model may hold as parameters, which are no missing physics; and the names of their values."""
+"""Effects that are constants of a fitted model and no missing physics, with the names of their parameters."""
 SHOWN_BY_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples")
-"""Effects of a sensor that can be seen in its signal alone."""
+"""Effects of a sensor that its signal shows without a model."""
 ONLY_BESIDE_CALIBRATION = (
     "the model was fitted to these recordings, and a law of the motion that the catalogue lacks may look like it; a "
     "calibrated model, or recordings of the device without the fault, would tell"
 )
-"""Why an effect of actuator or sensor is not named beside a model that was fitted to the same recordings."""
+"""Reason not to name an effect of actuator or sensor where the model was fitted to the same recordings."""
 BESIDE_DIVERGENCE = (
     "without it the model's error is larger than the signal: any effect that bounds the prediction lowers it"
 )
-"""Why an effect that the signal shows is not named where the model without it predicts nothing."""
+"""Reason not to name an effect that the signal shows, where the model without it predicts nothing."""
 
 
 def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
-    """The result with only those effects that take as much of the held-out error power as a law of a balance must: the
-    last is removed until one does. repeats: whether repeated periods show the noise; without them no verdict is
-    `explained`, because no error is known to be noise alone. Constants are parameters of the model and need no test."""
+    """The result with only those effects that remove as much of the held-out error power as a law of a balance must:
+    effects are dropped from the last on until the last one removes enough. repeats: whether repeated periods show the
+    noise; without them no verdict is `explained`, because no error is known to be noise alone. Constants are parameters
+    of the model: where all effects are constants, `explained` is kept."""
     found = result.found
     while found.steps and not _takes_enough(result.context, found):
         found = without_effect(result.context, found, len(found.steps) - 1)
@@ -47,10 +48,10 @@ def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
 
 
 def _takes_enough(context: SearchContext, found: Explanation) -> bool:
-    """Whether the last effect takes a notable share of the held-out error power beside those before it. True where
-    nothing is held out: both errors are then infinite."""
+    """Whether the last effect removes `FURTHER_LAW_OF_ALL` of the held-out error power that remains with the effects
+    before it. True where nothing is held out: both errors are then infinite."""
     before = context.with_test_score(found.steps[-2]) if len(found.steps) > 1 else found.plain
-    # Of logarithms of rms errors: half of that of the error power.
+    # `held_out` is a logarithm of rms errors, and thus half of the logarithm of the error power.
     return not found.after.held_out > before.held_out + np.log(1 - FURTHER_LAW_OF_ALL) / 2
 
 

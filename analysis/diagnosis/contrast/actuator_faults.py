@@ -2,7 +2,7 @@
 
 A recording holds the command u that was sent; a faulty actuator delivered a force g(u) instead. The faulty recording is
 explained by the intact device where u is replaced by g(u): "undoing" a fault therefore means to put the delivered force
-in the place of the command. The laws g, with `size` 1 as given and other sizes by interpolation of u and g(u):
+in the place of the command. The laws g at size 1 are as listed; other sizes s use u + s (g(u) - u):
 
     force_gain        2 u                            force_offset      u + rms(u)
     force_gain_drift  u (1 + ramp to 1 at the end)   actuator_cubic    u + u^3 / max(u)^2
@@ -36,11 +36,12 @@ from equalizer.signals.signal import FloatArray
 CommandChange = Callable[[FloatArray, float], FloatArray]
 """Maps one axis's command (n,), at a rate in Hz, to the force of the faulty actuator."""
 AROUND = (0.75, 1.35)
-"""Range of sizes in which a change that is nonlinear in its size may be scaled before it is linearised anew."""
+"""Range of sizes within which a change that is nonlinear in its size is scaled, before it is linearised about another
+size. By hand."""
 GRID = 12
-"""Number of sizes that are tried for faults which are nonlinear in their size, on a logarithmic grid."""
+"""Number of sizes on the logarithmic grid of a fault that is nonlinear in its size."""
 BEGUN = (0.0, 0.25, 0.5)
-"""Shares of a drift that had occurred before the recording began."""
+"""Shares of a drift that are assumed to have occurred before the recording began."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,7 @@ class _Axis:
     name: str
 
     def fault(self, effect: str, variants: Sequence[Variant]) -> Fault:
+        """A fault of this axis's actuator with these variants."""
         return Fault(effect, "actuator", self.name, self.number, tuple(variants))
 
     def undo_by(self, delivered: CommandChange) -> Undo:
@@ -111,6 +113,8 @@ def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
 
 
 def _gain_drift(axis: _Axis, begun: float, parameters_of: ParametersOf) -> Variant:
+    """A gain that drifts linearly. begun: share of the drift before the file began."""
+
     def ramp(part: Part, count: int) -> FloatArray:
         """(count, 1): the gain at `count` evenly spaced times of a part, as rows may be decimated."""
         gain = 1 + drift_shape(part, begun)
@@ -171,7 +175,7 @@ def delays_to_try(samples: FloatArray, rate_hz: float) -> list[float]:
     shortest, longest = 0.1 / rate_hz, LONGEST_DELAY / median_frequency_hz(samples, rate_hz)
     if longest <= shortest:
         return []
-    # So many that the ranges `AROUND` neighbouring delays overlap.
+    # So many that the ranges `AROUND` of neighbouring delays overlap.
     count = int(np.ceil(np.log(longest / shortest) / np.log(AROUND[1] / AROUND[0]))) + 1
     return [float(time_s) for time_s in np.geomspace(shortest, longest, max(count, GRID))]
 

@@ -20,7 +20,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AutoregressiveBase:
-    """One response. Rows are its second difference, then the past of all responses and commands, and 1.
+    """The model of a single response. Rows: its second difference, then the past of all responses and commands, and 1.
 
     The past of the responses is given as y(t - 1), its first difference, and second differences up to lag n - 2, which
     span the same space as y(t - 1) to y(t - n): products of smooth readings are nearly equal, so that in double
@@ -37,8 +37,8 @@ class AutoregressiveBase:
     """Number of response channels."""
 
     def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
-        """Per part (n, 1 + columns), the prediction of every decimated sample from the order on. like: not used; a
-        force balance reuses columns of it."""
+        """Per part (n, 1 + columns): predicted value and regressors of each decimated sample from index `order` on.
+        like: not used; a force balance reuses columns of it."""
         return tuple(self._rows(part) for part in parts)
 
     def command_columns(self, width: int) -> Mask:
@@ -52,7 +52,7 @@ class AutoregressiveBase:
         found = []
         for part in parts:
             known = part.known[:: self.step]
-            # A row reaches back over `order` samples; two more are a margin beside gaps and ends.
+            # A row reaches back over `order` samples; two more are a margin next to gaps and ends.
             invalid = np.convolve(~known, np.ones(self.order + 3))[: len(known)] > 0
             invalid[: self.order + 2] = True
             invalid[len(invalid) - 2 :] = True
@@ -84,8 +84,8 @@ def decimate(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:
 
 
 def likely_step(parts: Sequence[Part]) -> int:
-    """Decimation step that keeps the band of the fastest response: the part of its spectrum with the share
-    `RESPONSE_BAND_SHARE` of the power above the noise floor. That is the median power of the upper quarter of the
+    """Decimation step that keeps the band of the fastest response. This band ends where the cumulative power above the
+    noise floor reaches the share `RESPONSE_BAND_SHARE`; the floor is the median power of the upper quarter of the
     spectrum."""
     ends_hz = []
     for part in parts:

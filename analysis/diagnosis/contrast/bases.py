@@ -16,8 +16,8 @@ from equalizer.signals.signal import FloatArray
 
 
 def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tuple[list[Base], tuple[Motion, ...]]]:
-    """Force balances, one per axis, where they fit the clean side; then autoregressive models, one per response. Each
-    with the motions of both sides (the faulty one may be empty); empty where none was measured."""
+    """Force balances, one per axis, where they fit the clean set; then autoregressive models, one per response. Each
+    list comes with the motions of both sets, which are empty where no motion was measured. faulty: may be empty."""
     recording = clean[0].recording
     turning = recording.is_rotational
     motions: tuple[Motion, ...] = ()
@@ -39,7 +39,7 @@ def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tupl
 
 
 def move_alike(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
-    """Whether no response, detrended, moves more than `MOTIONS_APART` times as far on one side as on the other."""
+    """Whether the rms of each detrended response differs between the two sets by at most a factor `MOTIONS_APART`."""
     sizes = np.array(
         [np.sqrt(np.mean([_compute_detrended_mean_squares(part) for part in side], axis=0)) for side in (clean, faulty)]
     )
@@ -59,7 +59,7 @@ def compute_unexplained_share(base: Base, parts: tuple[Part, ...]) -> float:
 
 
 def compute_unexplained_share_of_rows(base: Base, parts: Sequence[FloatArray], masks: Sequence[Mask]) -> float:
-    """The same from the base's rows of each part, and which of them are valid."""
+    """As `compute_unexplained_share`, from the rows (n, 1 + columns) of each part and the masks (n,) of valid rows."""
     rows = np.vstack([part[mask] for part, mask in zip(parts, masks, strict=True)])
     signal = base.values(rows) if isinstance(base, AutoregressiveBase) else rows[:, 0]
     size = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)

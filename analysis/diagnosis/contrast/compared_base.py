@@ -3,11 +3,12 @@
 A base predicts a signal y from regressors x, y(t) = x(t)' w + e(t); a row is (y, x). The errors are correlated in time:
 one autoregressive filter A(q) for both sets, fitted to their errors (Yule-Walker), makes them white. With s the rms of
 A e of a set whose own w is fitted, the rows A (y, x) / s give sums of squares that are -2 log-likelihoods of Gaussian
-errors but for a constant (Ljung, System Identification, 2nd ed., section 7.4), and both sets count alike.
+errors up to a constant (Ljung, System Identification, 2nd ed., section 7.4), and both sets count alike.
 
 A fault is tested by undoing it in the rows of one set. Where it lies in the predicted signal itself, undoing maps y to
-g(y), and the likelihood of the y that was recorded is that of g(y) times |g'|. The errors are divided by |g'|
-therefore: otherwise a map that shrinks the signal, and with it every error, would win (`_jacobian_correction`).
+g(y), and the likelihood of the y that was recorded is that of g(y) times |g'| (change of variables). Therefore the
+errors are divided by |g'|: otherwise a map that shrinks the signal, and with it every error, would win
+(`_jacobian_correction`).
 """
 
 from collections.abc import Sequence
@@ -39,12 +40,13 @@ invalid."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordingSet:
-    """One set of recordings as rows of one base."""
+    """One set of recordings (clean or faulty) as rows of one base."""
 
     parts: tuple[Part, ...]
     rows: tuple[FloatArray, ...]
-    """Per part (kept, 1 + columns): what is predicted, then its predictors."""
+    """Per part (n, 1 + columns): the predicted signal, then its regressors."""
     masks: tuple[Mask, ...]
+    """Per part (n,): rows that are valid, and beyond the reach of gaps and ends."""
     scale: float
     """s: rms of the whitened error of a base fitted to this set alone, relative to the rms of the predicted signal."""
     white: FloatArray
@@ -61,6 +63,7 @@ class UndoneRows:
     """Rows of one set with a fault of size 1 undone."""
 
     rows: tuple[FloatArray, ...]
+    """As `RecordingSet.rows`."""
     lost: tuple[Mask, ...] | None = None
     """Rows without known values after undoing, such as readings from before the part began: they keep their values,
     because leaving them out would be a gain where a part fits worst at its ends."""
@@ -68,7 +71,7 @@ class UndoneRows:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ComparedBase:
-    """One base on the clean and on the faulty set."""
+    """One base with the rows of the clean and of the faulty set, whitened by the same filter."""
 
     base: Base
     clean: RecordingSet
@@ -79,7 +82,7 @@ class ComparedBase:
     columns: FloatArray
     """(1 + columns,): rms of each column, by which the rows are divided before products are formed."""
     gap_reach: int
-    """Rows beside a gap that are left out; see `_reach_of_gaps`."""
+    """Number of rows next to a gap that are left out; see `_reach_of_gaps`."""
 
     @property
     def row_s(self) -> float:
@@ -125,7 +128,7 @@ def _find_changed_columns(rows: Sequence[FloatArray], plain: Sequence[FloatArray
 
 
 def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> ComparedBase:
-    """Both sets as whitened and scaled rows of a base. Raises ValueError where too few rows of a set are left,
+    """Both sets as whitened and scaled rows of a base. Raises ValueError where a set has too few valid rows,
     numpy.linalg.LinAlgError where the base cannot be fitted."""
     if isinstance(base, AutoregressiveBase):
         least = (base.order + 2 * REACH) * base.step
@@ -176,7 +179,7 @@ def _residuals(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: Float
 
 
 def _white_error(white: FloatArray) -> float:
-    """Rms error of a base fitted to these whitened rows alone, over the rms of what is predicted."""
+    """Rms error of a base fitted to these whitened rows alone, over the rms of the predicted signal."""
     gram = white.T @ white / len(white)
     weights = weights_of(gram)
     return max(float(np.sqrt(max(float(weights @ gram @ weights), 0.0))), 1e-9)
@@ -250,8 +253,8 @@ def _lost_rows(compared: ComparedBase, side: RecordingSet, undone: Sequence[Part
 def _jacobian_correction(
     compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant, undone: UndoneRows
 ) -> float:
-    """Factor 1 / |g'| on the errors where undoing the fault maps the predicted signal y to g(y); see the theory above.
-    Interpolation alone lowers the errors of an autoregression by `variant.passed`, which is taken back."""
+    """Factor 1 / |g'| on the errors where undoing the fault maps the predicted signal y to g(y); see the head of this
+    file. Interpolation alone lowers the errors of an autoregression by `variant.passed`, which is corrected here."""
     factor = variant.unit
     if variant.curve is not None:
         factor *= _slope_correction(compared, side, variant.curve)
@@ -261,9 +264,9 @@ def _jacobian_correction(
 
 
 def _slope_correction(compared: ComparedBase, side: RecordingSet, curve: Curve) -> float:
-    """The factor for a curve g, whose slope scales errors and is no gain: 1 over the geometric mean of |g'|, which is
-    the Jacobian's, or 1 over the factor by which g scales the errors of the side's own base, if that is larger.
-    Otherwise a curve would win that is flat where errors are large, or steep where the sets differ least."""
+    """Factor on the errors for a curve g, whose slope would scale them: the larger of 1 over the geometric mean of |g'|
+    (the Jacobian) and 1 over the factor by which g scales the errors of the set's own base. With one of them alone, a
+    curve would win that is flat where errors are large, or steep where the sets differ least."""
     weights = weights_of(side.white.T @ side.white) * compared.columns[0] / compared.columns
     rows = np.concatenate([part[mask] for part, mask in zip(side.rows, side.masks, strict=True)])
     errors = rows @ weights

@@ -1,4 +1,8 @@
-"""Result of a comparison with reference recordings, fault by fault."""
+"""Result of a comparison with reference recordings, fault by fault: gains, excess errors, and whether the sets differ.
+
+With E the sum of squared whitened errors of one base fitted to both sets, and E0 that of separate bases, the excess is
+E / E0 - 1. It is compared with the excess between stretches of one set, in which nothing should differ.
+"""
 
 from dataclasses import dataclass
 
@@ -13,32 +17,31 @@ class JudgedFault:
 
     fault: Fault
     values: dict[str, float]
+    """Fitted parameters of the effect by name, in SI units."""
     spread: dict[str, float]
     """Standard error of each value, by leaving out sixths of either set: variation within the clean set counts as well
     as that within the faulty set."""
     errors: FloatArray
-    """(blocks,): sums of squares with it undone, of the faulty set, then of the clean one."""
+    """(blocks,): sums of squares with the fault undone, of the faulty set, then of the clean one."""
     gain: float
     """Error with the fault over the error with it undone, less 1."""
     usual: float
-    """The largest gain between stretches of one set, less the typical one."""
+    """The largest gain between stretches of one set, less `typical`."""
     typical: float
-    """Median gain between stretches of one set: the gain due to its flexibility alone."""
+    """Median gain between stretches of one set: the gain due to the flexibility of the fault alone."""
     share: float
-    """Share of the excess error that it explains: of the error of one base for both sets over that of separate
-    bases."""
+    """Share of the excess error that the fault explains; excess: see `Comparison.excess`."""
     held_out: float
     """Cross-validated sum of squares of the faulty set."""
     gain_low: float
-    """Lower confidence bound of the gain beyond the typical one, by bootstrap over blocks."""
+    """Lower confidence bound of the gain less `typical`, by bootstrap over blocks."""
     apart: float
     """The largest excess between stretches of one set, in the faulty one with the fault undone; see `Comparison`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """All tested faults with their gains, beside the errors with nothing undone and between stretches of the same
-    set."""
+    """All tested faults with their gains, the errors with nothing undone, and those between stretches of one set."""
 
     faults: tuple[JudgedFault, ...]
     """The best first."""
@@ -48,7 +51,7 @@ class Comparison:
     """Number of samples: the sum of squares with separate bases, because errors are scaled to white noise with rms
     1."""
     faulty_samples: int
-    """The same of the faulty set."""
+    """Number of samples of the faulty set."""
     held_out: float
     """Cross-validated sum of squares of the faulty set, with nothing undone."""
     faulty_share: float
@@ -56,17 +59,17 @@ class Comparison:
     usual: float
     """The largest `excess` between stretches of one set."""
     usual_clean: float
-    """The same of the clean set alone."""
+    """The largest `excess` between stretches of the clean set."""
     by_force: bool
     """Whether the bases of the device are force balances; else they are autoregressions."""
     step_s: float
-    """Time from one row to the next."""
+    """Time from one row to the next, in s."""
     complete: bool
     """Whether all faults were tested before the time ran out."""
 
     @property
     def excess(self) -> float:
-        """Sum of squares of one base for both sets over that of separate bases, less 1: 0 = the sets are alike."""
+        """Sum of squares of one base for both sets over that of separate bases, less 1; 0 = no difference."""
         return float(self.plain.sum()) / self.samples - 1
 
     @property
@@ -75,7 +78,7 @@ class Comparison:
         return self.excess > max(SETS_AS_ONE, SETS_APART * self.usual)
 
     def differ_but_for(self, fault: JudgedFault) -> bool:
-        """The same with the fault undone in the faulty set. An intermittent fault also makes its stretches differ; and
-        a fault that no base absorbs raises all errors of that set, so that it can be seen only in the lower bound of
-        its gain."""
+        """Whether the two sets differ by more than stretches of one set, with the fault undone between those of the
+        faulty set, because an intermittent fault makes these differ too. A fault that no base absorbs raises all errors
+        of the faulty set, and shows only in the lower bound of its gain; so the larger of both is compared."""
         return max(self.excess, fault.gain_low) > max(SETS_AS_ONE, SETS_APART * max(self.usual_clean, fault.apart))

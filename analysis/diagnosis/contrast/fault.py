@@ -1,4 +1,8 @@
-"""A fault as a transformation that undoes it: the recording as it would have been without a fault of a given size."""
+"""A fault as a transformation that undoes it: the recording as it would have been without a fault of a given size.
+
+Undoing a fault of size s changes the rows of a base by about s times the change for size 1 (`joint_products`), so that
+the size is found by least squares; nonlinear parameters, such as widths and delays, are fixed in each `Variant`.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -16,7 +20,7 @@ ColumnChange = Callable[[FloatArray, float, Part], FloatArray]
 ParametersOf = Callable[[FloatArray], dict[str, float]]
 """Maps sizes (sizes,) of a variant to the parameters of the effect, in SI units."""
 Curve = Callable[[FloatArray], FloatArray]
-"""Maps readings (n,) to readings, one by one: a sensor's gain, saturation or nonlinearity."""
+"""Maps readings (n,) to readings, sample by sample: a sensor's gain, saturation or nonlinearity."""
 EVERY = -1
 """Site number of a fault of all channels."""
 
@@ -31,23 +35,24 @@ class Variant:
     """Parameters of the fault from its sizes."""
     least: float = -np.inf
     most: float = np.inf
-    """Bounds of each size: about 1 where undoing is not linear in the size."""
+    """Bounds of each size: a narrow range about 1 where undoing is not linear in the size."""
     unit: float = 1.0
     """Factor by which the errors of a faulty sensor are scaled: otherwise a gain that reduces every error would win."""
     curve: Curve | None = None
-    """Where undoing is a map of single readings: its slope, which also scales the errors that were there before."""
+    """Map of single readings that undoes the fault, where there is one: its slope scales the errors, too."""
     passed: float = 1.0
-    """Factor by which interpolation alone reduces the prediction errors of all samples: see `noise_kept`."""
+    """Factor by which interpolation alone reduces the prediction errors: see `interpolation.noise_kept`."""
     column_change: ColumnChange | None = None
     """Change of the predicted command by the fault, where known. Undoing a gain or a lag in the recorded command
     instead would also reduce errors that the fault did not cause."""
     grid_error: float = 0.0
-    """Standard error of its parameter where the size is fixed: from the distance to the next variant."""
+    """Standard error of its parameter where the size is fixed: the distance to the next variant, in the parameter's
+    unit."""
     about: Callable[[float], "Variant"] | None = None
-    """The fault linearised about another size, where undoing it is not linear: that size then is its size 1."""
+    """Maps a size to the variant that is linearised about it (that size becomes 1), where undoing is not linear."""
     exact: bool = False
-    """Whether it is a fault at size 1 only: half of a delay undone is not half the delay, but the mean of two readings,
-    with less noise."""
+    """Whether only size 1 undoes the fault: undoing half of a delay gives not half the delay but the mean of two
+    readings, which has less noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,8 +62,11 @@ class Fault:
     effect: str
     """Name of the vocabulary, or a new one in the same style."""
     place: Place
+    """Component with the fault: mechanism, actuator or sensor."""
     axis: str
+    """Name of the axis or channel; empty for a fault of all channels."""
     site: int
+    """Index of the axis or channel, or `EVERY`."""
     variants: tuple[Variant, ...]
     simpler: tuple[str, ...] = ()
     """Faults that it contains as special cases."""
@@ -71,11 +79,11 @@ class ClockRate:
     """A rate at which the delay of the readings grows over the faulty set."""
 
     rate: float
-    """Relative error of the readings' clock rate: 0 is right."""
+    """Relative error of the readings' clock rate; 0 = correct."""
     step: float
     """Spacing of the rates that are tried."""
     runs_on: bool
-    """Whether its time counts from the beginning of the file, else of each part."""
+    """Whether its time is counted from the beginning of the file; else of each part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,15 +93,16 @@ class Rows:
     lag_samples: int
     """Samples of the recordings over which a lag of the responses is inverted: one row of an autoregression."""
     late_s: tuple[float, ...]
-    """See `likely_delays_s`."""
+    """Delays in s from `likely_delays.likely_delays_s`."""
     late_step_s: float
-    """Spacing of these delays."""
+    """Spacing of these delays in s."""
     clocks: tuple[ClockRate, ...]
-    """See `likely_clock_rates`."""
+    """Rates from `likely_delays.likely_clock_rates`."""
 
 
 def fix_size(variant: Variant, grid_error: float) -> Variant:
-    """The variant at size 1 only. Half of a delay of many oscillations undone is not a delay of half its length."""
+    """The variant at size 1 only, as for a delay over many oscillations, which cannot be scaled. grid_error: standard
+    error of its parameter."""
     return replace(variant, least=1.0, most=1.0, about=None, grid_error=grid_error)
 
 

@@ -1,4 +1,9 @@
-"""Interpolation between samples, and the share of white noise that it passes."""
+"""Interpolation between samples by splines, and the factor by which it reduces one-step prediction errors.
+
+By Kolmogorov's formula the one-step prediction error variance of a signal is the geometric mean of its spectrum over
+frequency, so that a filter multiplies prediction errors by the geometric mean of its gain. Delays and clock rates are
+undone by interpolation (`sensor_faults`), and their gain must not include this factor.
+"""
 
 from functools import cache
 
@@ -8,10 +13,10 @@ from scipy.interpolate import make_interp_spline
 from equalizer.signals.signal import FloatArray
 
 SMOOTH = 5
-"""Degree of the splines: of short range, whereas a phase shift of the spectrum rings from the ends; and hardly a low
-pass, unlike linear interpolation."""
+"""Degree of the splines. They act locally, whereas a phase shift of the spectrum rings at the ends of a signal, and
+attenuate high frequencies far less than linear interpolation."""
 FRACTIONS = np.linspace(0.0, 1.0, 41)
-"""Fractions of a sample at which the share is tabulated."""
+"""Fractions of a sample at which the factor is tabulated."""
 
 
 def resample(samples: FloatArray, at: FloatArray) -> FloatArray:
@@ -29,8 +34,8 @@ def shift_samples(samples: FloatArray, by: float) -> FloatArray:
 
 
 def noise_kept(at: FloatArray | float) -> float:
-    """The factor by which interpolation at times `at`, in samples, makes one-step prediction errors smaller: the
-    geometric mean of its gain over frequency (Kolmogorov's formula), and over the times."""
+    """Factor (at most about 1) by which interpolation at times `at`, in samples, multiplies one-step prediction errors:
+    the geometric mean of its gain over frequency (Kolmogorov's formula) and over the times."""
     return float(np.exp(np.mean(np.interp(np.mod(at, 1.0), FRACTIONS, _log_gains()))))
 
 

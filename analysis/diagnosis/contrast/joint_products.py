@@ -18,11 +18,11 @@ from equalizer.signals.signal import FloatArray
 
 Places = npt.NDArray[np.intp]
 RIDGE = 1e-9
-"""Ridge relative to a column's mean power."""
+"""Ridge relative to the mean power of the columns. By hand."""
 BLOWN_UP = 1e16
-"""Product of columns above which undoing a fault of a size about 1 is ill-conditioned."""
+"""Product of columns above which undoing a fault with bounded sizes counts as ill-conditioned. By hand."""
 ROUNDS = 3
-"""Gauss-Newton steps."""
+"""Largest number of Gauss-Newton steps."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,8 +37,8 @@ class Grams:
     """Number of columns without the changes."""
 
     def is_well_conditioned(self, variant: Variant) -> bool:
-        """Whether undoing the fault is well-conditioned. Sizes that may have any value are in SI units (a mass of 1 kg
-        on a device of 1 mg), so that their products may be of any magnitude."""
+        """Whether undoing the fault is well-conditioned. Unbounded sizes are in SI units (such as a mass of 1 kg on a
+        device of 1 mg), so that their products may have any magnitude and are only tested to be finite."""
         most = BLOWN_UP if np.isfinite(variant.most) else np.inf
         return bool(np.isfinite(self.blocks).all() and np.abs(self.blocks).max(initial=0.0) < most)
 
@@ -73,13 +73,13 @@ class Grams:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Blocks of a compared base: those in which a fault is undone, and those without it."""
+    """Blocks of a compared base: those in which a fault is undone, and those that are left unchanged."""
 
     with_it: Grams
     at: tuple[int, ...]
     """Indices in `with_it` of the blocks with the fault."""
     without: tuple[FloatArray, ...]
-    """Products of plain rows (width, width), one per block."""
+    """Products (width, width) of the unchanged rows, one matrix per block."""
     may_grow: float = 1.0
     """Factor by which undoing the fault may raise the sum of squares of the first blocks' own base without penalty.
     Where the clean set has larger errors than the faulty one, a faulty sensor may have hidden errors."""
@@ -91,7 +91,7 @@ class Pair:
 
     @cached_property
     def plain(self) -> FloatArray:
-        """(width, width): products of those without it."""
+        """(width, width): sum of the products of the unchanged blocks."""
         return np.asarray(sum(self.without))
 
 
@@ -100,6 +100,7 @@ class Fit:
     """Fitted sizes of a fault, and the errors of the base with the fault undone by these sizes."""
 
     sizes: FloatArray
+    """(sizes,): one per function in `Variant.undo`; empty without a fault."""
     errors: FloatArray
     """(blocks with, then without): sums of squares of whitened errors, over all compared bases."""
 
@@ -110,7 +111,8 @@ class Fit:
 
 
 def fit_sizes(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
-    """The sizes with the least error, every base fitted to both sides. variant: None = no fault."""
+    """The sizes with the least error, with every base fitted to both sets. variant: None = no fault. Raises
+    numpy.linalg.LinAlgError where the normal equations are singular."""
     if variant is None:
         return _fit_at(pairs, np.zeros(0))
     sizes = _find_starting_sizes(variant)
@@ -144,7 +146,7 @@ def _find_starting_sizes(variant: Variant) -> FloatArray:
 
 
 def weights_of(plain: FloatArray) -> FloatArray:
-    """(width,): 1, then minus the least-squares weights of the other columns: rows times it are residuals."""
+    """(width,): 1, then minus the least-squares weights of the other columns: rows times this vector are residuals."""
     gram, cross = plain[1:, 1:], plain[1:, 0]
     found = np.linalg.solve(_add_ridge(gram), cross)
     return np.concatenate([[1.0], -found])
@@ -157,6 +159,7 @@ def error_of_own_fit(gram: FloatArray) -> float:
 
 
 def _joint_products(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Products with the fault (k, k), the matrix `Grams.spread`, and (width, width) those of all rows, fault undone."""
     whole, spread = pair.whole, pair.with_it.spread(_pad_sizes(pair, sizes))
     return whole, spread, np.asarray(spread @ whole @ spread.T + pair.plain)
 
@@ -182,6 +185,7 @@ def _add_ridge(gram: FloatArray) -> FloatArray:
 
 
 def _errors(pair: Pair, sizes: FloatArray) -> FloatArray:
+    """(blocks with, then without): sums of squares, with weights fitted to all blocks with the fault undone."""
     _, spread, joined = _joint_products(pair, sizes)
     weights = weights_of(joined)
     at = spread.T @ weights

@@ -1,8 +1,8 @@
 """Delays and clock rates of the faulty set that cross-correlations of responses and commands suggest.
 
-With the weights of the clean set, errors are the sum of a part from the responses and one from the commands. Where the
-delay spans many oscillations of the signal, the error has a minimum at the true delay that is narrower than any grid.
-The cross-correlation of both parts has its peak there.
+With the weights of a base fitted to the clean set, errors are e = r - c, r from the responses and c from the commands.
+Where the delay spans many oscillations of the signal, the minimum of the error at the true delay is narrower than the
+spacing of a grid of delays. The cross-correlation of r and c has its peak there and suggests delays to try.
 """
 
 from collections.abc import Sequence
@@ -21,8 +21,8 @@ from equalizer.signals.signal import FloatArray
 
 
 def likely_delays_s(compared_bases: Sequence[ComparedBase]) -> tuple[float, ...]:
-    """Delays of the faulty responses behind the commands: per base of the device, the delay by cross-correlation, if it
-    is at least one row, and delays up to half a row away from it."""
+    """Delays in s of the faulty responses behind the commands: per base of the device, the delay by cross-correlation,
+    if it is at least one row, and delays up to half a row from it."""
     found = []
     for compared in _bases_of_device(compared_bases):
         late = _rows_late(compared)
@@ -31,8 +31,8 @@ def likely_delays_s(compared_bases: Sequence[ComparedBase]) -> tuple[float, ...]
 
 
 def likely_clock_rates(compared_bases: Sequence[ComparedBase]) -> tuple[ClockRate, ...]:
-    """Clock rates at which the delay grows over the faulty set: per base of the device, the most likely one, if it
-    amounts to at least a row at the end, and those within half a row there."""
+    """Clock rates at which the delay grows over the faulty set: per base of the device, the most likely rate, if its
+    delay at the end is at least one row, and rates whose delays differ from it by up to half a row there."""
     found = []
     for compared in _bases_of_device(compared_bases):
         for runs_on in (True, False) if any(part.start > 0 for part in compared.faulty.parts) else (True,):
@@ -52,7 +52,8 @@ def _bases_of_device(compared_bases: Sequence[ComparedBase]) -> list[ComparedBas
 
 
 def _split_errors(compared: ComparedBase, rows: FloatArray) -> FloatArray:
-    """(n, 2): whitened errors of the clean set's base, split into the contributions of responses and of commands."""
+    """(n, 2): whitened contributions r of the responses and c of the commands to the errors r - c of a part's rows,
+    with the weights of the clean set; without `REACH` rows at either end."""
     weights = weights_of(compared.clean.white.T @ compared.clean.white) / compared.columns
     pushed = np.arange(len(weights)) == 0
     if isinstance(compared.base, AutoregressiveBase):
@@ -63,7 +64,7 @@ def _split_errors(compared: ComparedBase, rows: FloatArray) -> FloatArray:
 
 
 def _rows_late(compared: ComparedBase) -> float:
-    """Rows by which the responses lag the commands in the longest part of the faulty set; 0 for less than one."""
+    """Rows by which the responses lag the commands in the longest part of the faulty set; 0 for less than one row."""
     made = _split_errors(compared, max(compared.faulty.rows, key=len))
     longest = len(made) // 4
     if longest < 1:
@@ -74,7 +75,8 @@ def _rows_late(compared: ComparedBase) -> float:
 
 def _likeliest_rate(compared: ComparedBase, runs_on: bool) -> tuple[float, float]:
     """The relative clock rate along whose delays the cross-correlations of short blocks have the largest sum (a Radon
-    transform of their peaks), and the last block's time, in rows. 0 where that is the fastest of all."""
+    transform of their peaks), and the time of the last block, in rows. The rate is 0 where the largest sum is at either
+    end of the range."""
     times, correlations = _correlate_blocks(compared, runs_on)
     if not correlations.size:
         return 0.0, 0.0
@@ -90,8 +92,8 @@ def _likeliest_rate(compared: ComparedBase, runs_on: bool) -> tuple[float, float
 
 
 def _correlate_blocks(compared: ComparedBase, runs_on: bool) -> tuple[FloatArray, FloatArray]:
-    """Times of blocks (b,) in rows, and per block the correlation coefficients at each lag (b, 2 longest + 1) of what
-    its responses make with what all commands of its part make. Empty where all parts are too short."""
+    """Times of blocks (b,) in rows, and correlation coefficients at each lag (b, 2 longest + 1) between the
+    contribution of a block's responses and that of all commands of its part. Empty where all parts are too short."""
     before = compared.base.order if isinstance(compared.base, AutoregressiveBase) else 0
     starts = [
         before + (part.start / (part.rate_hz * compared.row_s) if runs_on else 0.0) for part in compared.faulty.parts

@@ -1,4 +1,13 @@
-"""Faults of a mechanism: additional forces along the measured motion."""
+"""Faults of a mechanism: additional forces along the measured motion, each undone by subtracting it from the command.
+
+With q the position from the middle of the travel, v the speed, a the acceleration and sigma = tanh(v / width):
+
+    added_mass             m a               hardening_stiffness    k3 q^3
+    viscous_damping        d v               coulomb_friction       F sigma
+    quadratic_damping      c v |v|           asymmetric_friction    F+ max(sigma, 0) + F- min(sigma, 0)
+    added_stiffness        k q               presliding_hysteresis  F z (Dahl's law, `bristle_bend`)
+    end_stop               k max(|q| - q0, 0) sgn q                cogging   A sin(2 pi q / pitch + phase)
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -16,35 +25,44 @@ from equalizer.signals.signal import FloatArray
 Shape = Callable[[Motion], FloatArray]
 """Maps a part's motion to the force (n,) of a fault of size 1."""
 Along = Callable[[Part], Motion]
+"""Maps a part to its measured motion."""
 WIDER = (1.0, 3.0, 8.0, 20.0)
 """Widths of the smoothed sign of dry friction, relative to the narrowest."""
 GIVES = tuple(np.geomspace(0.003, 0.3, 7).tolist())
-"""Presliding distances, over the travel."""
+"""Presliding distances, relative to the travel."""
 RIPPLES = tuple(np.arange(2.0, 40.0, 0.35).tolist())
-"""Numbers of periods of a cogging force within the travel: neighbours cannot be distinguished."""
+"""Numbers of periods of a cogging force within the travel, so close that neighbours cannot be distinguished."""
 STOPS = tuple(np.arange(0.05, 0.5, 0.05).tolist())
-"""Distances of an end stop from the middle of the travel, over the travel."""
+"""Distances of an end stop from the middle of the travel, relative to the travel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Axis:
+    """A driven axis with the range of its measured motion, in m or rad and s."""
+
     number: int
     name: str
     along: Along
-    """A part's motion as it was measured."""
     channel: int
     """Channel of the motion."""
     middle: float
+    """Middle of the travel."""
     width: float
+    """Travel, from end to end."""
     sharp: float
+    """Least width of the smoothed sign, a speed."""
 
     def fault(self, effect: str, variants: Sequence[Variant], simpler: tuple[str, ...] = ()) -> Fault:
+        """A fault of the mechanism on this axis. simpler: faults that it contains as special cases."""
         return Fault(effect, "mechanism", self.name, self.number, tuple(variants), simpler)
 
     def plain(self, effect: str, shape: Shape, number: str, least: float = 0.0) -> Fault:
+        """A fault with a single parameter, the factor of `shape`. number: its name, least: its lower bound."""
         return self.fault(effect, [Variant((self.of(shape),), proportional_parameter(number), least=least)])
 
     def of(self, shape: Shape) -> Undo:
+        """The function that subtracts the force from the command of this axis."""
+
         def undo(part: Part) -> Part:
             command = part.command.copy()
             command[:, self.number] -= shape(self.along(part))
@@ -57,13 +75,15 @@ class _Axis:
         return np.asarray(motion.position[:, self.channel] - self.middle)
 
     def v(self, motion: Motion) -> FloatArray:
+        """(n,): velocity."""
         return motion.velocity[:, self.channel]
 
 
 def mechanism_faults(
     number: int, name: str, motions: Sequence[Motion], along: Along, rotational: bool
 ) -> Iterator[Fault]:
-    """All faults of the mechanism along axis `number`. motions: of all compared parts, whose range the grids span."""
+    """All faults of the mechanism along axis `number`. motions: of all compared parts, whose range the grids span.
+    along: makes the motion of a part. rotational: whether the axis turns; pitches of cogging are then within a turn."""
     channel = min(number, len(motions[0].channels) - 1)
     position = np.concatenate([motion.position[:, channel] for motion in motions])
     velocity = np.concatenate([motion.velocity[:, channel] for motion in motions])
@@ -109,14 +129,14 @@ def _make_cogging_variant(axis: _Axis, pitch: float) -> Variant:
         axis.of(lambda m: np.sin(2 * np.pi * m.position[:, axis.channel] / pitch)),
         axis.of(lambda m: np.cos(2 * np.pi * m.position[:, axis.channel] / pitch)),
     )
-    # Opposite signs: the catalogue's force acts along the motion, this one is what the motion needs.
+    # Opposite signs: the force in the catalogue acts on the moving mass, and the command must balance it.
     return Variant(undo, lambda s: {
         "amplitude": float(np.hypot(*s)), "pitch": pitch, "phase": float(np.arctan2(-s[1], -s[0])),
     })  # fmt: skip
 
 
 def _stops(axis: _Axis, reach: float) -> Iterator[Variant]:
-    """End stops at both ends, and at either."""
+    """End stops at both ends of the travel, and at each end alone. reach: distance from its middle, m or rad."""
     both = axis.of(lambda m: np.sign(axis.q(m)) * np.maximum(np.abs(axis.q(m)) - reach, 0.0))
     yield Variant((both,), _stop_parameters(axis.middle + reach, 1.0), least=0.0)
     for side in (1.0, -1.0):
@@ -129,5 +149,6 @@ def _stop(axis: _Axis, side: float, reach: float) -> Variant:
 
 
 def _stop_parameters(position: float, side: float) -> ParametersOf:
+    """Parameters of an end stop; the side (1 or -1) is given only where the sign of the position does not imply it."""
     beyond = {} if side * position > 0 else {"side": side}
     return lambda s: {"position": position, "stiffness": float(s[0]), **beyond}

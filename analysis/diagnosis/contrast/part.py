@@ -1,4 +1,4 @@
-"""Parts of recordings without gaps, as arrays in which a fault can be undone."""
+"""Parts of recordings without long gaps, as arrays in which a fault can be undone by replacing samples (`fault`)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,29 +21,30 @@ class Part:
     recording: Recording
     """The part as recorded, for its rate, hold and names."""
     command: FloatArray
-    """(n, m)"""
+    """(n, m): commands, in SI units."""
     response: FloatArray
-    """(n, p)"""
+    """(n, p): responses, in SI units."""
     position: FloatArray | None
-    """(n, d)"""
+    """(n, d): measured positions; None where there are none."""
     known: Mask
-    """(n,)"""
+    """(n,): samples of response and position that were recorded, not interpolated."""
     start: int
-    """Index of the part's first sample in its file: drifts and clocks also run between the parts."""
+    """Index of the part's first sample in its file, because drifts and clocks also run between the parts."""
     whole: int
-    """Samples of the file."""
+    """Number of samples of the file."""
 
     @property
     def elapsed_share(self) -> FloatArray:
-        """(n,): share of the file's time that has passed."""
+        """(n,): elapsed share of the file's duration, 0 to 1."""
         return np.linspace(self.start, self.start + len(self.known) - 1, len(self.known)) / max(self.whole - 1, 1)
 
     @property
     def rate_hz(self) -> float:
+        """Sample rate in Hz."""
         return self.recording.sample_rate_hz
 
     def to_observed(self) -> Observed:
-        """The part as the force balance reads it, with all samples to fit."""
+        """The part in the form that the force balance reads; all known samples are to fit, none are held out."""
         recording = replace(
             self.recording,
             command=replace(self.recording.command, samples=self.command),
@@ -55,7 +56,8 @@ class Part:
 
 
 def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
-    """The parts of recordings, each from its first known response to its last; short ones are left out."""
+    """The parts of recordings, each from its first to its last known sample. Only the last `PART_MOST_SAMPLES` samples
+    of a recording are used, and parts shorter than `PART_LEAST_SAMPLES` are left out."""
     found: list[Part] = []
     for recording in recordings:
         for start, stop in parts_of(recording):

@@ -1,4 +1,14 @@
-"""Faults of a sensor, each as the transformation of the readings that undoes it."""
+"""Faults of a sensor, each as the transformation of its readings y that undoes it, given for size 1.
+
+    sensor_gain    y / gain                  sensor_nonlinearity     x with y = x + c x^3
+    sensor_offset  y - shift                 sensor_asymmetry        x with y = x + c x^2
+    sensor_drift   y - total ramp            sensor_play             y +- up to half the gap (`_undo_play`)
+    logger_offset  y(t + T)                  cross_axis_sensitivity  y - another channel's reading
+    clock_drift    y(t / (1 + rate error))   sensor_misalignment     y + R y, R skew-symmetric (three axes)
+    sensor_lag     (y(t) - k y(t - Dt)) / (1 - k), k = exp(-Dt / T)
+
+T: delay or time constant in s; Dt: time from one row of the base to the next; ramp: `actuator_faults.drift_shape`.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -36,32 +46,40 @@ Read = Callable[[FloatArray, float], FloatArray]
 WIDELY = (0.5, 1.6)
 """Range of sizes, as `AROUND`, for faults that act nearly in proportion to their size."""
 GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 1.4, 1.6, 2.0, 2.6)
-"""Gains that are tried first; between neighbours a fit interpolates."""
+"""Gains about which the fault is linearised; the fit of its size covers the gains between neighbours."""
 SHIFTS = (0.03, 0.1, 0.3, 0.7, 1.2)
-"""Offsets and drifts, over the channel's rms."""
+"""Offsets and drifts that are tried, relative to the standard deviation of the channel."""
 BENT = (0.02, 0.06, 0.15, 0.3)
 """Nonlinearity errors at the largest reading, as a share of it."""
 PLAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
-"""Gaps before the sensor, over the channel's rms."""
+"""Gaps of a backlash before the sensor, relative to the standard deviation of the channel."""
 LATE = (*np.geomspace(0.004, 0.2, GRID // 2).tolist(), *np.arange(0.35, 2.0, 0.15).tolist())
-"""Largest delays of a clock at the end of the file, in periods: after the first ones, closer than half a period."""
+"""Delays of a clock at the end of the file that are tried, in periods of the median frequency: first a logarithmic
+grid, then steps of less than half a period."""
 IN_UNITS = ("sensor_offset", "sensor_drift")
 """Faults that channels can share only if they have the same unit."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Channel:
+    """The response channels with a fault, and the size of their readings."""
+
     numbers: tuple[int, ...]
-    """Channels with the fault: one, or all."""
+    """Indices of the channels: a single one, or all."""
     name: str
+    """Name of the channel; empty for all."""
     rms: float
+    """Standard deviation of the readings, of the largest channel."""
     top: float
+    """Largest magnitude of the readings."""
 
     def fault(self, effect: str, variants: Sequence[Variant], simpler: tuple[str, ...] = ()) -> Fault:
         site = self.numbers[0] if self.name else EVERY
         return Fault(effect, "sensor", self.name, site, tuple(variants), simpler)
 
     def of(self, read: Read) -> Undo:
+        """The function that applies `read` to these channels of a part."""
+
         def undo(part: Part) -> Part:
             response = part.response.copy()
             for number in self.numbers:
@@ -72,7 +90,8 @@ class _Channel:
 
 
 def sensor_faults(number: int, name: str, parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
-    """All faults of response channel `number`. parts: all compared ones, whose range the grids span."""
+    """All faults of response channel `number`. parts: all compared ones, whose range the grids span. rows: spacing of
+    the base's rows, and likely delays and clock rates."""
     whole = np.concatenate([part.response[:, number] for part in parts])
     channel = _Channel((number,), name, float(np.std(whole)) or 1.0, float(np.abs(whole).max(initial=0.0)) or 1.0)
     longest = max(parts, key=lambda part: len(part.response))
@@ -101,7 +120,7 @@ def faults_of_all(parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
 
 
 def _common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray, rows: Rows) -> Iterator[Fault]:
-    """Faults that one channel may have, or all. samples: (n,) of the longest part."""
+    """Faults that a single channel or all channels together may have. samples: (n,), readings of the longest part."""
     longest = max(parts, key=lambda part: len(part.response))
     times = delays_to_try(samples, longest.rate_hz)
     yield channel.fault("sensor_gain", [_gain(channel, gain) for gain in GAINS])
@@ -128,8 +147,9 @@ def _backlash(channel: _Channel, gap: float) -> Variant:
 
 
 def _undo_play(y: FloatArray, gap: float) -> FloatArray:
-    """(n,): the motion that drives a reading through a backlash, half the gap ahead of it. It reverses at the reading's
-    extreme, and has crossed the gap where the reading reverses."""
+    """(n,): the motion that drives a reading y (n,) through a backlash: it leads the reading by half the gap, reverses
+    at an extreme of the reading, and has crossed the gap when the reading reverses. In between, the lead changes with
+    the square of time."""
     side = np.sign(bristle_bend(y, REVERSAL_OF_GAP * gap))
     ahead = 0.5 * side
     turns = np.flatnonzero(side[1:] * side[:-1] < 0) + 1
@@ -187,8 +207,8 @@ def _logger_offset(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
 
 def _lag(channel: _Channel, time_s: float, rate_hz: float, samples: int) -> Variant:
     """A first-order low pass, y += (1 - kept) (x - y) per `samples`, inverted exactly. An autoregression predicts a row
-    from rows alone, so that samples between them, which come later, may not enter here either. Its one-step error
-    shrinks by the geometric mean of the low pass's gain (Kolmogorov's formula), which is 1 - kept."""
+    from earlier rows alone, so that samples between rows must not enter here either. The low pass reduces one-step
+    prediction errors by the geometric mean of its gain, 1 - kept (Kolmogorov's formula)."""
     kept = float(np.exp(-samples / (time_s * rate_hz)))
     undo = channel.of(lambda y, rate: (y - kept * np.concatenate([y[:1]] * samples + [y])[: len(y)]) / (1 - kept))
     parameters_of: ParametersOf = lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}  # noqa: E731
@@ -205,7 +225,8 @@ def _nonlinearity(channel: _Channel, share: float, power: int, number: str) -> V
 
 
 def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
-    """Solves y = x + share x^power for x by Newton's method."""
+    """(n,): x that solves y = x + share x^power, by 20 steps of Newton's method; clipped to -3 to 3. y: readings over
+    the largest."""
     x = y.copy()
     for _ in range(20):
         slope = 1 + power * share * x ** (power - 1)
@@ -214,8 +235,8 @@ def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
 
 
 def _clock_drift(channel: _Channel, late: float, runs_on: bool, parts: Sequence[Part]) -> Variant:
-    """Readings taken at t (1 + late), resampled to t. runs_on: t counts from the begin of the file, else of each
-    part."""
+    """Readings taken at t (1 + late), resampled to t. runs_on: t counts from the beginning of the file, else of
+    each part."""
 
     def read_times(part: Part) -> FloatArray:
         before = part.start if runs_on else 0
@@ -236,10 +257,11 @@ ROTATIONS = (
     ((0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
 )
+"""Generators of rotations about the three axes: undoing a small turn s (rad) adds s times generator times readings."""
 
 
 def sensor_misalignment() -> Fault:
-    """A rotation of a three-axis sensor by small angles."""
+    """A rotation of a three-axis sensor by small angles, to first order. Its three sizes are angles in rad."""
 
     def of(turn: FloatArray) -> Undo:
         return lambda part: replace(part, response=part.response + part.response @ turn.T)

@@ -27,15 +27,16 @@ class SignalFault:
     """A fault of responses or of commands that needs no model."""
 
     effect: str
+    """Name of the vocabulary."""
     place: Place
     channels: tuple[int, ...]
     values: dict[str, float]
-    """Parameters of the largest channel."""
+    """Parameters of the channel with the largest fault, in SI units."""
 
 
 def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
-    """Mains hum that is in the faulty parts alone, with the amplitude and frequency of its strongest channel; None
-    without."""
+    """Mains hum that is in the faulty parts alone, with the amplitude and frequency (Hz) of its strongest channel; None
+    where there is none."""
     found = [
         (*mains_line, channel)
         for channel in range(faulty[0].response.shape[1])
@@ -49,7 +50,8 @@ def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | Non
 
 
 def find_sensor_noise(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
-    """Added white noise: the same power in the highest eighth of the spectrum as in the eighth above its middle."""
+    """Added white noise, which has about the same power in the highest eighth of the spectrum as in the eighth above
+    its middle; None where there is none."""
     found: list[tuple[float, int]] = []
     for channel in range(faulty[0].response.shape[1]):
         here, usual = (
@@ -70,8 +72,8 @@ def find_sensor_noise(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
 
 
 def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
-    """A command whose values lie on a coarser lattice than the clean one's. Clean commands of few values, such as
-    steps, are not used."""
+    """A command whose values are multiples of a coarser step than those of the clean command; None where there is none.
+    Clean commands with few different values, such as steps, are not used."""
     for channel in range(faulty[0].command.shape[1]):
         here, usual = (np.concatenate([part.command[:, channel] for part in parts]) for parts in (faulty, clean))
         step = lattice_step(here)
@@ -82,6 +84,7 @@ def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
 
 
 def _stretches(part: Part) -> list[slice]:
+    """About `NOISE_STRETCHES` stretches of at least 64 samples, without those with missing samples."""
     count = max(len(part.response) // NOISE_STRETCHES, 64)
     starts = range(0, len(part.response) - count + 1, count)
     return [slice(start, start + count) for start in starts if part.known[start : start + count].all()]
@@ -100,7 +103,8 @@ def _noise_floors(samples: FloatArray, stretch: slice) -> tuple[float, float]:
 
 
 def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int) -> tuple[float, float] | None:
-    """Amplitude and frequency (Hz) of the largest mains line; None where none stands out."""
+    """Amplitude and frequency (Hz) of the largest mains line of a response; None where no line exceeds the spectrum
+    around it, or the clean recordings or the commands have it as well."""
     longest = max(faulty, key=lambda part: len(part.response))
     best: tuple[float, float] | None = None
     for mains in MAINS_HZ:
@@ -119,7 +123,7 @@ def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int
 
 
 def _line_power_ratio(samples: FloatArray, rate_hz: float, mains: float) -> tuple[float, float, float]:
-    """Power of the largest line near `mains` over the median around it, its amplitude and its frequency (Hz)."""
+    """Power of the largest line near `mains` (Hz) over the median around it, its amplitude and its frequency (Hz)."""
     window = np.hanning(len(samples))
     moved = samples - np.linspace(samples[0], samples[-1], len(samples))
     power = np.abs(np.fft.rfft((moved - moved.mean()) * window)) ** 2

@@ -1,4 +1,8 @@
-"""Whether the commands depend on the responses: a controller, a virtual spring."""
+"""Tests whether a recording was made in closed loop: commands depend on the responses (controller, virtual spring).
+
+Where the excitation was recorded, its difference from the command shows the feedback. Otherwise the test is that of
+Granger (1969): whether past responses improve the prediction of the command from its own past.
+"""
 
 import numpy as np
 
@@ -7,14 +11,14 @@ from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray
 
 PAST = 6
-"""Number of past samples of each signal from which the command is predicted (Granger causality)."""
+"""Number of past samples of each signal from which the command is predicted. By hand."""
 _LEAST = 200
 """Fewest known samples for the test."""
 
 
 def is_in_closed_loop(recording: Recording) -> bool:
-    """Whether the recording was made under feedback: by the excitation recorded beside the command, else by whether the
-    responses up to each sample help predict the command that is written just after (Granger 1969)."""
+    """Whether the recording was made under feedback: by the difference of command and recorded excitation, else by
+    whether the responses up to each sample help to predict the command that is written just after (Granger 1969)."""
     command = recording.command.samples
     if recording.excitation is not None:
         by_feedback = command - recording.excitation.samples
@@ -45,6 +49,7 @@ def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> boo
 
 
 def _residual_rms(aim: FloatArray, by: FloatArray) -> float:
+    """Rms residual of the least-squares fit of `aim` (n,) by the columns of `by` (n, k)."""
     scale = np.linalg.norm(by, axis=0)
     columns = by / np.where(scale > 0, scale, 1.0)
     found = np.linalg.lstsq(columns, aim, rcond=1e-12)[0]

@@ -19,15 +19,16 @@ def bootstrap_draws(blocks: int) -> npt.NDArray[np.int64]:
 
 
 def gain_with_bound(without: FloatArray, with_it: FloatArray) -> tuple[float, float]:
-    """Share of the error power that a law takes, and its lower bound by bootstrap over blocks. Inputs: (blocks,)."""
+    """Share of the error power that a law removes, and its lower bound by bootstrap over blocks. without, with_it:
+    (blocks,), sums of squares without and with the law."""
     drawn = bootstrap_draws(len(without))
     shares = 1 - with_it[drawn].sum(axis=1) / np.maximum(without[drawn].sum(axis=1), 1e-300)
     return float(1 - with_it.sum() / max(float(without.sum()), 1e-300)), float(np.quantile(shares, BOOTSTRAP_LEVEL))
 
 
 def agrees_with_folds(held: Sequence[FloatArray], folds: Sequence[FloatArray]) -> bool:
-    """Whether a law has a gain on the held-out blocks, and a significant one on these and the folds together. Each:
-    errors without the law, and with it, (blocks,)."""
+    """Whether a law has a gain on the held-out blocks, and a significant gain on these and the folds of
+    cross-validation together. held, folds: each a pair of errors (blocks,), without the law and with it."""
     _, low = gain_with_bound(*(np.concatenate(each) for each in zip(held, folds, strict=True)))
     return low > 0 and gain_with_bound(*held)[0] > 0
 

@@ -17,7 +17,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import hann
 
 STRETCHES = 12
-"""Number of stretches per command."""
+"""Number of stretches per command. By hand, as all constants here."""
 DRIVEN = 0.01
 """Least power of a driven line, relative to the strongest line."""
 SHARED_BY_WINDOW = 2.0
@@ -29,8 +29,9 @@ MEMORY, MOST_TAPS, RIDGE = 0.1, 100, 1e-3
 
 
 def response_significance(recordings: Sequence[Recording]) -> float | None:
-    """Excess coherence of the best response channel in standard deviations of that of noise; None where the recordings
-    are too short. recordings: alike, commands without gaps."""
+    """Excess coherence of the best response channel over that of noise, in standard deviations. None where the
+    recordings are too short for a verdict, or where the coherence is not significant but a filter predicts the response
+    or its command. recordings: alike, commands without gaps."""
     inputs, outputs = _spectra(recordings)
     if not len(inputs):
         return None
@@ -42,6 +43,7 @@ def response_significance(recordings: Sequence[Recording]) -> float | None:
         return None
     found, expected, variance = (np.array(column) for column in zip(*coherences, strict=True))
     spread = np.sqrt(SHARED_BY_WINDOW * variance.sum()) / len(coherences)
+    # Too short: even the coherence of a device that clearly responds would hardly be significant.
     if (ANSWER_COHERENCE - expected.mean()) / spread < 2 * ANSWER_DEVIATIONS:
         return None
     sure = float(((found.mean(axis=0) - expected.mean()) / spread).max())
@@ -50,6 +52,7 @@ def response_significance(recordings: Sequence[Recording]) -> float | None:
 
 
 def _is_predictable(recording: Recording) -> bool:
+    """Whether past commands predict a response, or the responses around a sample predict a command."""
     command, response = recording.command.samples, recording.response.samples
     return _predicts(response, command, ahead=False) or _predicts(command, response, ahead=True)
 
@@ -75,7 +78,8 @@ def _predicts(y: FloatArray, signals: FloatArray, ahead: bool) -> bool:
 
 
 def _spectra(recordings: Sequence[Recording]) -> tuple[ComplexArray, ComplexArray]:
-    """(stretches, lines, inputs) and (stretches, lines, outputs)"""
+    """Spectra (stretches, lines, inputs) of the commands and (stretches, lines, outputs) of the responses; empty where
+    stretches would have less than 16 samples."""
     inputs, outputs = len(recordings[0].command.channels), len(recordings[0].response.channels)
     length = sum(len(recording) for recording in recordings) // (STRETCHES * inputs)
     found = [pair for recording in recordings for pair in _stretches(recording, length)] if length >= 16 else []
@@ -94,6 +98,7 @@ def _stretches(recording: Recording, length: int) -> Iterator[tuple[ComplexArray
 
 
 def _lines(samples: FloatArray, window: FloatArray) -> ComplexArray:
+    """(lines, k): windowed spectrum of samples (n, k) about their mean."""
     return np.asarray(np.fft.rfft(window * (samples - samples.mean(axis=0)), axis=0))
 
 

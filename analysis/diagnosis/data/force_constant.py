@@ -1,4 +1,7 @@
-"""Converts commands in A, V or no unit to forces or torques, by a stated force constant."""
+"""Converts commands in A, V or no unit to forces or torques, by a force (torque) constant that the user states.
+
+force = constant x command, in N or N m per unit of the command, so that masses and stiffnesses are found in SI units.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,12 +17,13 @@ CONVERTED = {"m": ("force", "N"), "rad": ("torque", "N m")}
 
 
 class NoForceConstant(ValueError):  # noqa: N818 - an answer that a user reads
-    """The constants do not fit the recording; a sentence without a full stop."""
+    """The constants do not suit the recording; the message is a sentence without a full stop."""
 
 
 def with_force_constant(recording: Recording, constants: Sequence[float]) -> tuple[Recording, str]:
-    """The recording with its commands as forces, and a sentence about it. constants: one for all commands or one each,
-    in N or N m per unit of the command. Raises NoForceConstant."""
+    """The recording with its commands as forces, and a sentence about it. constants: a single value for all commands or
+    a value for each, in N or N m per unit of the command. Raises NoForceConstant where the motion has no SI unit, a
+    command is a force already, or the constants are of a wrong number, zero or not finite."""
     command, moved = recording.command, system_of(recording.command.units, recording.response.units).length
     if moved not in CONVERTED:
         raise NoForceConstant(

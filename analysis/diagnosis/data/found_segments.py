@@ -31,7 +31,7 @@ EXACT = 1e-6
 ROUNDED = 1e-3
 """Largest rms difference between periods due to rounding, relative to the command's rms."""
 MOST_SAMPLES = 2**19
-"""Samples in which a period is looked for: limits the time of the correlation."""
+"""Number of samples in which a period is searched for, which limits the time of the correlation."""
 LARGEST = 1e100
 """Largest sample whose squares can be summed without overflow; a damaged file may hold larger ones."""
 
@@ -54,7 +54,7 @@ def find_segments(recording: Recording) -> tuple[Recording, str]:
 
 
 def find_designed_command(recording: Recording) -> Signal:
-    """The signal that was designed beforehand: the excitation where one was recorded and varies, else the command."""
+    """The signal that was designed beforehand: the excitation where it was recorded and varies, else the command."""
     excitation = recording.excitation
     if excitation is None:
         return recording.command
@@ -63,14 +63,14 @@ def find_designed_command(recording: Recording) -> Signal:
 
 
 def exact_period(command: FloatArray) -> int:
-    """Period in samples after which the command (n, m) repeats exactly; 0 where it does not, or not often enough. An
-    odd multiple of the shortest period where that is too short to be of use."""
+    """Period in samples after which the command (n, m) repeats exactly; 0 where it does not, or not often enough. Where
+    the shortest period has less than `SHORTEST_DECLARED` samples, an odd multiple of it."""
     period = find_period(command)
     if not period or len(command) // period < FEWEST_PERIODS or not _is_same(command[period:], command[:-period]):
         return 0
     if period >= SHORTEST_DECLARED:
         return period
-    # The largest odd multiple of which `MOST_PERIODS` and the transient's fit in; a multiple of a period is a period.
+    # The largest odd multiple of which `MOST_PERIODS` and a period of transient fit in; it is a period, too.
     times = len(command) // period // (MOST_PERIODS + 1)
     multiple = period * max(1, times - 1 + times % 2)
     return multiple if multiple >= SHORTEST_DECLARED else 0
@@ -126,6 +126,7 @@ def _is_same(later: FloatArray, before: FloatArray) -> bool:
 
 
 def _segment_kind(command: FloatArray, period: int) -> str:
+    """Kind of a segment: noise without a period, sine with nearly all power on a single line, else multisine."""
     if not period:
         return "noise"
     power = np.sum(np.abs(np.fft.rfft(command[:period] - command[:period].mean(axis=0), axis=0)) ** 2, axis=1)
@@ -133,6 +134,7 @@ def _segment_kind(command: FloatArray, period: int) -> str:
 
 
 def _peak(command: Signal, start: int, stop: int) -> float:
+    """Largest magnitude of the finite samples from start to stop, over all channels; 0 without any."""
     samples = command.samples[start:stop]
     known = samples[np.isfinite(samples)]
     return float(np.abs(known).max()) if known.size else 0.0

@@ -1,4 +1,8 @@
-"""The recorded motion: what drives it, and the measured positions of the driven axes with their noise."""
+"""The measured motion of the driven axes with its noise, and tests of what drives it.
+
+A recording may be driven by a force, by an imposed motion (the force is then the response; `as_force_driven` exchanges
+the two), or not at all (free motion). Positions are needed by the force balance and by `forces`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,7 +15,7 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalM
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-# Quantities that push; a recording whose response is one of them was driven by an imposed motion.
+# Forces; a recording whose response is one of these quantities was driven by an imposed motion.
 _FORCES = frozenset({"force", "torque"})
 
 FREE = "free"
@@ -29,7 +33,8 @@ class MeasuredMotion:
 
 
 def has_motion(recording: Recording, model: MechanicalModel) -> bool:
-    """Whether positions or velocities of every driven axis were measured: accelerations do not show slow forces."""
+    """Whether positions or velocities of every driven axis were measured; accelerations do not count, because they do
+    not show slow forces."""
     return model.outputs >= model.inputs and (
         _has_position(recording, model) or DERIVATIVE_OF_QUANTITY[model.quantity] < 2
     )
@@ -47,7 +52,7 @@ def choose_measured_motion(recording: Recording, model: MechanicalModel, floor: 
     density = floor.response.density[:, :m]
     if DERIVATIVE_OF_QUANTITY[model.quantity] == 0:
         return MeasuredMotion(samples, density)
-    # Below one period per recording there is no line: the division by f² stops there.
+    # The lowest line has one period per recording; below it, f is held there to avoid a division by zero.
     slowest = np.maximum(floor.frequency_hz, rate_hz / len(recording))[:, None]
     moved = np.zeros(samples.shape)
     moved[1:] = np.cumsum(samples[1:] + samples[:-1], axis=0) / (2 * rate_hz)
@@ -71,7 +76,7 @@ def fill_gaps(samples: FloatArray) -> FloatArray:
 
 
 def is_quasi_static(recording: Recording) -> bool:
-    """Whether the time axis is unknown and a position was measured (or no motion): forces are then compared against the
+    """Whether the time axis is unknown, and either a position or no motion was measured: forces are then compared with
     positions, sample by sample. Where only speeds or accelerations were measured, samples are counted as time."""
     quantities = [
         quantity for signal in (recording.position, recording.response) if signal for quantity in signal.quantities
@@ -81,14 +86,13 @@ def is_quasi_static(recording: Recording) -> bool:
 
 
 def is_read_as_free(recording: Recording) -> bool:
-    """Whether the motion was not driven, so that the command is the force per unit mass that it implies; see
-    `first_model.free_motion`."""
+    """Whether the motion was free (not driven). The command is then the force per unit mass that the motion implies;
+    see `first_model.free_motion`."""
     return recording.meta.get("imposed") == FREE
 
 
 def time_unit(recording: Recording) -> str:
-    """ "sample" where the time axis is unknown, the unit of time otherwise: quantities that depend on time are then per
-    sample."""
+    """Unit of time: s, or "sample" where the time axis is unknown, so that rates are per sample."""
     return "s" if recording.is_timed else "sample"
 
 

@@ -1,7 +1,12 @@
 """States of a model, and the missing force along each axis, estimated from measurements by a Kalman smoother.
 
-The missing force is modelled as a random walk (a latent force, Alvarez and others 2009; Rogers and Friis 2021). Unlike
-deconvolution this works for plants that drift.
+With the state x, the force u along the axes and the missing force g (a latent force modelled as a random walk; Alvarez
+and others 2009; Rogers and Friis 2021), sample by sample:
+
+    x' = A x + B (u + g)      g' = g + w      y = C x + D (u of the step before + g) + e
+
+Gains are those of the steady state: the Riccati equation is solved by doubling (Anderson 1978), and the backward pass
+is that of Rauch, Tung and Striebel (1965). Unlike deconvolution, this works for plants that drift.
 """
 
 from dataclasses import dataclass
@@ -17,7 +22,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 EXPECTED = 0.1
-"""Rms change of a missing force within `CHANGES_S`, relative to the command's rms."""
+"""Rms change of a missing force within `CHANGES_S`, relative to the rms of the command. By hand."""
 CHANGES_S = 0.005
 """Time in s in which a missing force may change by `EXPECTED`."""
 _LEAK = 1e-5
@@ -26,7 +31,7 @@ _PROCESS_NOISE = 1e-12
 """Process noise of all states per sample, relative to their size: without it the Riccati equation has no stabilising
 solution."""
 _DOUBLINGS = 40
-"""Most doublings: the filter then has run over 2^40 samples."""
+"""Largest number of doublings, which is equivalent to running the filter over 2^40 samples."""
 _MATRIX = types.float64[:, ::1]
 _READ = types.Array(types.float64, 2, "C", readonly=True)
 
@@ -86,10 +91,11 @@ class SmoothedMotion:
     states: FloatArray
     """(n, 2 coordinates): positions, then velocities, just before each command is written."""
     axis_position: FloatArray
-    """(n, m)"""
+    """(n, m): positions along the driven axes, in m or rad."""
     axis_velocity: FloatArray
+    """(n, m): velocities along the driven axes, in m/s or rad/s."""
     missing_force: FloatArray
-    """(n, m), N"""
+    """(n, m): missing force along the driven axes, in N or N m."""
 
 
 def smooth_motion(model: MechanicalModel, record: Observed, forces: FloatArray, unit: FloatArray) -> SmoothedMotion:
@@ -126,8 +132,7 @@ def smooth_motion(model: MechanicalModel, record: Observed, forces: FloatArray, 
 
 
 def _observation_matrices(steps: LinearSteps, channels: int) -> tuple[FloatArray, FloatArray]:
-    """Observation matrix (c, s + m) of the state and the missing force; and (c, m) of the force that acted just
-    before."""
+    """Observation matrix (c, s + m) of state and missing force; and that (c, m) of the force over the step before."""
     p, m = len(steps.position), steps.by_axis_force.shape[1]
     of_state = np.vstack([steps.response, steps.position])[:channels]
     of_force = np.vstack([steps.response_by_axis_force, np.zeros((p, m))])[:channels]
@@ -137,6 +142,7 @@ def _observation_matrices(steps: LinearSteps, channels: int) -> tuple[FloatArray
 def _subtract_feedthrough(
     model: MechanicalModel, record: Observed, forces: FloatArray, direct: FloatArray
 ) -> FloatArray:
+    """(n, c): measured channels without the sensor's low pass, less the direct effect of the force just before."""
     measured, p = np.array(record.measured), model.outputs
     if model.sensor.bandwidth_hz > 0:
         measured[:, :p] = undo_low_pass(measured[:, :p], record.recording.sample_rate_hz, model.sensor.bandwidth_hz)

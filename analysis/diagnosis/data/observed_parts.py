@@ -1,4 +1,8 @@
-"""Recordings cut into their parts, at pauses between them; each part is compared by itself."""
+"""Recordings cut into their parts (continuous stretches between gaps); each part is compared with the model by itself.
+
+The samples of each part are split into those to fit, to choose and to test by (`observed.roles`). Periods of a segment
+after the first `MOST_PERIODS` are used for the test only.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,15 +16,16 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
 MOST_PERIODS = 4
-"""Most periods of a segment that are used: further ones add time and little information."""
+"""Largest number of periods of a segment to fit and to choose by: further ones add computing time and little
+information. By hand."""
 LEAST_SAMPLES = 32
-"""Least samples of a part."""
+"""Least number of samples of a part; shorter ones are left out. By hand."""
 
 
 def observe_parts(recordings: Sequence[Recording], responses: int) -> tuple[Observed, ...]:
-    """Parts of all recordings, ready for comparison. responses: number of position channels that belong to the model's
-    outputs. Roles are those of the whole set: where any recording is marked for the test, no other gives up samples for
-    it; where all are marked as test, none is held out."""
+    """Parts of all recordings, ready for comparison. responses: number of the model's outputs; a position with another
+    number of channels is not used. Roles are those of the whole set: where a segment of any recording is marked as
+    test, no other samples are held out; where all segments are marked as test, the marks are ignored."""
     marked = [segment.role for recording in recordings for segment in recording.segments]
     if marked and all(role == "test" for role in marked):
         recordings = [_clear_roles(recording) for recording in recordings]
@@ -39,7 +44,7 @@ def observe_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obse
 
 
 def samples_to_fit(recordings: Sequence[Recording]) -> int:
-    """Number of samples to fit that have a response, and a position where there is one per response channel."""
+    """Number of samples to fit that have a response, and a position where its channels are as many as the responses."""
     return sum(int(record.fit.sum()) for record in observe_parts(recordings, len(recordings[0].response.channels)))
 
 
@@ -65,7 +70,7 @@ def _surplus_periods(recording: Recording) -> Mask:
 
 
 def parts_of(recording: Recording) -> tuple[tuple[int, int], ...]:
-    """First sample and the one after the last of each part; the whole where `meta` names no parts."""
+    """Begin and end (exclusive) of each part, as sample indices; the whole recording where `meta` names no parts."""
     named = recording.meta.get("parts")
     parts = [
         (int(stretch["start"]), int(stretch["stop"]))
@@ -77,7 +82,7 @@ def parts_of(recording: Recording) -> tuple[tuple[int, int], ...]:
 
 
 def part_of(recording: Recording, start: int, stop: int) -> Recording:
-    """Samples start to stop, with the segments that lie in them."""
+    """The recording from sample start to stop (exclusive), with segments cut to this range."""
     if (start, stop) == (0, len(recording)):
         return recording
     segments = [
@@ -106,6 +111,7 @@ def _shift_segment(segment: Segment, start: int, stop: int) -> Segment:
 
 
 def _clear_roles(recording: Recording) -> Recording:
+    """The recording with unmarked segments."""
     return replace(recording, segments=tuple(replace(segment, role="") for segment in recording.segments))
 
 

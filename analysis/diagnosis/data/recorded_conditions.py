@@ -1,5 +1,8 @@
-"""The model and the effects as they were during one recording: with the weight that the device carried, under the
-conditions that were recorded, and driven by the commands as they were recorded."""
+"""The model and the effects as they were during a recording.
+
+Three things may differ between recordings of one device: a mass or inertia that it carried (keys of `meta`), recorded
+conditions such as a temperature, on which effects depend, and the sign of commands.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,7 +19,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 ADDED_MASS, ADDED_INERTIA = "added_mass_kg", "added_inertia_kg_m2"
-"""Keys of a recording's `meta`: mass or inertia that the device carried along every driven axis, beside the model's."""
+"""Keys of a recording's `meta`: mass or inertia that the device carried along every driven axis, not in the model."""
 
 
 REVERSED = "turned commands"
@@ -24,8 +27,8 @@ REVERSED = "turned commands"
 
 
 def add_carried_weight(model: MechanicalModel, recording: Recording) -> MechanicalModel:
-    """The model with the mass or inertia that the recording's `meta` says the device carried along every driven
-    axis."""
+    """The model with the mass or inertia that the device carried along every driven axis, as the recording's `meta`
+    states."""
     added = recording.meta.get(_key(model), 0.0)
     return add_mass(model, float(added)) if added else model
 
@@ -37,7 +40,7 @@ def add_mass(model: MechanicalModel, added: float) -> MechanicalModel:
 
 
 def is_unstable_within(model: MechanicalModel, longest_s: float) -> bool:
-    """Whether undisturbed motion grows noticeably within the longest recording."""
+    """Whether undisturbed motion grows by more than `MOST_GROWTH` (growth rate x time) within `longest_s` seconds."""
     return growth_rate(model) * longest_s > MOST_GROWTH
 
 
@@ -57,8 +60,8 @@ def effects_under_conditions(effects: Sequence[PlacedEffect], recording: Recordi
 
 
 def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
-    """The model driven by the commands as they were recorded. model: of the recording as it is compared, where commands
-    may have been reversed, and a free motion has the force per unit mass as its command."""
+    """The model for the commands as they were recorded. model: for the recording as it is compared, in which commands
+    may have been reversed. For a free motion, whose command is a force per unit mass, the model with unit masses."""
     if is_read_as_free(recording):
         return replace(model, mass=np.eye(len(model.mass)))
     channels, turned = recording.command.channels, recording.meta.get(REVERSED)
@@ -69,7 +72,7 @@ def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel
 
 
 def weight_problems(model: MechanicalModel, recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
-    """What is wrong with the recordings' stated weights, as sentences without a full stop; empty where nothing is."""
+    """Errors in the stated weights of the recordings, as sentences without a full stop; empty where there are none."""
     key = _key(model)
     other = ADDED_MASS if key == ADDED_INERTIA else ADDED_INERTIA
     problems = [
@@ -86,11 +89,12 @@ def weight_problems(model: MechanicalModel, recordings: Sequence[Recording], nam
 
 
 def has_carried_weight(recordings: Sequence[Recording]) -> bool:
-    """Whether any recording was made with a carried weight."""
+    """Whether any recording states a carried mass or inertia."""
     return any(key in recording.meta for recording in recordings for key in (ADDED_MASS, ADDED_INERTIA))
 
 
 def _key(model: MechanicalModel) -> str:
+    """Key of the carried mass of a linear device, or of the inertia of a rotational one."""
     return ADDED_INERTIA if model.rotational else ADDED_MASS
 
 

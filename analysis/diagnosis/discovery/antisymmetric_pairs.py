@@ -1,8 +1,9 @@
-"""Antisymmetric pairs: a force on one axis by the motion of another, and the opposite on that axis by the first one's.
+"""Antisymmetric pairs of forces between two axes: F_x = c v_y and F_y = -c v_x, or the same with positions.
 
-Of such a pair each half alone looks as if it were half a coupled damping or stiffness, which acts on both axes alike
-and which the model has as a separate parameter: only both together are fitted. With velocities it is a gyroscopic or
-Lorentz force, with positions a circulatory one (Merkin, Introduction to the Theory of Stability, 1997).
+With velocities such a pair is a gyroscopic or Lorentz force, with positions a circulatory force (Merkin, Introduction
+to the Theory of Stability, 1997). A linear model has the symmetric coupling (coupled damping or stiffness) as a
+parameter. A force on one axis alone is half symmetric, half antisymmetric, and that parameter imitates the symmetric
+half; therefore both forces of a pair are fitted together.
 """
 
 import re
@@ -25,13 +26,13 @@ from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.discovered_law import axis_names
 
 _COUPLED = re.compile(rf"p0\*(v?)([{AXES}])")
-"""Linear in the motion of another axis; in its own the model is."""
+"""Shape of a force that is linear in the motion of an axis; used for another axis than that of the force."""
 _BEGINS = 1e-9
-"""Share of a force that its opposite begins with."""
+"""Size with which the opposite force begins in a fit, relative to the force."""
 
 
 def antisymmetric_pairs(views: Sequence[View]) -> Iterator[Sum]:
-    """The pairs of axes whose two halves were fitted with opposite signs."""
+    """Antisymmetric sums of all pairs of axes whose two halves, fitted alone, have opposite signs."""
     forces = [view for view in views if view.acts_on == "force"][: len(AXES)]
     for (first, other), prefix in product(combinations(forces, 2), ("v", "")):
         halves = [
@@ -46,6 +47,7 @@ def antisymmetric_pairs(views: Sequence[View]) -> Iterator[Sum]:
 
 
 def _pair(own: Sum, partner: Sum, factor: float) -> Sum:
+    """Both halves as one sum with opposite factors; its errors are the means of the halves'."""
     return replace(
         own, factors=(factor,), cross_validated=(own.cross_validated + partner.cross_validated) / 2,
         without=(own.without + partner.without) / 2, spread=max(own.spread, partner.spread),
@@ -54,15 +56,15 @@ def _pair(own: Sum, partner: Sum, factor: float) -> Sum:
 
 
 def pair_starts(pair: Sum) -> tuple[Sum, ...]:
-    """Starting values of a pair's fit: as found, and with half of the factor. Where the model couples the axes, a half
-    was fitted as the whole pair, beside a coupled parameter, and is twice too large."""
+    """Starting values of a pair's fit: as found, and with half of the factor. Where the model couples the axes, each
+    half was fitted together with the coupled parameter, which took the other half: its factor is twice too large."""
     assert pair.partner is not None
     half, opposite = pair.factors[0] / 2, replace(pair.partner, factors=(pair.partner.factors[0] / 2,))
     return pair, replace(pair, factors=(half,), partner=opposite)
 
 
 def is_coupling(of: Sum) -> bool:
-    """Whether it is linear in another axis's motion, and no more."""
+    """Whether the sum is a force with a single term, linear in the motion of an axis."""
     return of.acts_on == "force" and len(of.terms) == 1 and bool(_COUPLED.fullmatch(f"p0*{of.terms[0].shape}"))
 
 
@@ -76,8 +78,9 @@ def sum_squares_of_coupling(tuning: Tuning, fitted: Fitted) -> float:
 
 
 def as_pair(measure: ErrorMeasure, tuning: Tuning, single: tuple[Fitted, Sum], pair: Sum) -> Fitted | None:
-    """The fit of one force alone as a pair of half its size: the model's coupled parameter takes the rest, so that both
-    foretell the same. None where they are of different motions, or that number would leave its bounds."""
+    """The fit of one force as a pair of half its size: the model's coupled parameter takes the symmetric half, so that
+    both predict the same. None where force and pair depend on different motions, or the parameter would leave its
+    bounds."""
     fitted, of = single
     assert pair.partner is not None
     halves = {(half.axis, half.terms[0].shape): half for half in (replace(pair, partner=None), pair.partner)}
@@ -92,9 +95,8 @@ def as_pair(measure: ErrorMeasure, tuning: Tuning, single: tuple[Fitted, Sum], p
 
 
 def with_equal_halves(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> Fitted:
-    """The fit with the two factors of each pair made opposite and equal, and what they had in common given to the
-    model's coupled parameter, which does the same. Unchanged where there is no pair, or the parameter would leave its
-    bounds."""
+    """The fit with the factors of each pair made antisymmetric: their mean is added to the model's coupled parameter,
+    which is the symmetric part. Unchanged where there is no pair, or the parameter would leave its bounds."""
     found = _find_coupled_laws(fitted, measure.records[0].recording.command.channels)
     values, deviations = (
         [dict(placed.values) for placed in fitted.hypothesis.list_placed_effects()],
@@ -114,9 +116,9 @@ def with_equal_halves(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> 
 
 
 def is_taken_by_coupling(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]) -> bool:
-    """Whether a law is linear in another axis's motion alone, and the model's own coupled damping or stiffness could
-    have made half of it: always where it acts on one axis; of an antisymmetric pair, where that number would stay
-    within the bound of re-tuning. inputs: command channels."""
+    """Whether a law is linear in the motion of another axis, and the model's coupled damping or stiffness could imitate
+    it: always for a force on a single axis; for an antisymmetric pair, if half of it is within the bound of re-tuning.
+    inputs: command channels."""
     found = _find_coupled_laws(fitted, inputs)
     for (prefix, axis, other), (_, factor) in found.items():
         opposite = found.get((prefix, other, axis), (0, 0.0))[1]
@@ -128,8 +130,8 @@ def is_taken_by_coupling(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]
 
 
 def _find_coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, int, int], tuple[int, float]]:
-    """Claim and factor of each force that is linear in another axis's motion, by prefix of the motion, its own axis and
-    the other one."""
+    """Claim and factor of each force that is linear in the motion of another axis, by prefix of the motion ("v" or
+    empty), own axis and other axis."""
     names, found = axis_names(inputs), {}
     for number, (claim, law) in enumerate(zip(fitted.hypothesis.claims, laws_of(fitted.hypothesis), strict=True)):
         linear = None if law is None or law.acts_on != "force" else _COUPLED.fullmatch(law.expression)
@@ -139,7 +141,7 @@ def _find_coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[st
 
 
 def _find_coupled_parameter(tuning: Tuning, prefix: str, axis: int, other: int) -> int:
-    """Which of the model's parameters is the coupled damping (prefix v) or stiffness of two axes."""
+    """Index among the model's parameters of the coupled damping (prefix v) or stiffness of two axes."""
     m = tuning.model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     return (1 if prefix else 2) * len(pairs) + pairs.index((min(axis, other), max(axis, other)))

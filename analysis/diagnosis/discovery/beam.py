@@ -1,4 +1,8 @@
-"""The best sums of up to three terms along one axis, by their held-out error: a beam over the grammar."""
+"""Beam search over the grammar: the sums of up to `LAW_MOST_TERMS` terms on one axis or reading with the least error.
+
+The error is cross-validated over blocks (`screen_terms`). All sums are finally ranked by the Bayesian information
+criterion, and a negative control gives the share of the error that chance removes (`_placebo_share`).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -23,17 +27,17 @@ from equalizer.signals.signal import FloatArray
 _PLACEBOS = 3
 """Shuffles of the blocks in the negative control."""
 _LACKING = 2
-"""Sums that are fitted to what the best sum leaves."""
+"""Number of rivals: sums that lack a variable of the best sum."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RankedSums:
-    """Sums of terms ranked by their held-out error, and what chance alone explains."""
+    """Sums of terms, ranked by information criterion, and the share that chance alone explains."""
 
     sums: tuple[Sum, ...]
     """The best first."""
     placebo: float
-    """Largest share of the held-out squares that a term takes of time-shuffled residuals: what chance takes."""
+    """Largest share of the held-out squares of time-shuffled residuals that any term removes: the effect of chance."""
 
 
 def best_sums(base: Products, terms: Sequence[Term], time_left: TimeBudget) -> RankedSums:
@@ -62,7 +66,7 @@ def best_sums(base: Products, terms: Sequence[Term], time_left: TimeBudget) -> R
 
 def _placebo_share(view: View, columns: FloatArray) -> float:
     """Negative control: each block gets another block's residual, reversed in time and scaled to its own rms; the
-    largest share that any term takes over several such shuffles."""
+    largest share that any term removes, over several such shuffles."""
     blocks, takes = list(pairwise(view.edges)), [0.0]
     for shift in range(1, min(len(blocks), _PLACEBOS + 1)):
         turned = np.zeros_like(view.residual)
@@ -89,7 +93,7 @@ def _fit_without_variables(
 
 
 def _is_worth_it(shorter: Sum, longer: Sum) -> bool:
-    """Whether another term takes enough of what is left above the noise."""
+    """Whether a further term removes at least `LAW_WORTH_SHARE` of the error above the noise."""
     return shorter.cross_validated - longer.cross_validated > LAW_WORTH_SHARE * max(shorter.cross_validated - 1.0, 0.0)
 
 
@@ -118,6 +122,7 @@ def _term_columns(view: View, terms: Sequence[Term]) -> tuple[list[Term], FloatA
 
 
 def _rank_terms(base: Products, columns: FloatArray) -> list[int]:
+    """Indices of the terms by rising cross-validated error, each alone with the columns in `base`."""
     return [int(number) for number in np.argsort(cross_validate_terms(base, columns).with_it.sum(axis=0))]
 
 

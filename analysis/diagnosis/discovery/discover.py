@@ -1,5 +1,7 @@
-"""Forward selection of discovered laws: where the largest excess error is, on an axis or a reading, sums of terms are
-screened, the best are fitted by output error, and the best fit is added; then again, up to `LAW_MOST_ROUNDS` laws.
+"""Forward selection of discovered laws, up to `LAW_MOST_ROUNDS`.
+
+In each round, sums of terms are screened on the axes and readings with the largest excess error, the best sums are
+fitted by output error, and the best fit is added.
 
 Steps and equations: see the theory of operation in the package's docstring (`analysis/diagnosis/discovery`).
 """
@@ -42,21 +44,21 @@ from analysis.diagnosis.types import Progress, TimeBudget
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Round:
-    """One law that was added."""
+    """A round of the selection, in which a law was added."""
 
     fitted_candidates: tuple[FittedCandidate, ...]
     """The best first."""
     sums: tuple[Sum, ...]
     """The screened sums in the order of `fitted_candidates`."""
     placebo: float
-    """Largest share of the held-out squares that a term takes of a time-shuffled missing force."""
+    """Largest share of the held-out squares of a time-shuffled missing force that a term removes."""
     complete: bool = True
-    """All of them were fitted before the time ended."""
+    """Whether all sums were fitted before the time ended."""
 
     @property
     def shares_above_noise(self) -> tuple[float, float]:
-        """Shares, at most 1, that the law takes of the missing force's held-out squares above the noise, and that
-        chance takes."""
+        """Shares (at most 1) of the held-out squares of the missing force above the noise that the law removes, and
+        that chance removes."""
         first = self.sums[0]
         above = max(first.without - 1.0, 1e-300)
         taken, by_chance = first.without - first.cross_validated, self.placebo * first.without
@@ -68,10 +70,11 @@ class Discovery:
     """Result of the search for discovered laws: the fits, and the rounds that led to them."""
 
     found: Explanation
-    """`after` holds the laws; its rounds and steps are those of the laws."""
+    """The explanation whose `after` contains the laws, with the rounds and steps of their selection."""
     rounds: tuple[Round, ...]
     chosen_of: int = 1
-    """Number of laws that fitted alike, of which the last one was chosen by its error on held-out stretches."""
+    """Number of laws that fitted about equally well, of which the last law was chosen by its error on held-out
+    stretches."""
 
 
 def discover(
@@ -82,9 +85,9 @@ def discover(
     most: int = LAW_MOST_ROUNDS,
     alone: bool = False,
 ) -> Discovery | None:
-    """The laws found, at most `most`, fitted by output error; None where none is worth its parameters. known: what the
-    named effects explain. alone: only laws of single terms that are likely to explain all; given up where a screen or
-    a fit shows that they do not, unless a law of the same kind may act on another axis."""
+    """The laws found, at most `most`, fitted by output error; None where none is worth its parameters. known: the
+    explanation by named effects. alone: only laws of single terms that are likely to explain the whole error; the
+    search ends where a screen or a fit shows that they do not, unless such a law may act on another axis."""
     context = replace(context, map_=limit_map(context.map_, time_left))
     retuned = known.retuned.fitted
     base = context.candidate(evaluate_fit(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))
@@ -126,12 +129,13 @@ def depends_on_another_axis(of: Sum) -> bool:
 
 
 def _first_half(context: SearchContext, pair: FittedCandidate) -> FittedCandidate:
-    """The candidate without the second law of its pair: each named law has a step of its own."""
+    """The candidate without the second law of its pair, because each named law needs a step in the explanation."""
     hypothesis = without_claim(pair.fitted.hypothesis, len(pair.fitted.hypothesis.claims) - 1)
     return context.candidate(evaluate_fit(context.measure, context.tuning, pair.fitted.deviations, hypothesis))
 
 
 def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget, alone: bool) -> Round | None:
+    """The next law: sums screened in the views with the largest excess, the best fitted. None where nothing fits."""
     views = views_of(context.measure, context.tuning, base)
     searched = [(view, best_sums(products_of(view), view_terms(view), time_left)) for view in _views_to_search(views)]
     every = sorted(
@@ -150,14 +154,14 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget, 
         return None
     ranked = put_plainest_first(context, pairs)
     first = ranked[0][1]
-    # Of the axes that it acts along.
+    # The negative control of the views that the best law, or either half of a pair, acts in.
     own = [(each.acts_on, each.axis) for each in (first, first.partner) if each is not None]
     placebo = max((found.placebo for view, found in searched if (view.acts_on, view.axis) in own), default=0.0)
     return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo, time_left())
 
 
 def _may_explain_alone(best: Sum) -> bool:
-    """Whether the screen leaves so little of the missing force, with a single term, that a fit is worth its time."""
+    """Whether a single term leaves so little of the missing force in the screen that a fit is worth its time."""
     left = best.cross_validated - 1 <= LAW_ALONE_LEAVES * (best.without - 1)
     return left and len(best.terms) == 1
 
@@ -172,8 +176,7 @@ def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
 
 
 def _views_to_search(views: Sequence[View]) -> list[View]:
-    """Views in which laws are searched: of axes and of readings at most two each, those with the largest excess error,
-    the largest first."""
+    """Views in which laws are searched: at most two of axes and two of readings, by falling excess error."""
     found: list[View] = []
     for acts_on in ("force", "response"):
         missing = [(_excess(view), view.output) for view in views if view.acts_on == acts_on]
@@ -186,8 +189,8 @@ def _views_to_search(views: Sequence[View]) -> list[View]:
 
 
 def _undoes_command(view: View, each: Sum) -> bool:
-    """Whether a force takes more than half of its axis's command away. With mass, damping and stiffness shrinking
-    alongside, the balance of forces then holds with nothing on either side: its trivial solution."""
+    """Whether a force cancels more than `LAW_COMMAND_TAKEN` (half) of the command of its axis. If mass, damping and
+    stiffness shrink in proportion, the force balance then approaches its trivial solution 0 = 0."""
     if each.acts_on != "force":
         return False
     taken = power = 0.0
@@ -201,21 +204,22 @@ def _undoes_command(view: View, each: Sum) -> bool:
 
 
 def _excess(view: View) -> float:
-    """Held-out squares of the re-tuned model over those of noise alone."""
+    """Excess error of a view: held-out squares of the re-tuned model over those of noise alone; 1 = noise."""
     base = products_of(view)
     without = cross_validate_terms(base, view.residual[None, :]).without
     return float(without.sum()) / (view.noise * len(view.residual))
 
 
 def _compute_explained_squares(views: Sequence[View], each: Sum) -> float:
+    """Held-out squares that a sum removes, in units of its view."""
     view = next(view for view in views if (view.acts_on, view.axis) == (each.acts_on, each.axis))
     own = (each.without - each.cross_validated) * view.noise * len(view.residual)
-    # A pair's errors are the mean of both halves'.
+    # The errors of a pair are the means of those of its halves.
     return own if each.partner is None else 2 * own
 
 
 def _keep_close_to_best(sums: Sequence[Sum]) -> list[Sum]:
-    """The sums whose error is not much above that of the best one."""
+    """The sums whose error above the noise is at most `LAW_FITTED_WITHIN` times that of the best sum."""
     return [
         each
         for each in sums
@@ -224,7 +228,7 @@ def _keep_close_to_best(sums: Sequence[Sum]) -> list[Sum]:
 
 
 def _best_of_each_structure(sums: Sequence[Sum]) -> list[Sum]:
-    """The best of each structure."""
+    """The best sum of each structure: same axis or reading, same shapes, a pair or not. sums: the best first."""
     found: dict[object, Sum] = {}
     for each in sums:
         shapes = frozenset(term.shape for term in each.terms)

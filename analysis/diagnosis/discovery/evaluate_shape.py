@@ -1,5 +1,8 @@
-"""Evaluates a term's formula along the samples of a recording, vectorised where it has no memory; gathers the signals
-that it may hold."""
+"""Evaluates the formula of a term along the samples of a recording, and collects the signals that formulas may contain.
+
+Formulas without memory are evaluated by NumPy on all samples at once; those with memory, such as delays and filters, by
+the sample-by-sample evaluator of `equalizer.laws`.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -21,8 +24,8 @@ _WHOLE: Mapping[str, Callable[..., FloatArray]] = {
 
 
 def columns_of(evidence: Evidence) -> Columns:
-    """Signals by their names in the grammar: x, vx and fx of the first axis, ax of the first channel of the response as
-    the model foresees it (free of noise), and so on; t."""
+    """Signals (n,) by their names in the grammar, in SI units: position x, velocity vx and command fx of the first
+    axis, ax of the first response channel as the model predicts it (free of noise), and so on; time t in s."""
     n, m = evidence.command.shape
     found = {"t": np.arange(n) / evidence.sample_rate_hz}
     for axis, name in zip(range(m), AXES, strict=False):
@@ -44,6 +47,7 @@ def evaluate_shape(shape: str, numbers: Sequence[float], columns: Columns, rate_
 
 
 def _value(tree: Node, numbers: Sequence[float], columns: Columns) -> FloatArray:
+    """Value of a node of the parsed formula, recursively: a scalar, or an array (n,) where it contains a signal."""
     match tree:
         case Number(value):
             return np.float64(value)  # type: ignore[return-value]

@@ -1,4 +1,8 @@
-"""Fits sums of terms as laws by output error, and puts the plainest of those that fit alike first."""
+"""Fits sums of terms as laws by output error, and puts the simplest of those that fit about equally well first.
+
+Screening uses a linearised residual (`fit_sum`); here, each sum is simulated with the model, and all parameters are
+fitted together by Gauss-Newton steps (`errors.output_error`).
+"""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -27,8 +31,8 @@ T = TypeVar("T")
 def fit_sums(
     context: SearchContext, base: Fitted, sums: Sequence[Sum], time_left: TimeBudget
 ) -> tuple[tuple[FittedCandidate, Sum], ...]:
-    """The sums fitted by output error: the best one, and plainer ones that are as good, until they converge. Without
-    time, the best of those that were begun."""
+    """The sums fitted by output error. The best sum, and simpler sums that are inseparable from it, are fitted to
+    convergence, the others for a few steps. When the time ends, those begun by then; empty where none can be fitted."""
     known = within_time(lambda: sensitivity_at(context, base.deviations, base.hypothesis), None)
     if known is None:
         return ()
@@ -43,7 +47,7 @@ def fit_sums(
     if not fits or not np.isfinite(fits[0][0].cost):
         return ()
     best = fits[0]
-    # Of a law's two starts the cheaper one may be that which ends where re-tuning without the law did.
+    # Of the starts of a law, that with the lower cost may converge to the fit of the re-tuned model without the law.
     ends = [_refine(context, start) for start, each in fits if each is best[1] and np.isfinite(start.cost)]
     refined = [(context.candidate(min(ends, key=lambda end: end.cost)), best[1])]
     others = {id(each): (start, each) for start, each in reversed(fits) if each is not best[1]}
@@ -63,8 +67,9 @@ def fit_sums(
 
 
 def _make_starting_fits(context: SearchContext, base: Fitted, each: Sum) -> list[Fitted]:
-    """The sum added to the fit, with the model's own parameters as they were or shifted as the sum's fit has them,
-    whichever costs less; where re-tuning ended at a bound, for want of this law, also with the parameters as given."""
+    """The sum added to the fit, with the model's own parameters unchanged or shifted as in the fit of the sum: the
+    start with the lower cost. Where re-tuning without this law ended at a bound, also a start with the given
+    parameters."""
     recording = context.measure.records[0].recording
     bound = context.tuning.bound
     shifted = np.clip(base.deviations + each.model_shift, -bound, bound)
@@ -87,7 +92,7 @@ def _make_starting_fits(context: SearchContext, base: Fitted, each: Sum) -> list
 def _like_best(
     context: SearchContext, best: tuple[Fitted, Sum], refined: FittedCandidate, other: tuple[Fitted, Sum]
 ) -> Fitted:
-    """The other fit; of a pair of which the best is one half, the refined best as that pair."""
+    """The other fit; if it is a pair of which the best sum is a half, the refined best fit converted to that pair."""
     single, pair = best[1], other[1]
     if single.partner is not None or pair.partner is None or not is_coupling(single):
         return other[0]
@@ -110,8 +115,8 @@ def put_plainest_first(
 
 
 def _count_parameters(pair: tuple[FittedCandidate, Sum]) -> int:
-    """Number of free parameters of a sum, without exponents that are whole or half numbers, and a soft limit's factor
-    of 1."""
+    """Number of free parameters of a sum. Exponents that are whole or half numbers are not counted, nor is the factor
+    of a soft limit that is 1."""
     candidate, of = pair
     law = laws_of(candidate.fitted.hypothesis)[-1]
     count = 0 if law is None else -int(is_whole_limit(law, LAW_NEAR))
@@ -122,12 +127,13 @@ def _count_parameters(pair: tuple[FittedCandidate, Sum]) -> int:
 
 
 def _refine(context: SearchContext, start: Fitted) -> Fitted:
+    """The fit continued to convergence; the start where the time ends before."""
     return within_time(lambda: refine(context, start), start)
 
 
 def within_time(work: Callable[[], T], begun: T) -> T:
-    """The result of a fit, or what it began with where the time ended within it: a stiff law takes a second to
-    simulate, and a fit simulates a hundred times."""
+    """The result of `work`, or `begun` where the time ends during it: a stiff law may take a second per simulation, and
+    a fit simulates about a hundred times."""
     try:
         return work()
     except OutOfTimeError:

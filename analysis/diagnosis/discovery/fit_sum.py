@@ -1,7 +1,8 @@
 """Fits the free parameters of a sum of terms to a fit's residual: Gauss-Newton with variable projection.
 
-Factors and the model's own parameters are solved for at each step, so that only what is not linear is searched
-(variable projection, Golub and Pereyra 1973).
+The residual is approximated by P d + sum of w_j phi_j(a_j): P the columns of the model's own parameters, w the factors
+and a the nonlinear parameters of the terms. At each step, d and w are solved for by least squares, so that only a is
+searched (variable projection, Golub and Pereyra 1973). Held-out errors are cross-validated over blocks.
 """
 
 from collections.abc import Sequence
@@ -17,8 +18,10 @@ from equalizer.laws.law import ActsOn
 from equalizer.signals.signal import FloatArray
 
 _MOVE, _MOVE_OF_LINE = 1e-3, 1e-5
-"""Shifts of a parameter for its slope. A frequency that moved by 0.1 % would be out of phase at a recording's end."""
+"""Steps of the finite differences, absolute or relative (`_shift_parameter`). The factor of time, a frequency, has the
+smaller step, because a change of 0.1 % would shift the phase too far at the end of a recording."""
 _ROUNDS = 8
+"""Largest number of Gauss-Newton steps."""
 _CONVERGED = 1e-3
 """Relative decrease of the cost below which a step is the last."""
 
@@ -31,18 +34,18 @@ class Sum:
     """Driven axis, or channel of the response."""
     terms: tuple[Term, ...]
     factors: tuple[float, ...]
-    """SI"""
+    """(terms,): factor of each term, in SI units."""
     cross_validated: float
     """Held-out squares over the noise's, per sample: 1 = noise alone."""
     without: float
-    """The same of the re-tuned model alone."""
+    """Held-out squares of the re-tuned model alone, in the same unit."""
     spread: float
-    """Jackknife error of the first factor over the blocks, as a share of it."""
+    """Jackknife standard error of the first factor over the blocks, relative to it."""
     model_shift: tuple[float, ...]
     """(t,): change of the model's own parameters that is fitted with it, in standard deviations."""
     acts_on: ActsOn = "force"
     partner: "Sum | None" = None
-    """The same on another axis, as a part of the same law."""
+    """Second force of an antisymmetric pair, on another axis; None for a single force."""
 
     @property
     def variables(self) -> tuple[str, ...]:
@@ -83,6 +86,7 @@ def fit_sum(base: Products, terms: Sequence[Term]) -> Sum | None:
 
 
 def _score_sum(base: Products, terms: tuple[Term, ...], columns: Sequence[FloatArray], best: Solution) -> Sum:
+    """The sum with cross-validated errors and the jackknife error of its first factor."""
     view = base.view
     whole = add_columns(base, columns[1:])
     held = cross_validate_terms(whole, columns[0][None, :])
@@ -104,6 +108,8 @@ def _score_sum(base: Products, terms: tuple[Term, ...], columns: Sequence[FloatA
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Point:
+    """Terms with their present parameters, and their columns (s,); None where a column is not finite."""
+
     terms: tuple[Term, ...]
     columns: tuple[FloatArray, ...] | None
 
@@ -114,10 +120,12 @@ def _columns(view: View, terms: Sequence[Term]) -> tuple[tuple[FloatArray, ...] 
 
 
 def _solve_columns(base: Products, columns: Sequence[FloatArray]) -> Solution:
+    """Least squares with the model's own parameters and these columns."""
     return solve(add_columns(base, columns))
 
 
 def _gauss_newton_step(base: Products, at: _Point, best: Solution) -> tuple[_Point, Solution] | None:
+    """A Gauss-Newton step, shortened until the cost falls; None where it does not fall or nothing is nonlinear."""
     view, k = base.view, len(base.view.parameter_columns)
     assert at.columns is not None
     factors = best.weights[k:]
@@ -151,7 +159,7 @@ def _gauss_newton_step(base: Products, at: _Point, best: Solution) -> tuple[_Poi
 
 
 def _damp_slopes(joint: Products, count: int) -> Products:
-    """Levenberg damping of the slopes (of norm 1), so that those nearly equal to other columns are not followed."""
+    """Levenberg damping of the slopes (of norm 1), so that slopes nearly collinear with other columns make no step."""
     squares = joint.squares.copy()
     places = np.arange(squares.shape[1] - count, squares.shape[1])
     squares[:, places, places] += 1e-4 / len(squares)
@@ -159,8 +167,8 @@ def _damp_slopes(joint: Products, count: int) -> Products:
 
 
 def _shift_parameter(term: Term, place: int, move: float) -> Term:
-    """The term with one number moved within its bounds: exponents and angles by `move`, others by the factor
-    exp(move)."""
+    """The term with the parameter at `place` moved within its bounds: exponents and angles by `move`, others by a
+    factor exp(move)."""
     numbers, (low, high) = list(term.numbers), term.bounds[place]
     here = numbers[place]
     plain = place in term.exponents or place in term.turns

@@ -1,8 +1,13 @@
-"""A matched filter of a fit's residuals for a force along one axis, and the effect of re-tuning on its output.
+"""Matched filter of a fit's residuals for a force along one axis, and what re-tuning the model explains of its output.
 
-Of all channels only what such a force could have caused is kept, scaled so that noise stays white and inner products of
-columns are those of the simulated responses. A column of force costs two Fourier transforms instead of a simulation.
-Where forces are compared, and for what is added to a reading, the filter is the band alone.
+For each spectral line, with the residuals r of all channels and their frequency response h to a force along the axis,
+
+    y = h* r / |h|        a force f along the axis gives y = |h| f
+
+so that only the part of r that such a force can cause is kept, white noise stays white, and inner products of filtered
+forces equal those of the simulated responses h f. A candidate force then costs two Fourier transforms instead of a
+simulation. Where forces are compared, h is minus the gain of the band's low pass; what is added to a reading is limited
+to the band of the commands and not filtered otherwise.
 """
 
 from collections.abc import Sequence
@@ -29,49 +34,50 @@ from equalizer.signals.band_limited import low_pass_gain
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _SETTLING_S = 2.0
-"""Zero padding for the filter's transient (s)."""
+"""Length (s) of the zeros appended to a record, so that the response at its end does not wrap around to the start."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilteredRecord:
-    """One record's filters: matched ones for forces along the m driven axes, then the band alone for p readings. An
-    output is one of these m + p."""
+    """Filters of one record with n samples and c channels. Its m + p outputs are the matched filters for forces along
+    the m driven axes, then p readings limited to the band."""
 
     columns: Columns
+    """Signals by their names in a formula, (n,) each."""
     missing_force: FloatArray
     """(n, m), N: the force that the model lacks."""
     rate_hz: float
     length: int
     """Length of the transforms, samples."""
     force_response: ComplexArray
-    """(lines, c, m): frequency response from a force to the residuals, up to the last line with command power."""
+    """(lines, c, m), 1/N: response h from a force to the residuals, up to the last line with command power."""
     strength: FloatArray
-    """(lines, m)"""
+    """(lines, m), 1/N: norm of that response over the channels, |h|; limited from below to avoid a division by zero."""
     reading_units: FloatArray
     """(p,): units of the residuals of the response channels; none where forces are compared."""
     block_slices: tuple[slice, ...]
-    """Blocks, in decimated samples."""
+    """Blocks of the cross-validation, as ranges of decimated samples."""
 
     def filter_residuals(self, residuals: FloatArray) -> FloatArray:
-        """(kept samples, m + p): residuals (n, c) through the filter of each output."""
+        """(kept samples, m + p): output of each filter for residuals (n, c), decimated."""
         return self._filter_spectrum(rfft(residuals, self.length, axis=0)[: len(self.force_response)])
 
     def _filter_spectrum(self, spectrum: ComplexArray) -> FloatArray:
-        """spectrum: (lines, c) of residuals."""
+        """(kept samples, m + p): output of each filter. spectrum: (lines, c), of residuals."""
         along = np.einsum("lcm,lc->lm", np.conj(self.force_response), spectrum) / self.strength
         return self._select_blocks(np.hstack([along, spectrum[:, : len(self.reading_units)]]))
 
     def filter_forces(self, forces: FloatArray) -> FloatArray:
-        """(kept samples, m + p): the residuals that forces (n, m), N, cause, through the same filters. Each force acts
-        as in `column`."""
+        """(kept samples, m + p): outputs for the residuals that forces (n, m), N, cause together. A force acts as in
+        `column`."""
         mean = forces.copy()
         mean[:-1] = 0.5 * (forces[1:] + forces[:-1])
         spectrum = rfft(mean, self.length, axis=0)[: len(self.force_response)]
         return self._filter_spectrum(np.einsum("lcm,lm->lc", self.force_response, spectrum))
 
     def column(self, added: FloatArray, output: int) -> FloatArray:
-        """(kept samples,): one filter's output for a force (n,), N, along its axis, or for what is added to its
-        reading. Sampled at each sample, a force acts as the mean over the step that begins there."""
+        """(kept samples,): output of one filter. added: (n,), a force along its axis, N, or a change of its reading.
+        The force between two samples is the mean of both, because the model's commands are held over a step."""
         lines, axes = self.strength.shape
         if output >= axes:
             spectrum = rfft(added, self.length)[:lines] / self.reading_units[output - axes]
@@ -82,6 +88,8 @@ class FilteredRecord:
         return self._select_blocks(spectrum[:, None])[:, 0]
 
     def _select_blocks(self, spectrum: ComplexArray) -> FloatArray:
+        """(kept samples, outputs): time series of a spectrum (lines, outputs), decimated to its band, in the blocks
+        only. Sums of squares are those at the full rate."""
         count = 2 * (len(spectrum) - 1)
         filtered = irfft(spectrum, count, axis=0) * np.sqrt(count / self.length)
         return np.concatenate([filtered[part] for part in self.block_slices])
@@ -89,29 +97,30 @@ class FilteredRecord:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """The filtered residual of one output, with what the model's own parameters would explain of it."""
+    """The filtered residual of one output, and the columns of a regression on the model's own parameters."""
 
     output: int
+    """Index of the filter: see `FilteredRecord`."""
     acts_on: ActsOn
-    """What a term of it is: a force, or what is added to a response."""
+    """"force": its terms are forces; "response": they are added to a reading."""
     axis: int
-    """The driven axis, or the channel of the response."""
+    """Index of the driven axis, or of the response's channel."""
     records: tuple[FilteredRecord, ...]
     residual: FloatArray
     """(s,), over all records and blocks."""
     parameter_columns: FloatArray
-    """(t + 1, s): what one standard deviation of each of the model's own parameters would explain of it, and a constant
-    force or reading."""
+    """(t + 1, s): change of the residual by one standard deviation of each of the model's t parameters, then by a
+    constant force or reading of 1."""
     to_calibration: FloatArray
-    """(t + 1,): the calibration's values of these parameters less the present ones, in standard deviations."""
+    """(t + 1,): the calibration's values of these parameters less the fitted ones, in standard deviations."""
     edges: tuple[int, ...]
-    """Edges of the blocks."""
+    """Edges of the blocks in the s samples, (blocks + 1)."""
     noise: float
-    """Mean square of the noise in a sample."""
+    """Mean square of the noise in a filtered sample."""
 
 
 def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:
-    """One view per driven axis, then one per channel of the response that the grammar has a name for."""
+    """One view per driven axis, then one per response channel (up to the three that the grammar has names for)."""
     model, placed = tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
     evidence = measure.evidence(model, placed, fitted.residuals)
     seen = tuple(_filter_record(measure, record, own) for record, own in zip(measure.records, evidence, strict=True))
@@ -135,15 +144,16 @@ def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[Vie
 
 
 def _zero_missing(left: FloatArray) -> FloatArray:
+    """Residuals with 0 where a reading is missing."""
     return np.where(np.isfinite(left), left, 0.0)
 
 
 def _parameter_columns(
     measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, seen: Sequence[FilteredRecord], number: int
 ) -> FloatArray:
-    """(s, m + p): effect of one standard deviation of one of the model's parameters. That of mass, damping and
-    stiffness follows from the force along the measured motion, exact however wrong the model is; that of modes from the
-    model without the hypothesis."""
+    """(s, m + p): change of all outputs by one standard deviation of one of the model's parameters, by its number. For
+    mass, damping and stiffness it is that of their force along the measured motion, exact even for a wrong model; for
+    modes, a finite difference of simulations without the hypothesis; 0 where no such model is valid."""
     m = tuning.model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     if number < 3 * len(pairs):
@@ -168,7 +178,7 @@ def _parameter_columns(
 def _parameter_force(
     record: FilteredRecord, tuning: Tuning, pairs: Sequence[tuple[int, int]], number: int
 ) -> FloatArray:
-    """(n, m), N: force of one standard deviation of a mass, a damping or a stiffness of a pair of axes."""
+    """(n, m), N: external force equivalent to one standard deviation more of a mass, damping or stiffness entry."""
     order, (i, j) = number // len(pairs), pairs[number % len(pairs)]
     forces = np.zeros_like(record.missing_force)
     for axis, other in {(i, j), (j, i)}:
@@ -183,6 +193,7 @@ def _parameter_force(
 
 
 def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) -> FilteredRecord:
+    """The filters of one record, up to the line below which `LAW_POWER_KEPT` of the commands' power lies."""
     rate_hz, n = evidence.sample_rate_hz, len(evidence.command)
     length = next_fast_len(n + int(_SETTLING_S * rate_hz), real=True)
     lines = rfftfreq(length, 1 / rate_hz)
@@ -193,7 +204,7 @@ def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) 
     strength = np.sqrt(np.sum(np.abs(through) ** 2, axis=1))
     strength = np.maximum(strength, 1e-9 * strength.max(axis=0))
     share = 2 * (last - 1) / length
-    # What a force does near the end is cut off there.
+    # The response to a force near the record's end is not recorded to its end, so that the last samples are left out.
     end = n - min(_count_settling_samples(measure, evidence), n // 4)
     kept = tuple(slice(int(a * share), int(min(b, end) * share)) for a, b in _blocks(record) if a < end)
     forces = isinstance(measure, PredictedForce)
@@ -202,6 +213,7 @@ def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) 
 
 
 def _force_response(measure: ErrorMeasure, evidence: Evidence, lines: FloatArray) -> ComplexArray:
+    """(lines, c, m), 1/N: see `FilteredRecord`. lines: frequencies, Hz."""
     if isinstance(measure, PredictedForce):
         m = evidence.command.shape[1]
         within = low_pass_gain(lines, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
@@ -212,7 +224,7 @@ def _force_response(measure: ErrorMeasure, evidence: Evidence, lines: FloatArray
 
 
 def _count_settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
-    """Samples until the response to a force has decayed."""
+    """Samples until the response to a force has decayed (`SETTLED_CONSTANTS` of the slowest time constant)."""
     if isinstance(measure, PredictedForce):
         return 0
     slowest = float(np.abs(np.linalg.eigvals(linear_steps(evidence.model, 1 / evidence.sample_rate_hz).advance)).max())
@@ -220,7 +232,8 @@ def _count_settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
 
 
 def _blocks(record: Observed) -> list[tuple[int, int]]:
-    """Segments that are not held out; where there are few, equal parts."""
+    """Start and stop of the segments that are not held out; with fewer than `LAW_BLOCKS` of them, of as many equal
+    parts of the samples."""
     used = record.fit | record.choose
     edges = [
         (segment.start, min(segment.stop, len(used)))
@@ -235,11 +248,13 @@ def _blocks(record: Observed) -> list[tuple[int, int]]:
 
 
 def _edges(seen: Sequence[FilteredRecord]) -> tuple[int, ...]:
+    """Edges of all blocks where the kept samples of the records follow one another."""
     sizes = [part.stop - part.start for each in seen for part in each.block_slices]
     return tuple(np.cumsum([0, *sizes]).tolist())
 
 
 def _noise(measure: ErrorMeasure, seen: Sequence[FilteredRecord], axis: int) -> float:
+    """Mean square of the noise in the output of an axis's matched filter."""
     left = (measure.noise / measure.unit) ** 2
     shares = [
         np.sum(np.abs(each.force_response[:, :, axis]) ** 2 * left[None, :], axis=1) / each.strength[:, axis] ** 2

@@ -1,8 +1,13 @@
-"""Screens terms by cross-validation: how much of a fit's residual each explains beside what re-tuning explains.
+"""Screening of candidate terms by cross-validation of linear regressions of a fit's filtered residual r (`View`).
 
-Each block's error is that of parameters fitted to all others (Stone, J. R. Stat. Soc. B 36:111, 1974), with the model's
-own parameters pulled to their calibration, and within the bounds of re-tuning. Terms are tried together, as products of
-columns.
+The columns X are a base (the model's own parameters, a constant, terms that were selected before) and one more term.
+The weights w minimise
+
+    |r - X w|² + (w - w0)' D (w - w0)        low <= w <= high
+
+with the calibration's values w0 of the model's parameters, the prior precision D, and the bounds of re-tuning. The
+error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B 36:111, 1974). Only the
+products X'X and X'r are needed, which are computed once per block, for all terms at once.
 """
 
 from collections.abc import Sequence
@@ -16,20 +21,20 @@ from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.signals.signal import FloatArray
 
 _DEPENDENT = 1e-6
-"""Share of a column's power that must be independent of the model's columns."""
+"""Least share of a term's power that must be linearly independent of the base columns; below it rounding dominates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Products:
-    """Normal equations of the base columns, block by block."""
+    """Normal equations of the k base columns, per block."""
 
     view: View
     held: tuple[FloatArray, ...]
-    """(s,) each: columns of terms already taken, after the model's parameters and a constant."""
+    """(s,) each: columns of terms selected before; they follow the model's parameters and the constant."""
     squares: FloatArray
-    """(blocks, k, k)"""
+    """(blocks, k, k): X'X"""
     with_residual: FloatArray
-    """(blocks, k): products with the residual."""
+    """(blocks, k): X'r"""
     power: FloatArray
     """(blocks,): sum of squares of the residual."""
 
@@ -41,7 +46,8 @@ class Products:
 
     @property
     def calibration(self) -> FloatArray:
-        """(k,): prior precision of each column's weight."""
+        """(k,): diagonal of D: 1 for the model's parameters, whose weights are in standard deviations of the
+        calibration; almost none for the constant and further terms, for numerical stability."""
         sizes = self.squares.sum(axis=0).diagonal()
         precision = np.where(sizes > 0, 1e-10 * sizes, 1.0)
         precision[: len(self.view.to_calibration) - 1] = 1.0
@@ -49,15 +55,15 @@ class Products:
 
     @property
     def wanted(self) -> FloatArray:
-        """(k,): the prior's part of the right side."""
+        """(k,): D w0, the prior's contribution to the right side of the normal equations."""
         offset = np.zeros(len(self.calibration))
         offset[: len(self.view.to_calibration)] = self.view.to_calibration
         return self.calibration * offset
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
-        """(k,) each: bounds of the weights. The model's parameters stay within those of re-tuning: with mass, damping
-        and stiffness free to vanish, a force that takes the command away would explain everything."""
+        """(k,) each: bounds of the weights; the model's parameters have those of re-tuning. If mass, damping and
+        stiffness could vanish, a force that cancels the command would explain the whole residual."""
         known, k = self.view.to_calibration, len(self.calibration)
         tuned = len(known) - 1
         low, high = np.full(k, -np.inf), np.full(k, np.inf)
@@ -65,7 +71,7 @@ class Products:
         return low, high
 
     def cross(self, columns: FloatArray) -> FloatArray:
-        """(blocks, k, terms): products of the base columns with others. columns: (terms, s)"""
+        """(blocks, k, terms): inner products of the base columns with those of terms. columns: (terms, s)"""
         found = []
         for part in self.blocks:
             those = columns[:, part].T
@@ -78,7 +84,7 @@ class Products:
 
 
 def products_of(view: View) -> Products:
-    """Products of the model's parameters and a constant."""
+    """The base of a view without further terms: the model's parameters and a constant."""
     base, edges = view.parameter_columns, list(pairwise(view.edges))
     return Products(
         view,
@@ -90,7 +96,7 @@ def products_of(view: View) -> Products:
 
 
 def add_columns(base: Products, columns: Sequence[FloatArray]) -> Products:
-    """The products with the columns of more terms. columns: (s,) each"""
+    """The base with the columns of further terms appended. columns: (s,) each"""
     if not len(columns):
         return base
     more, view = np.array(columns), base.view
@@ -105,18 +111,19 @@ def add_columns(base: Products, columns: Sequence[FloatArray]) -> Products:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TermErrors:
-    """Cross-validated squares of the base alone and with each term beside it, block by block."""
+    """Cross-validated sums of squared errors of the base alone and with each single term added, per block."""
 
     without: FloatArray
-    """(blocks,): held-out squares of the base alone."""
+    """(blocks,): held-out sum of squares of the base alone."""
     with_it: FloatArray
-    """(blocks, terms): held-out squares with each term."""
+    """(blocks, terms): held-out sum of squares with each term."""
     factors: FloatArray
     """(blocks, terms): each term's factor, fitted to the other blocks."""
 
 
 def cross_validate_terms(of: Products, columns: FloatArray) -> TermErrors:
-    """Held-out squares with each term alone beside the base, by leaving each block out. columns: (terms, s)"""
+    """Held-out sums of squares with each term added to the base by itself, each block left out once. columns: (terms,
+    s)"""
     parts = of.blocks
     cross = of.cross(columns)
     own = np.array([np.einsum("ks,ks->k", columns[:, part], columns[:, part]) for part in parts])
@@ -144,8 +151,9 @@ def cross_validate_terms(of: Products, columns: FloatArray) -> TermErrors:
 
 
 def _border(squares: FloatArray, other: FloatArray, size: FloatArray) -> FloatArray:
-    """(terms, k + 1, k + 1): normal equations of the base columns (k, k) bordered by each term. A term that depends on
-    them gets the weight 0. other: (k, terms) products; size: (terms,) squares."""
+    """(terms, k + 1, k + 1): normal matrix of the base (k, k) bordered by each term. A term that is linearly dependent
+    on the base gets an infinite diagonal entry, and so the weight 0. other: (k, terms), products with the base; size:
+    (terms,), sums of squares."""
     left = size - np.einsum("kt,kt->t", other, np.linalg.solve(squares, other))
     k = len(squares)
     bordered = np.zeros((len(size), k + 1, k + 1))
@@ -157,8 +165,8 @@ def _border(squares: FloatArray, other: FloatArray, size: FloatArray) -> FloatAr
 
 def solve_within(squares: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """(systems, k): least squares within bounds, from normal equations (systems, k, k) and right sides (systems, k), by
-    an active set: weights that leave their bounds are fixed there, and the others solved for again. An infinite
-    diagonal makes its weight 0."""
+    an active set: weights that leave their bounds are fixed there, and the others solved for again. The weight of an
+    infinite diagonal entry is 0."""
     barred = np.isinf(np.einsum("tkk->tk", squares))
     fixed, at = barred.copy(), np.zeros_like(right)
     for _ in range(right.shape[1]):
@@ -173,7 +181,7 @@ def solve_within(squares: FloatArray, right: FloatArray, low: FloatArray, high: 
 
 
 def _held_out_squares(of: Products, number: int, weights: FloatArray) -> FloatArray:
-    """(terms,). weights: (k, terms)"""
+    """(terms,): |r|² - 2 w'X'r + w'X'X w of block `number`, for each column w of the weights (k, terms)."""
     return np.asarray(
         of.power[number]
         - 2 * of.with_residual[number] @ weights

@@ -1,4 +1,8 @@
-"""The terms that are tried in a view: of a force, the grammar's; of a reading, what a sensor may add to it."""
+"""Candidate terms of one view: for a force along an axis those of the grammar, for a reading those of a sensor's error.
+
+Terms of a reading are powers, soft limits, dead zones, hysteresis (play), drift, and products with other channels. What
+is linear in the readings, such as a gain, a lag or a cross-axis share, is left to the effects of the catalogue.
+"""
 
 from collections.abc import Iterator
 from itertools import product
@@ -21,7 +25,7 @@ from analysis.diagnosis.discovery.matched_filter import View
 
 
 def view_terms(view: View) -> tuple[Term, ...]:
-    """All terms of a view; pitches and frequencies are those of its first recording."""
+    """All terms of a view. Spatial periods and frequencies of periodic terms are estimated from its first recording."""
     seen = view.records[0]
     if view.acts_on == "response":
         return terms_of_readings(seen.columns, view.axis, len(seen.reading_units))
@@ -32,8 +36,8 @@ def view_terms(view: View) -> tuple[Term, ...]:
 
 
 def terms_of_readings(columns: Columns, channel: int, channels: int) -> tuple[Term, ...]:
-    """All terms for one channel of a response of so many. What is linear in readings is none: a gain, a lag or another
-    axis's share are effects of the catalogue."""
+    """All terms for one channel of a response. columns: signals by name; channel: its index; channels: their number.
+    Thresholds start at shares of the channel's largest reading."""
     names = [f"a{axis}" for axis in AXES[:channels]]
     own, others = names[channel], [name for name in names if name != names[channel]]
     size = max(float(np.abs(columns[own]).max()), 1e-12)
@@ -41,6 +45,7 @@ def terms_of_readings(columns: Columns, channel: int, channels: int) -> tuple[Te
 
 
 def _own_terms(own: str, size: float) -> Iterator[Term]:
+    """Terms of one channel's own reading. size: its largest magnitude."""
     yield Term(f"sign({own})")
     for start in (0.5, 1.5, 2.0, 3.0, 5.0):
         yield Term(odd_power(own, 0), (start,), (POWER,), (0,))
@@ -56,6 +61,7 @@ def _own_terms(own: str, size: float) -> Iterator[Term]:
 
 
 def _cross_terms(own: str, others: list[str]) -> Iterator[Term]:
+    """Products and powers up to the third order that involve other channels of the response."""
     for other in others:
         shapes = (
             f"{own}*{other}", f"{other}**2", f"{other}*abs({other})", f"abs({other})", f"{own}*abs({other})",

@@ -1,8 +1,8 @@
 """Error measure for impacts: the power of each channel in each band and segment, because waveforms are unpredictable.
 
-The logarithm of the amplitude in half octaves (Welch's spectra over 1 s), the noise counted in. Two simulations of a
-rattling device whose initial states differ by less than any sensor resolves agree in it to a few per cent, while their
-waveforms do not (chaos).
+Compared is ln a, with a² the mean power density in a band of half an octave (Welch's method, windows of 1 s); the
+noise's power is added to a predicted a². Impacts make the motion chaotic: the waveforms of two simulations whose
+initial states differ by less than any sensor resolves diverge; their band amplitudes agree to a few per cent.
 """
 
 from collections.abc import Sequence
@@ -21,18 +21,20 @@ from equalizer.signals.spectral_density import spectral_density
 WINDOW_S, OCTAVES = 1.0, 0.5
 """Length of a Welch window in s, and width of a band in octaves."""
 LOWEST, HIGHEST = 2.0, 0.48
-"""Edges of the bands, relative to a window's own line, and relative to the sample rate."""
+"""Lower end of the lowest band in lines of a window (1 / WINDOW_S), and limit of the highest over the sample rate."""
 LONGEST_S, LEAST = 8.0, 256
-"""Longest stretch without segments, and least samples of any stretch."""
+"""Longest stretch of a record without segments (s), and least number of samples of any stretch."""
 HEARD = 4.0
-"""Least ratio of a band's power to the noise's."""
+"""Least ratio of a band's power to that of the noise; bands below it are not compared."""
 PARTS = ("fit", "choose", "test")
+"""Roles of samples, by the names of the masks of `Observed`."""
 Residuals = tuple[FloatArray, ...]
+"""Residuals of an error measure: per record (n, c), in units of `ErrorMeasure.unit`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Samples of one record with one role (fit, choose or test)."""
+    """Samples `first` to `last` (exclusive) of one record, all with the same role (`part`: fit, choose or test)."""
 
     record: int
     first: int
@@ -48,8 +50,8 @@ class BandPower:
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
-        """Per segment (rest left out) and role, the longest run of its samples, where that has `LEAST` or more. Without
-        segments, pieces of `LONGEST_S` take their place."""
+        """Per segment (rest left out) and role, the longest run of its samples, where that has `LEAST` or more. A
+        record without segments is divided into pieces of `LONGEST_S`."""
         return tuple(
             Stretch(number, first, last, part)
             for number, record in enumerate(self.measure.records)
@@ -60,36 +62,38 @@ class BandPower:
 
     @cached_property
     def measured(self) -> FloatArray:
-        """(stretches, bands, c): logarithm of the amplitude; NaN where it is below the noise."""
+        """(stretches, bands, c): ln a of the measured signals; NaN where the power is below `HEARD` times the noise."""
         power = self._power([record.measured for record in self.measure.records])
         with np.errstate(divide="ignore"):
             return np.where(power > HEARD * self._noise, 0.5 * np.log(power), np.nan)
 
     def predict(self, residuals: Residuals) -> FloatArray:
-        """(stretches, bands, c): logarithm of the predicted amplitude, the noise's power added."""
+        """(stretches, bands, c): ln a of the predicted signals, with the noise's power added."""
         unit = self.measure.unit
         predicted = [r.measured - left * unit for r, left in zip(self.measure.records, residuals, strict=True)]
         return np.asarray(0.5 * np.log(self._power(predicted) + self._noise))
 
     def misfits(self, off: FloatArray) -> FitScore:
-        """Rms by channel of a difference of logarithms `off`, on the samples to fit, choose and test by; NaN = none."""
+        """Rms per channel of differences `off` of ln a, (stretches, bands, c), by role; NaN without a compared band."""
         known_errors = np.where(np.isnan(self.measured), np.nan, off)
         return FitScore(*(_rms(known_errors[[stretch.part == part for stretch in self.stretches]]) for part in PARTS))
 
     @cached_property
     def _edges(self) -> FloatArray:
-        """(bands + 1,), Hz"""
+        """(bands + 1,), Hz: edges of the bands, at constant ratios."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         count = int(np.log2(HIGHEST * rate_hz * WINDOW_S / LOWEST) / OCTAVES)
         return np.asarray(LOWEST / WINDOW_S * 2.0 ** (OCTAVES * np.arange(max(count, 1) + 1)))
 
     @property
     def _noise(self) -> FloatArray:
+        """(c,): one-sided power density of white noise with the rms of the measure's noise."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         return np.asarray(self.measure.noise**2 / (rate_hz / 2))
 
     def _power(self, predicted: Sequence[FloatArray]) -> FloatArray:
-        """(stretches, bands, c): mean density."""
+        """(stretches, bands, c): a², mean power density over the lines of each band, in units squared per hertz. A
+        band between two lines takes the line above it. predicted: signals (n, c), per record."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         rows = np.empty((len(self.stretches), len(self._edges) - 1, len(self.measure.noise)))
         for row, stretch in zip(rows, self.stretches, strict=True):
@@ -101,6 +105,7 @@ class BandPower:
         return rows
 
     def _spans(self, number: int) -> list[tuple[int, int]]:
+        """Start and stop of the segments of a record in motion, or of pieces of it where it has none."""
         record = self.measure.records[number]
         segments = [(segment.start, segment.stop) for segment in record.recording.segments if segment.kind != "rest"]
         length, longest = len(record.measured), int(LONGEST_S * record.recording.sample_rate_hz)
@@ -108,13 +113,14 @@ class BandPower:
 
 
 def _longest_run(mask: Mask, first: int, last: int) -> list[tuple[int, int]]:
-    """The longest run of samples that count, between first and last; empty where it is short."""
+    """Start and stop of the longest run of masked samples between first and last; empty below `LEAST` samples."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask[first:last].astype(np.int8), [0]]))).reshape(-1, 2)
     runs = [(first + int(a), first + int(b)) for a, b in edges if b - a >= LEAST]
     return [max(runs, key=lambda run: run[1] - run[0])] if runs else []
 
 
 def _rms(off: FloatArray) -> FloatArray:
+    """(c,): rms over stretches and bands, without NaN; NaN where all are NaN."""
     count = np.sum(np.isfinite(off), axis=(0, 1))
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(np.sqrt(np.nansum(off**2, axis=(0, 1)) / count))

@@ -1,7 +1,13 @@
 """Robust Gauss-Newton least squares on band powers, for the parameters of a hypothesis and of the model.
 
-Predictions of impacts are chaotic, so that finite differences take large steps, and each band of a segment is weighted
-by the inverse of its variance between simulations.
+With the differences e of ln a, measured less predicted (`band_power`), and deviations d of the model's own parameters,
+
+    J = (sum of rho(e / s) + d'd) / N        s² = spread² + FLOOR²
+    rho(x) = x² for |x| <= k, else k (2 |x| - k)        k = TRUSTED
+
+with Huber's loss rho (Huber, Ann. Math. Stat. 35:73, 1964) over the N fitted bands. Simulations of impacts are chaotic:
+the spread of ln a between simulations whose parameters differ by rounding sets the weights, and derivatives are central
+differences over large steps.
 """
 
 from dataclasses import dataclass, replace
@@ -17,21 +23,22 @@ from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
 MOVES, WIDEST = (0.02, 0.2), 12.0
-"""Finite-difference step of a logarithm, least and most; and relative to its usual step."""
+"""Least and largest finite-difference step of a logarithmic parameter; and its ratio to `FreeParameter.move` between
+these limits."""
 LONGEST_STEP = 0.5
-"""Largest step of a logarithm; two finite-difference steps for parameters of either sign."""
+"""Largest Gauss-Newton step of a logarithmic parameter; for others it is two finite-difference steps."""
 MOST_BY_CHANCE = 0.8
-"""Largest share of a column's apparent information that is attributed to chance."""
+"""Largest share of a parameter's information that is attributed to the chaotic scatter of its finite differences."""
 LEAST_KNOWN = 1e-6
-"""Information on a combination of parameters to which the prediction is not sensitive."""
+"""Lower limit of the information on a combination of parameters to which the prediction is not sensitive."""
 SHARES = (1.0, 0.3, 0.1, 0.03)
-"""Factors on a step that are tried (line search)."""
+"""Factors on a step that are tried in turn (line search)."""
 FLOOR = 0.04
-"""Least standard deviation of the logarithm of an amplitude: no simulation predicts it better."""
+"""Least standard deviation of ln a: no simulation of impacts predicts it better."""
 TRUSTED = 2.0
-"""Huber's threshold in standard deviations (Huber 1964): the model may lack more than one thing."""
+"""Threshold k of Huber's loss, in standard deviations: more than the fitted effect may be missing."""
 RESTS = 1e-4
-"""Relative decrease of the cost below which a step is the last."""
+"""Relative decrease of the cost below which the fit ends."""
 
 
 PERTURBATION = 1e-9
@@ -46,15 +53,15 @@ def perturb(hypothesis: Hypothesis, number: int) -> Hypothesis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """The band powers that are compared, their weights, and what is fitted."""
+    """The band powers that are compared, their weights, and the parameters that are fitted."""
 
     power: BandPower
     tuning: Tuning
     map_: Mapper
     spread: float | FloatArray = 0.05
-    """Standard deviation of the logarithms between simulations; (stretches, bands, c), or one for all."""
+    """Standard deviation of ln a between simulations: (stretches, bands, c), or a single value."""
     by_deviations: FloatArray | None = None
-    """(t, stretches, bands, c): sensitivity to the model's own parameters; None = these are not fitted."""
+    """(t, stretches, bands, c): derivatives of ln a by the model's own parameters; None = these are not fitted."""
     ensemble: int = 1
     """Ensemble size: simulations over which a prediction is averaged, from parameters that differ by PERTURBATION."""
 
@@ -68,6 +75,7 @@ class View:
         return np.asarray(np.mean(list(self.map_(member, members)), axis=0))  # type: ignore[arg-type]
 
     def _member(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
+        """(stretches, bands, c): ln a of a single simulation; NaN for an invalid model."""
         try:
             model = self.tuning.tune(deviations)
             return self.power.predict(self.power.measure.residuals(model, hypothesis.list_placed_effects()))
@@ -76,7 +84,7 @@ class View:
 
     @property
     def weights(self) -> FloatArray:
-        """(stretches, bands, c): 0 for held-out stretches and bands below the noise."""
+        """(stretches, bands, c): 1 / s; 0 for held-out stretches and bands below the noise."""
         fit = np.array([stretch.part != "test" for stretch in self.power.stretches], dtype=np.bool_)
         known = np.isfinite(self.power.measured) & fit[:, None, None]
         return np.asarray(np.where(known, 1 / np.hypot(self.spread, FLOOR), 0.0))
@@ -84,24 +92,25 @@ class View:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandPowerFit:
-    """A hypothesis with its prediction."""
+    """A hypothesis and deviations of the model's parameters, with the predicted band powers and the cost."""
 
     hypothesis: Hypothesis
     deviations: FloatArray
+    """(t,): in standard deviations of the calibration."""
     predicted: FloatArray
-    """(stretches, bands, c)"""
+    """(stretches, bands, c): ln a."""
     cost: float
-    """Mean Huber loss over the fitted bands; inf for an invalid model."""
+    """J of the module's equation; inf for an invalid model."""
     errors: FloatArray
     """(parameters,): standard errors of the point; empty before a step."""
 
     def off(self, view: View) -> FloatArray:
-        """(stretches, bands, c): logarithm of the measured over the predicted amplitude; NaN below the noise."""
+        """(stretches, bands, c): ln of the measured over the predicted amplitude; NaN below the noise."""
         return np.asarray(view.power.measured - self.predicted)
 
 
 def evaluate_hypothesis(view: View, deviations: FloatArray, hypothesis: Hypothesis) -> BandPowerFit:
-    """Predicted band powers and their robust cost (Huber) at given parameters, without fitting; infinite where a
+    """Predicted band powers and their cost at given parameters, without fitting. The cost is infinite where a
     prediction is not finite."""
     predicted = view.predict(deviations, hypothesis)
     weights = view.weights
@@ -127,7 +136,7 @@ def fit_band_power(view: View, start: BandPowerFit, rounds: int) -> BandPowerFit
 
 
 def hypothesis_columns(view: View, at: BandPowerFit) -> FloatArray:
-    """(parameters, stretches, bands, c): sensitivity to the hypothesis's parameters, by central differences."""
+    """(parameters, stretches, bands, c): derivatives of ln a by the hypothesis's coordinates (central differences)."""
     parameters = at.hypothesis.parameters
     jobs = [(number, way) for number in range(len(parameters)) for way in (1.0, -1.0)]
 
@@ -144,6 +153,7 @@ def hypothesis_columns(view: View, at: BandPowerFit) -> FloatArray:
 
 
 def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
+    """The fit after a bounded step with line search, with its standard errors; its cost may be higher than before."""
     own = np.array([_weight(view, column) for column in hypothesis_columns(view, at)])
     off = _weight(view, view.power.measured - at.predicted)
     t = 0 if view.by_deviations is None else len(at.deviations)
@@ -151,7 +161,8 @@ def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
     columns = np.vstack([*known, *own])
     columns[~np.isfinite(columns).all(axis=1)] = 0.0
     trust = np.minimum(1.0, TRUSTED / np.maximum(np.abs(off), TRUSTED))
-    # Steps of the model's own parameters are small; where they leave a large residual, an effect is missing.
+    # Re-tuning within the calibration makes small changes, so a residual that stays large shows a missing effect: with
+    # the model's own parameters in the fit, large residuals get less weight.
     weighted = columns * (trust**3 if t else trust)
     rhs = weighted @ off
     products = weighted @ columns.T
@@ -173,10 +184,10 @@ def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
 
 
 def _errors(view: View, at: BandPowerFit, products: FloatArray) -> FloatArray:
-    """(parameters,): standard errors from the information matrix, with the information attributed to chance
-    subtracted. What is left is scaled in rows and columns alike: chance adds to the diagonal alone, but subtracted from
-    it alone, the matrix is indefinite where parameters are correlated. Errors of strongly correlated parameters come
-    out small by that; twenty values of five drawn devices (seeds 7000 to 7004) were off by 1.09 of them, rms."""
+    """(parameters,): standard errors from the information matrix, reduced by the information due to chaotic scatter.
+    Scatter adds to the diagonal only; subtracted there, it would make the matrix of correlated parameters indefinite,
+    so rows and columns are scaled instead. This underestimates errors of strongly correlated parameters: twenty
+    parameters of five simulated devices (seeds 7000 to 7004) were wrong by 1.09 standard errors (rms)."""
     parameters = at.hypothesis.parameters
     first = len(products) - len(parameters)
     chance = _weight(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))
@@ -191,6 +202,7 @@ def _errors(view: View, at: BandPowerFit, products: FloatArray) -> FloatArray:
 
 
 def _step_bounds(at: BandPowerFit, t: int) -> tuple[FloatArray, FloatArray]:
+    """Bounds of a step, (t + parameters,) each: the model's own parameters stay within 3 standard deviations."""
     parameters = at.hypothesis.parameters
     most = np.array([LONGEST_STEP if free.parameter.scale == "log" else 2 * _move(free) for free in parameters])
     bounds = np.array([free.bounds for free in parameters]).reshape(-1, 2) - at.hypothesis.point[:, None]
@@ -207,10 +219,12 @@ def _move(free: FreeParameter) -> float:
 
 
 def _huber(off: FloatArray) -> FloatArray:
+    """Huber's loss rho of the module's equation, element by element."""
     size = np.abs(off)
     return np.asarray(np.where(size <= TRUSTED, size**2, TRUSTED * (2 * size - TRUSTED)))
 
 
 def _weight(view: View, of: FloatArray) -> FloatArray:
+    """(N,): weighted values of (stretches, bands, c) in the fitted bands."""
     weights = view.weights
     return np.asarray((of * weights)[weights > 0])

@@ -1,4 +1,8 @@
-"""Makes the error measure of recordings and a model: by the rule of `error_measure_rule`, or as a user asks."""
+"""Makes the error measure for recordings and a model, by the rule of `error_measure_rule` or by the user's choice.
+
+In this order: the samples of each recording are divided into those to fit, to choose and to test by; the noise of each
+channel is estimated; errors get their unit from the noise; the rule selects free simulation, windows or forces.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,10 +27,10 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 Compared = Literal["auto", "motion", "force"]
-"""Signals that the user asks to be compared; auto: selected by the rule."""
+"""Signals that the user sets to be compared; auto: by the rule."""
 
 DITHER = 0.02
-"""Noise in steps of a converter below which differences between repeats do not show the noise."""
+"""Rms noise over the step of a converter below which differences between repeats do not show the noise."""
 ORDERED = 0.45
 """End of the band relative to the sample rate, for samples without a time axis."""
 BY_FORCE = (
@@ -51,6 +55,7 @@ class MeasureChoice:
     floors: tuple[NoiseFloor, ...]
     """Noise of the compared signals, per record of the measure."""
     remarks: tuple[str, ...]
+    """Sentences on the choice, and on the effects that the model itself names."""
 
 
 def measure_of(
@@ -59,8 +64,8 @@ def measure_of(
     beside: Sequence[Recording] = (),
     compared: Compared = "auto",
 ) -> MeasureChoice:
-    """The error measure that the rule selects, of every part of the recordings. beside: other recordings that must be
-    measured the same way, and are not part of it."""
+    """The error measure that the rule or `compared` selects. beside: further recordings that must suit the same measure
+    but are not part of it. Windows without an estimable state become a free simulation or, by the rule, forces."""
     if compared == "force":
         return measure_by_force(recordings, model, None)
     records, others = (
@@ -94,7 +99,8 @@ def measure_of(
 
 
 def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float | None) -> MeasureChoice:
-    """The error measure by force, up to a frequency, without the rule; see `has_motion`."""
+    """The error measure by force without the rule. band_hz: forces are compared up to it; None = by the noise. The
+    recordings must have a motion (`has_motion`)."""
     records = observe_parts(recordings, model.outputs)
     known = place_recorded_effects(model, recordings[0])
     floors = [noise_floor(record.recording) for record in records]
@@ -108,6 +114,7 @@ def _by_force(
     remarks: tuple[str, ...],
     band_hz: float | None = None,
 ) -> MeasureChoice:
+    """The error measure by force, with the end of its band among the remarks."""
     from analysis.diagnosis.forces.force_views import force_views
 
     known = place_recorded_effects(model, records[0].recording)
@@ -117,6 +124,7 @@ def _by_force(
 
 
 def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:
+    """Remark on the effects that the model's file names; none without any."""
     if not known:
         return ()
     kinds = ", ".join(dict.fromkeys(noun_of(placed.effect.name) for placed in known))
@@ -124,7 +132,7 @@ def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:
 
 
 def _leave_out_beginning(record: Observed, model: MechanicalModel) -> Observed:
-    """The record without its first seconds, where these are in motion and short."""
+    """The record with the samples of its initial motion given no role, where that decays soon (`samples_to_settle`)."""
     after = samples_to_settle(record, model)
     if not after:
         return record
@@ -133,7 +141,7 @@ def _leave_out_beginning(record: Observed, model: MechanicalModel) -> Observed:
 
 
 def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:
-    """(c,): rms noise of each channel in the quietest recording."""
+    """(c,): rms noise of each channel in the quietest recording; `UNKNOWN_NOISE_SHARE` of the signal where unknown."""
     count = records[0].measured.shape[1]
     rows = [
         np.concatenate([_noise_before_rounding(f, record), f.position_rms if f.position_rms is not None else []])[
@@ -147,9 +155,9 @@ def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatAr
 
 
 def _noise_before_rounding(floor: NoiseFloor, record: Observed) -> FloatArray:
-    """(p,): rms noise of the response before a converter rounded it, because rounding is an effect that a model may
-    lack; the rounding of positions is assumed as for every encoder. Only from repeats: otherwise rounding and noise
-    cannot be separated."""
+    """(p,): rms noise of the response before a converter rounded it (rounding adds step² / 12), because quantisation is
+    an effect that the model may lack. Positions keep their rounding, which every encoder has. Noise that was not
+    estimated from repeats is unchanged, because it cannot be separated from rounding."""
     noise = floor.response_rms
     if floor.how != "repeats":
         return noise

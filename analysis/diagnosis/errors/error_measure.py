@@ -14,7 +14,7 @@ from equalizer.signals.signal import FloatArray
 
 
 class ErrorMeasure(Protocol):
-    """A comparison of whole simulated responses, of windows of them, or of forces."""
+    """A comparison of measurements with simulated responses, with windows of them, or with predicted forces."""
 
     @property
     def name(self) -> str:
@@ -22,7 +22,7 @@ class ErrorMeasure(Protocol):
 
     @property
     def records(self) -> tuple[Observed, ...]:
-        """The compared records: their `measured`, with the channels of their recording's response and position."""
+        """The compared records. Their `measured` are the c channels: response and position, or forces."""
 
     @property
     def noise(self) -> FloatArray:
@@ -34,22 +34,24 @@ class ErrorMeasure(Protocol):
 
     @property
     def least(self) -> float:
-        """Least error in units of the noise: smaller ones are set to it."""
+        """Least error in units of the noise: smaller errors are set to it."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         """The measure on the same records with other sample roles."""
 
     def with_floor(self, rms: FloatArray) -> Self:
-        """The measure with more noise, and that noise as its least error. rms: (c,), in each channel's own unit."""
+        """The measure with further noise added to its own (root sum of squares), and 1 as its least error. rms: (c,),
+        in each channel's own unit."""
 
     def shorten(self) -> Self:
-        """The measure without the samples after the last to fit or to choose by."""
+        """The measure on records cut after their last sample to fit or to choose by."""
 
     def can_observe(self, effect: Effect) -> bool:
-        """Whether the effect changes the compared signals; other effects are not considered."""
+        """Whether the effect changes the compared signals; an effect that does not is not a candidate."""
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        """Per record (n, c): measured less predicted, in units of `unit`."""
+        """Per record (n, c): measured less predicted, in units of `unit`. Forces raise numpy.linalg.LinAlgError where
+        the model's outputs do not determine its motion."""
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]

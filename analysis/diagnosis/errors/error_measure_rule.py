@@ -15,7 +15,9 @@ recording: any small error grows without bound. It is simulated in windows of 1 
 from the measured motion, or, where no state can be estimated, compared by forces;
 
 * a recording that does not begin at rest: the initial motion decays, so its first seconds are left out; where that
-would be more than a quarter of the recording, windows are used.
+would be more than a quarter of the recording, windows are used;
+
+* a recording of an imposed motion with a measured force, or without a time axis: forces are compared.
 """
 
 from collections.abc import Sequence
@@ -100,13 +102,14 @@ def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choic
 
 
 def is_self_stable(model: MechanicalModel, longest_s: float) -> bool:
-    """Whether all free motion decays well within a recording (no pole at or near the stability limit)."""
+    """Whether all free motion of the model decays well within a recording of `longest_s` seconds: the slowest time
+    constant is less than `DIES_OUT_SHARE` of it."""
     return _slowest_decay_rate(model) * DIES_OUT_SHARE * longest_s > 1
 
 
 def samples_to_settle(record: Observed, model: MechanicalModel) -> int:
-    """Samples to leave out at the beginning, where the recording begins in motion and that takes a short time; 0 =
-    none."""
+    """Samples to leave out at the beginning of a record that begins in motion, until the motion has decayed; 0 where it
+    begins at rest, or where they would be more than `MOST_LEFT_OUT` of the record."""
     after = _count_settling_samples(record, model)
     if after > MOST_LEFT_OUT * len(record.command) or not _begins_moving(record):
         return 0
@@ -114,17 +117,19 @@ def samples_to_settle(record: Observed, model: MechanicalModel) -> int:
 
 
 def _count_settling_samples(record: Observed, model: MechanicalModel) -> float:
-    """Samples until the initial motion has decayed."""
+    """Samples until the initial motion has decayed (`SETTLED_CONSTANTS` time constants); infinite if it never does."""
     slowest = _slowest_decay_rate(model)
     return SETTLED_CONSTANTS / slowest * record.recording.sample_rate_hz if slowest > 0 else np.inf
 
 
 def _slowest_decay_rate(model: MechanicalModel) -> float:
-    """Decay rate of the slowest free motion, 1/s; negative for one that grows."""
+    """Decay rate of the slowest free motion, 1/s; negative where a motion grows."""
     return -float(free_motion_rates(model).real.max())
 
 
 def _begins_moving(record: Observed) -> bool:
+    """Whether a channel is away from zero and changes in the first `REST_S`, both relative to the whole record. An
+    offset alone is no motion."""
     first = max(int(REST_S * record.recording.sample_rate_hz), 4)
     known = record.measured[np.isfinite(record.measured).all(axis=1)]
     if len(known) < 4 * first:

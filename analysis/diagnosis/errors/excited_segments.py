@@ -1,4 +1,8 @@
-"""Selects the segments that excite one axis: enough to identify its drive, and quick to simulate."""
+"""Selects the segments of a record in which one axis is driven.
+
+The first fit of an effect with impacts uses only these segments: they contain the information about that axis, and cost
+less simulation time than the whole record (`search.impacts`).
+"""
 
 from dataclasses import replace
 
@@ -10,13 +14,13 @@ from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from equalizer.signals.recording import Segment
 
 EXCITED_SHARE = 0.5
-"""Least command of the axis, relative to that of the strongest axis in a segment."""
+"""Least rms command of the axis, relative to that of the strongest axis in a segment."""
 LONGEST_S = 6.0
-"""Longest part of a segment that is used."""
+"""Longest part of a segment that is used (s)."""
 
 
 def select_excited_segments(measure: FreeSimulation, axis: int) -> FreeSimulation:
-    """The measure on the segments that excite an axis, each from rest; unchanged where there are none."""
+    """The measure on the segments that excite an axis, each simulated from rest; unchanged where there are none."""
     parts = tuple(
         _cut_record(record, segment)
         for record in measure.records
@@ -28,11 +32,13 @@ def select_excited_segments(measure: FreeSimulation, axis: int) -> FreeSimulatio
 
 
 def _is_excited(record: Observed, segment: Segment, axis: int) -> bool:
+    """Whether the axis is driven in the segment with at least `EXCITED_SHARE` of the strongest axis's command."""
     power = np.sum(record.command[segment.start : segment.stop] ** 2, axis=0)
     return bool(power[axis] >= EXCITED_SHARE**2 * power.max() > 0)
 
 
 def _cut_record(record: Observed, segment: Segment) -> Observed:
+    """The record of a segment alone, at most `LONGEST_S` of it, rounded to whole periods where it has a period."""
     longest = int(LONGEST_S * record.recording.sample_rate_hz)
     if segment.period:
         longest = max(longest // segment.period, 1) * segment.period

@@ -1,4 +1,8 @@
-"""Errors of a fit over the noise, on the samples to fit, to choose and to test by."""
+"""Scores of a fit: rms error over rms noise per channel, on the samples to fit, to choose and to test by.
+
+`FitScore.mean_log_error` is the criterion by which fits are compared; the functions below compute rms errors and the
+rms of the measured signals that errors are normalised by.
+"""
 
 from dataclasses import dataclass
 
@@ -11,7 +15,7 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
 
 _TINY = 1e-6
-"""Lower limit of an error, so that its logarithm is finite."""
+"""Lower limit of an error in `mean_log_error`, so that its logarithm is finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,17 +33,17 @@ class FitScore:
 
     @property
     def mean_log_error(self) -> float:
-        """Criterion of comparisons: mean over channels of the logarithm of the error power; 0 = only noise. This is the
-        likelihood with a free error variance per channel, so that no channel dominates the others."""
+        """Mean log error power: mean over channels of ln(fit * choose); 0 = only noise. Up to constants this is the
+        negative log-likelihood with a free error variance per channel, so that no channel dominates the others."""
         return float(np.mean(np.log(np.maximum(self.fit, _TINY))) + np.mean(np.log(np.maximum(self.choose, _TINY))))
 
     def larger(self, times: FloatArray) -> "FitScore":
-        """Score with errors multiplied by times (c,)."""
+        """The score with its errors multiplied by `times`, (c,)."""
         return FitScore(self.fit * times, self.choose * times, self.test * times)
 
 
 def fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FitScore:
-    """Score of residuals, per record (n, c), in units of `measure.unit`."""
+    """The score of residuals, per record (n, c), in units of `measure.unit`; errors are at least `measure.least`."""
     scale = measure.unit / measure.noise
     return FitScore(
         *(
@@ -75,7 +79,7 @@ def signal_rms(records: tuple[Observed, ...], masks: list[Mask]) -> FloatArray:
 
 
 def rms_over(records: tuple[Observed, ...], residuals: tuple[FloatArray, ...], masks: list[Mask]) -> FloatArray:
-    """(c,): rms residual over the masked samples of all records; NaN where no sample counts."""
+    """(c,): rms residual over the masked samples of all records; NaN where the masks are empty."""
     squares = sum(np.einsum("nc,nc->c", each[mask], each[mask]) for each, mask in zip(residuals, masks, strict=True))
     count = sum(int(mask.sum()) for mask in masks)
     return np.asarray(np.sqrt(squares / count)) if count else np.full(residuals[0].shape[1], np.nan)

@@ -1,4 +1,9 @@
-"""Hypotheses about what is missing: effects of the catalogue, each at an axis or channel, with free parameters."""
+"""Hypotheses about missing physics: effects, each at an axis or channel, with the free parameters that a fit varies.
+
+A hypothesis is a list of claims (effect and sites) and a point: one coordinate per free parameter. A coordinate is the
+logarithm of a parameter on a log scale, else the parameter over its unit, so that a fit can step along it. Hypotheses
+are immutable: the functions below make new ones.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -10,15 +15,16 @@ from equalizer.effects.effect import AxisForce, Effect, JointForce, Parameter, P
 from equalizer.signals.signal import FloatArray
 
 Spread = Literal["one", "all", "each"]
+"""How the sites of an effect share parameters: a single site; all with the same values; each with its own."""
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One effect at one or several sites."""
+    """An effect at one or several sites (axes or channels)."""
 
     effect: Effect
     spread: Spread
-    """How sites share parameters: one site; all with the same; each with its own."""
+    """How the sites share parameters: see `Spread`."""
     sites: tuple[int, ...]
     """Numbers of the axes or channels, from 0."""
 
@@ -34,7 +40,7 @@ class FreeParameter:
 
     parameter: Parameter
     unit: float
-    """Value of one step of the coordinate where it is not logarithmic."""
+    """Change of the value per unit of the coordinate where it is not logarithmic (SI)."""
 
     def value(self, coordinate: float) -> float:
         """The parameter's value (SI) at a coordinate, within its limits."""
@@ -50,7 +56,7 @@ class FreeParameter:
 
     @property
     def move(self) -> float:
-        """Step of the finite differences, in the coordinate."""
+        """Step of finite differences, in the coordinate: 1 on a linear scale, else the parameter's own step."""
         return 1.0 if self.parameter.scale == "linear" else self.parameter.step
 
     @property
@@ -61,11 +67,12 @@ class FreeParameter:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """Claims that hold together, with the parameters to start a fit from, or those it found."""
+    """Claims that hold at the same time, with the parameters that a fit starts from or has found."""
 
     claims: tuple[Claim, ...]
     starts: tuple[Values, ...]
-    """Per group of each claim: values that stay fixed, and the scale of those that may have either sign."""
+    """Per group of each claim, values by parameter name: those of fixed parameters, and the magnitudes that are the
+    units of parameters of either sign."""
     point: FloatArray
     """(k,): coordinates of the free parameters, claim by claim, group by group (`FreeParameter.coordinate`)."""
 
@@ -109,12 +116,12 @@ class Hypothesis:
 
 
 def has_motion_forces(hypothesis: Hypothesis) -> bool:
-    """Whether a force that depends on the motion is part of it."""
+    """Whether the hypothesis contains a force that depends on the motion."""
     return any(isinstance(claim.effect.acts, (AxisForce, JointForce)) for claim in hypothesis.claims)
 
 
 def without_claim(whole: Hypothesis, number: int) -> Hypothesis:
-    """The hypothesis without its claim of that number, and without the claim's starts and parameters."""
+    """The hypothesis without the claim of this number, and without the claim's starts and parameters."""
     first = sum(claim.groups for claim in whole.claims[:number])
     last = first + whole.claims[number].groups
     sizes = [sum(not p.fixed for p in claim.effect.parameters) * claim.groups for claim in whole.claims]
@@ -127,9 +134,9 @@ def without_claim(whole: Hypothesis, number: int) -> Hypothesis:
 
 
 def move_point(hypothesis: Hypothesis, step: FloatArray, straight: bool) -> Hypothesis:
-    """The hypothesis with its coordinates moved. straight: values change in proportion to the step also where
-    coordinates are logarithms, and a tenth of them is left at least. Along a valley in which a parameter of the model
-    makes up for one of the effect (two masses), steps of logarithms leave the valley's floor."""
+    """The hypothesis with its coordinates moved by a step (k,). straight: logarithmic coordinates move by ln(1 + step),
+    so that values change in proportion to the step, and drop to a tenth at least. Where a parameter of the model
+    compensates for that of the effect (two masses), the cost has a valley that is straight in the values only."""
     if not straight:
         return replace(hypothesis, point=hypothesis.point + step)
     logarithmic = np.array([free.parameter.scale == "log" for free in hypothesis.parameters], dtype=np.bool_)
@@ -153,10 +160,12 @@ def combine(first: Hypothesis, other: Hypothesis) -> Hypothesis:
 
 
 NOTHING = Hypothesis((), (), np.zeros(0))
+"""The hypothesis without effects: the model alone."""
 
 
 def similar_hypotheses(whole: Hypothesis) -> Iterator[Hypothesis]:
-    """The hypothesis with other parameters that have almost the same effect, one effect at a time."""
+    """Variants of the hypothesis in which one effect at a time has other values with almost the same response
+    (`Effect.alike`)."""
     parameters, begin = whole.parameters, 0
     for placed in whole.list_placed_effects():
         end = begin + sum(not p.fixed for p in placed.effect.parameters)
@@ -168,6 +177,8 @@ def similar_hypotheses(whole: Hypothesis) -> Iterator[Hypothesis]:
 
 
 def _unit(p: Parameter, start: Values) -> float:
+    """Unit of a coordinate that is not logarithmic: the magnitude of the start where either sign is possible (1 where
+    it is 0), else the parameter's own step."""
     if p.scale == "signed":
         return abs(start[p.name]) or 1.0
     return p.step

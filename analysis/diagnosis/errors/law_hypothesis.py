@@ -1,4 +1,7 @@
-"""A law without a name as a hypothesis, to be fitted by output error."""
+"""Converts a discovered law, a formula that is no effect of the catalogue, to a hypothesis that `output_error` can fit.
+
+The free numbers of the formula become the parameters of an effect (`law_effect`) at one axis or response channel.
+"""
 
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, hypothesis_of_claim
 from equalizer.effects.discovered_law import law_channels, law_effect, law_values
@@ -7,7 +10,7 @@ from equalizer.signals.recording import Recording
 
 
 def hypothesis_of_law(law: Law, axis: int, recording: Recording) -> Hypothesis:
-    """Hypothesis with a single claim, the law on axis (or channel) `axis`, which starts from the law's own
-    parameters."""
+    """Hypothesis with a single claim: the law at an axis, or at a channel for a law of the response. The fit starts
+    from the law's own values. axis: index, from 0."""
     effect = law_effect(law, law_channels(recording))
     return hypothesis_of_claim(Claim(effect, "one", (axis,)), [law_values(law)])

@@ -1,9 +1,9 @@
 """Re-tuning: the free parameters of a mechanical model within the tolerances of its calibration.
 
-Before physics is called missing, the parameters of the given model may move by a few standard deviations of their
-calibration. The model M q'' + B q' + K q = input is first written in the coordinates of Craig and Bampton (AIAA Journal
-6 (1968), 1313): the m driven axes, and the modes with these axes held (fixed-interface modes), scaled to unit mass.
-Free are then
+The parameters of the given model may move by a few standard deviations of their calibration; only a mismatch that
+remains then is attributed to missing physics. The model M q'' + B q' + K q = input is first written in the coordinates
+of Craig and Bampton (AIAA Journal 6 (1968), 1313): the m driven axes, and the modes with these axes held
+(fixed-interface modes), scaled to unit mass. Free are then
 
 * each entry of the m x m blocks of mass, damping and stiffness at the driven axes (an absolute change);
 * of each mode k its frequency f, mass and damping ratio (relative changes df, dm, dz):  K_kk (1 + df)², the coupling to
@@ -31,7 +31,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
 UNSTATED = Tolerance(modes=UNSTATED_MODES)
-"""Tolerance of a model that states none; grounded parameters have `UNSTATED_SHARE` of the largest at any axis."""
+"""Tolerance of a model that states none; for parameters of the axes it is `UNSTATED_SHARE` of the largest entry."""
 DAMPING_PER_MODES = 10.0
 """Relative uncertainty of a mode's damping over that of its frequency. Chosen by hand: damping is identified far less
 accurately."""
@@ -136,10 +136,12 @@ class _Split:
     back: FloatArray
     """Transformation of a matrix back to the model's coordinates: back.T @ matrix @ back."""
     frequency_hz: FloatArray
+    """(modes,): natural frequencies with the driven axes held."""
 
 
 def _read_stated_deviation(stated: float | None, grounded: FloatArray) -> float:
-    """One standard deviation of the entries of a block (m, m) at the driven axes; also above 0 where the block is 0."""
+    """One standard deviation of the entries of a block (m, m) at the driven axes: as stated, else `UNSTATED_SHARE` of
+    the largest diagonal entry; above 0 even where the block is 0."""
     if stated is not None:
         return stated
     return UNSTATED_SHARE * float(np.abs(np.diagonal(grounded)).max()) or UNSTATED_SHARE
@@ -171,7 +173,7 @@ def _split(model: MechanicalModel) -> _Split:
 
 
 def _tune(model: MechanicalModel, split: _Split, pairs: list[tuple[int, int]], values: FloatArray) -> MechanicalModel:
-    """The model with its parameters changed by `values` (parameters,), in their units; equations: see above."""
+    """The model with its parameters changed by `values` (parameters,), in their units; equations: module docstring."""
     m, modes = model.inputs, len(split.frequency_hz)
     grounded = values[: 3 * len(pairs)].reshape(3, len(pairs))
     frequency_change, mass_change, damping_change = values[3 * len(pairs) :].reshape(3, modes)

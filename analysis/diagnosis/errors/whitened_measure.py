@@ -5,8 +5,9 @@ on reference recordings,
 
     w(t) = r(t) + a1 r(t-1) + ... + ap r(t-p),        R a = -[R(1) ... R(p)]        (Yule-Walker)
 
-with the autocovariance R(k) = E r(t) r(t-k) and its Toeplitz matrix R. |A|² of the filter is the inverse of the
-residual's spectrum: what the re-tuned model misses everywhere counts little, what it never missed counts much.
+with a = (a1 ... ap), the autocovariance R(k) = E r(t) r(t-k) and its Toeplitz matrix R. The squared gain of the filter
+is proportional to the inverse of the residual's spectrum: frequencies at which the re-tuned model also errs on the
+reference recordings get little weight, those at which it is accurate get much.
 
 References: Yule, Phil. Trans. R. Soc. A 226 (1927), 267; Walker, Proc. R. Soc. A 131 (1931), 518; Ljung, System
 Identification (1999), section 7.2 (prefiltering of prediction errors).
@@ -30,7 +31,8 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 MOST_LAGS, SAMPLES_PER_LAG = 64, 50
-"""Largest order p of the autoregression, and least samples per lag: fewer make the coefficients noise. By hand."""
+"""Largest order p of the autoregression, and least samples per lag: with fewer, the coefficients are mostly noise.
+Both were set by hand."""
 FLAT = 1e-4
 """White noise added to the residual before the fit, as a share of its power: no frequency weighs more than 1 / FLAT
 times what it would in a flat spectrum of this power, and the Toeplitz matrix stays well conditioned."""
@@ -41,7 +43,7 @@ class WhiteningFilter:
     """A causal FIR filter per channel, which makes the reference residual white."""
 
     coefficients: FloatArray
-    """(lags + 1, c): impulse response, 1 and then a1 ... ap."""
+    """(p + 1, c): impulse response, 1 and then a1 ... ap."""
 
     @property
     def lags(self) -> int:
@@ -82,16 +84,18 @@ def whitening_filter(residuals: Sequence[FloatArray], least: FloatArray) -> Whit
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WhitenedMeasure:
-    """An error measure with whitened residuals; they count where all samples that the filter uses are known."""
+    """An error measure (`ErrorMeasure`) of whitened residuals. Samples count only where all samples that the filter
+    uses are known."""
 
     plain: ErrorMeasure
     whitening: WhiteningFilter
     unit: FloatArray
-    """(c,): what a whitened residual is divided by: the noise, and with a floor its root sum of squares with it."""
+    """(c,): divisor of the whitened residuals, in each channel's own unit: the noise, with a floor added in
+    quadrature."""
     noise: FloatArray
     """(c,): rms of the whitened residual of the reference recordings, in each channel's own unit."""
     least: float = 0.0
-    """Least error in units of the noise: smaller ones are set to it; 1 with a floor."""
+    """Least error in units of the noise: smaller errors are set to it; 1 with a floor."""
 
     @property
     def name(self) -> str:
@@ -132,5 +136,6 @@ def whiten_measure(plain: ErrorMeasure, whitening: WhiteningFilter, noise: Float
 
 
 def _leave_out_warm_up(record: Observed, whitening: WhiteningFilter) -> Observed:
+    """The record without roles for samples whose filter output depends on unknown samples."""
     full = whitening.has_full_history(record.measured)
     return replace(record, fit=record.fit & full, choose=record.choose & full, test=record.test & full)

@@ -1,7 +1,8 @@
-"""Error measure by windows (multiple shooting): short simulations, each from a smoothed state, so that plants without a
-restoring force cannot drift far.
+"""Error measure by windows (multiple shooting): short simulations, each from an initial state estimated by a smoother.
 
-The error of the initial state is fitted in each window, and does not count.
+For plants without a restoring force, whose free simulation would drift. The estimated state is not exact, so that the
+residuals of each window are projected on the complement of its free motions from other initial states (least squares):
+only the error that no initial state explains counts.
 """
 
 from collections.abc import Sequence
@@ -27,11 +28,11 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _UNSEEN = 1e-9
-"""Least singular value, relative to the largest, for which a direction of the initial state is fitted."""
+"""Least singular value of the free motions, over the largest, for which a direction of the state is fitted."""
 
 
 STATES = 10.0
-"""Least readings of a window per state: the fitted initial state then absorbs a tenth of an error at most by chance."""
+"""Least readings of a window per fitted state: the fit then absorbs a tenth of the power of random errors at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,12 +44,15 @@ class Windows:
     states: tuple[FloatArray, ...]
     """Per record (windows, 2 coordinates): initial state of each window."""
     unit: FloatArray
+    """(c,): unit of a residual, in each channel's own unit."""
     noise: FloatArray
+    """(c,): rms noise, in each channel's own unit."""
     window_s: float = WINDOW_S
+    """Length of a window (s)."""
     known: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
-    """Least error in units of the noise: smaller ones are set to it; 1 with a floor."""
+    """Least error in units of the noise: smaller errors are set to it; 1 with a floor."""
 
     @property
     def name(self) -> str:
@@ -88,7 +92,7 @@ class Windows:
     def _simulate_from_states(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
     ) -> tuple[SimulationResult, FloatArray]:
-        """The windows' simulation, and its residuals (n, c) without the fitted initial states."""
+        """The simulation of all windows, and its residuals (n, c) after the fit of the initial states."""
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
@@ -111,9 +115,10 @@ class Windows:
     def _without_states(
         self, structure: MechanicalModel, residual: FloatArray, sample_rate_hz: float, length: int
     ) -> FloatArray:
-        """(n, c): residuals after projection on the free motion from other initial states of the windows."""
+        """(n, c): residuals without their projection on the free motions from other initial states, window by
+        window."""
         n, c = residual.shape
-        # A fit may try an unstable model.
+        # A fit may try an unstable model, whose free motion overflows: its residuals are returned as they are.
         with np.errstate(over="ignore", invalid="ignore"):
             free = _free_motion(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
             finite = np.isfinite(residual).all() and np.isfinite(np.sum(free**2))
@@ -162,7 +167,8 @@ def windows_of(
     records: tuple[Observed, ...], model: MechanicalModel, scales: tuple[FloatArray, FloatArray], window_s: float = 1.0
 ) -> Windows:
     """The measure with each window's initial state estimated by a smoother. scales: unit and noise, (c,) each.
-    window_s: shortest window. Raises numpy.linalg.LinAlgError where the motion cannot be estimated."""
+    window_s: shortest window, lengthened where it has too few readings for its states. Raises numpy.linalg.LinAlgError
+    where the motion cannot be estimated."""
     unit, noise = scales
     fitted = 2 * len(model.mass) / records[0].measured.shape[1]
     window_s = max(window_s, STATES * fitted / records[0].recording.sample_rate_hz)
@@ -193,7 +199,7 @@ def _free_motion(structure: MechanicalModel, sample_rate_hz: float, length: int,
 
 
 def _project_out(residual: FloatArray, free: FloatArray) -> FloatArray:
-    """Rows of left (windows, samples) after projection on the columns of free (samples, k)."""
+    """(windows, samples): residuals without their least-squares projection on the columns of `free`, (samples, k)."""
     size = np.linalg.norm(free, axis=0)
     along, sizes, _ = np.linalg.svd(free / np.where(size > 0, size, 1.0), full_matrices=False)
     along = along[:, sizes > _UNSEEN * max(float(sizes[0]), np.finfo(float).tiny)]

@@ -1,7 +1,8 @@
 """Fits a first linear model of a device to its recordings alone.
 
-`one_motion_per_force` reads a recording of any origin as commands and the motions that they drive (`restore_sign` and
-`infer_quantity` are two of its cases); `choose_structure` compares the structures of `model_structures`, `joint_fit`
-fits several axes at once; `model_from_balance` makes a model of what a force balance found, `reduced_recordings` the
-recordings that it is fitted to. Begin at `choose_structure.py`.
+In this order: `one_motion_per_force` converts recordings to commands and the motions that they drive (its steps include
+`infer_quantity`, `free_motion`, `restore_sign` and `reversed_commands`); `fit_without_model` makes the `first_model` of
+a diagnosis, from force balances (`model_from_balance`; `reduced_recordings`) or by a fit. Where a user asks for a model
+only, `choose_structure` compares the structures of `model_structures`, and `joint_fit` fits several axes at once.
+Begin at `fit_without_model.py`.
 """

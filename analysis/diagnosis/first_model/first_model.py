@@ -1,4 +1,4 @@
-"""The model that a diagnosis starts from."""
+"""Data class of the first model: what a diagnosis starts from where the user gave no model (`fit_without_model`)."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -11,10 +11,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstModel:
-    """Force balances and first model that a diagnosis starts from where no model was given."""
+    """The first model, with the force balances that were computed for it."""
 
     model: MechanicalModel
+    """Fitted to the recordings; its tolerance says how far a diagnosis may re-tune it."""
     remarks: tuple[str, ...]
-    """Remarks about it."""
+    """Sentences for the user on how the model was fitted, and what it does not show."""
     balances: "tuple[Balance, ...] | None" = None
-    """Force balances; None = not computed."""
+    """Force balance of each command; None = not computed."""

@@ -1,4 +1,10 @@
-"""Fits the model that a diagnosis starts from where none was given."""
+"""Fits the model that a diagnosis starts from where the user gave none.
+
+In this order: the weights of the force balances, where these name laws along the motion of one body per command; rigid
+bodies fitted to forces, for recordings in closed loop or of an imposed motion (`rigid_model`); a mechanical model
+fitted to frequency responses (`mechanical_fit`), which takes longest. Their tolerances are wide, because missing
+physics biases the fitted parameters.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -82,18 +88,20 @@ def first_model_of(
 
 
 def _hold_mass(model: MechanicalModel) -> MechanicalModel:
-    """The model with a mass that re-tuning does not change."""
+    """The model with a mass tolerance so small (`HELD_FIXED`) that re-tuning does not change the mass."""
     assert model.tolerance is not None
     return replace(model, tolerance=replace(model.tolerance, mass_kg=HELD_FIXED * float(np.abs(model.mass).max())))
 
 
 def _free_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
+    """A mass with damper and spring for a free motion, or without the spring where that fit fails; None without
+    both."""
     return _plain_structure(recordings, "mass-spring") or _plain_structure(recordings, "motor")
 
 
 def _plain_structure(recordings: Sequence[Recording], kind: Kind) -> MechanicalModel | None:
-    """Fit the plain structure by force balance; None where no motion was measured along the commands, or where the fit
-    fails."""
+    """The model of a structure, fitted by force balance; None where no motion was measured along the commands, or where
+    the fit fails."""
     try:
         return fit_structure(balance_recordings(recordings), kind).model
     except (StructureRefused, NoMotionError):
@@ -103,7 +111,8 @@ def _plain_structure(recordings: Sequence[Recording], kind: Kind) -> MechanicalM
 def fit_first_linear_model(
     recordings: Sequence[Recording], on_progress: Callable[[float], None], whose: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
-    """A linear model fitted by forces or spectra, with remarks. Raises NothingToDiagnose where none can be fitted."""
+    """A linear model fitted by forces or spectra, with remarks. whose: the recordings in words. Raises
+    NothingToDiagnose where no model can be fitted."""
     _require_no_weight(recordings)
     if wants_rigid_model(recordings) and (rigid := _rigid_model(recordings, whose)) is not None:
         return rigid, (RIGID_REMARK,)
@@ -136,6 +145,7 @@ def _answers(model: MechanicalModel, recording: Recording) -> bool:
 
 
 def _require_no_weight(recordings: Sequence[Recording]) -> None:
+    """Raises NothingToDiagnose where the device carried a weight, whose mass a fitted model would include."""
     if has_carried_weight(recordings):
         raise NothingToDiagnose(
             ("a recording was made with a weight on, and a model that is fitted to it would hold the weight",)
@@ -143,7 +153,7 @@ def _require_no_weight(recordings: Sequence[Recording]) -> None:
 
 
 def _rigid_model(recordings: Sequence[Recording], whose: str) -> MechanicalModel | None:
-    """Fit a rigid body; None where the recordings do not determine one."""
+    """A rigid body per command; None where the recordings do not determine it."""
     if not can_be_rigid(recordings):
         return None
     try:

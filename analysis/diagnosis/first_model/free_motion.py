@@ -31,8 +31,8 @@ def is_free_motion(recordings: Sequence[Recording]) -> bool:
 
 
 def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], str]:
-    """The recordings with the force per unit mass as their command, and a sentence; as they are where something drives
-    the motion."""
+    """The recordings with the force per unit mass as their command, and a sentence about it; unchanged, with an empty
+    sentence, where a command drives the motion."""
     if not recordings or not is_free_motion(recordings):
         return tuple(recordings), ""
     response = recordings[0].response
@@ -62,8 +62,8 @@ def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, 
 
 
 def _levels(recording: Recording, samples: FloatArray) -> tuple[Segment, ...]:
-    """Stretches of some cycles each: as it decays, the motion passes through all levels, and each is used for fit and
-    test. samples: (n, p)."""
+    """Segments of at least `DECAY_LEAST_CYCLES` cycles each, with their amplitude: a decaying motion passes through all
+    levels, and every level should be among the samples to fit and to test by. samples: (n, p)."""
     found = []
     for span in find_moving_spans(samples, parts_of(recording)):
         moving = samples[span.start : span.end_of_motion]

@@ -1,9 +1,10 @@
-"""Infers the quantity of responses without one: position, velocity or force, from their name where that is clear, else
-from their relation to the command.
+"""Infers the physical quantity of responses for which none is stated: position, velocity or force.
 
-If the response is a position, the force balance needs its second derivative, unless the mass is negligible; if it is a
-velocity, the mass belongs to the first derivative. So a response is taken as a position, or as a velocity where it is
-significant itself and its second derivative is not. The same is done for a sensor's voltage.
+From the channel's name where that is clear; force where the commands are motions; else from a force balance on the
+response y and its derivatives, f = m y'' + c y' + k y. With a position, mass makes y'' significant; with a velocity,
+mass multiplies y' and damping y, so that y'' is not needed. A response is a velocity where y'' explains less than
+`DERIVATIVE_NEEDED` of the force's power in cross-validation and y at least that much, otherwise a position. A sensor's
+voltage is treated likewise.
 """
 
 from collections.abc import Sequence
@@ -22,11 +23,13 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.units import UNSTATED
 
 KNOWN = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) - {"voltage"}
+"""Quantities that a force balance can use. A voltage is a sensor's reading of an unknown quantity."""
 
 
 def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """The recordings with their responses' quantity, and a sentence about it; empty where all was stated. recordings:
-    alike in channels, units and rate."""
+    """The recordings with the quantity of their responses, and a sentence about the assumption; unchanged, with an
+    empty sentence, where a quantity was stated or none can be assumed. recordings: alike in channels, units and
+    rate."""
     first = recordings[0]
     if set(first.response.quantities) & KNOWN:
         return recordings, ""
@@ -51,7 +54,7 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
 
 
 def _quantities_in_names(recording: Recording) -> tuple[str, ...]:
-    """Quantities of the responses, where a name determines one that nothing else determines; else empty."""
+    """Quantities of the responses by the channels' names and units; empty where these determine none."""
     from equalizer.signals.quantity_words import quantity_in  # only where a quantity is missing
 
     response = recording.response
@@ -63,6 +66,7 @@ def _quantities_in_names(recording: Recording) -> tuple[str, ...]:
 
 
 def _sentence_of_names(recording: Recording, quantities: Sequence[str]) -> str:
+    """Sentence on the quantities that were taken from names, with the way to correct them."""
     taken = [
         f"{name} was taken for {'an' if quantity.startswith('a') else 'a'} {quantity}"
         for name, quantity in zip(recording.response.channels, quantities, strict=True)
@@ -72,7 +76,8 @@ def _sentence_of_names(recording: Recording, quantities: Sequence[str]) -> str:
 
 
 def _likely_quantity(recordings: Sequence[Recording]) -> str:
-    """Quantity of the first response, judged against the first command; a position where it cannot be determined."""
+    """Quantity of the first response by the force balance of the first command (see above); a position where the
+    balance cannot be computed."""
     count = len(recordings[0].response.channels)
     taken = [replace(_with_quantity(each, "position"), position=None) for each in recordings]
     try:

@@ -1,7 +1,11 @@
 """Fits symmetric mass, damping and stiffness matrices of all axes at once, by least squares on forces.
 
-Axes count alike: each axis's error is divided by the power of its force. Standard errors are sandwich estimates over
-blocks, because residuals are correlated (White, Econometrica 48:817, 1980).
+For the forces f of d axes and the motion q along them,
+
+    f = M q'' + D q' + K q + f0 + e,        M, D, K symmetric; minimal: sum over axes of |e_i|² / power of f_i
+
+so that every axis has the same weight. Standard errors are sandwich estimates over blocks of samples, because residuals
+are correlated (White, Econometrica 48:817, 1980).
 """
 
 from collections.abc import Sequence
@@ -27,30 +31,32 @@ class JointFit:
     """Symmetric mass, damping and stiffness matrices fitted together, with their intervals and held-out errors."""
 
     matrices: dict[Part, FloatArray]
-    """(d, d) each; zero where a part was not asked for."""
+    """(d, d) each, SI; zero where a part was not fitted."""
     halves: dict[Part, FloatArray]
-    """Half-widths of the 95 % intervals, including the bias due to the noise of the motion."""
+    """(d, d) each: half-widths of the 95 % intervals (Student's t over blocks), with the possible bias by noise of the
+    motion, `ACCELERATION_NOISE_SHARE`, added in quadrature."""
     deviations: dict[Part, float]
-    """The largest standard error on the diagonal."""
+    """The largest standard error on the diagonal of each matrix, SI."""
     folds: FloatArray
-    """(blocks,): cross-validated sum of squares of each block, relative to the power of all, in the mean over the
-    axes."""
+    """(blocks,): cross-validated sum of squares of each block over the power of all blocks, mean over the axes."""
     folds_error: float
     """Root of their sum."""
     held_out: FloatArray
     """(d,): rms of each axis's held-out error over that of its force."""
     remainders: tuple[FloatArray, ...]
-    """Per motion, (kept samples, d): the force that is not explained."""
+    """Per motion, (kept samples, d): residual force, N (N m)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Parametrisation:
-    """Which parameters are fitted, and their places in each axis's row of weights."""
+    """The fitted parameters, and the linear map from them to the weights of each axis's regression."""
 
     columns: list[int]
+    """Columns of the regression that are used."""
     rows: tuple[FloatArray, ...]
-    """Per axis (columns, parameters)"""
+    """Per axis, (columns, parameters): map from the parameters to the weights of the scaled columns."""
     entries: tuple[tuple[Part, int, int], ...]
+    """Matrix, row and column of each parameter; the constant forces follow them."""
 
 
 def regressions_of(motions: Sequence[Motion], turns: bool) -> tuple[Regression, ...]:
@@ -59,8 +65,9 @@ def regressions_of(motions: Sequence[Motion], turns: bool) -> tuple[Regression, 
 
 
 def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> JointFit:
-    """The joint fit. parts: matrices of the model; a constant force is always fitted, too. Raises
-    numpy.linalg.LinAlgError where the motion does not determine them."""
+    """The joint fit. parts: the matrices to fit; a constant force per axis is always fitted, too. Held-out errors are
+    those of cross-validation where too little was held out. Raises numpy.linalg.LinAlgError where the motion does not
+    determine them."""
     shape = _parametrisation(regressions[0], parts)
     powers = [max(signal_power(regression.fit), 1e-300) for regression in regressions]
     own = _products([regression.fit for regression in regressions], shape, powers)
@@ -103,7 +110,7 @@ def _parametrisation(regression: Regression, parts: Sequence[Part]) -> _Parametr
 def _products(
     blocks: Sequence[Sequence[Block]], shape: _Parametrisation, powers: Sequence[float]
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Normal equations of the joint parameters, per block."""
+    """Normal equations of the joint parameters, per block. powers: of each axis's force."""
     found = []
     for each in zip(*blocks, strict=True):
         count = shape.rows[0].shape[1]
@@ -116,12 +123,14 @@ def _products(
 
 
 def _solve(products: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """(parameters,): solution of the normal equations, scaled to a unit diagonal."""
     size = np.sqrt(np.maximum(np.diagonal(products[0]), 1e-300))
     return np.asarray(np.linalg.solve(products[0] / np.outer(size, size), products[1] / size) / size)
 
 
 def _standard_errors(own: Sequence[tuple[FloatArray, FloatArray]], whole: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """Standard errors of the parameters."""
+    """(parameters,): sandwich standard errors, the root of the diagonal of G^-1 (sum of s s') G^-1 b / (b - 1), with
+    the normal matrix G, and the gradient s of each of the b blocks."""
     found = _solve(whole)
     size = np.sqrt(np.maximum(np.diagonal(whole[0]), 1e-300))
     inverse = np.linalg.inv(whole[0] / np.outer(size, size)) / np.outer(size, size)
@@ -131,7 +140,7 @@ def _standard_errors(own: Sequence[tuple[FloatArray, FloatArray]], whole: tuple[
 
 
 def _errors(blocks: Sequence[Sequence[Block]], shape: _Parametrisation, numbers: Sequence[FloatArray]) -> FloatArray:
-    """(blocks, axes): sums of squares."""
+    """(blocks, axes): sums of squared force errors. numbers: parameters for each block."""
     return np.array(
         [
             [
@@ -144,6 +153,7 @@ def _errors(blocks: Sequence[Sequence[Block]], shape: _Parametrisation, numbers:
 
 
 def _matrices(regression: Regression, shape: _Parametrisation, values: FloatArray) -> dict[Part, FloatArray]:
+    """The symmetric matrices (d, d) that hold the values of the parameters."""
     axes = len(regression.motions[0].channels)
     found = {part: np.zeros((axes, axes)) for part in PARTS}
     for (part, i, k), value in zip(shape.entries, values, strict=False):
@@ -154,6 +164,7 @@ def _matrices(regression: Regression, shape: _Parametrisation, values: FloatArra
 def _remainders(
     regressions: Sequence[Regression], shape: _Parametrisation, found: FloatArray
 ) -> tuple[FloatArray, ...]:
+    """See `JointFit.remainders`."""
     weights = [row @ found / regressions[0].scale[shape.columns] for row in shape.rows]
     return tuple(
         np.column_stack(

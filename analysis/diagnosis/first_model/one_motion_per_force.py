@@ -1,5 +1,8 @@
-"""Converts recordings of any form so that forces can be balanced along a measured motion, with a sentence for each
-change. Only used without a given model: a model defines its commands and responses itself."""
+"""Converts recordings of any form to forces and the motions that they drive, with a sentence on each change.
+
+Used only without a given model, because a model defines its commands and responses itself. The steps are in the order
+of `one_motion_per_force`; each returns the recordings unchanged, with an empty sentence, where it does not apply.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -21,19 +24,23 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
 FORCES = frozenset({"force", "torque"})
+"""Quantities of a measured force."""
 DRIVES = FORCES | {"voltage", "current"} | set(DERIVATIVE_OF_QUANTITY)
-"""Quantities of commands that drive a motion; all others are conditions."""
+"""Quantities of commands that drive a motion; all other commands, such as a temperature, are conditions."""
 STILL = 1e-9
-"""Range of a signal over its size, below which changes are rounding errors."""
+"""Range of a signal over its largest magnitude, below which changes are rounding errors."""
 MOTIONS = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
+"""Quantities of a motion: positions and their derivatives."""
 
 Recordings = tuple[Recording, ...]
 Step = Callable[[Recordings], tuple[Recordings, str]]
+"""Maps recordings to changed ones and a sentence; the sentence is empty where nothing was changed."""
 
 
 def one_motion_per_force(recordings: Sequence[Recording], turns: bool = True) -> tuple[Recordings, tuple[str, ...]]:
     """The converted recordings, and a sentence for each change. recordings: alike in channels, units and rate. turns:
-    commands that are counted against their motion are reversed; not where a model says already how they are counted."""
+    commands whose positive direction is opposite to that of their motion are reversed; False where a model defines the
+    directions."""
     found, remarks = tuple(recordings), []
     steps: tuple[Step, ...] = (
         name_motion, read_free_motion, _separate_conditions, _select_imposed_motion, _select_motions, _select_forces,
@@ -133,7 +140,8 @@ def _drop_constant_commands(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _with_axes(recording: Recording, kept: list[int], paired: bool) -> Recording:
-    """The recording with some commands only; paired: also only the responses and positions in the same places."""
+    """The recording with the kept commands only. paired: also with the responses and positions of the same indices
+    only."""
     command, position, excitation = recording.command, recording.position, recording.excitation
     alike = position is not None and len(position.channels) == len(recording.response.channels)
     return replace(
@@ -146,12 +154,13 @@ def _with_axes(recording: Recording, kept: list[int], paired: bool) -> Recording
 
 
 def _verb(names: Sequence[str], name: str) -> str:
+    """The verb in the singular for a single name, else in the plural."""
     plural = {"changes": "change", "was": "were", "drives": "drive"}
     return name if len(names) == 1 else plural[name]
 
 
 def _merge_commands(recordings: Recordings) -> tuple[Recordings, str]:
-    """Merges commands that drive the same single motion into one, each with its fitted gain."""
+    """Merges commands that drive the same single motion into their sum, each with its fitted gain."""
     command, response = recordings[0].command, recordings[0].response
     if len(command.channels) < 2 or len(response.channels) != 1 or set(response.quantities) <= FORCES:
         return recordings, ""
@@ -173,11 +182,14 @@ def _merge_commands(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _sum(signal: Signal, gains: FloatArray, main: int) -> Signal:
+    """The sum of the channels times their gains, under the name and unit of the main channel."""
     return replace(signal.select_channels([main]), samples=signal.samples @ gains[:, None])
 
 
 def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
-    """Gains (m,) of the commands, relative to the strongest one, and its number."""
+    """Gains (m,) of the commands relative to the strongest, and the index of that. They are the weights of the commands
+    in a regression of the acceleration on commands, velocity, position and dry friction; without a time axis, of the
+    position on commands and friction."""
     motions = motions_of(observe_parts(recordings, 1))
     rows, aims = [], []
     for motion in motions:
@@ -201,7 +213,7 @@ def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
 
 
 def _lowest_derivative_channels(signal: Signal) -> list[int]:
-    """Channels of the lowest derivative."""
+    """Indices of the motions with the lowest derivative, such as the positions among positions and velocities."""
     orders = [DERIVATIVE_OF_QUANTITY[quantity] if quantity in MOTIONS else 9 for quantity in signal.quantities]
     return [k for k, order in enumerate(orders) if order == min(orders)]
 
@@ -214,6 +226,7 @@ def _select_excitation(excitation: Signal | None, command: Signal, kept: Sequenc
 
 
 def _append_channels(condition: Signal | None, command: Signal, places: Sequence[int]) -> Signal:
+    """The conditions with these channels of the command appended."""
     more = command.select_channels(places)
     if condition is None:
         return more

@@ -1,7 +1,8 @@
-"""Subtracts from the commands the linear part of a force balance that one body per command cannot describe.
+"""Subtracts from the commands the linear forces of a balance that a model with one body per command cannot describe.
 
-This is the force of motions other than the driven ones, of modes and of a delayed command. Each remaining command
-drives one measured motion, so that laws are fitted and drawn as for any device.
+These are forces of motions other than the driven ones, of modes, and of a delayed command, with the weights of the
+force balance. The reduced command drives one measured motion each, so that nonlinear laws are fitted and drawn as for
+any device.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,9 @@ from equalizer.signals.unit_system import system_of
 
 
 def is_reduced(balances: Sequence[Balance]) -> bool:
-    """Whether the balances hold more than one body per command, and no law of a command, which acts on all of it."""
+    """Whether commands must be reduced: a balance has linear terms beyond one body per command, or integrated motions,
+    and every named law is a column of the regression (a law of the command acts on the whole command, not on a
+    part)."""
     if not all(each.has_column for balance in balances for each in balance.named):
         return False
     motion = balances[0].search.regression.motions[0]
@@ -28,7 +31,7 @@ def is_reduced(balances: Sequence[Balance]) -> bool:
 
 
 def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
-    """The reduced recordings. recordings: those of the balances, part by part."""
+    """The recordings with reduced commands and the driven motions as response. recordings: those of the balances."""
     found, begin = [], 0
     for recording in recordings:
         parts = parts_of(recording)
@@ -40,6 +43,7 @@ def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balanc
 def _reduce(
     recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], begin: int
 ) -> Recording:
+    """A reduced recording. parts: start and stop of its parts. begin: number of its first part among all motions."""
     command = recording.command.samples.copy()
     for axis, balance in enumerate(balances):
         regression = balance.search.regression
@@ -61,11 +65,12 @@ def _reduce(
 
 
 def _force_beside(balance: Balance, motion: Motion) -> FloatArray:
-    """(n,): linear force beside the driven motion's own mass, damping and stiffness, and beside the named laws."""
+    """(n,), N (N m): linear force of the balance without the driven motion's own mass, damping and stiffness. The named
+    laws are part of the regression, but not of this force."""
     regression, d = balance.search.regression, len(motion.channels)
     linear = [each.place for each in balance.laws if each.law.linear]
     weights = regression.weights(regression.columns_of([*linear, *(each.place for each in balance.named)]))
-    # The constant of the base is left to the fit.
+    # The constant force of the base stays in the command, for the later fit.
     weights = np.delete(weights, regression.base - 1)
     motion_columns = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // d]
     whole = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in balance.linear_laws)])
@@ -77,7 +82,7 @@ def _force_beside(balance: Balance, motion: Motion) -> FloatArray:
 def _driven_motions(
     recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], begin: int
 ) -> tuple[Signal, bool]:
-    """The driven motions, and whether they are integrals of the measured ones."""
+    """The driven motions, and whether they are integrals of measured accelerations."""
     regression = balances[0].search.regression
     measured = motion_signal(recording)
     assert measured is not None

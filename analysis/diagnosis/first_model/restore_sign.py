@@ -1,8 +1,8 @@
 """Restores the sign of a speed whose sensor shows its magnitude only, such as a pulse counter, from the command.
 
-Between two minima near zero the sign is constant. It is estimated as that of the command after a linear filter, which
-is in turn fitted to the signed speed (alternating projections, as in phase retrieval; Gerchberg and Saxton, Optik
-35:237, 1972).
+Between two minima near zero the sign is constant. It is that of the speed which an FIR filter predicts from the
+command, and the filter is fitted to the signed speed in turn, until the signs no longer change (alternating
+projections, as in phase retrieval; Gerchberg and Saxton, Optik 35:237, 1972).
 """
 
 import itertools
@@ -22,11 +22,13 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 TAPS, RIDGE, ROUNDS = 40, 1e-3, 20
-"""Number of taps of the filter, its ridge, and how often it is fitted."""
+"""Taps of the filter (samples), ridge parameter over the mean power of a tap, and largest number of fits."""
 
 
 def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """The recordings with signed speeds, and a sentence; unchanged where the only response is no unsigned speed."""
+    """The recordings with signed speeds, and a sentence about it. Unchanged, with an empty sentence, where a recording
+    holds more than one unsigned speed and its command, or where the filter predicts the signed speed too poorly
+    (`SIGNED_SPEED_FITS`, `SIGNED_SPEED_BETTER`)."""
     if any(not _is_unsigned_speed(recording) for recording in recordings):
         return recordings, ""
     found = []
@@ -45,6 +47,7 @@ def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
 
 
 def _is_unsigned_speed(recording: Recording) -> bool:
+    """Whether the only response is never negative and often near zero, though the only command has both signs."""
     response, command = recording.response, recording.command
     if len(response.channels) != 1 or len(command.channels) != 1 or recording.position is not None:
         return False
@@ -76,24 +79,26 @@ def _find_signs(command: FloatArray, amount: FloatArray) -> tuple[FloatArray, fl
 
 
 def _compute_unexplained_share(command: FloatArray, amount: FloatArray) -> float:
+    """Error of the filter for the magnitude itself, its mean subtracted, as a share of the magnitude's power."""
     rows, flat = _rows(command), amount - amount.mean()
     return float(np.sum((flat - _predict_speed(rows, flat)) ** 2) / np.sum(amount**2))
 
 
 def _rows(command: FloatArray) -> FloatArray:
-    """(n, TAPS + 1): the command's past, and a constant."""
+    """(n, TAPS + 1): the last TAPS samples of the command at each instant, and a constant."""
     padded = np.concatenate([np.zeros(TAPS), command])
     return np.column_stack([*(padded[TAPS - k : len(padded) - k] for k in range(TAPS)), np.ones(len(command))])
 
 
 def _predict_speed(rows: FloatArray, speed: FloatArray) -> FloatArray:
+    """(n,): prediction of the speed by ridge regression on the rows."""
     gram = rows.T @ rows
     weights = np.linalg.solve(gram + RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), rows.T @ speed)
     return np.asarray(rows @ weights)
 
 
 def _stretches(amount: FloatArray) -> list[slice]:
-    """Stretches between minima near zero."""
+    """Stretches between local minima of the magnitude below `REVERSAL_NEAR_ZERO` of its rms."""
     low = REVERSAL_NEAR_ZERO * float(np.sqrt(np.mean(amount**2)))
     inner = (amount[1:-1] <= amount[:-2]) & (amount[1:-1] <= amount[2:]) & (amount[1:-1] < low)
     ends = [0, *(np.flatnonzero(inner) + 1).tolist(), len(amount)]
@@ -101,6 +106,7 @@ def _stretches(amount: FloatArray) -> list[slice]:
 
 
 def _with_signs(amount: FloatArray, predicted: FloatArray, stretches: list[slice]) -> FloatArray:
+    """(n,): the magnitude, negative in each stretch in which its product with the predicted speed is negative."""
     found = amount.copy()
     for part in stretches:
         if float(amount[part] @ predicted[part]) < 0:

@@ -1,6 +1,7 @@
 """Errors as forces: the force that a model needs for the measured motion (inverse dynamics), and the missing force.
 
-`inverse_dynamics` inverts a model by spectra, `inverse_response` line by line, `predicted_force` compares with a
-measured force, `force_views` chooses the band in which the recordings allow it; `rigid_model` is the case of a single
-body; `missing_force` traces a motion error back to a force.
+In this order: `force_views` converts recordings to forces and chooses the band in which their noise allows a
+comparison; `inverse_response` gives the frequency response from motion to force, `inverse_dynamics` the required force
+over time, and `predicted_force` compares it with the applied force (an error measure). `rigid_model` fits one body per
+command to such forces; `missing_force` converts an error of the motion to a force instead. Begin at `force_views.py`.
 """

@@ -1,4 +1,4 @@
-"""Converts recordings to forces along the measured motion, with the choice of the band and the noise in it.
+"""Error measure by forces along the measured motion: choice of the frequency band, and noise of the forces in it.
 
 Theory of operation. With the motion q measured, the force that a model misses follows without simulation (inverse
 dynamics): the model's force M a + D v + K q + (effects along q) is compared with the actuator's force, both low-pass
@@ -46,14 +46,15 @@ class ForceViews:
 
     measure: PredictedForce
     floors: tuple[NoiseFloor, ...]
-    """Noise of the views, per record."""
+    """Noise of the forces, per record."""
 
 
 def force_views(
     records: Sequence[Observed], model: MechanicalModel, floors: Sequence[NoiseFloor], band_hz: float | None = None
 ) -> ForceViews:
     """The error measure by forces along the measured motion, with its noise. records: with motion, see `has_motion`.
-    band_hz: up to which forces are compared; None = by the noise."""
+    floors: noise of their signals. band_hz: end of the band; None = by the noise. Raises numpy.linalg.LinAlgError where
+    the measured outputs do not determine the model's motion."""
     motions = [
         choose_measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)
     ]

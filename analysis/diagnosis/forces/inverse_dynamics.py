@@ -1,4 +1,11 @@
-"""Inverse dynamics: the force that a model needs for a measured motion, computed in the frequency domain."""
+"""Inverse dynamics: the force u that a linear model needs for a measured motion y, computed in the frequency domain.
+
+    M q'' + D q' + K q = B u,    y = C q        below the end of the band, by a zero-phase low pass
+
+Where every coordinate is measured, q follows from y and the derivatives suffice; else the frequency response from y to
+u is used (`inverse_response`). The straight line between the first and the last sample, which a Fourier transform
+cannot represent, is treated by itself in steady state.
+"""
 
 from dataclasses import dataclass
 
@@ -11,12 +18,12 @@ from equalizer.signals.band_limited import end_to_end_line, filter_by_gain, low_
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _NEARLY_STILL_HZ = 1e-6
-"""Frequency at which the derivative of the inverse at 0 Hz is computed."""
+"""Frequency (Hz) at which the derivative of the inverse response at 0 Hz is computed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RequiredForce:
-    """Required force and axis motion within a band; each (n, m)."""
+    """Required force, N (N m), and motion of the driven axes within a band, SI; each (n, m)."""
 
     force: FloatArray
     axis_position: FloatArray
@@ -32,10 +39,11 @@ class BandMotion:
     """(n, m): positions of the model's first m outputs, as measured, finite."""
     sample_rate_hz: float
     band_hz: float
+    """Frequency at which the low pass has a gain of 1/2."""
     at: tuple[FloatArray, FloatArray, FloatArray]
-    """(n, m) each: position, velocity and acceleration at each instant."""
+    """(n, m) each: position, velocity and acceleration at each sample."""
     around: tuple[FloatArray, FloatArray, FloatArray]
-    """(n, m) each: their means over one sample period around each instant."""
+    """(n, m) each: their means over one sample period around each sample."""
 
 
 def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> BandMotion:
@@ -59,9 +67,9 @@ def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> 
 
 
 def compute_required_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
-    """Mean of the required force over one sample period around each instant, without actuator, sensor and effects.
-
-    Raises numpy.linalg.LinAlgError where the first m outputs do not determine the model's motion."""
+    """Required force, mean over one sample period around each sample, and motion of the axes at the samples. Actuator,
+    sensor and effects are not included. Raises numpy.linalg.LinAlgError where the first m outputs do not determine the
+    model's motion."""
     if model.coordinates == model.inputs:
         return _force_of_square_model(model, motion)
     position, sample_rate_hz = motion.position, motion.sample_rate_hz
@@ -97,8 +105,9 @@ def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> Requir
 
 
 def _force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
-    """(n, 4 m): required force and motion for the straight line between first and last position, in steady
-    state. The Fourier transform is applied to the rest only."""
+    """(n, 4 m): required force, position, velocity and acceleration of the axes for the straight line between first and
+    last position, in steady state: y of constant slope needs the force G(0) y + G'(0) y' with the inverse response
+    G."""
     m = model.inputs
     line = end_to_end_line(position)
     slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz

@@ -21,13 +21,13 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 LINES_SOLVED_EACH = 2000
-"""Number of lines up to which the system is solved at each line."""
+"""Number of spectral lines up to which the system is solved at each line."""
 LINES_OVER_RANGE, HALF_WIDTHS = 60, np.array([-1.0, 0.0, 1.0])
-"""Lines of the fit: number over the whole range, and places about each pole in its half-widths."""
+"""Lines of the fit: number over the whole range, and distances from each pole in units of its half-width."""
 HIGHEST_POWER = 4
 """Highest power of s in the expansion: that of an inertia behind a massless coupling."""
 POLE_LIMIT = 1e3
-"""Ratio to the highest line above which a pole is replaced by a power of s."""
+"""Ratio of a pole to the highest line above which a power of s represents it instead."""
 FIT_TOLERANCE = 1e-8
 """Largest relative error at lines that were not fitted; above it the system is solved at each line."""
 
@@ -49,7 +49,8 @@ def inverse_response(model: MechanicalModel, frequency_hz: FloatArray) -> Comple
 def fast_inverse_response(
     model: MechanicalModel, lines: int, highest_hz: float
 ) -> Callable[[FloatArray], ComplexArray]:
-    """`inverse_response` as a function of frequency, fast for many lines."""
+    """`inverse_response` as a function of frequency (Hz), fast for many lines. lines: number of them; highest_hz: the
+    highest."""
     if lines > LINES_SOLVED_EACH and (expansion := _fit_partial_fractions(model, highest_hz)) is not None:
         return expansion
     return lambda frequency_hz: inverse_response(model, frequency_hz)

@@ -1,4 +1,10 @@
-"""Error measure by force: the applied force against the force that the model requires along the measured motion."""
+"""Error measure by force: the applied force u less the force that the model requires along the measured motion q.
+
+    e = L (u + h) - L (M q'' + D q' + K q)        L: zero-phase low pass, see `force_views`
+
+with the forces h of the effects along q (inverse dynamics). No simulation is needed, so that the measure suits plants
+in closed loop and plants that drift. All forces are means over one sample period around each sample.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,32 +24,35 @@ from equalizer.signals.band_limited import filter_low_pass
 from equalizer.signals.signal import FloatArray
 
 EDGE = 0.5
-"""Length of the distorted edge, in periods of the band's end."""
+"""Length of the distorted edge at either end of a record, in periods of the band's end."""
 _Found = TypeVar("_Found")
 WEAKEST = 1e-3
-"""Least ratio of an actuator's force to its command, in rms."""
+"""Least ratio of an actuator's rms force to its rms command by which errors are rescaled (see `_balance`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedForce:
-    """Error of the force that the model requires for the measured motion: for a plant in closed loop, whose command
-    depends on the response, and for one that drifts freely."""
+    """Error of the force that the model requires for the measured motion; an `ErrorMeasure`. For a plant in closed
+    loop, whose command depends on the response, and for a plant that drifts without a restoring force."""
 
     records: tuple[Observed, ...]
     """Records whose `measured` is the applied force within the band."""
     motions: tuple[BandMotion, ...]
     """Per record: measured motion of the model's first m outputs."""
     unit: FloatArray
+    """(m,): unit of a residual, N (N m)."""
     noise: FloatArray
-    """(m,): rms of the force noise due to the noise of the motion."""
+    """(m,): rms noise of the forces, N (N m): see `force_views`."""
     band_hz: float
+    """End of the band in which forces are compared."""
     name: str = "predicted force"
     known: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
-    """Least error in units of the noise: smaller ones are set to it; 1 with a floor."""
+    """Least error in units of the noise: smaller errors are set to it; 1 with a floor."""
     remembered: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
-    """Last inputs and result by kind and record: laws are compared on one model, models on one command."""
+    """Cache of the last inputs and result by kind and record, because many laws are tested on the same model and
+    command."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
@@ -87,6 +96,8 @@ class PredictedForce:
         return tuple(self._evidence(model, (*self.known, *effects), number) for number in range(len(self.records)))
 
     def _balance(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_Balance":
+        """The force balance of a record. Its residual is scaled by the actuator's rms command over rms force: a smaller
+        actuator gain would otherwise reduce every error."""
         record, motion = self.records[number], self.motions[number]
         rate_hz = record.recording.sample_rate_hz
         model = add_carried_weight(model, record.recording)
@@ -112,6 +123,7 @@ class PredictedForce:
         return _Balance(required, (total - required.force) * rescale, total)
 
     def _actuator_force(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_ActuatorForce":
+        """The force of the actuators of a record, cached where no effect changes the command."""
         record = self.records[number]
         rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
         changed = [effect for effect in effects if isinstance(effect.effect.acts, OnCommand)]
@@ -164,6 +176,8 @@ class _ActuatorForce:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Balance:
+    """Force balance of one record within the band."""
+
     required: RequiredForce
     residual: FloatArray
     """(n, m): applied force, effects included, less the required force; scaled to the actuator's nominal gain."""

@@ -1,6 +1,10 @@
-"""A linear model of a device in closed loop, where none is given: masses, dampers and springs by least squares on
-forces, as rigid robots are identified (Gautier, Vandanjon and Pressé 1994). Estimates by spectra would be biased by the
-controller."""
+"""Fits a model with one body per command to a device in closed loop, by least squares on forces.
+
+    f = M q'' + D q' + K q + f0        M, D, K made symmetric after the fit; K only where springs reduce the misfit
+
+along the measured motion q, both sides low-pass filtered, as rigid robots are identified (Gautier, Vandanjon and Pressé
+1994). Frequency responses from commands to motions would be biased by the controller. Used where no model was given.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,24 +24,24 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 _ROUNDS = 2
-"""Fits: the band in which forces are compared depends on the model, so the fit is repeated."""
+"""Number of fits: the band in which forces are compared depends on the model, so the fit is repeated with the first."""
 
 
 def wants_rigid_model(recordings: Sequence[Recording]) -> bool:
-    """Whether a controller made the commands, or a motion was imposed."""
+    """Whether a rigid model is preferred: a controller made the commands, or a motion was imposed."""
     return can_be_rigid(recordings) and any(
         is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings
     )
 
 
 def can_be_rigid(recordings: Sequence[Recording]) -> bool:
-    """Whether there is one measured position or velocity for every command."""
+    """Whether one position or velocity was measured for every command, all of the same order of derivative."""
     return all(_is_square(recording) for recording in recordings)
 
 
 def rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
     """Least-squares model with one body per command. Raises MechanicalModelError where the forces give no positive
-    mass."""
+    mass, or where no motion was measured."""
     model = _unit_masses(recordings[0], name)
     records = observe_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
@@ -56,6 +60,7 @@ def _is_square(recording: Recording) -> bool:
 
 
 def _unit_masses(recording: Recording, name: str) -> MechanicalModel:
+    """The model that the first band is computed with: unit masses without dampers and springs."""
     eye = np.eye(len(recording.command.channels))
     return MechanicalModel(
         name, recording.response.quantities[0], eye, 0 * eye, 0 * eye, eye, eye, rotational=recording.is_rotational
@@ -63,6 +68,7 @@ def _unit_masses(recording: Recording, name: str) -> MechanicalModel:
 
 
 def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:
+    """The model with fitted matrices, made passive, and with their tolerances."""
     rows, aims = [], []
     for record, motion in zip(measure.records, measure.motions, strict=True):
         motion_and_force = compute_required_force(model, motion)
@@ -94,8 +100,7 @@ def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> Mechanica
 
 
 def _least_mass(acceleration: FloatArray, force: FloatArray) -> FloatArray:
-    """(m,): least masses, for bodies whose inertia is not measurable in the force: a simulation needs a positive
-    mass."""
+    """(m,): least masses, for bodies whose inertia does not show in the force: a simulation needs a positive mass."""
     return np.asarray(MASSLESS_SHARE * force.std(axis=0) / np.maximum(acceleration.std(axis=0), 1e-300))
 
 

@@ -1,5 +1,8 @@
-"""The mismatch that a model leaves on clean recordings, by cell and by channel; it counts as model error, not as
-evidence for an effect."""
+"""Model error on clean recordings: the mismatch that the re-tuned model leaves on them, per cell and per channel.
+
+Clean recordings are recordings of the same device without the fault. A mismatch of this size in the recordings to
+diagnose counts as model error, not as evidence for an effect. `reference.learn_model_error` computes it.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,29 +13,30 @@ from analysis.wording import conjoin
 
 
 class NothingLearned(ValueError):  # noqa: N818 - an answer that a user reads
-    """The clean recordings cannot be compared with those to diagnose; a sentence without a full stop."""
+    """The clean recordings cannot be compared with those to diagnose. Its text is a sentence without a full stop."""
 
 
 @dataclass(frozen=True, slots=True)
 class CleanFloor:
-    """Rms mismatch over the rms signal of clean recordings, raised by `beyond`."""
+    """Shares of rms mismatch in the rms signal of clean recordings. Empty without clean recordings."""
 
     shares: Mapping[tuple[str, str, str, Band], float] = field(default_factory=dict)
-    """Shares by output, its quantity, input and octave."""
+    """Share of each cell: output, its quantity, input and octave."""
     channels: tuple[float, ...] = ()
-    """Shares by channel, the response's and then the position's, over all octaves. Empty without clean recordings."""
+    """Share of each channel over all octaves: those of the response, then those of the position."""
     error: str = ""
     """Name of the error measure, as in `diagnosis.json`."""
     recordings: int = 0
+    """Number of clean recordings."""
 
     @property
     def beyond(self) -> float:
-        """Factor by which the largest observed share was raised; larger for fewer recordings."""
+        """Factor on the largest observed share, because the next recording may exceed it: 1 + 1 / recordings."""
         return 1 + 1 / max(self.recordings, 1)
 
     def share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
-        """Share of a cell; the largest of the channel's octave where clean recordings never drove this input; else
-        0."""
+        """Share of a cell. Where clean recordings never drove this input, the largest share of the same channel and
+        octave; 0 without any."""
         own = self.shares.get((output, quantity, input, band_hz))
         if own is not None:
             return own

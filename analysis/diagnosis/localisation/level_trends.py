@@ -19,23 +19,24 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class LevelTrend:
-    """Distortion of a kind in an output, by input and band, and how it changes with the level."""
+    """Distortion of one kind in an output, for an input and a band, and its change with the level of excitation."""
 
     output: str
     quantity: str
     input: str
     band_hz: Band
     whole_band: bool
+    """True: the whole driven band; False: one octave of it."""
     kind: Kind
     relative_db: float
-    """Distortion over the response on driven lines, at the highest level."""
+    """Rms distortion over the rms response on driven lines, at the highest level (dB)."""
     p_value: float
-    """p-value of no distortion: the smallest over levels, corrected for their number."""
+    """p-value of no distortion: the smallest over the levels times their number (Bonferroni)."""
     db_per_doubling: float | None
     """Slope of the relative distortion with the level; None where it is not significant at any level, or with one level
     only."""
     from_nothing: bool
-    """Not significant at the lowest level: the slope is a lower bound."""
+    """Whether it is not significant at the lowest level, but at another: the slope is then a lower bound."""
 
     @property
     def present(self) -> bool:
@@ -66,6 +67,7 @@ def level_trends(cells: Sequence[Distortion]) -> tuple[LevelTrend, ...]:
 
 
 def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distortion]) -> LevelTrend:
+    """The trend of one group. cells: its distortions, by rising level."""
     sizes = np.array([max(cell.rms, cell.limit_rms) for cell in cells])
     signals = np.array([cell.signal_rms for cell in cells])
     levels = np.array([cell.amplitude for cell in cells])
@@ -82,8 +84,9 @@ def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distorti
 def _slope_with_limits(
     levels: FloatArray, relative_db: FloatArray, lines: FloatArray, significant: Mask
 ) -> float | None:
-    """Slope. Where the distortion is not significant at a level, the detection limit there bounds the slope: from below
-    at the lowest level, from above at the highest."""
+    """Slope in dB per doubling of the level; None where it is not known. Where the distortion is not significant at a
+    level, the detection limit takes its place, and bounds the slope: from below at the lowest level, from above at the
+    highest. A bound that does not show a trend is not used: the slope is then that of the significant levels."""
     if not significant.any() or not (levels > 0).all() or len(set(levels)) < 2:
         return None
     bounded = _slope(np.log2(levels), relative_db, lines)
@@ -98,7 +101,8 @@ def _slope_with_limits(
 
 
 def _slope(doublings: FloatArray, relative_db: FloatArray, lines: FloatArray) -> float:
-    """dB per doubling of the level, weighted by lines."""
+    """dB per doubling of the level: linear regression, weighted by the number of lines. doublings: log2 of the
+    levels."""
     centred = doublings - np.average(doublings, weights=lines)
     return float(np.sum(lines * centred * relative_db)) / float(np.sum(lines * centred**2))
 

@@ -1,4 +1,9 @@
-"""Localises a mismatch: the state of motion that it depends on, the component through which it enters, and its kind."""
+"""Localises a mismatch: the component through which it enters the model, the states that it depends on, and its kind.
+
+`find_entry_point` compares the residual's spectra with the model's responses to a force at each axis and to an error of
+each sensor (`entry_point`); `find_tied_states` then tests the residual of that component against position, velocity,
+command and time (`state_dependence`).
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -31,20 +36,21 @@ _DERIVATIVES: Mapping[str, Literal[0, 1, 2]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Localisation:
-    """Where a mismatch is: the states that it goes with, the component of entry, and the kinds of distortion."""
+    """Where a mismatch is: the states that it depends on, the component of entry, and the kinds of distortion."""
 
     states: Mapping[str, tuple[StateMismatch, ...]] = field(default_factory=dict)
     """Significant state dependences, by "before", "retuned", "after"."""
     entry: EntryPoint | None = None
-    """Entry point of the re-tuned model's residual; None where that is noise, the model drifts, or the noise is not
-    known."""
+    """Entry point of the re-tuned model's residual; None where the residual is noise, where the noise is not known, or
+    where no free simulation was compared."""
     distortions: Distortions = field(default_factory=lambda: Distortions((), ()))
 
 
 def find_entry_point(
     measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, floor: NoiseFloor, cells: Sequence[MismatchCell]
 ) -> EntryPoint | None:
-    """The entry point by the first recording, which represents the device. cells: of this fit, the re-tuned model's."""
+    """The entry point by the first recording, which represents the device. fitted: the re-tuned model; cells: of it.
+    None where no cell exceeds the noise, or the spectra are not known."""
     if measure.name != "free simulation" or not any(cell.beyond_noise for cell in cells):
         return None
     record = measure.records[0]
@@ -68,7 +74,8 @@ def find_tied_states(
     entry: EntryPoint | None,
     known: Sequence[Evidence] = (),
 ) -> tuple[StateMismatch, ...]:
-    """Significant state dependences of the first recording. cells: of this fit. known: its evidence, where known."""
+    """State dependences of the first recording: of the sensor's error where that is the best entry, else of the missing
+    force. cells: of this fit. known: evidence of this fit; empty = to be computed."""
     if not any(cell.beyond_noise for cell in cells):
         return ()
     recording, evidence = measure.records[0].recording, (known or gather_evidence(measure, tuning, fitted))[0]
@@ -83,8 +90,7 @@ def possible_entries(
     model: MechanicalModel, recording: Recording, frequency_hz: FloatArray, position: bool
 ) -> tuple[Entry, ...]:
     """Entries at which a mismatch may enter the model: a force along an axis, forces along several, or an error of a
-    sensor. frequency_hz: (lines,). position: whether the position's
-    channels are compared beside the response's."""
+    sensor. frequency_hz: (lines,). position: whether the position is compared in addition to the response."""
     transfer = axis_transfer(model, recording.sample_rate_hz, frequency_hz)
     forces = np.concatenate([transfer.response, transfer.position], axis=1) if position else transfer.response
     axes = tuple(axis_letter(channel, recording.command.channels) for channel in recording.command.channels)

@@ -1,4 +1,7 @@
-"""Sentences about the localisation of a mismatch."""
+"""Sentences for the user about the localisation of a mismatch: where it enters, and the states that it depends on.
+
+Called by the report and by `real_answer`; the numbers come from `entry_point` and `state_regions`.
+"""
 
 from collections.abc import Sequence
 
@@ -38,7 +41,7 @@ def entry_sentence(entry: EntryPoint | None) -> str:
 
 
 def states_sentence(states: Sequence[StateMismatch]) -> str:
-    """Sentence on the states that the mismatch goes with; empty where there are none."""
+    """Sentence on the states that the mismatch depends on; empty where there are none."""
     if not states:
         return ""
     parts = [
@@ -50,6 +53,7 @@ def states_sentence(states: Sequence[StateMismatch]) -> str:
 
 
 def _rival_entry(entry: EntryPoint) -> str:
+    """Clauses on entries that the data cannot distinguish from the best, and on the next best entry; may be empty."""
     best, others = entry.ranking[0], [score for score in entry.ranking[1:] if score.name not in entry.ranking[0].alike]
     alike = f"; so does {conjoin(best.alike)}, which looks the same" if best.alike else ""
     # Entries along several axes contain those along each, and errors of several channels contain each channel's.
@@ -64,6 +68,7 @@ def _rival_entry(entry: EntryPoint) -> str:
 
 
 def _sensor_rule_sentence(entry: EntryPoint) -> str:
+    """Sentence on the comparison of position and response (`SensorRule`); empty where it is undecided."""
     if entry.rule is None or entry.rule.verdict == "undecided":
         return ""
     if entry.rule.verdict == "motion":

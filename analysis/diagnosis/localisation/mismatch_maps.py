@@ -3,7 +3,7 @@
 A mismatch is significant only beyond the model's typical error on held-out data. No model is exact, and its error does
 not follow from the noise. The residual in a cell is therefore modelled as noise plus model error, both random, with the
 error's power a share of the signal's that varies slowly with frequency. The share is learned from the held-out cells of
-the most complete model, of the same channel, in the same octave and those beside it: other levels, other axes, other
+the most complete model, of the same channel, in the same and the neighbouring octaves: other levels, other axes, other
 recordings. Its robust estimate is the median, so that a mismatch at one level or in one octave does not raise its own
 reference.
 """
@@ -32,7 +32,7 @@ from analysis.diagnosis.types import Mapper
 
 Cells = tuple[MismatchCell, ...]
 STRETCHES = 16
-"""Stretches of a record over which error powers are compared with noise."""
+"""Number of stretches of a record over which error powers are compared with noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,8 +60,8 @@ def mismatch_maps(
     learned: CleanFloor | None = None,
     map_: Mapper = map,
 ) -> Maps:
-    """Maps of all stages. stages: fits by name ("before", "retuned", "after"). learned: the mismatch of clean
-    recordings, which does not count; nor does the error of the last stage on held-out samples."""
+    """Maps of all stages, tested against noise, the mismatch of clean recordings (learned), and the error of the stage
+    "after" on held-out samples. stages: fits by name ("before", "retuned", "after"). floors: noise per record."""
     # Stages with the same fit are tested once.
     fits = list({id(fitted): fitted for fitted in stages.values()}.values())
 
@@ -130,20 +130,20 @@ def cells_of(
 
 
 BESIDE = 2.1
-"""Ratio of two octaves' lower ends up to which they are the same or neighbours."""
+"""Ratio of the lower ends of two octaves up to which these are the same or neighbours."""
 
 
 @dataclass(frozen=True, slots=True)
 class _HeldOutShare:
     fold: tuple[int, str, float]
-    """Key of a cell: part, input and level."""
+    """Part, input and level of the cell."""
     band_hz: Band
     share: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelError:
-    """Held-out mismatch as shares of the signal, from which the usual error near a cell follows."""
+    """Held-out mismatch as shares of the signal, from which the expected model error near a cell is estimated."""
 
     held: Mapping[tuple[str, str], tuple[_HeldOutShare, ...]]
     """Held-out shares by (channel, quantity)."""
@@ -176,7 +176,8 @@ def adjust_for_model_error(cells: Sequence[MismatchCell], error: ModelError) -> 
 
 def _p_value(cell: MismatchCell, error: ModelError) -> float:
     """p-value of an F ratio of two sums of powers, each with the degrees of freedom of a chi-squared variable of its
-    mean and variance (Satterthwaite 1946). The model error in the cell has the degrees of freedom of a single line."""
+    mean and variance (Satterthwaite, Biometrics Bulletin 2:110, 1946). The model error in the cell has the degrees of
+    freedom of a single line."""
     share, count = error.of(cell)
     model_error_power = share * cell.signal_in_noise
     if not count or model_error_power <= 0:

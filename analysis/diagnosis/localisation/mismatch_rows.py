@@ -1,4 +1,8 @@
-"""Mismatch cells and regions of state as rows of the diagnosis document."""
+"""Converts significant mismatch cells and regions of state to rows of the diagnosis document (`Mismatch`).
+
+Cells are those of `mismatch_cells`, regions those of `state_regions`. The order of the rows puts the largest missing
+power first.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,7 +42,7 @@ def mismatch_rows(
 
 
 def _channel(cell: MismatchCell) -> tuple[str, str]:
-    """Response and position may share a name."""
+    """Name and quantity of the cell's channel: response and position may share a name."""
     return cell.output, cell.quantity
 
 
@@ -53,12 +57,14 @@ def _whole_signals(cells: Sequence[MismatchCell]) -> dict[tuple[str, str], float
 
 
 def _cell_row(cell: MismatchCell) -> Mismatch:
+    """The row of a cell; its share is limited to 1, as the document requires."""
     return Mismatch(
         cell.output, cell.input, cell.band_hz, cell.amplitude or None, None, min(cell.share, 1.0), cell.adjusted_p_value
     )
 
 
 def _state_row(state: StateMismatch) -> Mismatch:
+    """The row of a region of state, over all levels."""
     region = state.region
     return Mismatch(
         state.output, state.input, state.band_hz, None, region.words, min(region.share, 1.0), region.p_value

@@ -1,5 +1,9 @@
-"""Dependence of a residual on the state (position, speed, command, response, time): where it is large, or whether its
-sign follows the state's."""
+"""Dependence of a residual on a state variable: where it is large, and whether its mean follows the state.
+
+State variables are position, velocity, command, response and time. Samples are sorted into bins of the state; tested
+are the power per bin (size) and the mean per bin (sign) against permutations of blocks of samples within a segment
+(`block_permutation`), because neighbouring samples are correlated.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +17,9 @@ from equalizer.signals.signal import FloatArray
 
 StateKind = Literal["position", "velocity", "command", "response", "time"]
 _BINS = 12
-"""Bins of a state, with equally many samples each."""
+"""Number of bins of a state, with equally many samples each."""
 PERMUTATIONS = 60
-"""Permutations of blocks; the p-value is that of a gamma distribution fitted to them."""
+"""Number of permutations of blocks."""
 _CONCENTRATED = 1.5
 """Least ratio of a bin's mean square to the expected one, for the bin to belong to a region."""
 _LEAST_SHARE = 0.05
@@ -24,7 +28,7 @@ _TINY = np.finfo(np.float64).tiny
 _LEAST_EXPECTED = 1e-9
 """Least expected power of a bin, relative to the mean; bins below it, such as those at rest, are not tested."""
 MIDDLING = "at middling"
-"""Begins the words of a region that holds neither small nor large values of a state."""
+"""First words of the text for a region with neither small nor large values of a state."""
 _READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
 
 
@@ -50,8 +54,8 @@ class Disturbance:
     """(n,): number of the condition or segment; -1 = not used. Conditions differ in what is driven and at which level,
     so samples are compared within them only."""
     signal: FloatArray | None = None
-    """(n,): the signal that contains the disturbance. Needed for elapsed time: tested is whether the disturbance's
-    share of it changes."""
+    """(n,): the signal that contains the disturbance. Needed for the state "time", for which the test is whether the
+    disturbance's share of the signal's power changes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +82,8 @@ def state_regions(
     smallest p-value first, then the largest share. p-values are of single tests, by block permutation within segments,
     and not compared with any limit here; they depend on the seed in their third digit.
 
-    Tested are the size for every state, over its magnitude where it has a sign of its own, and beside it the sign for
-    position and velocity.
+    The size is tested for every state (over the magnitude of velocity, command and response), the sign for position and
+    velocity only.
 
     Raises ValueError where a state has another length than the disturbance.
     """
@@ -109,11 +113,14 @@ def state_regions(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sample:
+    """The used samples of a disturbance, sorted by stratum, as (n,) arrays."""
+
     values: FloatArray
     expected: FloatArray
     """Expected mean square of each sample if it did not depend on the state."""
     strata: IntArray
     block: int
+    """Length of a block of permuted samples."""
     even: bool
     """Whether `expected` is constant within each stratum, so that permutation does not change it."""
 
@@ -121,6 +128,7 @@ class _Sample:
 def _test_states(
     asked: _Sample, states: Sequence[tuple[State, FloatArray]], permutations: int, random: np.random.Generator
 ) -> list[StateRegion]:
+    """Regions of all states, from one set of permutations. states: with their values at the used samples."""
     by_size = [_equal_bins(np.abs(v) if _uses_magnitude(state) else v) for state, v in states]
     by_sign = [_equal_bins(v) for state, v in states if _has_sign(state)]
     total, counts = float(np.sum(asked.values**2)), [np.bincount(b) for b in by_sign]
@@ -152,8 +160,8 @@ def _test_states(
 
 
 def _region(state: State, values: FloatArray, bins: IntArray, asked: _Sample) -> tuple[float, float, str] | None:
-    """Share, occupied and words of the run of bins around the largest that exceed `_CONCENTRATED`; None = no such
-    bin."""
+    """`share`, `occupied` and `words` of a `StateRegion`: the run of bins above `_CONCENTRATED` that contains the
+    largest; None where no bin is above it."""
     power = asked.values**2
     one_stratum = bool((asked.strata == asked.strata[0]).all())
     expected = _sums(bins, asked.expected)
@@ -187,10 +195,12 @@ def _within_stratum(strata: IntArray) -> FloatArray:
 
 
 def _sums(bins: IntArray, weights: FloatArray) -> FloatArray:
+    """(bins,): sum of the weights in each bin."""
     return np.asarray(np.bincount(bins, weights), dtype=np.float64)
 
 
 def _mean_square_in(values: FloatArray, strata: IntArray) -> FloatArray:
+    """(n,): mean square of the values in the stratum of each sample."""
     _, numbers = np.unique(strata, return_inverse=True)
     mean = _sums(numbers, values**2) / np.bincount(numbers)
     return np.asarray(mean[numbers], dtype=np.float64)
@@ -203,10 +213,12 @@ def _equal_bins(values: FloatArray) -> IntArray:
 
 
 def _uses_magnitude(state: State) -> bool:
+    """Whether the size is tested over the state's magnitude, because zero has a meaning (rest, no command)."""
     return state.kind in ("velocity", "command", "response")
 
 
 def _has_sign(state: State) -> bool:
+    """Whether the mean of the disturbance per bin is tested, too."""
     return state.kind in ("position", "velocity")
 
 
@@ -229,7 +241,8 @@ def region_in_words(
 
 
 def dependence_in_words(symbol: str, means: FloatArray) -> str:
-    """Words for the trend. means: over bins of equal count, in the order of the state."""
+    """Words for the trend of the bin means: by the sign of the state where their sign changes, else depending on it.
+    means: over bins of equal count, in the order of the state."""
     lower, upper = means[: len(means) // 2].mean(), means[len(means) // 2 :].mean()
     larger = max(abs(lower), abs(upper))
     if larger > 0 and lower * upper < 0 and min(abs(lower), abs(upper)) > larger / 3:

@@ -1,4 +1,7 @@
-"""The noise of a signal's channels, as a value."""
+"""Data classes of the noise of a signal's channels: rms, spectrum, and degrees of freedom of the estimates.
+
+Made by `quiet_noise` and `repeat_noise`, and combined by `noise_floor`. Variances are in the channel's unit squared.
+"""
 
 from dataclasses import dataclass
 
@@ -7,18 +10,21 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SegmentNoise:
-    """Variance between the periods of one segment."""
+    """Variance between the periods of one segment with a periodic excitation."""
 
     segment: int
+    """Index of the segment in the recording."""
     amplitude: float
+    """Level of the excitation, in the command's unit."""
     variance: FloatArray
     """(channels,)"""
     freedom: FloatArray
     """(channels,): degrees of freedom of the variance."""
     counted: tuple[bool, ...]
-    """Per channel: whether it is used for the noise floor."""
+    """Per channel: whether the variance is used for the noise floor."""
     varies: tuple[bool, ...]
-    """Per channel: whether it is larger than in the quietest segments, so that it contains more than noise."""
+    """Per channel: whether the variance is larger than in the quietest segments, so that it contains more than
+    noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,4 +43,4 @@ class ChannelNoise:
     segments: tuple[SegmentNoise, ...] = ()
     """Variances by segment; empty unless measured from repeats."""
     more_than_rest: tuple[bool, ...] = ()
-    """Per channel: every segment varies between periods by more than the noise at rest, which was used instead."""
+    """Per channel: whether every segment varies by more than the noise at rest, which was then used instead."""

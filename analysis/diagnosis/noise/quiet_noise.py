@@ -1,4 +1,9 @@
-"""Noise where nothing is driven: at rest, or on the lines above the driven band."""
+"""Noise of signals where the device is not driven: at rest, or on the spectral lines above the driven band.
+
+At rest, the noise is estimated from windowed spectra, or at high frequencies from third differences, which remove slow
+ringing after an excitation. Without rest, the median power of the lines above the driven band is taken, which single
+harmonics do not change, and the noise is assumed to be white.
+"""
 
 from dataclasses import dataclass
 
@@ -16,9 +21,9 @@ from equalizer.signals.signal import FloatArray, runs_of
 from equalizer.signals.spectral_density import hann
 
 _LEAST_SAMPLES = 8
-"""Least samples of a window: recordings at less than 32 Hz have no window."""
+"""Least number of samples of a window: recordings at less than 32 Hz have no window."""
 _WINDOW_S = 0.25
-"""Length of a window at rest."""
+"""Length of a window at rest (s)."""
 _SILENT = 1e-4
 """Share of the strongest smoothed power of the command below which nothing is driven."""
 _CLEAR = 1.3
@@ -26,7 +31,8 @@ _CLEAR = 1.3
 _LEAST_LINES = 16
 """Fewest lines above the driven band from which the noise is estimated."""
 _DIFFERENCE_GAIN, _DIFFERENCE_LOSS = 20.0, 2.31
-"""Third differences of white noise: gain of variance, and loss of degrees of freedom by correlation."""
+"""Third differences (1, -3, 3, -1) of white noise: gain of variance, 1 + 9 + 9 + 1; and factor by which correlation
+reduces the degrees of freedom, 1 + 2 (15² + 6² + 1²) / 20²."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,14 +40,14 @@ class FastNoise:
     """Variance of the noise at rest at high frequencies, scaled as if it were white."""
 
     variance: FloatArray
-    """(windows, channels)"""
+    """(windows, channels), in the channel's unit squared."""
     freedom: FloatArray
-    """(windows, channels)"""
+    """(windows, channels): degrees of freedom of the variance."""
 
 
 def fast_noise_at_rest(recording: Recording, samples: FloatArray) -> FastNoise | None:
-    """Noise from third differences in windows of 0.25 s, beginning 0.25 s after the excitation: third differences
-    remove slow ringing. None where there is no such window."""
+    """Noise from third differences in windows of 0.25 s, from 0.25 s after the end of an excitation. samples: (n,
+    channels). None where there is no such window."""
     length = round(_WINDOW_S * recording.sample_rate_hz)
     if length < _LEAST_SAMPLES:
         return None
@@ -58,8 +64,8 @@ def fast_noise_at_rest(recording: Recording, samples: FloatArray) -> FastNoise |
 
 
 def rest_noise(recording: Recording, samples: FloatArray, frequency_hz: FloatArray) -> tuple[FloatArray, float] | None:
-    """(lines, channels) density and its degrees of freedom; None without a rest of a quarter of a second, or where a
-    reading is constant at rest: an encoder's steps then hide its noise."""
+    """Density (lines, channels) at `frequency_hz` and its degrees of freedom. None without a rest of a quarter of a
+    second, or where a reading is constant at rest, because an encoder's steps then hide its noise."""
     length = round(_WINDOW_S * recording.sample_rate_hz)
     if length < _LEAST_SAMPLES:
         return None
@@ -86,6 +92,7 @@ def quiet_band_noise(
     if len(samples) < 2 * _LEAST_LINES:
         return None
     n = len(samples)
+    # A Hann window has a mean square of 3/8.
     window = np.sqrt(8 / 3) * hann(n)
     lines_hz: FloatArray = np.arange(1.0, n // 2) * (recording.sample_rate_hz / n)
     driven = np.abs(np.fft.rfft((command - command.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2
@@ -97,6 +104,7 @@ def quiet_band_noise(
     if len(quiet) < _LEAST_LINES:
         return None
     power = np.abs(np.fft.rfft((samples - samples.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2 / n
+    # The power of a line is exponentially distributed, with a median of ln 2 times its mean.
     level = np.median(power[quiet], axis=0) / np.log(2)
     return np.tile(level, (len(frequency_hz), 1)), float(len(quiet))
 

@@ -1,7 +1,11 @@
 """Quantisation noise: differences between repeats show only a part of it, because equal motions are rounded alike.
 
-With a movement over many steps, the rounding error has variance step² / 12 and does not depend on the noise before it.
-Its part that repeats has the Fourier series of a saw tooth, blurred by the noise (Widrow and Kollar 2008).
+For a motion over many steps of size 1, with noise of variance v before rounding, the rounding error has variance 1/12.
+The part of it that repeats is a saw tooth blurred by the noise; with the power of its Fourier series,
+
+    repeating = sum over k >= 1 of exp(-4 pi² k² v) / (2 pi² k²),        between repeats = v + 1/12 - repeating
+
+(Widrow and Kollar, Quantization Noise, 2008). `undo_rounding` solves this for v, and so finds the total noise.
 """
 
 from dataclasses import dataclass
@@ -11,7 +15,9 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 _TERMS = np.arange(1, 200)
+"""Terms k of the Fourier series."""
 _EXAMINED, _HALVES = 20_000, 40
+"""Largest number of samples in which a step is looked for; number of bisections."""
 _TOLERANCE = 1e-3
 """Largest deviation from multiples of a step, relative to the step: float32 storage leaves no exact multiples."""
 
@@ -26,7 +32,8 @@ class RoundedNoise:
 
 
 def rounding_step(samples: FloatArray) -> float:
-    """The step of which all values of a channel are multiples, up to an offset; 0 where there is none. samples: (n,)"""
+    """The step of which all values of a channel are multiples, apart from an offset; 0 where there is none, or for
+    fewer than three values. samples: (n,)"""
     values = np.unique(samples[np.isfinite(samples)][:_EXAMINED])
     if len(values) < 3:
         return 0.0
@@ -42,8 +49,8 @@ def rounding_step(samples: FloatArray) -> float:
 
 
 def undo_rounding(between_repeats: float, step: float) -> RoundedNoise:
-    """Total noise, rounding included, from the variance between repeats of a movement over many steps. step: 0 = not
-    rounded."""
+    """Total noise, rounding included. between_repeats: variance between repeats of a motion over many steps. step: 0 =
+    not rounded. Variances above step² are not corrected, because noise then blurs the saw tooth completely."""
     if step == 0:
         return RoundedNoise(between_repeats, 0.0)
     seen = between_repeats / step**2
@@ -54,8 +61,7 @@ def undo_rounding(between_repeats: float, step: float) -> RoundedNoise:
 
 
 def _variance_before_rounding(seen: float) -> float:
-    """The noise's variance before rounding, by bisection: the variance between repeats grows with it. For steps of
-    1."""
+    """v for a variance between repeats `seen`, both for steps of 1: bisection, as one grows with the other."""
     low, high = 0.0, 1.0 if seen > 0 else 0.0
     for _ in range(_HALVES):
         middle = (low + high) / 2
@@ -64,7 +70,8 @@ def _variance_before_rounding(seen: float) -> float:
 
 
 def _compute_repeating_variance(variance: float) -> float:
-    """Variance of the repeating part for steps of 1. variance: of the noise before rounding."""
+    """Variance of the repeating part for steps of 1, see above. variance: v. Without noise, the sum of all terms that
+    were left out is added."""
     blurred = np.exp(-4 * np.pi**2 * _TERMS**2 * variance) / _TERMS**2
     left_out = 0.0 if variance > 0 else np.pi**2 / 6 - float(np.sum(1 / _TERMS**2))
     return float((np.sum(blurred) + left_out) / (2 * np.pi**2))

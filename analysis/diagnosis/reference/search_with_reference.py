@@ -1,4 +1,9 @@
-"""Searches for effects that explain more than clean recordings of the same device leave unexplained."""
+"""Search for effects whose contribution exceeds the model error on clean recordings of the same device.
+
+The residual of the re-tuned model on clean recordings (`learn_model_error`) counts as noise in two ways: as coloured
+noise, by a whitening filter; and, where the residual is much larger than that noise, by its rms only. Effects that also
+improve the prediction of the clean recordings are not named: the model lacks them, but they are not the fault.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,12 +33,11 @@ def search_with_reference(
     progress: Progress,
     time_left: TimeBudget,
 ) -> SearchResult:
-    """Search with the model's error on clean recordings as noise. context: as without reference recordings, but for
-    what is certain. Residuals of the result are by its own measure, with the model error of the reference recordings
-    counted as noise.
+    """Search with the model's error on clean recordings (learned) as noise. context: as without clean recordings, with
+    the faults that are certain. Residuals of the result are by its own measure, with that model error as noise.
 
-    Where the residual is much larger than that, whitening helps little: then effects are also searched for with the
-    plain residual, and the result with the smaller error is kept.
+    Where the residual is much larger, whitening helps little: effects are then also searched for with the plain
+    residual, and the result with the smaller error is kept.
     """
     fine = _unname_what_was_there(_search_by_contrast(context, learned, catalogue, progress, time_left), learned)
     if context.certain or fine.found.after.score.worst_channel <= learned.floor.beyond or not time_left():
@@ -47,8 +51,7 @@ def search_with_reference(
 
 
 def _unname_what_was_there(seen: SearchResult, learned: LearnedError) -> SearchResult:
-    """The result without effects that the reference recordings show as well, with the same parameters: the model lacks
-    them, but they are not the fault."""
+    """The result without effects that the clean recordings show with the same parameters; these become unconfirmed."""
     found, before = seen.found, []
     for place in reversed(range(len(found.steps) if seen.judgement.named and not seen.context.certain else 0)):
         whole = found.after.fitted.hypothesis
@@ -63,7 +66,7 @@ def _unname_what_was_there(seen: SearchResult, learned: LearnedError) -> SearchR
 
 
 def _mean_log_error(context: SearchContext, seen: SearchResult) -> float:
-    """Mean log error power of what is named, on the samples to fit and to choose by."""
+    """Mean log error power with the named effects, on the samples to fit and to choose by."""
     stands = seen.found.after if seen.judgement.named else seen.found.retuned
     fitted = evaluate_fit(context.measure, context.tuning, stands.fitted.deviations, stands.fitted.hypothesis)
     return FittedCandidate(fitted, fit_score(context.measure, fitted.residuals)).score.mean_log_error
@@ -76,6 +79,7 @@ def _search_by_size(
     progress: Progress,
     time_left: TimeBudget,
 ) -> SearchResult:
+    """Search on the plain residual, with the model error on clean recordings, raised by its factor, as white noise."""
     wide = replace(learned.floor, channels=tuple(learned.floor.beyond * channel for channel in learned.floor.channels))
     plain = count_as_noise(context.whole, wide)
     beside = replace(context, measure=plain.shorten(), whole=plain, least_left=EXPLAINED_ERROR)
@@ -92,9 +96,10 @@ def _search_by_contrast(
     progress: Progress,
     time_left: TimeBudget,
 ) -> SearchResult:
+    """Search on the whitened residual; the result is refitted and judged on the plain one."""
     plain = count_as_noise(context.whole, learned.floor)
     whole = learned.noise_measure(plain, context.tuning.model)
-    # What was learned is no noise: a right law leaves more beside it.
+    # Model error is not random noise: even the right law leaves more than its learned size.
     least_left = EXPLAINED_ERROR * learned.references.beyond
     beside = replace(
         context, measure=whole.shorten(), whole=whole, references=learned.references, least_left=least_left
@@ -133,8 +138,8 @@ def _judge_with_floor(measure: ErrorMeasure, found: Explanation, named: bool, be
 
 
 def _refit_by(context: SearchContext, found: Explanation) -> Explanation:
-    """The explanation with its parameters refitted on the plain residual: effects are chosen on the whitened one, where
-    a law that is not exact would be biased by frequencies with little weight."""
+    """The explanation with its parameters refitted on the plain residual. Effects are chosen on the whitened residual,
+    which would bias the parameters of a law that is not exact."""
     after = found.after.fitted
     if after.hypothesis.claims and not context.certain:
         start = evaluate_fit(context.measure, context.tuning, after.deviations, after.hypothesis)
@@ -150,6 +155,7 @@ def _refit_by(context: SearchContext, found: Explanation) -> Explanation:
 
 
 def _evaluate_by(measure: ErrorMeasure, context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
+    """The candidate with its residuals by this measure, at the same parameters; its score is unchanged."""
     return replace(
         candidate,
         fitted=evaluate_fit(measure, context.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis),

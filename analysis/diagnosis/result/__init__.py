@@ -3,5 +3,6 @@
 In this order: `assemble_findings` puts a finished search into `findings`: the effects with their parameters
 (`named_effects`), the errors (`error_table`), the examination of the fits after the search (`post_search`:
 localisation, the curve of each effect, a black box) and the recording to make next (`propose_experiment`). `wording`
-puts it into sentences; `answer_of_findings` makes the plain values of a real recording (`real_answer`).
+puts the findings into sentences; `answer_of_findings` makes the plain values of a real recording (`real_answer`). Begin
+at `assemble_findings.py`.
 """

@@ -1,4 +1,8 @@
-"""Assembles the findings of a finished search: the document, and the data of its figures."""
+"""Assembles the findings of a finished search: the document (`Diagnosis`), and the data of figures and sentences.
+
+In this order: labels and re-tuned models, standard errors, mismatch maps of the given, re-tuned and completed model,
+examination of the fits (`post_search`), choice of the next recording, document.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -41,8 +45,8 @@ if TYPE_CHECKING:
 def assemble_findings(
     result: SearchResult, floors: tuple[NoiseFloor, ...], names: Sequence[str], learned: CleanFloor
 ) -> Findings:
-    """The findings of a search. result.found.after is the model with the named effects, the same as re-tuned where
-    nothing is named. names: of the recordings. learned: the residual of clean recordings, counted as noise."""
+    """The findings of a search. result.found.after: the model with the named effects, or the re-tuned model without
+    any. names: of the recordings. learned: the residual of clean recordings, counted as noise."""
     context, found, judged = result.context, result.found, result.judgement
     measure, tuning = context.whole, context.tuning
     recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.list_placed_effects()
@@ -95,6 +99,7 @@ def _models(result: SearchResult, recording: Recording) -> tuple[MechanicalModel
 
 
 def _still_sentence(measure: ErrorMeasure) -> str:
+    """Sentence where the held-out samples contain no motion; else empty."""
     if not held_out_stands_still(measure.records, measure.noise):
         return ""
     return (
@@ -106,6 +111,7 @@ def _still_sentence(measure: ErrorMeasure) -> str:
 def _remarks(
     first: Sequence[str], time_series: Sequence[TimeSeries], tuning: Tuning, floors: tuple[NoiseFloor, ...]
 ) -> tuple[str, ...]:
+    """Remarks without repetition: the first, doubtful units, a constant force of the model, and those of the noise."""
     of_noise = (remark for floor in floors for remark in floor.remarks)
     texts = (*first, *unit_sentences(time_series), constant_sentence(tuning.model), *of_noise)
     return tuple(dict.fromkeys(filter(None, texts)))
@@ -121,8 +127,8 @@ def _split_s(measure: ErrorMeasure) -> dict[str, float]:
 
 
 def _standard_errors(result: SearchResult) -> FloatArray:
-    """Standard errors of the model's own parameters, then of the named effects'; NaN where none is shown. See
-    `final_errors`."""
+    """Standard errors of the model's own parameters, then of the named effects' parameters; NaN where they are not
+    computed. See `final_errors`."""
     context, found = result.context, result.found
     own, numbers = len(context.tuning.names), len(found.after.fitted.hypothesis.point)
     if found.statistic is not None:
@@ -137,6 +143,7 @@ def _standard_errors(result: SearchResult) -> FloatArray:
 def _document(
     result: SearchResult, errors: FloatArray, examined: tuple[Maps, Localisation], proposal: "Proposal | None"
 ) -> Diagnosis:
+    """The document. errors: standard errors of all parameters. examined: mismatch maps and localisation."""
     found, judged = result.found, result.judgement
     measure, tuning, fitted = result.context.whole, result.context.tuning, found.after.fitted
     maps, local = examined
@@ -179,7 +186,8 @@ def _effects_with_gains(result: SearchResult, errors: FloatArray, labels: Labels
 
 
 def _proposal(context: SearchContext, found: Explanation, judged: Judgement) -> "Proposal | None":
-    """The next recording; None where no effect is named, or where recordings cannot be predicted by simulation."""
+    """Proposal of the next recording; None where no effect is named, or where recordings cannot be predicted by
+    simulation."""
     if not judged.named or context.whole.name != "free simulation" or found.statistic is not None:
         return None
     # Imported here: only named effects have rivals that a further recording could separate.
@@ -195,6 +203,7 @@ def channel_names(recording: Recording, count: int) -> tuple[str, ...]:
 
 
 def _time_series(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) -> tuple[TimeSeries, ...]:
+    """Measured signals and those predicted at each stage, per recording."""
     time_series = []
     for number, record in enumerate(measure.records):
         count = record.measured.shape[1]
@@ -219,6 +228,7 @@ def _time_series(measure: ErrorMeasure, found: Explanation, names: Sequence[str]
 
 
 def _units(recording: Recording) -> tuple[str, ...]:
+    """Unit of each channel of the response, then of the position."""
     signals = [signal for signal in (recording.response, recording.position) if signal is not None]
     return tuple(
         signal.unit if isinstance(signal.unit, str) else signal.unit[k]

@@ -1,4 +1,8 @@
-"""Sentences about laws that the data cannot distinguish, and about unconfirmed candidates."""
+"""Sentences for the user about classes of laws that the data cannot distinguish, and about unconfirmed candidates.
+
+A class holds a named effect and the effects that explain the held-out data equally well; where all are of a family
+below, the family's name takes the place of the list.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -43,7 +47,7 @@ _FAMILIES = (
         {"force_deadband", "coulomb_friction"},
     ),
 )  # fmt: skip
-"""Families of laws that act alike: short name, title of a sentence, and members."""
+"""Families of effects with similar forces or delays: short name, beginning of a sentence, and members."""
 
 REFINED = "it holds the named law as a special case, and what it allows beyond that brings nothing on held-out data"
 """Reason for which a law that refines the named one is not reported as a rival."""
@@ -53,7 +57,7 @@ SENTENCES = 3
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """Facts about the device that sentences need."""
+    """Facts about the device and its recordings that the sentences need."""
 
     single: bool
     """Whether it has a single axis, which is then not named."""
@@ -63,8 +67,8 @@ class Device:
 
 
 def class_noun(effect: NamedEffect) -> str:
-    """Name of an effect with those that these data cannot distinguish from it: "friction (dry friction or 2 laws like
-    it)"; its own noun where there are none."""
+    """Name of an effect with its class, such as "friction (dry friction, or 2 laws like it)"; its own name without a
+    class."""
     names = _class_names(effect)
     others = len(names) - 1
     family = _family(names)
@@ -76,7 +80,8 @@ def class_noun(effect: NamedEffect) -> str:
 
 
 def class_sentence(effect: NamedEffect) -> str:
-    """Which laws would explain the data as well; empty where the data distinguish it from all others."""
+    """Sentence on the effects that would explain the data as well; empty where the data distinguish it from all
+    others."""
     inseparable = [rival.effect for rival in effect.rivals if rival.inseparable]
     names = tuple(dict.fromkeys((*_class_names(effect), *inseparable)))
     if len(names) < 2:
@@ -90,7 +95,7 @@ def class_sentence(effect: NamedEffect) -> str:
 
 
 def refinement_sentence(effect: NamedEffect) -> str:
-    """A sentence on laws that hold the named one as a special case; empty where none was tested."""
+    """A sentence on laws that contain the named law as a special case; empty where none was tested."""
     names = [noun_of(rival.effect) for rival in effect.rivals if rival.why_not == REFINED]
     if not names:
         return ""
@@ -100,13 +105,15 @@ def refinement_sentence(effect: NamedEffect) -> str:
 
 
 def _class_names(effect: NamedEffect) -> tuple[str, ...]:
-    """The effect's name and those of its class; of a formula that stands for a law with a name, that name."""
+    """Names of the effect and its class; for a formula that simulates a law with a name, the names of the class
+    only."""
     names = effect.class_ or (effect.effect,)
     formula = effect.law is not None and len(names) > 1 and names[1] in PLAYED_AS_FORMULA
     return names[1:] if formula else names
 
 
 def _family(names: Sequence[str]) -> tuple[str, str] | None:
+    """Short name and title of the first family that contains all names; None where none does."""
     return next(((short, long) for short, long, members in _FAMILIES if set(names) <= members), None)
 
 
@@ -118,7 +125,7 @@ def candidate_title(candidate: Candidate, device: Device | None = None) -> str:
 
 
 def candidate_parameters(candidate: Candidate, device: Device | None = None) -> str:
-    """device: None = not known, and so are the units: bare SI numbers."""
+    """The parameters of a candidate with units. device: None = not known, so that bare SI numbers are given."""
     if device is None:
         text = ", ".join(
             f"{name.replace('_', ' ')} {value:.3g}".replace("e-0", "e-") for name, value in candidate.parameters.items()
@@ -129,7 +136,7 @@ def candidate_parameters(candidate: Candidate, device: Device | None = None) -> 
 
 
 def candidate_sentences(diagnosis: Diagnosis, device: Device | None = None) -> tuple[str, ...]:
-    """A sentence for each of the best few candidates; without the first where the verdict's sentence says it."""
+    """A sentence for each of the best `SENTENCES` candidates, without that of `best_candidate_sentence`."""
     already = 1 if best_candidate_sentence(diagnosis, device) else 0
     return tuple(
         f"Not confirmed: {_with_gain(candidate, device)}" for candidate in diagnosis.candidates[already:SENTENCES]
@@ -144,6 +151,7 @@ def best_candidate_sentence(diagnosis: Diagnosis, device: Device | None = None) 
 
 
 def _with_gain(candidate: Candidate, device: Device | None) -> str:
+    """The candidate with its gain on held-out data, and the reason why it is not named."""
     return (
         f"{candidate_title(candidate, device)}. It would take {share_text(candidate.held_out_gain)} of the error's "
         f"power on held-out data, {share_text(candidate.share_of_black_box)} of what all laws together take. Why it "

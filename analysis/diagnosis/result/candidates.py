@@ -1,5 +1,8 @@
-"""Contribution of a force balance to the findings: classes of laws that cannot be distinguished, candidates, and the
-gain of all laws together."""
+"""Adds the results of force balances to the findings: classes of effects, shares, candidates, and balance errors.
+
+A class holds effects that the data cannot distinguish; a candidate is a law that was found but is not confirmed. Gains
+are shares of the squared force error on held-out data (`judged_law`).
+"""
 
 import re
 from collections.abc import Sequence
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
 
 
 _NAME, _FREE, _OWN_SIGNAL = re.compile(r"[A-Za-z_]\w*"), re.compile(r"^p\d+$"), re.compile(r"^([vf]?)[xyz]$")
+"""Names in a formula; names of its free parameters; names of the position, velocity or command of an axis."""
 _NUMBER = re.compile(r"(?<![A-Za-z_\d])\d[\d.]*(?:[eE][+-]?\d+)?")
 MOST = 6
 """Most candidates that a diagnosis lists. By hand."""
@@ -30,12 +34,12 @@ REFINING = {
     "condition_dependent_friction": ("coulomb_friction",),
     "drifting_force": ("constant_force",),
 }
-"""Laws that are not simulated, and the special cases that each contains."""
-# PLAINER, ALIKE and BEYOND: reasons for which a candidate is not named, as the document states them.
+"""Laws without a simulation, and the special cases that each contains."""
+# PLAINER, ALIKE and BEYOND: reasons in the document for which an effect is not named.
 PLAINER = "its special case, which is named, leaves hardly more in a simulation, where its further parameters are open"
 ALIKE = "as good in its place on held-out data"
 LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
-"""With a single measured response, a late command and a late reading are equivalent."""
+"""Effects that delay a signal: with a single measured response, a late command and a late reading are equivalent."""
 
 
 BEYOND = "a mode, lag or relaxation that the model lacks: linear dynamics, which simulations did not confirm"
@@ -47,8 +51,8 @@ def beside_given(
     unconfirmed: Sequence[Candidate],
     channels: tuple[str, ...],
 ) -> Diagnosis:
-    """Candidates and classes, where a model was given. unconfirmed: what the search by simulation found and did not
-    name. channels: of the commands."""
+    """The diagnosis with classes and candidates, where a model was given. unconfirmed: effects that the search by
+    simulation found and did not name. channels: of the commands."""
     alike = {
         (law.law.effect, axis_letter(channels[axis], channels)): law.alike
         for axis, balance in enumerate(balances)
@@ -75,7 +79,8 @@ def beside_given(
 
 
 def _class_of(effect: NamedEffect, alike: tuple[str, ...]) -> tuple[str, ...]:
-    """Rivals that neither the simulation nor the balance can distinguish from it."""
+    """The effect with its rivals that neither simulation nor balance can distinguish from it; empty without any. alike:
+    rivals by the balance."""
     passed = {rival.effect for rival in effect.rivals if not rival.inseparable}
     names = [rival.effect for rival in effect.rivals if rival.inseparable]
     names += [name for name in alike if name not in passed]
@@ -127,8 +132,8 @@ def with_balances(
 def _weigh_law(
     effect: NamedEffect, weighed: "Sequence[tuple[JudgedLaw, str, float]]"
 ) -> "tuple[JudgedLaw, float] | None":
-    """The law of a balance that an effect was named after, and its share of the mismatch. weighed: with axis and
-    share."""
+    """The law of a balance that the named effect represents, and its share of the mismatch; None where no balance has
+    it. weighed: laws with their axis and share."""
     for law, axis, share in weighed:
         same = (law.played_as, axis) == (effect.effect, effect.axis or "")
         if same and law.formula is not None and effect.law is not None:
@@ -139,13 +144,14 @@ def _weigh_law(
 
 
 def _form(formula: str) -> list[str]:
-    """Signals and functions of a law's formula in order, those of an axis named as in a balance."""
+    """Signals and functions of a formula in their order, to compare formulas; the axis's own signals have the names of
+    a balance (x, vx and fx become q, v and f)."""
     names = (_FREE.sub("", name) for name in _NAME.findall(_NUMBER.sub("", formula)))
     return [_OWN_SIGNAL.sub(lambda own: own[1] or "q", name) for name in names if name]
 
 
 def _names_covered_by(effect: NamedEffect) -> tuple[str, ...]:
-    """Names that are no candidates beside it: its own, its class, and what only refines it."""
+    """Names that are not listed as candidates once the effect is named: its own, its class, and its refinements."""
     refined = (rival.effect for rival in effect.rivals if rival.why_not == REFINED)
     return (effect.effect, *effect.class_, *refined)
 
@@ -163,8 +169,8 @@ def _rank(weighed: "JudgedLaw") -> int:
 def linear_remarks(
     balances: "Sequence[Balance]", channels: tuple[str, ...], in_samples: bool = False
 ) -> tuple[str, ...]:
-    """Remarks on the first model's linear terms beside mass, damping and stiffness; channels: of the commands.
-    in_samples: samples are counted as time."""
+    """Remarks on the linear terms of the first model other than mass, damping and stiffness. channels: of the commands.
+    in_samples: times are in samples."""
     texts = []
     for channel, balance in zip(channels, balances, strict=False):
         beside, motion = balance.search.regression.beside, balance.search.regression.motions[0]
@@ -200,8 +206,8 @@ def balance_errors(
 
 
 def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Each effect at its best place alone; laws without a name differ by their formulas, and all stay. candidates: the
-    best first."""
+    """The candidates with each effect only once, at its best place; laws without a name are the same only if their
+    formulas and axes are. candidates: the best first."""
     first: dict[object, Candidate] = {}
     for candidate in candidates:
         law = candidate.law
@@ -210,14 +216,15 @@ def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
 
 
 def _compute_explained_share(balance: "Balance", law: "JudgedLaw") -> float:
-    """Share of the linear model's held-out error power that goes with a law; its own is of what all laws take."""
+    """Share of the linear model's held-out error power that a law removes. `JudgedLaw.share` is relative to the
+    decrease by all laws together, and for a law of the command to the linear error already."""
     whole = 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2 if law.has_column else 1.0
     return min(max(whole * law.share, 0.0), 1.0)
 
 
 def _with_class(effect: NamedEffect, found: "tuple[JudgedLaw, float] | None") -> NamedEffect:
-    """The effect with the class of effects that cannot be distinguished from it, and its share and probability by the
-    balance. found: the law as it was weighed, and its share of the mismatch; None where no balance has it."""
+    """The effect with its class, share and probability by the balance. found: the law of the balance, and its share of
+    the mismatch; None where no balance has it."""
     if found is None:
         late = effect.effect in LATE
         return replace(effect, class_=tuple(dict.fromkeys((effect.effect, *LATE)))) if late else effect
@@ -241,13 +248,13 @@ def _with_class(effect: NamedEffect, found: "tuple[JudgedLaw, float] | None") ->
 
 
 def refines(effect: str, plain: str) -> bool:
-    """Whether a law holds another as a special case."""
+    """Whether an effect contains another (plain) as a special case."""
     known = EFFECTS[effect].simpler if effect in EFFECTS else REFINING.get(effect, ())
     return plain in known
 
 
 def _candidate(weighed: "JudgedLaw", axis: str, effects: Sequence[NamedEffect] = ()) -> Candidate:
-    """A law of a balance as a candidate of the document. effects: those that are named."""
+    """A law of a balance as a candidate of the document. effects: the named effects."""
     plainer = any(refines(weighed.law.effect, named.effect) and named.axis == axis for named in effects)
     why_not = PLAINER if plainer else "simulations of the whole recording do not bear it out"
     return Candidate(

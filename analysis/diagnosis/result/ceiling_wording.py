@@ -1,4 +1,8 @@
-"""Sentences about held-out errors, compared with noise alone, with all laws together, and with a black box."""
+"""Sentences for the user about held-out errors: compared with the noise, with all laws together, and with a black box.
+
+The ceiling is the fit of all laws together in a force balance (`BalanceErrors.ceiling`): the error that no sum of a few
+laws should be expected to beat. Errors are rms errors over the rms of the signal, unless a text says otherwise.
+"""
 
 from collections.abc import Sequence
 
@@ -9,7 +13,7 @@ from analysis.diagnosis.unit_wording import error_of_signal, error_text, share_t
 from analysis.wording import capitalise
 
 SAME = 1e-9
-"""Share by which two errors of the same data may differ by rounding."""
+"""Relative difference of two errors of the same data that is due to rounding."""
 
 
 def black_box_sentence(box: BlackBox | None, named: bool) -> str:
@@ -38,6 +42,7 @@ def describe_ceiling(reached: Sequence[BalanceErrors]) -> tuple[str, ...]:
 
 
 def _describe_ceiling_of_axis(reached: BalanceErrors, single: bool) -> str:
+    """The sentence of one axis. single: whether the device has no other, so that it needs no name."""
     along = "" if single else f" along {reached.axis}"
     if not reached.tested:
         return (
@@ -57,17 +62,18 @@ def _describe_ceiling_of_axis(reached: BalanceErrors, single: bool) -> str:
 
 
 _NOISE_SOURCES = {"rest": "as it is at rest", "quiet band": "as it is above the driven band"}
-"""Ways of estimating noise other than from repeats: its level during excitation is then unknown, so errors are not
-stated in units of it."""
+"""Words for noise that was not estimated from repeats, by `NoiseFloor.how`. Its level during excitation is then
+unknown, so that errors are not stated in units of it."""
 
 
 def times_text(ratio: float) -> str:
-    """ "1.04 times"."""
+    """A ratio in words, such as "1.04 times"."""
     return f"{ratio:.2f} times" if ratio < 10 else f"{ratio:.3g} times"
 
 
 def fall_text(errors: Errors, first: tuple[str, str], last: tuple[str, str], how: str = "") -> str:
-    """first, last: a field of `Errors`, and what it is called. how: `NoiseFloor.how`; empty where it is not known."""
+    """Clause on the change of the held-out error between two stages. first, last: a field of `Errors`, and its name in
+    words. how: `NoiseFloor.how`; empty where it is not known."""
     before, after = getattr(errors, first[0]), getattr(errors, last[0])
     if before is None or after is None:
         return "how much better it predicts held-out data is not known"
@@ -79,13 +85,14 @@ def fall_text(errors: Errors, first: tuple[str, str], last: tuple[str, str], how
 
 
 def one_error(text: str, error: float | None, errors: Errors, how: str = "") -> str:
-    """Clause on a single held-out error beside the noise, or that it is not known. text: begins the clause."""
+    """Clause on a single held-out error and on the noise, or that the error is not known. text: begins the clause."""
     if error is None:
         return "its error on held-out data is not known"
     return f"{text}, its error on held-out data is {error_of_signal(error)}{_noise(errors, error, how)}"
 
 
 def _noise(errors: Errors, error: float, how: str) -> str:
+    """End of a clause: an error compared with that of noise alone."""
     if not errors.noise or how == "unknown":
         return "; what noise alone would leave is not known"
     if how in _NOISE_SOURCES:
@@ -94,7 +101,8 @@ def _noise(errors: Errors, error: float, how: str) -> str:
 
 
 def confirmation_sentence(fit: Errors, test: Errors) -> str:
-    """A sentence where held-out data do not confirm the fit; else empty. Errors are compared in units of the noise."""
+    """A sentence where held-out data do not confirm the fit; else empty. The errors of both sets are compared in units
+    of their noise, so that different signals do not matter."""
     if None in (test.after, test.retuned, test.noise, fit.after, fit.noise):
         return ""
     assert test.after is not None and test.retuned is not None and test.noise and fit.after is not None and fit.noise

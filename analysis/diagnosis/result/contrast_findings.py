@@ -1,4 +1,8 @@
-"""Adds the result of a comparison with clean recordings to the findings: the named fault, and candidates."""
+"""Adds the result of a comparison with clean recordings to the findings: verdict, named fault, and candidates.
+
+The comparison (`contrast`) replaces verdict, effects and errors of the search by simulation. Where the sets could
+not be compared, only a fault that the readings show by themselves is named.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -36,8 +40,8 @@ BY_ITSELF = "This is seen in the readings themselves, and not in those of the cl
 
 
 def add_contrast(whole: Findings, found: Contrast, recording: Recording, beyond: float) -> Findings:
-    """The findings with the result of a comparison with clean recordings in their diagnosis, model and remarks. beyond:
-    factor on the usual gain from which a fault counts."""
+    """The findings with the result of a comparison in their diagnosis, model and remarks. recording: one of the faulty
+    set. beyond: factor on the usual gain from which a fault counts."""
     if found.comparison is None or found.decision is None:
         named = _directly_shown_fault(found, recording)
         if named is None:
@@ -56,6 +60,7 @@ def add_contrast(whole: Findings, found: Contrast, recording: Recording, beyond:
 def _with_effects(
     diagnosis: Diagnosis, verdict: Verdict, effects: tuple[NamedEffect, ...], candidates: tuple[Candidate, ...]
 ) -> Diagnosis:
+    """The diagnosis with other verdict, effects and candidates; mismatch and remainder as the verdict requires."""
     left = diagnosis.remainder or diagnosis.mismatch
     return replace(
         diagnosis,
@@ -71,6 +76,7 @@ def _with_effects(
 def _with_comparison(
     diagnosis: Diagnosis, found: Comparison, decided: Decision, recording: Recording, system: UnitSystem
 ) -> Diagnosis:
+    """The diagnosis with the decision of a comparison. Errors are those of the faulty set."""
     best = decided.named
     named = () if best is None else (_name_fault(best, decided, recording, system),)
     candidates = tuple(_candidate(law, why, recording) for law, why in decided.others)
@@ -89,12 +95,14 @@ def _with_comparison(
 
 
 def _errors(found: Comparison, before: float, after: float) -> Errors:
-    """Errors of the faulty set before and after, over its signal's rms."""
+    """Errors of the faulty set before and after a fault was undone, rms over the rms of its signal. before, after: sums
+    of squares."""
     sizes = [float(np.sqrt(left / found.faulty_samples)) * found.faulty_share for left in (before, after)]
     return Errors(sizes[0], sizes[0], sizes[1], None)
 
 
 def _name_fault(best: JudgedFault, decided: Decision, recording: Recording, system: UnitSystem) -> NamedEffect:
+    """The fault as a named effect of the document, with its class."""
     effect = best.fault.effect
     rivals = tuple(Rival(name, 0.0, True, "as good in its place on what was compared") for name in decided.alike)
     return NamedEffect(
@@ -110,11 +118,13 @@ def _name_fault(best: JudgedFault, decided: Decision, recording: Recording, syst
 
 
 def _axis(weighed: JudgedFault, recording: Recording) -> str | None:
+    """Letter of the fault's axis or channel; None where it concerns all."""
     channels = recording.response.channels if weighed.fault.place == "sensor" else recording.command.channels
     return axis_letter(weighed.fault.axis, channels) if weighed.fault.axis in channels else None
 
 
 def _estimates(weighed: JudgedFault, recording: Recording, system: UnitSystem) -> dict[str, Estimate]:
+    """Parameters of the fault with units and 95 % intervals; without an interval where the standard error is 0."""
     units = _units(weighed.fault, recording, system)
     return {
         name: Estimate(
@@ -136,6 +146,7 @@ def _units(fault: Fault, recording: Recording, system: UnitSystem) -> Mapping[st
 
 
 def _candidate(weighed: JudgedFault, why: str, recording: Recording) -> Candidate:
+    """The fault as a candidate. Its gain E / E' - 1 becomes the share 1 - E' / E of the error with the fault."""
     return Candidate(
         effect=weighed.fault.effect,
         place=weighed.fault.place,
@@ -148,6 +159,8 @@ def _candidate(weighed: JudgedFault, why: str, recording: Recording) -> Candidat
 
 
 def _directly_shown_fault(found: Contrast, recording: Recording) -> NamedEffect | None:
+    """The fault that the readings show without a model (`signal_faults`, `model_free_faults`), such as hum or clipping;
+    None without any. It has no interval."""
     place: Place = "sensor"
     if found.line is not None:
         name, sites, values, place = found.line.effect, found.line.channels, found.line.values, found.line.place
@@ -170,7 +183,7 @@ def _directly_shown_fault(found: Contrast, recording: Recording) -> NamedEffect 
 
 
 def _improve_model(given: MechanicalModel, effects: tuple[NamedEffect, ...]) -> MechanicalModel:
-    """The given model with the faults that have a simulation."""
+    """The given model with the faults that have a simulation, among its effects."""
     played = tuple(
         ModelEffect(effect.effect, effect.axis, {name: estimate.value for name, estimate in effect.parameters.items()})
         for effect in effects

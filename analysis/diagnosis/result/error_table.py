@@ -1,4 +1,9 @@
-"""The errors of the given, the re-tuned and the completed model, normalised and against the noise."""
+"""Table of errors of the given, the re-tuned and the completed model, on fitted and on held-out samples.
+
+Errors are rms residuals over the rms of the measured signal (`signal_rms`), root mean square over the channels, and are
+listed with the error that noise alone would leave. For impacts they are errors of the logarithm of band
+amplitudes instead.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,8 +22,7 @@ from equalizer.signals.signal import FloatArray
 
 
 def errors_of(measure: ErrorMeasure, found: Explanation) -> Fit:
-    """Rms error relative to the rms signal, root mean square over the channels. "fit" includes the samples to choose
-    by."""
+    """The table for the document (`Fit`). "fit" includes the samples to choose by."""
     if found.statistic is not None:
         return Fit(*(_log_errors(found, found.statistic, parts) for parts in (("fit", "choose"), ("test",))))
     return Fit(_errors(measure, found, ("fit", "choose")), _errors(measure, found, ("test",)))
@@ -31,7 +35,8 @@ def channel_errors(found: Explanation, names: tuple[str, ...]) -> Mapping[str, M
 
 
 def _log_errors(found: Explanation, statistic: Statistic, parts: tuple[str, ...]) -> Errors:
-    """Root mean square over the channels of the logarithmic error of a prediction."""
+    """Rms over the channels of the error of ln a (`band_power`), and its chance value in place of the noise. parts:
+    roles of the samples."""
 
     def error(candidate: FittedCandidate) -> float | None:
         off = np.array([getattr(candidate.score, part) for part in parts]) * statistic.chance
@@ -43,6 +48,8 @@ def _log_errors(found: Explanation, statistic: Statistic, parts: tuple[str, ...]
 
 
 def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -> Errors:
+    """Normalised errors on the samples of these roles; None where there are none, or where held-out samples contain no
+    motion."""
     if parts == ("test",) and held_out_stands_still(measure.records, measure.noise):
         return Errors(None, None, None, None)
     masks = [np.logical_or.reduce([getattr(record, part) for part in parts]) for record in measure.records]
@@ -63,7 +70,9 @@ def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -
 
 
 def held_out_stands_still(records: Sequence[Observed], noise: FloatArray) -> bool:
-    """Whether samples are held out, and no channel moves in them as it does in the fitted ones. noise: (c,), rms."""
+    """Whether samples are held out, and every channel's mean square in them is below `STILL_SHARE` of that in the other
+    samples, or at its noise, although a channel moves above the noise in the others. Errors on such samples test
+    nothing. noise: (c,), rms."""
     if not any(each.test.any() for each in records):
         return False
     held = _mean_power(records, [each.test for each in records])
@@ -74,7 +83,7 @@ def held_out_stands_still(records: Sequence[Observed], noise: FloatArray) -> boo
 
 
 def _mean_power(records: Sequence[Observed], masks: Sequence[Mask]) -> FloatArray:
-    """(c,): mean square of each channel about rest over the masked samples."""
+    """(c,): mean square of each channel about its rest value, over the masked samples."""
     moved = [_about_rest(each, mask)[mask] for each, mask in zip(records, masks, strict=True)]
     return np.asarray(np.nanmean(np.concatenate(moved) ** 2, axis=0))
 

@@ -1,4 +1,8 @@
-"""All findings of a diagnosis: the document, and the data of its figures and sentences."""
+"""Result types of a diagnosis: the document, and the data of its figures and sentences.
+
+`assemble_findings` builds `Findings` after the search, `wording` puts them in sentences, and
+`analysis.figures.diagnosis` draws them. Errors are rms values; each attribute states what they are relative to.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,69 +28,79 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeSeries:
-    """One recording, measured and predicted; channels are the response's, then the position's; all (n, c), SI."""
+    """One recording, measured and predicted, in SI units: n samples of c channels, the response's before the
+    position's."""
 
     name: str
     sample_rate_hz: float
     channels: tuple[str, ...]
     units: tuple[str, ...]
     measured: FloatArray
+    """(n, c)"""
     before: FloatArray
+    """(n, c): prediction of the model as given."""
     retuned: FloatArray
+    """(n, c): prediction of the re-tuned model without new physics."""
     after: FloatArray
+    """(n, c): prediction of the model with the named effects."""
     tested: tuple[tuple[int, int], ...]
-    """Stretches of held-out samples, which nothing was fitted to or chosen by."""
+    """First and end sample (exclusive) of each held-out stretch, used neither to fit nor to choose."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signature:
-    """A curve that shows a named effect: the missing force or the residual against its variable, with the fitted
-    law."""
+    """A curve that shows a named effect: the missing force, or the residual, against the variable on which the effect
+    depends, with the fitted law."""
 
     effect: str
     axis: str | None
+    """Letter of the axis; None where all axes share the effect."""
     along: str
     """Label of the abscissa with unit: "velocity of x (m/s)"."""
     of: str
     """Label of the ordinate with unit."""
     measured_at: FloatArray
-    """(k,)"""
+    """(k,): abscissa of the measured points."""
     measured: FloatArray
-    """(k,): mean of the missing quantity there."""
+    """(k,): mean of the missing force, or of the residual, at these points."""
     spread: FloatArray
-    """(k,): its standard error."""
+    """(k,): standard error of that mean."""
     law_at: FloatArray
-    """(q,)"""
+    """(q,): abscissa of the law's points."""
     law: FloatArray
-    """(q,)"""
+    """(q,): value of the fitted law at these points."""
     visited: tuple[float, float] | None = None
-    """Range of the abscissa that the recordings visited; the law is drawn beyond it."""
+    """Range of the abscissa that the recordings visited; beyond it the law is extrapolated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BlackBox:
-    """A model without physics and with as many parameters, fitted to the same samples."""
+    """A model without physics, with as many terms per channel as the named effects have parameters (at least 1), fitted
+    to the same samples (`black_box`)."""
 
     kind: str
+    """What it is, in words."""
     numbers: int
+    """Number of its coefficients, all channels together."""
     test: float
-    """Error on the test samples, as in `document.Errors`."""
+    """Error on the test samples, relative to the signal, as in `document.Errors`."""
     physics: float
-    """The same of the named effects."""
+    """Error of the model with the named effects on the same samples, relative to the signal."""
 
 
 @dataclass(frozen=True, slots=True)
 class BalanceErrors:
-    """Errors of one axis's force balance on held-out data, rms over the signal's rms."""
+    """Errors of one axis's force balance on held-out data: rms residual relative to the rms signal."""
 
     axis: str
     linear: float
     """With mass, damping and stiffness alone."""
     named: float
-    """With the named laws."""
+    """With the named laws in addition."""
     ceiling: float
-    """With all laws together."""
+    """With all candidate laws together: the best that laws achieve here."""
     any_named: bool
+    """Whether a law is named on this axis."""
     tested: bool = True
     """Whether the held-out samples move enough to test laws by."""
     given: bool = False
@@ -94,7 +108,8 @@ class BalanceErrors:
 
     @property
     def share(self) -> float:
-        """Share of the gain of all laws together that the named laws reach."""
+        """Reduction of the error power by the named laws over the reduction by all laws together, 0 to 1; 0 where all
+        laws together reduce nothing."""
         room = self.linear**2 - self.ceiling**2
         return min(max((self.linear**2 - self.named**2) / room, 0.0), 1.0) if room > 0 else 0.0
 
@@ -108,15 +123,15 @@ class Findings(Summarised):
     given: MechanicalModel
     """The initial model; see `fitted`."""
     improved: MechanicalModel
-    """The re-tuned model with the named effects among its `effects`; driven by the commands as they were recorded."""
+    """The re-tuned model with the named effects among its `effects`; its inputs are the commands as recorded."""
     named: tuple[PlacedEffect, ...]
     evidence: tuple[Evidence, ...]
-    """Evidence of the re-tuned model, per recording."""
+    """Motion, commands and residuals of the re-tuned model, per recording."""
     time_series: tuple[TimeSeries, ...]
     noise_rms: Mapping[str, float]
     """Noise rms by channel, SI."""
     channel_errors: Mapping[str, Mapping[str, float]]
-    """Rms error over the test samples in units of the noise: by stage ("before", "retuned", "after"), then by
+    """Rms error on the test samples, in units of the noise: by stage ("before", "retuned", "after"), then by
     channel."""
     mismatch: tuple[Mismatch, ...]
     """All tested cells, not only the significant ones (see p_value and share)."""
@@ -127,9 +142,9 @@ class Findings(Summarised):
     maps: Mapping[str, tuple[MismatchCell, ...]] = field(default_factory=dict)
     """Every cell of the mismatch map, in units of the noise, by stage ("before", "retuned", "after")."""
     local: Localisation = field(default_factory=Localisation)
-    """Localisation of the mismatch: in which states, through which input, and of which kind."""
+    """Localisation of the mismatch: the states it occurs in, where it enters, and the kind of distortion."""
     fitted: bool = False
-    """Whether `given` was fitted to these recordings by the program: there is then no calibration of its parameters."""
+    """Whether the program fitted `given` to these recordings, so that its parameters have no calibration."""
     floor: NoiseFloor | None = None
     """Noise of the first recording: how it was measured, and its spectrum."""
     is_timed: bool = True
@@ -140,20 +155,21 @@ class Findings(Summarised):
     axes: tuple[str, ...] = ()
     """Displayed names of the driven axes; empty = x, y, z."""
     proposal: "Proposal | None" = None
-    """The next recording proposed, where rivals are as good as what is named."""
+    """Proposed next recording, where rivals fit as well as the named effects; None = no proposal."""
     reached: tuple[BalanceErrors, ...] = ()
     """Force balance per axis; empty where none was computed."""
     state_maps: tuple[StateMaps, ...] = ()
-    """Maps per axis, in the order of drawing."""
+    """The missing force over the states of motion, per axis, in the order of drawing."""
     split_s: Mapping[str, float] = field(default_factory=dict)
-    """Duration in seconds by "fit", "choose", "test"."""
+    """Duration in s of the samples to fit, to choose by and to test; keys "fit", "choose", "test"."""
     retuned: MechanicalModel | None = None
-    """The re-tuned model without new physics; as `improved`."""
+    """The re-tuned model without new physics; its inputs are those of `improved`."""
     own_errors: FloatArray | None = None
     """(t,): standard errors of the deviations of the model's own parameters, as `tuning` counts them; NaN = not
     computed."""
 
     def summary(self) -> Summary:
+        """Verdict, missing effects, the first three candidates and the held-out errors."""
         errors = self.diagnosis.fit.test
         left = {"as given": errors.before, "re-tuned": errors.retuned, "with the effects": errors.after}
         return Summary(
@@ -168,7 +184,8 @@ class Findings(Summarised):
 
 
 def effect_text(effect: NamedEffect) -> str:
-    """The effect's name and axis, and its parameters with units, in a line, each value to four significant digits."""
+    """Name and axis of the effect with its parameters and their units, on one line; values to four significant
+    digits."""
     numbers = ", ".join(
         f"{name} {each.value:.4g} {'' if each.unit == '1' else each.unit}".strip()
         for name, each in effect.parameters.items()

@@ -1,4 +1,8 @@
-"""Sentences for diagnoses that compare impacts by the band powers of the response instead of sample by sample."""
+"""Sentences for a diagnosis of rattling play, which compares band powers of the response instead of samples.
+
+Errors are rms logarithms of the ratio of amplitudes (`errors.band_power`), so that exp(error) is the factor by which
+amplitudes are off.
+"""
 
 import math
 
@@ -11,10 +15,12 @@ IMPACTS_COMPARED = (
     "differ by, at least 5 %, stands where the noise stands otherwise. No black box was fitted beside: it would have "
     "to predict each impact."
 )
+"""Remark on every such diagnosis: how impacts were compared, and what the errors mean."""
 
 
 def impact_sentence(diagnosis: Diagnosis, named: str) -> str:
-    """The whole answer, first thing to be read. named: the effects."""
+    """The answer, with which the report begins: the named effects, and the factors by which amplitudes are off without
+    them, with them, and by chance alone (held-out errors, else those of the fit). named: the effects, in words."""
     errors = diagnosis.fit.test if diagnosis.fit.test.after is not None else diagnosis.fit.fit
     rest = "" if diagnosis.verdict == "explained" else ", but that is not all"
     off = [errors.retuned, errors.after, errors.noise]

@@ -1,4 +1,8 @@
-"""The named effects for the document: parameters with intervals, rivals with reasons, probabilities."""
+"""The named effects for the document: parameters with intervals, rivals with reasons, probabilities.
+
+A reported parameter's 95 % interval is value ± hypot(1.96 s, `INTERVAL_SHARE` value), with the standard error s
+propagated from the fit's coordinates. Probabilities of the candidates of a round fall exponentially with their errors.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -32,9 +36,10 @@ from equalizer.signals.unit_system import UnitSystem
 
 BY_CHANCE = "what chance makes of it"
 BY_NOISE = "the noise"
+"""Units of errors in sentences: the difference between two simulations by chance, or the noise."""
 
 _SAME_ERROR = 0.005
-"""Relative difference below which two errors count as the same."""
+"""Relative difference of two errors below which they count as equal."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +69,7 @@ def labels_of(recording: Recording, model: MechanicalModel) -> Labels:
 
 def named_effects(found: Explanation, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
     """The effects of the final hypothesis with parameters, rivals and probabilities. errors: (parameters,), standard
-    errors of the hypothesis's point for its intervals (`interval_errors`)."""
+    errors of the coordinates of the hypothesis's point (`interval_errors`)."""
     whole, named, first = found.after.fitted.hypothesis, [], 0
     shares = shares_taken(found.retuned, found.steps)
     for number, claim in enumerate(whole.claims):
@@ -96,6 +101,8 @@ def axis_of(claim: Claim, labels: Labels) -> str | None:
 
 
 def _rivals(found: Explanation, number: int, labels: Labels) -> tuple[tuple[Rival, ...], float]:
+    """The other effects tried in the round of an effect, each once, up to `MOST_RIVALS`; and the probability of the
+    named effect. number: index of the round."""
     fitted_candidates = found.rounds[number]
     left = (
         found.after.score.worst_channel
@@ -147,6 +154,9 @@ def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: t
 
 
 def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, labels: Labels) -> dict[str, Estimate]:
+    """Parameters of a claim with units and intervals. The variance of a parameter is the sum of its squared changes
+    when each coordinate moves by its standard error; covariances are left out. own: the claim's coordinates of the
+    point."""
     claim = whole.claims[number]
     at = report_parameters(whole, number, whole.point)
     spread = {name: 0.0 for name in at}
@@ -166,6 +176,7 @@ def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, l
 
 
 def _units(effect: Effect, values: Values, labels: Labels) -> dict[str, str]:
+    """Units by parameter, in the model's unit system: of a discovered law by its dimensions, else of the vocabulary."""
     if effect.law is not None:
         law = law_with_values(effect.law, values)
         units = law_units(law, Channels(labels.inputs, labels.outputs, labels.quantity), labels.system)
@@ -184,12 +195,14 @@ def law_of_claim(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw |
 
 
 def _interval(value: float, standard_error: float) -> tuple[float, float] | None:
+    """The 95 % interval of a value; None where no standard error is known (0 or infinite)."""
     reach = float(np.hypot(1.96 * standard_error, INTERVAL_SHARE * value)) if standard_error > 0 else 0.0
     return (value - reach, value + reach) if np.isfinite(reach) and reach > 0 else None
 
 
 def report_parameters(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
-    """Parameters as the vocabulary defines them: of the first site, or of the largest for effects in `LARGEST`."""
+    """Parameters of a claim as the vocabulary defines them: of its first site, or, for an effect in `LARGEST`, of the
+    site with the largest main parameter. point: coordinates of the whole hypothesis."""
     groups = _groups(whole, number, point)
     claim = whole.claims[number]
     reported = [dict(claim.effect.report(values)) for values in groups]
@@ -200,19 +213,20 @@ def report_parameters(whole: Hypothesis, number: int, point: FloatArray) -> dict
 
 
 LARGEST = ("mains_hum", "sensor_drift", "sensor_offset")
-"""Effects that report the parameters of their largest channel."""
+"""Effects of which only the channel with the largest main parameter is reported."""
 
 
 def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[str, float]]:
+    """Parameters of each group of a claim (one group per site, or one for all), at a point of the hypothesis."""
     placed = whole.list_placed_effects(point)
     first = sum(claim.groups for claim in whole.claims[:number])
     return [dict(effect.values) for effect in placed[first : first + whole.claims[number].groups]]
 
 
 def probabilities(fitted_candidates: Sequence[FittedCandidate], left: float) -> tuple[float, ...]:
-    """Probability of each candidate, proportional to exp(-excess mean log error / PROBABILITY_SCALE), with a sum below
-    1; the first candidate is the preferred one, and its refinements count for it. left: errors of the whole explanation
-    in the worst channel, in units of the noise."""
+    """Probability of each candidate of a round: proportional to exp(-excess / PROBABILITY_SCALE), the excess being its
+    mean log error above that of the first, preferred candidate (at least 0); 0 for a refinement of the first. The sum
+    is 1 - `probability_of_none(left)`."""
     if not fitted_candidates:
         return ()
     best = fitted_candidates[0]
@@ -225,7 +239,7 @@ def probabilities(fitted_candidates: Sequence[FittedCandidate], left: float) -> 
 
 
 def probability_of_none(left: float) -> float:
-    """Probability that no candidate is right: a logistic function of the logarithm of left - 1, from ELSEWHERE_LEAST to
-    ELSEWHERE_MOST. left: error of the explanation in the worst channel, in units of the noise."""
+    """Probability that no candidate is right: a logistic function of ln(left - 1), from ELSEWHERE_LEAST to
+    ELSEWHERE_MOST. left: error of the whole explanation in the worst channel, in units of the noise."""
     odds = (max(left - 1.0, 0.0) / ELSEWHERE_HALFWAY) ** ELSEWHERE_STEEPNESS
     return float(ELSEWHERE_LEAST + (ELSEWHERE_MOST - ELSEWHERE_LEAST) * odds / (1 + odds))

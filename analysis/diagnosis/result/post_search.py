@@ -1,4 +1,7 @@
-"""Examination of the fits after a search, in parallel pieces: localisation, curves, and a black box."""
+"""Examination of the fits after a search: localisation of the mismatch, curves of the effects, and a black box.
+
+The pieces are independent and computed in parallel; one that crashes is left out and noted (`search.guard`).
+"""
 
 from dataclasses import dataclass
 from functools import partial
@@ -26,7 +29,7 @@ from equalizer.effects.placing import axis_letter
 from equalizer.effects.starts.evidence import Evidence
 
 WHERE = "the localisation"
-"""What crashed, for the note of a crash (`guard`)."""
+"""Name of the work in the note of a crash (`guard`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +46,7 @@ class Examination:
 
 def examine_fits(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Examination:
     """Examine the given, the re-tuned and the final model. floor: noise of the first recording. maps: mismatch maps of
-    the same stages. A piece that crashes is left out and noted (`guard`)."""
+    these three stages."""
     context, found = result.context, result.found
     measure, tuning, stages = context.whole, context.tuning, found.stages
     evidence = gather_evidence(measure, tuning, stages["retuned"])
@@ -69,8 +72,8 @@ def examine_fits(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Examina
 
 
 def _black_box(context: SearchContext, found: Explanation) -> BlackBox | None:
-    """A black box with as many parameters as the effects found, at least 1, fitted to what the re-tuned model leaves;
-    None where waveforms are not compared."""
+    """A black box with as many terms per channel as the effects have parameters, at least 1, fitted to the residuals of
+    the re-tuned model; None where band powers are compared instead of samples."""
     if found.statistic is not None:
         return None
     parameters = max(len(found.after.fitted.hypothesis.point), 1)
@@ -78,7 +81,8 @@ def _black_box(context: SearchContext, found: Explanation) -> BlackBox | None:
 
 
 def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, ...]:
-    """Curves of the named effects, each against the final model without that effect, in one record."""
+    """Curve of each named effect: the missing force or residual of the final model without that effect, in the record
+    with the most samples to fit or choose by."""
     measure, tuning, fitted = context.whole, context.tuning, found.after.fitted
     if not fitted.hypothesis.claims:
         return ()
@@ -101,10 +105,10 @@ def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, 
 
 
 def _most_fitted(measure: ErrorMeasure) -> int:
-    """Index of the first record with the most samples to fit or choose by: another one may be held out completely."""
+    """Index of the first record with the most samples to fit or choose by: another record may be held out entirely."""
     return int(np.argmax([np.sum(record.fit | record.choose) for record in measure.records]))
 
 
 def _strength(values: Values) -> float:
-    """Size of the main parameter, which comes first."""
+    """Magnitude of the main parameter, which is the first of the values."""
     return abs(next(iter(values.values())))

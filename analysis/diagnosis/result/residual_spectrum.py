@@ -1,4 +1,8 @@
-"""Residual spectra on held-out data, beside the noise."""
+"""Amplitude densities of the residuals on held-out data, with those of the signal and the noise.
+
+Welch's spectra (`spectral_density`) of all held-out stretches, averaged in power with the lengths as weights, then over
+sixths of an octave.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,28 +15,34 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import spectral_density
 
 _LENGTH = 2048
-"""Samples of a Welch window."""
+"""Most samples of a Welch window; a shorter stretch sets its own length."""
 _PER_OCTAVE = 6
 """Bins per octave of the drawn spectrum."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RemainderSpectrum:
-    """Amplitude densities of one channel, in its unit per root hertz; all (lines,)."""
+    """Amplitude densities of one channel, in its unit per root hertz; arrays are (lines,), a line per sixth of an
+    octave."""
 
     channel: str
     unit: str
     frequency_hz: FloatArray
     measured: FloatArray
+    """Density of the measured signal."""
     before: FloatArray
+    """Density of the residual of the model as given."""
     retuned: FloatArray
+    """Density of the residual of the re-tuned model."""
     after: FloatArray
+    """Density of the residual of the model with the named effects."""
     noise: FloatArray
     """Density of the noise; NaN where not known."""
 
 
 def remainder_spectra(time_series: Sequence[TimeSeries], floor: NoiseFloor | None) -> tuple[RemainderSpectrum, ...]:
-    """One per channel, over all held-out stretches; in sixths of an octave. Empty where nothing was held out."""
+    """A spectrum per channel, over all held-out stretches of 64 samples or more in the recordings that have the first
+    one's channels. Empty where there is no such stretch."""
     parts = [(series, start, stop) for series in time_series for start, stop in series.tested if stop - start >= 64]
     if not parts:
         return ()
@@ -66,7 +76,8 @@ def remainder_spectra(time_series: Sequence[TimeSeries], floor: NoiseFloor | Non
 
 
 def _power(part: tuple[TimeSeries, int, int], name: str, length: int) -> FloatArray:
-    """(lines, channels)"""
+    """(lines, channels): one-sided power density of the measured signal, or of the residual of the named prediction, in
+    one stretch; missing samples count as 0."""
     series, start, stop = part
     measured = series.measured[start:stop]
     values = measured if name == "measured" else measured - getattr(series, name)[start:stop]
@@ -75,7 +86,8 @@ def _power(part: tuple[TimeSeries, int, int], name: str, length: int) -> FloatAr
 
 
 def _noise_power(floor: NoiseFloor | None, lines_hz: FloatArray, rate_hz: float, channels: int) -> FloatArray:
-    """(lines, channels), one-sided density."""
+    """(lines, channels): one-sided power density of the noise, in the channel's unit squared per hertz; NaN where
+    unknown. `ChannelNoise.density` is s² for white noise of variance s², hence the factor 2 / rate_hz."""
     unknown = np.full((len(lines_hz), channels), np.nan)
     if floor is None or not floor.known:
         return unknown

@@ -1,4 +1,4 @@
-"""Lists the model's own parameters that a fit moved beyond their calibration, with sentences about doubtful ones."""
+"""The model's own parameters that re-tuning moved beyond their calibration, and sentences about doubtful values."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
 _LISTED = 4
-"""Most re-tuned parameters that a sentence lists."""
+"""Largest number of re-tuned parameters that a sentence lists; the others are counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,25 +24,26 @@ class MovedParameter:
     unit: str
     """SI; "1" for a relative change."""
     deviations: float
-    """The same in standard deviations of the calibration."""
+    """Change in standard deviations of the calibration."""
     at_bound: bool = False
-    """It moved as far as the search lets it."""
+    """Whether the parameter is at the bound of the search (`Tuning.bound`)."""
 
     @property
     def text(self) -> str:
-        """ "damping fx +0.35 N s/m (2.1 standard deviations)"."""
+        """Name and change in words: "damping fx +0.35 N s/m (2.1 standard deviations)"."""
         return f"{self.name} {self.size} ({abs(self.deviations):.2g} standard deviations)"
 
     @property
     def size(self) -> str:
-        """The change, with its sign."""
+        """The change with its sign and unit; a relative change in per cent."""
         sign = "+" if self.change >= 0 else ""
         size = f"{typeset(f'{100 * self.change:.2g}')} %" if self.unit == "1" else value_text(self.change, self.unit)
         return f"{sign}{size}"
 
 
 def all_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
-    """deviations: (parameters,)"""
+    """All free parameters of the model with their changes. deviations: (parameters,), in standard deviations of the
+    calibration."""
     return tuple(
         MovedParameter(name, float(change), unit, float(deviation), bool(abs(deviation) >= tuning.bound - 1e-6))
         for name, change, unit, deviation in zip(
@@ -52,14 +53,15 @@ def all_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParamet
 
 
 def find_moved_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
-    """Parameters that moved by a standard deviation or more, the largest first. deviations: (parameters,)"""
+    """Parameters that moved by `RETUNING_NAMED` standard deviations or more, the largest move first. deviations:
+    (parameters,), in standard deviations of the calibration."""
     moved = [number for number in all_parameters(tuning, deviations) if abs(number.deviations) >= RETUNING_NAMED]
     return tuple(sorted(moved, key=lambda number: -abs(number.deviations)))
 
 
 def describe_retuning(moved: Sequence[MovedParameter], fitted: bool = False) -> str:
-    """Sentence on the parameters that were re-tuned beside named physics. fitted: the model was fitted to the same
-    recordings first, so that no calibration holds its parameters."""
+    """Sentence on the re-tuned parameters; empty where none moved. fitted: the model was fitted to the same recordings
+    first, so that its parameters have no calibration."""
     if not moved:
         return ""
     texts = [f"{number.name} {number.size}" if fitted else number.text for number in moved[:_LISTED]]
@@ -72,8 +74,9 @@ def describe_retuning(moved: Sequence[MovedParameter], fitted: bool = False) -> 
 
 
 def doubtful_sentences(moved: Sequence[MovedParameter], fitted: bool = False) -> tuple[str, ...]:
-    """Sentence on parameters that left the likely range of their calibration: they may compensate for physics that was
-    not named. Many are only counted, because the table of parameters lists all. fitted: as in `describe_retuning`."""
+    """Sentences on parameters that moved by `RETUNING_DOUBTED` standard deviations or more, so that they may compensate
+    for physics that was not named: one each up to `_LISTED`, else one with their number, because a table lists all.
+    fitted: as in `describe_retuning`; then one sentence on the parameters at their bound."""
     far = [number for number in moved if abs(number.deviations) >= RETUNING_DOUBTED]
     at_end = [number for number in far if number.at_bound]
     if fitted:
@@ -98,23 +101,24 @@ _AS_FAR = ", as far as it may"
 
 
 def _is_error_raised(errors: Errors) -> bool:
-    """Re-tuning raises the error on held-out data."""
+    """Whether re-tuning raises the held-out error by more than a factor `SAME_TO_READERS`."""
     return errors.before is not None and errors.retuned is not None and errors.retuned > SAME_TO_READERS * errors.before
 
 
 def better_model(errors: Errors) -> tuple[str, str]:
-    """Field and words of the better of the given and the re-tuned model, with which named effects are compared."""
+    """Field of `Errors`, and words, of the model with which named effects are compared: the given model where re-tuning
+    raises the held-out error, else the re-tuned model."""
     return ("before", "as given") if _is_error_raised(errors) else ("retuned", "re-tuned without it")
 
 
 def better_alone(errors: Errors) -> tuple[str, float | None]:
-    """Words for the better of the given and the re-tuned model, and its error: the given model only where re-tuning
-    raises the error."""
+    """Words and held-out error of the given model where re-tuning raises that error, else of the re-tuned model."""
     return ("as given", errors.before) if _is_error_raised(errors) else ("re-tuned", errors.retuned)
 
 
 def describe_raised_error(errors: Errors) -> str:
-    """errors: on held-out data. Empty where re-tuning does not raise them."""
+    """Sentence that re-tuning raises the held-out error; empty where it does not. errors: on held-out data, relative to
+    the signal."""
     if not _is_error_raised(errors) or errors.before is None or errors.retuned is None:
         return ""
     return (

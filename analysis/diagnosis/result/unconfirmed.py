@@ -1,4 +1,7 @@
-"""Candidates that a search by simulation did not confirm, and the held-out gains of the effects that it named."""
+"""Candidates that a search by simulation found and did not confirm, and held-out gains of the effects that it named.
+
+The held-out gain is the share of the error power on held-out samples that an effect explains (`held_out_gain`).
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,8 +21,9 @@ from equalizer.signals.recording import Recording
 def list_unconfirmed_candidates(
     found: Sequence[Unconfirmed], box: BlackBox | None, recording: Recording, model: MechanicalModel
 ) -> tuple[Candidate, ...]:
-    """The unconfirmed effects as candidates; of several in one hypothesis the last, unless one is specified. Shares are
-    relative to the gain of a black box, or, where physics gains more, to the largest gain."""
+    """The unconfirmed effects as candidates, of each hypothesis the claim with index `Unconfirmed.claim`.
+    `share_of_black_box` is relative to the gain of the black box or, where a candidate gains more, to the largest gain
+    of the candidates."""
     if not found:
         return ()
     labels, most = labels_of(recording, model), max(max(each.gain for each in found), _gain_of(box), 1e-300)
@@ -43,14 +47,16 @@ def list_unconfirmed_candidates(
 
 
 def _gain_of(box: BlackBox | None) -> float:
-    """Share of the error power of a model without named effects that the black box explains."""
+    """Share of the held-out error power of the model (`BlackBox.physics`) that the black box explains; 0 without a
+    black box. The model has no new physics where no effect is named."""
     return 0.0 if box is None or not box.physics > 0 else 1 - (box.test / box.physics) ** 2
 
 
 def with_gains(
     effects: Sequence[NamedEffect], measure: ErrorMeasure, stages: Sequence[FittedCandidate]
 ) -> tuple[NamedEffect, ...]:
-    """The effects with their held-out gains. stages: the model without new physics, then that after each effect."""
+    """The effects with their held-out gains and 95 % intervals, in the order in which they were found. stages: the fit
+    without new physics, then the fit after each effect."""
     named = []
     for place, effect in enumerate(effects):
         gain = held_out_gain(measure, stages[place], stages[place + 1])

@@ -1,5 +1,9 @@
-"""Channels that differ from the prediction by a constant factor or a sign: a wrong unit or reversed wiring is then more
-likely than such a device."""
+"""Sentences that doubt a unit or a sign: a channel differs from the model's prediction by a constant factor only, or
+the command is not a force.
+
+A wrong unit or reversed wiring is more likely than a device with such a response. Thresholds: `UNIT_FACTOR` on the
+ratio of amplitudes, `UNIT_CORRELATION` on the correlation coefficient.
+"""
 
 from collections.abc import Sequence
 
@@ -11,7 +15,8 @@ from equalizer.plant.mechanical_model import MechanicalModel
 
 
 def unit_sentences(time_series: Sequence[TimeSeries]) -> tuple[str, ...]:
-    """A sentence for each channel that differs from the given model's prediction by a constant factor."""
+    """A sentence for each channel that differs from the given model's prediction by a factor of `UNIT_FACTOR` or more,
+    or by its sign, while both correlate well."""
     found: dict[str, float] = {}
     for series in time_series:
         for channel, name in enumerate(series.channels):
@@ -26,7 +31,8 @@ def unit_sentences(time_series: Sequence[TimeSeries]) -> tuple[str, ...]:
 
 
 def _factor(series: TimeSeries, channel: int) -> float | None:
-    """Ratio of measured to predicted amplitude, signed; None where the two are not well correlated."""
+    """Ratio of the measured to the predicted rms, both without their means, with the sign of the correlation; None
+    where the correlation is below `UNIT_CORRELATION` in magnitude, a signal is constant, or no sample is finite."""
     measured, predicted = series.measured[:, channel], series.before[:, channel]
     known = np.isfinite(measured) & np.isfinite(predicted)
     if not known.any():
@@ -40,6 +46,7 @@ def _factor(series: TimeSeries, channel: int) -> float | None:
 
 
 def _words(factor: float) -> str:
+    """The factor in words: "12 times as large and with the other sign"."""
     times = max(abs(factor), 1 / abs(factor))
     shown = f"{times:.3g}" if times < 100 else f"{times:.0f}"
     texts = [f"{shown} times {'as large' if abs(factor) > 1 else 'smaller'}"] if times >= UNIT_FACTOR else []
@@ -47,11 +54,13 @@ def _words(factor: float) -> str:
 
 
 def _sign_or_unit(factor: float) -> str:
+    """What may be wrong: the sign where the magnitude is plausible, else the unit."""
     return "sign" if -UNIT_FACTOR < factor < -1 / UNIT_FACTOR else "unit"
 
 
 def constant_sentence(model: MechanicalModel) -> str:
-    """A sentence about the unit of all parameters where the commands are no forces; else empty."""
+    """A sentence about the unit of forces, masses, damping and stiffness where commands have no known conversion to
+    force or torque; empty for a known unit system."""
     system = model.system
     if system.known:
         return ""

@@ -1,4 +1,7 @@
-"""A diagnosis in plain sentences, the same in the report, in the terminal and on the screen."""
+"""A diagnosis in plain sentences, the same in the report, in the terminal and on the screen.
+
+`summary_lines` gives all of them in order, the verdict first; errors are relative to the signal, on held-out data.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -37,7 +40,7 @@ from analysis.diagnosis.unit_wording import probability_text, share_text
 from analysis.wording import capitalise, conjoin, end_sentence, p_text
 
 _PLACES_NAMED = 3
-"""Most places that a sentence lists."""
+"""Largest number of places of a remaining mismatch that a sentence lists."""
 _NOT_MORE = (
     "What is left is no more than the noise seems to be; only repeats of a drive would show that nothing else is "
     "missing."
@@ -45,14 +48,14 @@ _NOT_MORE = (
 
 
 def effect_title(effect: NamedEffect, single: bool = False) -> str:
-    """ "dry friction on the x drive". single: the device has one axis."""
+    """Noun and place of an effect: "dry friction on the x drive". single: the device has one axis."""
     if effect.effect in OF_THE_WHOLE and effect.axis is None:
         return noun_of(effect.effect)
     return f"{class_noun(effect)} {place_words(effect.place, effect.axis, single)}"
 
 
 def effect_sentence(effect: NamedEffect, signature: str = "", single: bool = False) -> str:
-    """An effect with its parameters. signature: what it causes in the data, as the catalogue says it."""
+    """Sentence on an effect with its parameters. signature: what the effect causes in the data, by the catalogue."""
     if effect.law is not None:
         signature = "; ".join(filter(None, (law_text(effect.law), signature)))
     text = ", ".join(filter(None, (effect_title(effect, single), parameters_text(effect.effect, effect.parameters))))
@@ -60,7 +63,8 @@ def effect_sentence(effect: NamedEffect, signature: str = "", single: bool = Fal
 
 
 def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedParameter] = (), device: Device | None = None) -> str:
-    """The whole answer, first thing to be read; where nothing is named, with the best candidate."""
+    """The answer, with which every output begins: verdict, named effects and held-out errors; where nothing is named,
+    with the best candidate. moved: re-tuned parameters, for the verdict "parameters"."""
     single = device is not None and device.single
     errors = diagnosis.fit.test
     named = conjoin([effect_title(effect, single) for effect in diagnosis.effects])
@@ -89,7 +93,7 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedParameter] = (),
 
 
 def answer_of(found: Findings) -> str:
-    """The verdict's sentence."""
+    """The sentence of the verdict, by band powers where impacts were compared."""
     diagnosis, device = found.diagnosis, device_of(found)
     if found.explanation.statistic is not None:
         return impact_sentence(
@@ -106,7 +110,8 @@ def device_of(found: Findings) -> Device:
 
 
 def rival_sentences(effect: NamedEffect) -> tuple[str, ...]:
-    """Why each rival was not chosen; those that the data cannot tell from it are in `inseparable_sentence`."""
+    """A sentence per rival of the effect: its probability and why it was not chosen. Rivals that the data cannot
+    distinguish from the effect are in `inseparable_sentence`."""
     return tuple(
         f"{capitalise(noun_of(rival.effect))} (probability {probability_text(rival.probability)}): "
         f"{end_sentence(rival.why_not)}"
@@ -116,7 +121,8 @@ def rival_sentences(effect: NamedEffect) -> tuple[str, ...]:
 
 
 def inseparable_sentence(effect: NamedEffect) -> str:
-    """Rivals that the data cannot tell from it, and laws that only refine it; empty where there are none."""
+    """Sentences on rivals that the data cannot distinguish from the effect, and on laws that only refine it; empty
+    where there are none."""
     return " ".join(filter(None, (_inseparable(effect), refinement_sentence(effect))))
 
 
@@ -140,7 +146,8 @@ def _inseparable(effect: NamedEffect) -> str:
 
 
 def remainder_sentence(diagnosis: Diagnosis, device: Device | None = None) -> str:
-    """Sentences on the remaining mismatch, in the document's order: rows with the largest share of the signal first."""
+    """Sentence on the remaining mismatch: its first `_PLACES_NAMED` significant rows in the document's order, which
+    begins with the largest share of the signal, and the number of the others."""
     left = significant(diagnosis.remainder)
     if not left:
         return "Nothing significant is left unexplained."
@@ -150,12 +157,13 @@ def remainder_sentence(diagnosis: Diagnosis, device: Device | None = None) -> st
 
 
 def significant(rows: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
-    """The significant rows: without repeats, a verdict comes with a residual, however small."""
+    """The rows with a p-value of at most `FALSE_DISCOVERY_RATE`: a document may list rows that are not significant."""
     return tuple(row for row in rows if row.p_value <= FALSE_DISCOVERY_RATE)
 
 
 def place_of(mismatch: Mismatch, device: Device | None = None) -> str:
-    """ "ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the mismatch (p < 0.0001)"."""
+    """Where a mismatch occurs and its share, in words: "ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the
+    mismatch (p < 0.0001)"."""
     low, high = mismatch.band_hz
     band = f" at {low:g} to {high:g} Hz" if device is None or device.system.time == "s" else ""
     level = "" if mismatch.amplitude is None else f" at {mismatch.amplitude:g}"
@@ -166,8 +174,8 @@ def place_of(mismatch: Mismatch, device: Device | None = None) -> str:
 
 
 def next_experiment_sentence(diagnosis: Diagnosis) -> str:
-    """Sentences on the recording to make next and why; where none is foreseen, empty or, with rivals that cannot be
-    distinguished, a sentence that says so."""
+    """Sentences on the recording to make next, and why. Without a proposal: a sentence that says so where rivals cannot
+    be distinguished, else empty."""
     wanted = diagnosis.next_experiment
     if wanted is None:
         alike = any(rival.inseparable for effect in diagnosis.effects for rival in effect.rivals)
@@ -179,7 +187,7 @@ def next_experiment_sentence(diagnosis: Diagnosis) -> str:
 
 
 def share_sentence(effect: NamedEffect) -> str:
-    """Sentence on an effect's share of the mismatch after re-tuning, the probability of its name, and its gain."""
+    """Sentences on an effect's share of the mismatch after re-tuning, its probability, and its held-out gain."""
     return (
         f"It accounts for {100 * effect.share:.3g} % of the mismatch that re-tuning leaves; "
         f"the probability that this is its name is {probability_text(effect.probability)}.{gain_sentence(effect)}"
@@ -187,7 +195,7 @@ def share_sentence(effect: NamedEffect) -> str:
 
 
 def gain_sentence(effect: NamedEffect) -> str:
-    """The effect's held-out gain, with a space before it; empty where nothing was held out."""
+    """Sentence on the effect's held-out gain, preceded by a space; empty where no gain with an interval is known."""
     gain = effect.held_out_gain
     if gain is None or gain.ci95 is None:
         return ""
@@ -224,12 +232,13 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
 
 
 def final_moved_parameters(found: Findings) -> tuple[MovedParameter, ...]:
-    """The model's own parameters as they stand in the end, those that moved furthest first."""
+    """The model's own parameters that the final fit moved by a standard deviation of their calibration or more, the
+    largest move first."""
     if found.tuning is None:
         return ()
     return find_moved_parameters(found.tuning, found.explanation.after.fitted.deviations)
 
 
 def signature_texts(found: Findings) -> Mapping[str, str]:
-    """What each named effect causes in the data, by effect, as the catalogue says it."""
+    """What each named effect causes in the data, by name of the effect, in the words of the catalogue."""
     return {placed.effect.name: placed.effect.signature for placed in found.named}

@@ -1,7 +1,8 @@
-"""Compares simulations by band power, where waveforms cannot be predicted: misfits in units of chance.
+"""Compares hypotheses by band power, for responses whose waveform cannot be predicted (rattling play).
 
-Chance is the difference between two simulations of one hypothesis whose parameters differ by 1e-9: with impacts they
-diverge, and no hypothesis can be closer to the recording than to itself.
+A misfit is the rms logarithm of the ratio of measured and simulated amplitudes, divided by its chance variation: the
+same quantity between two simulations of one hypothesis, whose coordinates differ by 1e-9 (`perturb`). Impacts make
+these simulations diverge, and no hypothesis can be expected to match the recording better than it matches itself.
 """
 
 from dataclasses import dataclass
@@ -24,23 +25,26 @@ class BandPowerComparison:
 
     context: SearchContext
     power: BandPower
-    """Of the whole recording."""
+    """Band powers of the whole recording."""
     chance: FloatArray
-    """(c,): difference of two simulations of one hypothesis, in logarithms of the amplitude."""
+    """(c,): chance variation, the rms difference between two simulations of one hypothesis in the natural logarithm of
+    the amplitude; at least `IMPACTS_LEAST_SPREAD`."""
 
     def score_candidate(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
-        """The candidate with its misfits over chance, those of the held-out samples included."""
+        """The candidate with its misfits over the chance variation, those on held-out samples included."""
         whole = evaluate_fit(self.context.whole, self.context.tuning, deviations, hypothesis)
         off = self.power.misfits(self.power.measured - self.power.predict(whole.residuals))
         return FittedCandidate(whole, FitScore(*(self._times(misfit) for misfit in (off.fit, off.choose, off.test))))
 
     def _times(self, off: FloatArray) -> FloatArray:
-        """Misfit over chance; 1 for a channel whose bands are all below the noise."""
+        """(c,): misfit over the chance variation; 1 for a channel whose bands are all below the noise, NaN where no
+        channel has a band above it."""
         return off if np.isnan(off).all() else np.where(np.isnan(off), 1.0, off / self.chance)
 
 
 def comparison_of(context: SearchContext, best: BandPowerFit) -> BandPowerComparison:
-    """The comparison whose chance is that of the given fit."""
+    """The comparison with the chance variation of the given fit: per channel the largest of its values on the samples
+    to fit, to choose by and to test."""
     power, model = BandPower(context.whole), context.tuning.tune(best.deviations)
 
     def predict(number: int) -> FloatArray:
@@ -53,8 +57,8 @@ def comparison_of(context: SearchContext, best: BandPowerFit) -> BandPowerCompar
 
 
 def is_convincing(named: FittedCandidate, retuned: FittedCandidate) -> bool:
-    """Whether an explanation takes most of the re-tuned model's misfit and leaves little more than chance, on the
-    samples to choose by and on those to test."""
+    """Whether an explanation removes at least `IMPACTS_SHARE` of the re-tuned model's misfit and leaves at most
+    `IMPACTS_ERROR` times the chance variation, on the samples to choose by and on those to test."""
     pairs = [
         (getattr(retuned.score, part), getattr(named.score, part))
         for part in ("choose", "test")
@@ -68,7 +72,8 @@ def is_convincing(named: FittedCandidate, retuned: FittedCandidate) -> bool:
 
 
 def is_as_good(rival: FittedCandidate, named: FittedCandidate) -> bool:
-    """Whether a rival's misfit is hardly larger, on the samples to choose by and on those to test."""
+    """Whether a rival's misfit is at most `IMPACTS_AS_GOOD` times that of the named hypothesis, on the samples to
+    choose by and on those to test."""
     ways = [(getattr(candidate.score, part) for candidate in (rival, named)) for part in ("choose", "test")]
     return all(
         _rms_over_channels(other) <= IMPACTS_AS_GOOD * _rms_over_channels(own)
@@ -78,12 +83,12 @@ def is_as_good(rival: FittedCandidate, named: FittedCandidate) -> bool:
 
 
 def _rms_over_channels(times: FloatArray) -> float:
-    """Root mean square over the channels."""
+    """Root mean square over the channels; NaN is left out."""
     return float(np.sqrt(np.nanmean(times**2)))
 
 
 def worst_part(candidate: FittedCandidate) -> float:
-    """The larger misfit over chance of the samples to choose by and of the held-out ones, each the root mean square of
-    channels."""
+    """The larger of the misfits on the samples to choose by and on the held-out samples, each the root mean square over
+    channels, in units of the chance variation; 0 where there is none."""
     parts = (candidate.score.choose, candidate.score.test)
     return max((_rms_over_channels(part) for part in parts if np.isfinite(part).any()), default=0.0)

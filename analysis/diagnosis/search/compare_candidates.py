@@ -1,11 +1,12 @@
-"""Compares candidates: the best first fits are continued until they converge, then ordered by their errors.
+"""Compares candidates: the best first fits are continued until they converge, then all are ordered by their errors.
 
-A Gauss-Newton fit converges about geometrically: after gains g1 and g2 of two steps the next one is predicted to gain
-g2 min(g2 / g1, 1). A fit ends when that is below a tolerance (`output_error.expect_gain`). The sensitivity to the
-model's own parameters costs one simulation each; it is kept from fit to fit, and recomputed only where a parameter has
-moved far from where it was computed. So all candidates can be compared at a small part of the cost of full fits, and
-only those within reach of the best are refined. Under forces that depend on the motion, a sensitivity without these, or
-of one period, ends short of the minimum: what is refined is polished with that of all parameters on all samples.
+A Gauss-Newton fit converges about geometrically: after relative reductions g1 and g2 of the cost by two fits, the next
+is expected to reduce it by g2 min(g2 / g1, 1) (`output_error.expect_gain`); fits end when that is below a tolerance.
+The sensitivity to the model's own parameters costs one simulation for each of them. It is therefore kept from fit to
+fit, and recomputed only where a parameter has moved far. So all candidates are compared at a small part of the cost of
+full fits, and only those near the best are refined. With forces that depend on the motion, a sensitivity that was
+computed without these forces, or on one period, ends short of the minimum: refined fits are then continued with the
+sensitivity of all parameters on all samples (`_polish`).
 """
 
 from collections.abc import Sequence
@@ -38,19 +39,20 @@ from analysis.diagnosis.settings import (
 )
 
 SECOND_ROUNDS, WHOLE_ROUNDS = 4, 2
+"""Gauss-Newton steps of a refining fit, and of a fit to all periods."""
 MOST_POLISHED, POLISHED = 3, 0.002
-"""Times at most that fits are polished, and share of the cost that must be gained to go on; each takes a simulation for
-every parameter of the model. By hand."""
+"""Largest number of rounds of `_polish`, and share of the cost that a round must remove for another to follow. A round
+takes a simulation for every parameter of the model. By hand."""
 MOST_REFRESHED, CONVERGED, CONVERGED_FAR, STALE = 4, 0.0005, 0.01, 0.5
-"""The sensitivity to the model's parameters is recomputed so often, or until that gains no more than such a share, or,
-far above the noise, such a share of the logarithm of the error; and only where one of the parameters has moved by so
-many standard deviations since, for it costs a simulation for each."""
+"""Largest number of fits in a row, with the sensitivity renewed between them; share of the cost below which a reduction
+is none, and factor on ln(cost) for that share far above the noise (`_least_gain`); and move of a parameter, in standard
+deviations, from which the sensitivity is renewed, which costs a simulation per parameter."""
 
 
 def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitted]) -> tuple[FittedCandidate, ...]:
     """The candidates sorted by error, the best fits refined. fits: first fits, the best first (`first_fits`)."""
     worth = _worth_refining(base, fits)
-    # First fits beside a force that depends on the motion have been continued on all samples already.
+    # Where a held effect is a force that depends on the motion, first fits were continued on all samples already.
     continued = has_motion_forces(base.hypothesis)
     first: list[tuple[Fitted, Sensitivity]] = []
     if not continued:
@@ -81,10 +83,9 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
 
 
 def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
-    """The fits continued with the sensitivity of all parameters under the forces of the first, which they share, and
-    again while that gains, at noise too: a fit that leaves hardly more may still be two standard deviations off. fits:
-    of laws that do nearly the same, the best first; where that leaves noise alone, those that leave much more are given
-    up. Without such forces they are complete."""
+    """The fits, the best first, continued with the sensitivity of all parameters under the forces of the best;
+    unchanged without forces that depend on the motion. Rounds follow while they lower the cost, even at the noise: such
+    a fit may be two standard deviations off. Where the best reaches the noise, fits far above it are not continued."""
     measure, tuning = context.measure, context.tuning
     if not any(has_motion_forces(law.hypothesis) for law in fits):
         return fits
@@ -101,18 +102,19 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
 
             before, fits = fits[0].cost, list(context.map_(continue_fit, fits))  # type: ignore[arg-type]
         except OutOfTimeError:
-            break  # fits that are not polished are results all the same
+            break  # the fits so far are valid results
         if fits[0].cost > before * (1 - max(POLISHED, _least_gain(fits[0]))):
             break
     return fits
 
 
 def _error_of(context: SearchContext, law: Fitted) -> float:
-    """Error of the worst channel, times the noise."""
+    """Error of the worst channel, in units of the noise."""
     return context.candidate(law).score.worst_channel
 
 
 def _is_timeless(law: Fitted) -> bool:
+    """Whether no effect of the fit depends on time within the recording (`Effect.of_time`)."""
     return not any(placed.effect.of_time for placed in law.hypothesis.list_placed_effects())
 
 
@@ -125,14 +127,15 @@ def _is_same_start(context: SearchContext, law: Fitted, other: Fitted) -> bool:
 
 
 def _prediction_difference(context: SearchContext, law: Fitted, other: Fitted) -> float:
-    """Mean square difference of two fits' predictions, in units of the noise."""
+    """Mean square difference of two fits' predictions on the samples to fit, in units of the noise's variance."""
     apart = residuals_to_fit(context.measure, law.residuals) - residuals_to_fit(context.measure, other.residuals)
     with np.errstate(over="ignore", invalid="ignore"):
         return float(apart @ apart) / max(len(apart), 1)
 
 
 def _worth_refining(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
-    """The fits whose gain is not far below the best one's. fits: the best first."""
+    """The fits that lower the cost of `base` by at least `WORTH_REFINING` of what the best fit does. fits: the best
+    first."""
     gained = [base.cost - found.cost for found in fits]
     return [found for found, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
 
@@ -145,9 +148,9 @@ def refine(context: SearchContext, fitted: Fitted) -> Fitted:
 def refine_with_sensitivity(
     context: SearchContext, fitted: Fitted, known: Sensitivity | None = None
 ) -> tuple[Fitted, Sensitivity]:
-    """The refined fit and its sensitivity. Where a drive repeats, it is first fitted to one period of each segment,
-    whose sensitivity then stands for all periods; where it does not, under forces that depend on the motion, with
-    longer steps. known: the sensitivity of a law that moves the device nearly alike."""
+    """The refined fit and its sensitivity. Where a drive repeats, the fit is first made on one period of each segment,
+    and its sensitivity serves for all periods; else, with forces that depend on the motion, first with longer
+    simulation steps (`coarsen`). known: sensitivity of a law that moves the device nearly alike."""
     short_form = short_recordings_of(context, fitted)
     coarse = coarsen(context.measure)
     if short_form is None and (coarse is context.measure or not has_motion_forces(fitted.hypothesis)):
@@ -158,15 +161,15 @@ def refine_with_sensitivity(
     )
     start = evaluate_fit(context.measure, context.tuning, near.deviations, near.hypothesis)
     found = _fit_whole(context, start, known if short_form is None else short_form.repeat_sensitivity(known))
-    # What one period leaves open may run away on the whole.
+    # Parameters that one period does not determine may diverge on all samples: then the fit before is kept.
     if found.cost <= fitted.cost:
         return choose_plainest(context, found), known
     return (fitted if has_motion_forces(fitted.hypothesis) else _refine_from_both_starts(context, fitted)[0]), known
 
 
 def _fit_whole(context: SearchContext, start: Fitted, known: Sensitivity) -> Fitted:
-    """The fit to all periods, from that to one of them: mostly settled after a few steps, but where more than noise is
-    left, the periods may differ, and the fit moves on."""
+    """The fit to all periods, started from the fit to one period of each segment: a few steps are usually enough, more
+    where the error is above the noise, because periods may then differ."""
     best = start
     for _ in range(MOST_REFRESHED):
         better = fit(context.measure, context.tuning, best, known, WHOLE_ROUNDS, context.map_)
@@ -178,18 +181,18 @@ def _fit_whole(context: SearchContext, start: Fitted, known: Sensitivity) -> Fit
 
 
 def _least_gain(fitted: Fitted) -> float:
-    """Share of the cost below which a further gain counts as none; far above the noise it is larger."""
+    """Relative reduction of the cost below which a fit has converged: max(CONVERGED, CONVERGED_FAR ln(cost))."""
     return max(CONVERGED, CONVERGED_FAR * float(np.log(max(fitted.cost, 1.0))))
 
 
 def _refine_from_both_starts(
     context: SearchContext, fitted: Fitted, known: Sensitivity | None = None
 ) -> tuple[Fitted, Sensitivity]:
-    """The refined fit and its sensitivity; where more than noise is left, also started from the calibrated model,
-    because re-tuning may have absorbed the missing effect and ended in another minimum. Not where a sensitivity is
-    known: the law that it is of was started from there, and moves the device nearly alike."""
+    """The better of two refined fits, with its sensitivity. Where the first leaves more than noise, a second starts
+    from the calibrated model, because re-tuning may have absorbed the missing effect and ended in another minimum. With
+    a known sensitivity there is no second start: the law it belongs to, which moves the device nearly alike, had it."""
     shared = known is not None
-    # A gain of all that there is counts as the one before: what is shared may have to be computed anew.
+    # With 1 as the reduction before, `_refine_from` may renew a shared sensitivity instead of ending after one fit.
     here, known = _refine_from(context, fitted, known, 1.0)
     here, known = _refine_similar(context, here, known)
     if shared or context.candidate(here).score.worst_channel <= NO_SECOND_START:
@@ -200,7 +203,8 @@ def _refine_from_both_starts(
 
 
 def _refine_similar(context: SearchContext, fitted: Fitted, known: Sensitivity) -> tuple[Fitted, Sensitivity]:
-    """The best fit among similar hypotheses; the plainest where it is as good as any."""
+    """The best fit among similar hypotheses (`similar_hypotheses`), or the plainest of them if it is about as good, and
+    the sensitivity there."""
     best = fitted, known
     for other in similar_hypotheses(fitted.hypothesis):
         beside = _refine_from(context, evaluate_fit(context.measure, context.tuning, fitted.deviations, other), known)
@@ -209,7 +213,8 @@ def _refine_similar(context: SearchContext, fitted: Fitted, known: Sensitivity) 
 
 
 def choose_plainest(context: SearchContext, fitted: Fitted) -> Fitted:
-    """The plainest of the similar forms of the fit's laws that leaves hardly more than the best of them."""
+    """The fit, or a similar form of its laws (`similar_hypotheses`) whose sum of squares exceeds that of the form
+    preferred so far by less than `RICHER_LAW_SQUARES` noise variances."""
     best = fitted
     for other in similar_hypotheses(fitted.hypothesis):
         plain = evaluate_fit(context.measure, context.tuning, best.deviations, other)
@@ -221,9 +226,9 @@ def choose_plainest(context: SearchContext, fitted: Fitted) -> Fitted:
 def _refine_from(
     context: SearchContext, fitted: Fitted, known: Sensitivity | None, before: float = np.inf
 ) -> tuple[Fitted, Sensitivity]:
-    """Fits with the sensitivity recomputed until that gains little. known: sensitivity at another point of the same
-    hypothesis, or of one that moves the device nearly alike; None = not computed yet. before: share that was gained
-    last; infinite = one fit is enough once the sensitivity is computed."""
+    """The fit continued with renewed sensitivities until the cost hardly falls. known: sensitivity at another point of
+    the same hypothesis, or of a hypothesis that moves the device nearly alike; None = not computed yet. before:
+    relative reduction of the cost by the fit before; infinite = unknown, no further reduction is expected."""
     best = fitted
     complete = known is not None
     before = before if complete else np.inf
@@ -242,6 +247,7 @@ def _refine_from(
 
 
 def _contains(richer: Fitted, plain: Fitted) -> bool:
-    """Whether the last claim contains the other's as a special case: then both must be fitted equally well."""
+    """Whether the last effect of `richer` contains that of `plain` as a special case at the same sites: for a fair
+    comparison both must then be fitted equally far."""
     last, other = richer.hypothesis.claims[-1], plain.hypothesis.claims[-1]
     return other.effect.name in last.effect.simpler and set(other.sites) <= set(last.sites)

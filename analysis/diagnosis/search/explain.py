@@ -12,10 +12,10 @@ Fits are compared by the log error power, a log-likelihood in which each channel
    free (`screening`); where the drive repeats, on one period of each segment (`short_recordings`).
 4. The most promising are fitted, the best of them until convergence (`compare_candidates`).
 5. Of candidates equal within the errors, the most parsimonious is taken (`parsimony`).
-6. It is added if it removes at least `ADDED_SHARE` of the error that is left above the noise; where no more is left
-   than right laws leave of a real device (`EXPLAINED_ERROR`), half of the worst channel's. Then the next effect is
-   looked for, up to `MOST_EFFECTS`. Two strong effects may hide each other: where the best alone removes less, it is
-   added with a second one if both remove twice that share.
+6. It is added if it lowers L by at least `ADDED_SHARE` of its excess above the noise; where the error is as small as
+   right laws leave on a real device (`EXPLAINED_ERROR`), the worst channel's ln(error) must also fall by half. Then the
+   next effect is looked for, up to `MOST_EFFECTS`. Two strong effects may hide each other: where the best effect alone
+   lowers L by less, it is added together with a second one if both lower L by twice that share.
 
 Samples to fit, to choose by and to test are disjoint: the test samples are evaluated once, at the end (`verdict`).
 
@@ -50,9 +50,10 @@ from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
 
 LOOKED_AHEAD = 2
-"""Effects beside which a second one is looked for, where none alone is worth adding; each takes a round. By hand."""
+"""Candidates to which a second effect is added on trial, where none alone is worth adding; each takes a round. By
+hand."""
 MOST_REFITTED_RIVALS = 3
-"""Rivals of a step that are fitted again where a search goes on with more samples; each takes a second or more."""
+"""Rivals of a step that are fitted again where a search continues on more samples; each takes a second or more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,10 +61,11 @@ class Statistic:
     """A statistic of the response, by which candidates are compared where waveforms cannot be predicted."""
 
     words: str
+    """Name of the statistic."""
     chance: FloatArray
-    """(c,): its usual difference between two simulations of one model; takes the place of the noise."""
+    """(c,): chance variation of the statistic, between two simulations of one model; used in place of the noise."""
     errors: FloatArray
-    """(parameters,): standard errors of the final hypothesis's point."""
+    """(parameters,): standard errors of the coordinates of the final hypothesis."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,23 +77,24 @@ class Explanation:
     retuned: FittedCandidate
     """The model re-tuned within its tolerances."""
     after: FittedCandidate
-    """The model with the effects found; the same as re-tuned where none was."""
+    """The model with the effects found; equal to `retuned` where none was found."""
     rounds: tuple[tuple[FittedCandidate, ...], ...]
-    """The candidates for the first effect, the second, …; the best first. The last may have brought nothing."""
+    """The candidates of each round (first effect, second, …), the preferred one first. In the last round none may have
+    been added."""
     steps: tuple[FittedCandidate, ...]
     """The fit after each effect that was added."""
     statistic: Statistic | None = None
-    """None where samples were compared, in units of their noise."""
+    """The compared statistic; None where samples were compared, in units of their noise."""
     ended_early: bool = False
-    """The time limit was reached before the search was done."""
+    """Whether the time limit was reached before the search was done."""
     barred: str = ""
-    """An effect that was not to be named, where nothing but refinements of it explains as much."""
+    """Name of an excluded effect (`SearchContext.barred`), where only refinements of it explain as much; else empty."""
     undetermined: tuple[str, ...] = ()
-    """Effects that were found, and are not named: the recordings leave their parameters open."""
+    """Effects that were found and removed, because the recordings do not determine their parameters."""
     errors: tuple[Fitted, FloatArray] | None = None
-    """A fit, and the standard errors of all its parameters, where they were computed already; as `final_errors`."""
+    """A fit and the standard errors of all its parameters (`final_errors`), where they were computed already."""
     between: tuple[Fitted, FloatArray | None] | None = None
-    """A fit at its minimum, and what its parameters vary between segments (`segment_errors`)."""
+    """A fit at its minimum, and the jackknife standard errors of its parameters over segments (`segment_errors`)."""
 
     @property
     def plain(self) -> FittedCandidate:
@@ -112,16 +115,17 @@ def explain(
     time_left: TimeBudget = always,
     begun: Sequence[Sequence[FittedCandidate]] = (),
 ) -> Explanation:
-    """Re-tunes the model and adds effects one by one. time_left: asked before each piece of the search; what was found
-    when it says no is kept. begun: per step of a search on fewer samples, it and its rivals; one effect is added to
-    these, up to `MOST_EFFECTS`. Raises OutOfTimeError where the time ends before these are fitted again."""
+    """Re-tunes the model and adds effects one by one. time_left: called before each piece of the search; when it
+    returns False, the search ends with what it has found. begun: the steps of a search on fewer samples, each with its
+    rivals; one effect is added to these, up to `MOST_EFFECTS`. Raises OutOfTimeError where the time ends before these
+    are fitted again."""
     found = begin(replace(context, map_=limit_map(context.map_, time_left)) if begun else context, progress, begun)
     most = min(len(found.rounds) + 1, MOST_EFFECTS) if begun else MOST_EFFECTS
     return add_effects(context, catalogue, found, progress, time_left, most)
 
 
 def begin(context: SearchContext, progress: Progress, begun: Sequence[Sequence[FittedCandidate]] = ()) -> Explanation:
-    """The model as given and re-tuned, with the effects that are not searched for."""
+    """The model as given and re-tuned, with the effects that need no search (`_known_rounds`)."""
     before = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.02)
     base = context.candidate(refine(context, before))
@@ -139,8 +143,8 @@ def add_effects(
     time_left: TimeBudget = always,
     most: int = MOST_EFFECTS,
 ) -> Explanation:
-    """The explanation with further effects, up to `most` in all. A last round of `found` that brought none is not
-    computed again: a pair is looked for beside its best."""
+    """The explanation with further effects, up to `most` in total. A last round of `found` in which no effect was added
+    is not computed again: a second effect is looked for together with its best candidate."""
     rounds, steps = list(found.rounds), list(found.steps)
     base = steps[-1] if steps else context.candidate(_evaluate_again(context, found.retuned))
     within_time, barred, ended_early = replace(context, map_=limit_map(context.map_, time_left)), "", found.ended_early
@@ -172,14 +176,14 @@ def add_effects(
 
 
 def _evaluate_again(context: SearchContext, scored: FittedCandidate) -> Fitted:
-    """The fit on the samples to fit and to choose by, of a candidate that was scored on others."""
+    """The candidate's model simulated again on the samples to fit and to choose by; the candidate was scored on all."""
     return evaluate_fit(context.measure, context.tuning, scored.fitted.deviations, scored.fitted.hypothesis)
 
 
 def is_worth_searching(context: SearchContext, found: Explanation, base: FittedCandidate) -> bool:
-    """Whether `base`, the last step of `found`, leaves enough error to look for one more effect. A third is not looked
-    for where two fit as well as laws of a real device do: it would take up what these leave. Opened samples are an
-    exception: few among many, they may show what the others do not."""
+    """Whether `base`, the last step of `found`, leaves enough error to look for one more effect. No third effect is
+    looked for where two fit as well as right laws fit a real device, because it would only absorb their small errors;
+    except with opened held-out samples, which are few and may show an effect that the others do not."""
     if base.fitted.hypothesis.claims:
         judged_whole = context.references is None and not context.opened
         if judged_whole and len(base.fitted.hypothesis.claims) > 1 and leaves_little(found.retuned, base):
@@ -196,8 +200,9 @@ def _look_ahead(
     named: tuple[FittedCandidate, ...],
     step: "Step",
 ) -> tuple[tuple[FittedCandidate, ...], ...]:
-    """Two rounds, of an effect that alone is not worth adding and of one beside which it is: together they remove twice
-    the share. None where the best of `named` is worth adding, or where no such pair is found."""
+    """Two rounds: an effect that alone is not worth adding, and a second effect, where both together remove more than
+    twice `ADDED_SHARE` of the excess error. Empty where the best of `named` is worth adding, or no such pair is
+    found."""
     if not named or is_worthwhile(base, named[0]) or base.score.worst_channel <= REACHES_NOISE:
         return ()
     seen = {candidate.newest: candidate for candidate in reversed(named)}
@@ -215,8 +220,8 @@ def _look_ahead(
 def _known_rounds(
     context: SearchContext, base: FittedCandidate, begun: Sequence[Sequence[FittedCandidate]]
 ) -> list[tuple[FittedCandidate, ...]]:
-    """Rounds of what is not searched for: the certain hypotheses, and the steps of a search on fewer samples with those
-    rivals that these could not tell from them, all refitted."""
+    """Rounds that need no search: the certain hypotheses, and the steps of a search on fewer samples with the rivals
+    that were inseparable from them, all refitted."""
     rounds: list[tuple[FittedCandidate, ...]] = []
     for hypothesis in context.certain:
         base = _add_certain(context, base, hypothesis)
@@ -228,11 +233,12 @@ def _known_rounds(
 
 
 def _refit(context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
+    """The candidate fitted again to the context's samples, from its own parameters."""
     return context.candidate(refine(context, _evaluate_again(context, candidate)))
 
 
 def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:
-    """The fit with a certain hypothesis added, whether or not that lowers the error."""
+    """The fit with a certain hypothesis added, even where that does not lower the error."""
     start = evaluate_fit(
         context.measure, context.tuning, base.fitted.deviations, combine(base.fitted.hypothesis, hypothesis)
     )

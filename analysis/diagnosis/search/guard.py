@@ -1,6 +1,6 @@
-"""Crash isolation: an effect that crashes is left out of the search, and the answer says so.
+"""Crash isolation: an effect or a piece of work that crashes is left out of the search, and the answer says so.
 
-Off, as it is unless asked for, every crash is an error: so tests, benchmarks and banks see it.
+The guard is off by default, and exceptions then propagate: tests, benchmarks and banks must see every crash.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -20,12 +20,14 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True)
 class Crash:
-    """A crash that was caught: what crashed, at what work, and the error's class and message."""
+    """An exception that was caught."""
 
     what: str
-    """An effect's name, or what else was tried, in words."""
+    """Name of the effect that crashed, or the piece of work in words."""
     doing: str
+    """The step at which it crashed, in words: "its fit"."""
     said: str
+    """Class and message of the exception."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,23 +35,28 @@ class Part:
     """A piece of the work that can be left out."""
 
     what: str
-    """An effect's name, or words."""
+    """Name of an effect, or the piece of work in words."""
     doing: str
+    """The step, in words."""
     work: Callable[[], Any]
     instead: Any
-    """The result where it crashes."""
+    """The result that replaces that of `work` if `work` crashes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Guard:
-    """Runs work so that a crash is noted and its result left out or replaced; when off, crashes are errors."""
+    """Runs work so that a crash is noted and its result left out or replaced; while it is off, exceptions propagate.
+
+    OutOfTimeError always propagates: it is no crash.
+    """
 
     on: bool = False
     crashes: list[Crash] = field(default_factory=list)
     """Crashes caught so far."""
 
     def over(self, map_: Mapper, doing: str) -> Mapper:
-        """A map over effects, hypotheses or fits that notes crashes and leaves their results out."""
+        """A map over effects, hypotheses or fits that notes crashes and leaves out the results of the items that
+        crashed. doing: the step, in words."""
         if not self.on:
             return map_
 
@@ -59,7 +66,7 @@ class Guard:
                 return _try(_effect_of(item), doing, lambda: function(item))
 
             results: list[tuple[object, ...] | Crash] = list(map_(guard_item, items))  # type: ignore[arg-type]
-            # Noted here, for it may have happened in another process.
+            # Crashes are noted here and not in `guard_item`, which may run in another process.
             self.crashes.extend(found for found in results if isinstance(found, Crash))
             return [result for found in results if not isinstance(found, Crash) for result in found]
 
@@ -73,8 +80,8 @@ class Guard:
         instead: Result,
         passed_on: tuple[type[Exception], ...] = (),
     ) -> Result:
-        """The result of a piece of work, or `instead` where it crashes. what: an effect's name, or words. passed_on:
-        exceptions that are meant for the user, and are raised."""
+        """The result of a piece of work, or `instead` where it crashes. what, doing: as in `Part`. passed_on:
+        exceptions that are meant for the user and propagate."""
         found = _try(what, doing, work, passed_on) if self.on else (work(),)
         if isinstance(found, Crash):
             self.crashes.append(found)
@@ -82,7 +89,7 @@ class Guard:
         return found[0]
 
     def parts(self, map_: Mapper, pieces: Sequence[Part]) -> list[Any]:
-        """The results of independent pieces of work."""
+        """The results of independent pieces of work, in their order; `Part.instead` for each that crashed."""
 
         def try_part(piece: Part) -> tuple[Any] | Crash:
             return _try(piece.what, piece.doing, piece.work) if self.on else (piece.work(),)
@@ -96,13 +103,14 @@ class Guard:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """One per effect, with what it crashed at and how."""
+        """A sentence per effect or piece of work that crashed, with the steps and the exceptions."""
         return tuple(_sentence(what, self.crashes) for what in dict.fromkeys(crash.what for crash in self.crashes))
 
 
 def _try(
     what: str, doing: str, work: Callable[[], Result], passed_on: tuple[type[Exception], ...] = ()
 ) -> tuple[Result] | Crash:
+    """The result in a tuple, or the crash. Raises OutOfTimeError, and the exceptions of `passed_on`."""
     try:
         return (work(),)
     except OutOfTimeError:

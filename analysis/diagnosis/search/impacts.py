@@ -1,10 +1,11 @@
-"""Rattling play: its waveform is chaotic and cannot be predicted, so hypotheses are compared by band powers.
+"""Rattling play (backlash): its waveform is chaotic and cannot be predicted, so hypotheses are compared by band powers.
 
 Two simulations of a drive with play diverge within a few impacts, however small their initial difference (Ott, Chaos in
-Dynamical Systems, chapter 4). So the difference between two simulations of one hypothesis takes the place of the noise.
+Dynamical Systems, chapter 4). The difference between two simulations of one hypothesis, its chance variation, is
+therefore used in place of the noise.
 
-Where play alone leaves more than chance, a second effect is looked for beside it: faults of the sensor, whose starting
-values come from the readings themselves (a line, repeats, a limit), and what the search by waveforms tried first.
+Where play alone leaves clearly more than chance, a second effect is looked for: sensor faults, whose starting values
+come from the readings themselves, and the candidates of the first round of the search by waveforms.
 """
 
 from collections.abc import Sequence
@@ -53,17 +54,19 @@ from equalizer.signals.signal import FloatArray
 
 WORDS = "band power of the response"
 SIMULATIONS = 4
-"""Simulations of one hypothesis: their spread is the chance variation, their mean is compared by the last fit."""
+"""Simulations of one hypothesis: their standard deviation is the chance variation, and their mean is what the last fit
+compares."""
 WIDTHS = np.geomspace(0.02, 5.0, 13)
-"""Gaps that are tried, over the estimated one."""
+"""Starting values of the gap that are tried, relative to the estimated gap."""
 FIRST_ROUNDS, ROUNDS, STEPS = 5, 4, 2
-"""Steps of the first fit, without the model's parameters; linearisations of the last fit; and its steps for each."""
+"""Steps of the first fit, in which the model's parameters are fixed; linearisations of the last fit, and steps with
+each of them."""
 GAINED = 0.02
-"""Relative decrease of the cost that a further linearisation must promise."""
+"""Expected relative reduction of the cost above which a further linearisation follows."""
 RIVAL = "loose_joint"
-"""Effect that is fitted at the same place as play, to be compared with it."""
+"""Effect that is fitted at the same place as play, for comparison."""
 MOST_BESIDE = 3
-"""Effects of different names that are fitted as a second one beside play; each takes some 7 s. By hand."""
+"""Most effects, of different names, that are fitted as a second effect with play; each takes some 7 s. By hand."""
 
 
 def explain_impacts(
@@ -73,8 +76,9 @@ def explain_impacts(
     catalogue: Sequence[Effect],
     time_left: TimeBudget = always,
 ) -> Explanation | None:
-    """The explanation by play, compared by band power; None where the response is regular, or play does not explain
-    it. time_left: asked before a second effect is looked for."""
+    """The explanation by play, compared by band power; None where the response is regular, where play does not explain
+    it, or where responses are not simulated freely. floors: noise per recording. time_left: called before a second
+    effect is looked for."""
     effects = {effect.name: effect for effect in catalogue}
     if "backlash" not in effects or not isinstance(context.whole, FreeSimulation):
         return None
@@ -100,7 +104,7 @@ def explain_impacts(
         comparison = comparison_of(context, beside[0]) if beside else comparison
     rivals = [rival.hypothesis for rival in others if rival.hypothesis.claims and np.isfinite(rival.cost)]
     named = _judge(comparison, found, view, (best, beside), rivals)
-    # Where the gap may be zero, something else makes the response irregular.
+    # If the gap may be zero, play is not the cause of the irregular response.
     if named is None or any(open_effects(context, named)) or not _needs_gap(comparison, view, (*beside, best)[0]):
         return None
     return named
@@ -109,8 +113,8 @@ def explain_impacts(
 def _suggest_second_effects(
     context: SearchContext, found: Explanation, alone: BandPowerFit, catalogue: Sequence[Effect]
 ) -> list[Hypothesis]:
-    """Hypotheses of a second effect beside play: faults of the sensor, started from the readings, and what the search
-    by waveforms tried first, as it was fitted there."""
+    """Hypotheses of a second effect in addition to play: sensor faults with starting values from the readings, and the
+    candidates of the first round of the search by waveforms, as fitted there."""
     played = evaluate_fit(context.measure, context.tuning, alone.deviations, alone.hypothesis)
     evidence = gather_evidence(context.measure, context.tuning, played)[0]
     sensed = [effect for effect in catalogue if place_of_effect(effect) == "sensor"]
@@ -122,8 +126,8 @@ def _suggest_second_effects(
 def _with_second_effect(
     view: View, alone: BandPowerFit, suggested: Sequence[Hypothesis], time_left: TimeBudget
 ) -> tuple[BandPowerFit, ...]:
-    """Fits of play with a second effect, the best first: those that take most of the cost of play alone, on the samples
-    to fit and to choose by. Empty where none does."""
+    """Fits of play with a second effect, the best first: those that remove at least `IMPACTS_SHARE` of the cost of play
+    alone, on the samples to fit and to choose by. Empty where none does."""
     chanced = _with_chance(view, alone)
     before = evaluate_hypothesis(chanced, alone.deviations, alone.hypothesis).cost
 
@@ -145,7 +149,8 @@ def _with_second_effect(
 
 
 def _needs_gap(comparison: BandPowerComparison, view: View, best: BandPowerFit) -> bool:
-    """Whether two bodies that touch without a gap, refitted, leave far more: the profile of the gap at zero."""
+    """Whether the gap is needed: with the gap fixed at its least value and all else refitted, the misfit is far larger
+    (profile of the likelihood at a gap of zero)."""
     claim, placed = best.hypothesis.claims[0], best.hypothesis.list_placed_effects()[0]
     free = claim.effect.parameters
     closed = replace(claim.effect, parameters=tuple(replace(p, fixed=p.fixed or p.name == "gap") for p in free))
@@ -162,7 +167,8 @@ def _needs_gap(comparison: BandPowerComparison, view: View, best: BandPowerFit) 
 
 
 def _fit_claim(view: View, evidence: Evidence, claim: Claim) -> BandPowerFit:
-    """The best fit of a claim, on the segments that excite its axis."""
+    """The best fit of a claim on the segments that excite its axis, over a grid of starting gaps, with the model's
+    parameters fixed; the model without effects where the claim has no starting values."""
     measure = view.power.measure
     assert isinstance(measure, FreeSimulation)
     near = View(BandPower(select_excited_segments(measure, claim.sites[0])), view.tuning, view.map_)
@@ -179,7 +185,8 @@ def _fit_claim(view: View, evidence: Evidence, claim: Claim) -> BandPowerFit:
 
 
 def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
-    """The fit of the hypothesis's and the model's parameters together: play changes the sensitivity to the model's."""
+    """The joint fit of the hypothesis's and the model's parameters. The sensitivity to the model's parameters is
+    renewed up to `ROUNDS` times, because play changes it."""
     view = _with_chance(view, start)
     best = evaluate_hypothesis(view, start.deviations, start.hypothesis)
     before = 0.0
@@ -194,7 +201,8 @@ def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
 
 
 def _with_chance(view: View, at: BandPowerFit) -> View:
-    """The view with each band's chance variation between simulations, and averaging over as many."""
+    """The view with each band's standard deviation over `SIMULATIONS` simulations, and predictions averaged over as
+    many."""
 
     def predict(number: int) -> FloatArray:
         return view.predict(at.deviations, perturb(at.hypothesis, number))
@@ -204,7 +212,8 @@ def _with_chance(view: View, at: BandPowerFit) -> View:
 
 
 def _by_deviations(view: View, at: BandPowerFit) -> FloatArray:
-    """(t, stretches, bands, c): sensitivity by forward differences of one standard deviation, large against chance."""
+    """(t, stretches, bands, c): sensitivity to the model's t parameters, by forward differences with steps of one
+    standard deviation, which are large compared with the chance variation; 0 where a step gives no finite value."""
     ways = np.eye(len(at.deviations))
 
     def moved(number: int) -> FloatArray:
@@ -221,9 +230,9 @@ def _judge(
     fits: tuple[BandPowerFit, Sequence[BandPowerFit]],
     others: Sequence[Hypothesis],
 ) -> Explanation | None:
-    """The explanation by play, and by a second effect where there is one; None where the re-tuned model or another
-    single effect is as good, or a rival of play, with the same second effect. comparison: its chance is that of the
-    best fit. fits: of play alone, and of play with a second effect, the best first. others: the rivals of play."""
+    """The explanation by play, and by a second effect if there is one; None where the re-tuned model, another effect or
+    a rival of play is about as good. comparison: with the chance variation of the best fit. fits: of play alone, and
+    with a second effect, the best first. others: the rivals."""
     alone, beside = fits
     best = (*beside, alone)[0]
     played = comparison.score_candidate(alone.deviations, alone.hypothesis)
@@ -259,8 +268,8 @@ def _judge(
 
 
 def is_irregular(context: SearchContext, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:
-    """Whether a response is irregular, as of rattling play: its periods vary by far more than the noise or, without
-    repeats, a channel's residual has a kurtosis above `PEAKED_KURTOSIS`."""
+    """Whether a response is irregular, like that of rattling play: periods of a segment vary by more than
+    `VARIES_ERROR` times the noise or, without repeats, a channel's residual has a kurtosis above `PEAKED_KURTOSIS`."""
     if any(floor.how == "repeats" for floor in floors):
         return any(_varies(channel) for floor in floors for channel in (floor.response, floor.position) if channel)
     masks = [record.fit | record.choose for record in context.whole.records]
@@ -273,4 +282,5 @@ def is_irregular(context: SearchContext, found: Explanation, floors: Sequence[No
 
 
 def _varies(noise: ChannelNoise) -> bool:
+    """Whether the variance between the periods of a segment exceeds (VARIES_ERROR rms)² in a channel."""
     return any(bool(np.any(segment.variance > (VARIES_ERROR * noise.rms) ** 2)) for segment in noise.segments)

@@ -1,5 +1,8 @@
-"""Detects explanations without predictive power: an effect that stops the simulated device can fit better than a wrong
-one."""
+"""Detects explanations without predictive power: the prediction is no better than a constant.
+
+An effect that stops the simulated device, or a low-pass filter that passes nothing, leaves the whole signal as
+residual. That can be a smaller error than that of a wrong prediction, although it explains nothing.
+"""
 
 import numpy as np
 
@@ -13,16 +16,19 @@ from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
 _TINY = 1e-300
+"""Lower limit of an rms, so that its logarithm is finite."""
 
 
 def is_without_prediction(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
-    """Whether the prediction is better than none in no channel, on the samples to fit and to choose by."""
+    """Whether in every channel the residual is at least `NO_PREDICTION_SHARE` of the signal (rms), on the samples to
+    fit and to choose by."""
     return bool((_residual_rms(measure, candidate.fitted) >= NO_PREDICTION_SHARE * _signal_rms(measure)).all())
 
 
 def predicts_nothing(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
-    """Whether the new effect leaves no predictive power, far above the noise, in the channel where it gains most or
-    whose sensor it acts on: a low pass that passes nothing explains nothing, though it frees the model for others."""
+    """Whether the newest effect leaves no predictive power in the channel where it reduces the error most, or in a
+    channel whose sensor it acts on: a residual of at least `NO_PREDICTION_SHARE` of the signal and of
+    `NO_PREDICTION_ERROR` times the noise. Such an effect only frees the model to fit the other channels."""
     before, left = _residual_rms(measure, base), _residual_rms(measure, fitted)
     most = int(np.argmax(np.log(np.maximum(before, _TINY)) - np.log(np.maximum(left, _TINY))))
     claim = fitted.hypothesis.claims[-1]
@@ -32,14 +38,15 @@ def predicts_nothing(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> boo
 
 
 def _residual_rms(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
-    """(c,): rms"""
+    """(c,): rms residual, in each channel's own unit."""
     return np.asarray(rms_over(measure.records, fitted.residuals, _decision_samples(measure)) * measure.unit)
 
 
 def _signal_rms(measure: ErrorMeasure) -> FloatArray:
-    """(c,): rms"""
+    """(c,): rms of the measured signal without its mean, in each channel's own unit."""
     return signal_rms(measure.records, _decision_samples(measure))
 
 
 def _decision_samples(measure: ErrorMeasure) -> list[Mask]:
+    """Per record, the mask of the samples to fit and to choose by."""
     return [record.fit | record.choose for record in measure.records]

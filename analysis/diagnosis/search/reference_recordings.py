@@ -1,4 +1,9 @@
-"""The gain of a hypothesis on clean recordings, where its effect is absent: a baseline for its gain elsewhere."""
+"""The gain of a hypothesis on clean recordings, where its effect is absent: a baseline for its gain on other
+recordings.
+
+A hypothesis may reduce the error on a clean recording by absorbing model errors. Only a larger reduction on the
+recordings under test is evidence for its effect. Gains are reductions of the logarithm of the rms error, per channel.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -15,11 +20,12 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 ROUNDS = 4
+"""Gauss-Newton steps of a fit."""
 TRIED = 2
-"""Starts that are followed to their end."""
+"""Starting points, those of least cost, from which a fit is made."""
 
 SETTLED = 1e-4
-"""Share of the cost below which a fit ends: smaller gains are no evidence."""
+"""Relative reduction of the cost that counts as evidence in `hold`; smaller ones are within a fit's tolerance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,13 +35,14 @@ class ReferenceRecording:
     measure: WhitenedMeasure
     tuning: Tuning
     base: Fitted
-    """Re-tuned, without any effect."""
+    """The re-tuned model without any effect."""
     known: Sensitivity
-    """Sensitivity to the model's parameters there."""
+    """Sensitivity to the model's parameters at `base`."""
     evidence: Evidence
+    """Signals and residuals of `base`, from which starting values are estimated."""
 
     def gain_on_clean(self, wanted: Hypothesis) -> FloatArray:
-        """(c,): fall of the logarithm of the rms error by the hypothesis, both fitted."""
+        """(c,): reduction of the logarithm of the rms error by the hypothesis, both models fitted to this recording."""
         measure, tuning = self.measure, self.tuning
         starts = [
             evaluate_fit(measure, tuning, self.base.deviations, hypothesis) for hypothesis in self._starts(wanted)
@@ -47,19 +54,21 @@ class ReferenceRecording:
         return np.asarray(np.log(without) - np.log(np.maximum(with_it, np.finfo(float).tiny)))
 
     def costs_of(self, fixed: Hypothesis) -> tuple[float, float]:
-        """Cost without and with a hypothesis whose parameters are fixed, the model re-tuned as far in either."""
+        """Cost without and with a hypothesis whose parameters are fixed; the model is re-tuned in both cases."""
         start = evaluate_fit(self.measure, self.tuning, self.base.deviations, fixed)
         without, with_it = (fit(self.measure, self.tuning, each, self.known, ROUNDS) for each in (self.base, start))
         return without.cost, with_it.cost
 
     def _starts(self, wanted: Hypothesis) -> list[Hypothesis]:
-        """Starting points: the wanted hypothesis, and the last claim's starting values from this recording."""
+        """Starting points: the parameters of the given hypothesis, and for its last claim also the starting values that
+        this recording suggests."""
         last = wanted.claims[-1]
         own = [hypothesis for hypothesis in candidates([last.effect], self.evidence) if hypothesis.claims == (last,)]
         held = without_claim(wanted, len(wanted.claims) - 1)
         return [wanted, *(combine(held, hypothesis) for hypothesis in own)]
 
     def _channel_rms(self, fitted: Fitted) -> FloatArray:
+        """(c,): rms residual on the samples to fit and to choose by, in units of `measure.unit`."""
         masks = [record.fit | record.choose for record in self.measure.records]
         return rms_over(self.measure.records, fitted.residuals, masks)
 
@@ -70,11 +79,14 @@ class ReferenceRecordings:
 
     each: tuple[ReferenceRecording, ...]
     beyond: float
-    """Factor on the largest gain of the reference recordings, which a gain must exceed: the fewer, the larger."""
+    """Factor on the largest gain among the reference recordings, which a gain elsewhere must exceed; the fewer these
+    recordings, the larger the factor."""
     seen: dict[object, FloatArray] = field(default_factory=dict)
+    """Gains computed so far, by `Hypothesis.key`."""
 
     def gain_on_clean(self, hypothesis: Hypothesis) -> FloatArray:
-        """(c,): the gain that is counted against the hypothesis; 0 for a model without effects."""
+        """(c,): the gain that is counted against the hypothesis, `beyond` times the largest gain on the clean
+        recordings (at least 0); (1,) zero for a model without effects."""
         if not hypothesis.claims:
             return np.zeros(1)
         if hypothesis.key not in self.seen:
@@ -83,8 +95,8 @@ class ReferenceRecordings:
         return self.seen[hypothesis.key]
 
     def hold(self, hypothesis: Hypothesis, claim: int) -> bool:
-        """Whether the recordings in order are predicted better with an effect as it was fitted elsewhere, all its
-        parameters included: then it did not come since. claim: which of the hypothesis's effects."""
+        """Whether an effect with the parameters fitted elsewhere also improves the prediction of the clean recordings:
+        then it was present before, and is no new fault. claim: index of the effect in the hypothesis."""
         effect = hypothesis.claims[claim].effect
         numbers = tuple(replace(parameter, fixed=True) for parameter in effect.parameters)
         held = replace(hypothesis.claims[claim], effect=replace(effect, parameters=numbers))
@@ -96,7 +108,8 @@ class ReferenceRecordings:
 def reference_recording(
     measure: WhitenedMeasure, tuning: Tuning, deviations: FloatArray, map_: Mapper
 ) -> ReferenceRecording:
-    """deviations: of the model re-tuned to it."""
+    """A clean recording prepared for comparison. deviations: of the model re-tuned to this recording, in standard
+    deviations of the calibration; the fit is continued from there."""
     known = sensitivity(measure, tuning, deviations, NOTHING, map_)
     base = fit(measure, tuning, evaluate_fit(measure, tuning, deviations, NOTHING), known, ROUNDS)
     return ReferenceRecording(measure, tuning, base, known, gather_evidence(measure, tuning, base)[0])

@@ -1,9 +1,9 @@
 """Revises the effects that forward selection found: exchanges one for another, or drops one (backward elimination).
 
-Forward selection chooses the first effect while it alone must explain the whole error, so that it may be a compromise.
-With the second effect kept, the first is searched again; where another effect fits better in its place, it replaces the
-first, as the last in the order. Then the next is searched again, until no effect fits better or each had its turn
-(Miller, Subset Selection in Regression, 2002, ch. 3).
+Forward selection chooses the first effect while that effect alone must explain the whole error, so that the choice may
+be a compromise. The first effect is therefore searched for again with the later effects kept; where another effect fits
+better, it replaces the first and becomes the last in the order. This is repeated until no replacement fits better, or
+every effect has been tried once (Miller, Subset Selection in Regression, 2002, ch. 3).
 """
 
 from collections.abc import Callable, Sequence
@@ -49,13 +49,13 @@ def without_effect(context: SearchContext, found: Explanation, number: int) -> E
 
 
 def without_last_refitted(context: SearchContext, found: Explanation) -> Explanation:
-    """The explanation without the last of several effects; the others are refitted from their values with it, which may
-    lead to a better minimum than the one they had before it was found."""
+    """The explanation without the last of several effects. The others are refitted from the values that they had with
+    it, which may lead to a better minimum than the one before it was added; the better of both minima is used."""
     last, before = len(found.steps) - 1, without_effect(context, found, len(found.steps) - 1)
     freed = context.candidate(refine(context, _without(context, found.steps[-1], last).fitted))
     if not freed.fitted.cost < before.steps[-1].fitted.cost:
         return before
-    # Rivals of the effect before it were compared at a worse minimum, so they are left out.
+    # Rivals of the remaining last effect were compared at a worse minimum, so they are left out.
     rounds = (*before.rounds[: last - 1], (freed,))
     return replace(before, after=context.with_test_score(freed), rounds=rounds, steps=(*before.steps[:-1], freed))
 
@@ -67,10 +67,10 @@ def _without(context: SearchContext, candidate: FittedCandidate, number: int) ->
 
 
 def drop_needless(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """Drop the first effect without which the others fit as well: an earlier effect may have taken the place of a later
-    one, and the last may have led the others out of a local minimum. Of three effects, also drop the one without which
-    the other two leave the smallest error, if that is as small as laws of a real device leave: no law is exact, and a
-    third effect fits the remaining error."""
+    """Drop the first effect without which the others fit as well: a later effect may have made it superfluous, and the
+    last may only have led the others out of a local minimum. Of three effects, also drop the one without which the
+    other two leave the smallest error, if that is as small as right laws leave on a real device: no law is exact, and a
+    third effect may only fit the remaining error."""
     enough, last = [], len(found.steps) - 1
     for number in range(len(found.steps) if time_left() else 0):
         others = without_effect(context, found, number) if number < last else without_last_refitted(context, found)
@@ -84,8 +84,8 @@ def drop_needless(context: SearchContext, found: Explanation, time_left: TimeBud
 
 
 def drop_unconfirmed(context: SearchContext, found: Explanation) -> Explanation:
-    """Drop a last effect that was found in an error as small as the right laws leave on a real device, if the held-out
-    samples do not confirm it: their error is no smaller with it."""
+    """Drop a last effect that was added to an explanation whose error was at most `EXPLAINED_ERROR` already, as right
+    laws leave on a real device, if the held-out error is not smaller with it."""
     while len(found.steps) > 1 and found.steps[-2].score.worst_channel <= EXPLAINED_ERROR:
         if found.after.held_out < context.with_test_score(found.steps[-2]).held_out or np.isinf(found.after.held_out):
             break
@@ -94,7 +94,8 @@ def drop_unconfirmed(context: SearchContext, found: Explanation) -> Explanation:
 
 
 def drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
-    """Drop last effects that reduce the error by little while the error stays above the noise."""
+    """Drop last effects that remove less than `LAST_EFFECT_SHARE` of the mismatch while the error stays above the noise
+    and the others are still worth naming."""
     while len(found.steps) > 1 and not as_good_as_noise(found):
         if shares_taken(found.retuned, found.steps)[-1] >= LAST_EFFECT_SHARE:
             break
@@ -108,8 +109,8 @@ def drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
 def exchange_effects(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> Explanation:
-    """The explanation with effects exchanged; unchanged where its error is as small as laws of a real device leave, it
-    has a single effect, no other effect fits better, or a law fails."""
+    """The explanation with effects exchanged; unchanged where its error is as small as right laws leave on a real
+    device, where it has a single effect, where no other effect fits better, or where an exchange crashes."""
     limited = replace(context, map_=limit_map(context.map_, time_left))
     for _ in found.steps:
         if not _may_exchange(context, found, time_left) or leaves_little(found.retuned, found.after):
@@ -132,8 +133,8 @@ def _find_first_again(
 def exchange_for_relatives(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> Explanation:
-    """The explanation with its first effect exchanged for one of its family, or a refinement, at the same place: which
-    of them fits best may show only when the second effect is known.
+    """The explanation with its first effect exchanged for another of its family, or a refinement, at the same site:
+    which of them fits best may show only when the second effect is known.
 
     The candidates start from the whole explanation without the first effect, whose other values are not refitted; only
     a candidate with a smaller error than the first effect is fitted further. The first effect is among the candidates,
@@ -152,7 +153,7 @@ def exchange_for_relatives(
         better = [law for law in fits if law.cost < last.fitted.cost]
         present = _with_first_at_end(limited, last)
         compared = plainest_first([*compare_plausible(limited, base, better, evidence), present])
-        # The others are fitted anew only where the first effect goes.
+        # The other effects are refitted only where the first effect is replaced.
         return found if compared[0] is present else without_effect(limited, found, 0), compared
 
     return _exchange_first(context, found, compare) or found
@@ -168,7 +169,7 @@ def _with_first_at_end(context: SearchContext, candidate: FittedCandidate) -> Fi
 
 
 def _may_exchange(context: SearchContext, found: Explanation, time_left: TimeBudget) -> bool:
-    """Whether there are two or more effects, they may be changed, the error is above `EXPLAINED_ERROR`, and time is
+    """Whether there are two or more effects that may be changed, the error is above `EXPLAINED_ERROR`, and time is
     left."""
     fixed = context.certain or context.references is not None or found.ended_early or found.barred
     more = len(found.steps) > 1 and found.after.score.worst_channel > EXPLAINED_ERROR
@@ -176,6 +177,7 @@ def _may_exchange(context: SearchContext, found: Explanation, time_left: TimeBud
 
 
 def _again(progress: Progress) -> Step:
+    """The step of the work that the progress display shows for an exchange."""
     return Step("looking again for the first effect", 0.8, progress)
 
 

@@ -1,12 +1,13 @@
-"""Ranks hypotheses by the gain that a linear model about their starting values predicts, one simulation each.
+"""Ranks hypotheses by the reduction of the cost that a linearised fit predicts; one simulation per hypothesis.
 
-With e the errors of the base and c the change of the prediction at a hypothesis's starting values, the error of a fit
-is taken to be e - S d - c s, linear in d, the change of the model's own parameters (sensitivity S), and in s, a factor
-on the hypothesis's effect. The step z = (d, s) that minimises |e - S d - c s|² + |d0 + d|² within its bounds removes
+Let e be the prediction errors of the base fit, and c the change of the prediction by a hypothesis at its starting
+values, both in units of the noise. The error of a fit is approximated by e - S d - c s, linear in d, the change of the
+model's own parameters in standard deviations (sensitivity S), and in s, a factor on the effect. The step z = (d, s)
+that minimises |e - S d - c s|² + |d0 + d|² within its bounds reduces this sum, which is N times the cost, by
 
-    2 z'g - z'P z        P = [[S'S + I, S'c], [c'S, c'c]],   g = (S'e - d0, c'e),   d0 the base's deviations
+    2 z'g - z'P z        P = [[S'S + I, S'c], [c'S, c'c]],   g = (S'e - d0, c'e)
 
-from the cost's sum (Draper and Smith, Applied Regression Analysis, 1998, ch. 6: extra sum of squares).
+with d0 the deviations of the base (Draper and Smith, Applied Regression Analysis, 1998, ch. 6: extra sum of squares).
 """
 
 from collections.abc import Sequence
@@ -27,7 +28,7 @@ class ScreenedHypothesis:
     """A hypothesis with the cost that the linear model predicts for its fit."""
 
     hypothesis: Hypothesis
-    """The suggested effect together with those that are held already."""
+    """The suggested effect together with those of the base."""
     cost: float
     """`Fitted.cost` predicted by linearisation at the starting values."""
 
@@ -40,7 +41,8 @@ def screen(
     suggested: Sequence[Hypothesis],
     map_: Mapper,
 ) -> tuple[ScreenedHypothesis, ...]:
-    """The hypotheses with their predicted costs, the best first. known: sensitivity to the model's own parameters."""
+    """The hypotheses, each combined with that of `base`, with their predicted costs, the lowest first. known:
+    sensitivity to the model's own parameters at `base`."""
     model = tuning.tune(base.deviations)
     errors = residuals_to_fit(measure, base.residuals)
 
@@ -55,9 +57,9 @@ def screen(
 
 
 def _predict_cost(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray, bound: float) -> float:
-    """Predicted `Fitted.cost`; infinite where the simulation diverged or does not change. errors, change: (samples,)
-    in units of the noise, e and c of the theory of operation."""
-    with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
+    """Predicted `Fitted.cost`; infinite where the simulation diverged or the effect does not change it. errors, change:
+    (samples,), e and c of the module's equation. bound: of |d0 + d|, in standard deviations."""
+    with np.errstate(over="ignore", invalid="ignore"):  # a diverged simulation overflows
         strength = float(change @ change)
     if not (np.isfinite(strength) and strength > 0):
         return np.inf

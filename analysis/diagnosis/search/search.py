@@ -2,28 +2,27 @@
 
 Theory of operation.
 
-1. `add_effects` selects effects forward, on the samples to fit and to choose by. Once a second one is found, the first
-   is exchanged for another of its family that gains enough, and after the last for any other that fits better
+1. Forward selection (`add_effects`) uses the samples to fit and to choose by. After a second effect was found, the
+   first may be exchanged for another of its family; after the last, for any effect that fits better
    (`revise_selection`).
-2. Backward elimination (`prune`) removes what selection added and the result does not need: effects without which the
-   others, refitted, fit as well; effects that take too little of the mismatch; effects whose parameters the data
-   do not determine (`identifiability`: the interval of the only amplitude, or its profile likelihood, contains zero).
-3. `verdict.judge` compares the held-out errors, in units of the noise, with limits: on samples that neither fitted nor
-   chose anything, a wrong explanation has no advantage over a right one.
-4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), the
-   search is repeated with a part of them opened: all but the loudest segments, else half of each stretch, or every
-   other of more parts, the finest where nothing is found in coarser ones. What it finds must be confirmed by the part
-   that is still held out.
-5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`): before a second
-   effect is looked for, as a law that alone explains is a shorter description than two effects, and at the end. A law
-   that was found early and leaves a part is kept where the rest of the search names nothing. Before a third effect,
-   play that rattles is looked for (`impacts`): no sum of effects predicts its waveform.
-6. Where that still leaves a mismatch, or needs three effects, and a parameter of the model is at its bound, the search
-   is repeated with a wider one (`move_model_further`): a model that was fitted to this device has the missing physics
-   as a bias. Its result is taken if it explains what the first does not, or by fewer effects.
+2. Backward elimination (`prune`) removes effects without which the others, refitted, fit as well; effects that remove
+   too little of the mismatch; and effects whose parameters the data do not determine (`identifiability`: the interval,
+   or the profile likelihood, of the only amplitude contains zero).
+3. `verdict.judge` compares the errors, in units of the noise, with limits. The errors on held-out samples, which
+   neither fitted nor chose anything, can only withdraw names or the verdict "explained".
+4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), a part
+   of them is used to fit and to choose by, and the search repeated: all but the loudest segments; else the first half
+   of each stretch, or every other of more parts. What this finds must be confirmed by the part that is still held out.
+5. Where the catalogue leaves a mismatch, `Beyond` is called (laws outside the catalogue, `discovery`): before a second
+   effect is searched for, because one law that explains everything is a shorter description than two effects, and at
+   the end. A law that was found early and leaves a part of the mismatch is kept where the rest of the search names
+   nothing. Before a third effect, rattling play is tried (`impacts`): no sum of effects predicts its waveform.
+6. Where a mismatch remains, or three effects are needed, and a parameter of the model is at its bound, the search is
+   repeated with a wider bound (`move_model_further`): a model that was fitted to this device has absorbed missing
+   physics as a bias. The new result is used if it explains what the first does not, or with fewer effects.
 
-Reference recordings of the intact device: see `reference/search_with_reference`. Literature: Hastie, Tibshirani and
-Friedman, The Elements of Statistical Learning (2009), section 7.2 (training, validation, test), 3.3 (stepwise).
+The search with reference recordings of the intact device is `reference/search_with_reference`. References: Hastie,
+Tibshirani and Friedman, The Elements of Statistical Learning (2009), 7.2 (training, validation, test), 3.3 (stepwise).
 """
 
 from collections.abc import Callable, Sequence
@@ -76,7 +75,7 @@ HUM = "mains_hum"
 
 
 def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """Backward elimination: effects that forward selection added and that are not needed are removed."""
+    """Backward elimination (step 2). Unchanged where band powers were compared, or with effects that are certain."""
     if found.statistic is not None or context.certain:
         return found
     if len(found.steps) > 1:
@@ -88,15 +87,15 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
 
 @dataclass(frozen=True, slots=True)
 class Beyond:
-    """Searches beyond the catalogue, for a mismatch that it leaves. Each returns the result with its own effects named
-    in place of the catalogue's, with candidates, or unchanged."""
+    """Searches beyond the catalogue, for a mismatch that the catalogue leaves (step 5). Each returns the result with
+    its own effects named in place of the catalogue's, with additional candidates, or unchanged."""
 
     before_pairs: Callable[[SearchResult], SearchResult] = lambda seen: seen
-    """Before a second effect is looked for: names only what is a shorter description than two effects."""
+    """Called before a second effect is searched for: names only what is a shorter description than two effects."""
     before_thirds: Callable[[SearchResult], SearchResult] = lambda seen: seen
-    """Before a third effect is looked for: names only what explains all that the catalogue's pairs do not."""
+    """Called before a third effect is searched for: names only what explains all that two effects leave."""
     at_end: Callable[[SearchResult], SearchResult] = lambda seen: seen
-    """After the last effect; with opened held-out samples, too, where only they show the mismatch."""
+    """Called after the last effect; also with opened held-out samples, where only these show the mismatch."""
 
 
 def search_effects(
@@ -106,7 +105,7 @@ def search_effects(
     time_left: TimeBudget = always,
     beyond: Beyond = Beyond(),
 ) -> SearchResult:
-    """The search for effects with its verdict, with the model's own parameters within `Tuning.bound`."""
+    """Steps 1 to 5: the search for effects and its verdict, the model's own parameters being within `Tuning.bound`."""
     beyond = Beyond(_guarded(beyond.before_pairs), beyond.before_thirds, _guarded(beyond.at_end))
     alone = add_effects(context, catalogue, begin(context, progress), progress, time_left, most=1)
     early = SearchResult(context, alone, Judgement("unexplained", False))
@@ -115,7 +114,7 @@ def search_effects(
     explains = early.judgement.verdict == "explained"
     if explains and early.found.after.score.worst_channel <= EXPLAINED_ERROR:
         return early
-    # With an effect left out, a round that brought none may not be taken up again.
+    # With excluded effects, a round that added none cannot be resumed, so that all effects are searched for at once.
     pair = add_effects(context, catalogue, alone, progress, time_left, MOST_EFFECTS if context.barred else 2)
     pair = exchange_for_relatives(context, pair, catalogue, progress, time_left)
     rattling = beyond.before_thirds(replace(early, found=pair))
@@ -132,9 +131,9 @@ def move_model_further(
     progress: Progress,
     time_left: TimeBudget = always,
 ) -> SearchResult:
-    """The search repeated with a wider bound of the model's own parameters, where the result leaves a mismatch or needs
-    three effects, and a parameter is at its bound; the same result where that explains nothing by fewer effects.
-    context: of the search that gave the result."""
+    """Step 6: the search repeated with a wider bound of the model's own parameters, where the result leaves a mismatch
+    or needs three effects, and a parameter is at its bound; the result unchanged where the wider bound does not make it
+    plainer (`is_plainer`). context: of the search that gave the result."""
     if not catalogue or not may_move_further(result) or not time_left():
         return result
     progress("searching again, with a model that may move further", 0.1)
@@ -148,8 +147,8 @@ def move_model_further(
 
 
 def _keep_early(early: SearchResult, result: SearchResult) -> SearchResult:
-    """The result of the whole search; the law that was found before it where nothing is named, or where the time ended
-    before that law was weighed and what is named leaves far more."""
+    """The result of the whole search; or the early result by a law, where the whole search names nothing, or where time
+    ran out and its named effects leave far more than that law."""
     ended = result.found.ended_early
     if not early.judgement.named:
         return replace(result, unconfirmed=(*early.unconfirmed, *result.unconfirmed)) if ended else result
@@ -171,12 +170,13 @@ def _search_with_thirds(
     time_left: TimeBudget,
     beyond: Callable[[SearchResult], SearchResult],
 ) -> SearchResult:
-    """The search after two effects, where these leave enough for more. pair: the explanation by them."""
+    """The search after at most two effects: a third one, exchange, elimination, and opened held-out samples (steps 1 to
+    5). pair: the explanation by up to two effects. beyond: `Beyond.at_end`."""
     found = add_effects(context, catalogue, pair, progress, time_left)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     judged = _judge_with_prediction(context, found)
     first = SearchResult(context, found, judged, search_remarks(found))
-    # What fits where it was fitted is kept even if unconfirmed: a second effect may show in the held-out samples alone.
+    # Effects that fit their samples are kept even if unconfirmed: another may show in the held-out samples alone.
     left = found.after if judged.named or (found.steps and as_good_as_noise(found)) else found.retuned
     if found.ended_early or found.barred or not shows_there_alone(left.score.test, left):
         return beyond(first)
@@ -197,8 +197,8 @@ def _search_with_thirds(
 def _find_beyond(
     first: SearchResult, opened: SearchResult, adds: bool, beyond: Callable[[SearchResult], SearchResult]
 ) -> SearchResult:
-    """Result of the search beyond the catalogue: first without the opened held-out samples, then, where that names
-    nothing, with them."""
+    """Result of the search beyond the catalogue: first without opened held-out samples, then, where that names nothing,
+    with them. adds: whether `opened` adds confirmed effects to `first`."""
     tried = beyond(first)
     if tried.judgement.named:
         return tried
@@ -211,7 +211,7 @@ def _find_beyond(
 
 
 def _leave_open(result: SearchResult) -> SearchResult:
-    """The result, unexplained where nothing is named: the held-out samples alone show a mismatch."""
+    """The result; where it names nothing, with the verdict "unexplained", because held-out samples show a mismatch."""
     judged = replace(result.judgement, verdict="unexplained")
     return result if result.judgement.named else replace(result, judgement=judged, remarks=(NOT_SHOWN, *result.remarks))
 
@@ -224,10 +224,9 @@ def _find_with_opened(
     time_left: TimeBudget,
     coarsest: int = HALVES,
 ) -> tuple[SearchResult, int]:
-    """The search repeated with a part of the held-out samples to fit and to choose by: all but the loudest stretches
-    where the others show the mismatch, else the first half of each, or every other of more parts. coarsest: number of
-    parts from which on stretches are cut; beyond halves, the loudest are, too. Also returns the number of parts, 0 for
-    the loudest against the others."""
+    """Step 4: the search repeated with a part of the held-out samples to fit and to choose by, and the number of parts
+    into which each stretch was cut; 0 = all but the loudest segments were opened, where both groups show the mismatch.
+    coarsest: least number of parts; above 2, all stretches are cut. left: fit that shows the mismatch."""
     milder = first.context.open_milder(left) if coarsest == HALVES else None
     context, parts = first.context.open_alternate(left, coarsest) if milder is None else (milder, 0)
     going_on = left is first.found.after and as_good_as_noise(first.found)
@@ -241,8 +240,8 @@ def _find_with_opened(
 def _find_in_parts(
     first: SearchResult, left: FittedCandidate, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> tuple[SearchResult, bool]:
-    """What is found with opened samples, and whether it adds to the first; in the finest parts, too, where it adds
-    nothing: coarser ones may hold too little, such as none of the few contacts with a stop."""
+    """The result with opened samples, and whether it adds to the first. Where it adds nothing, the finest parts are
+    tried as well: coarser ones may contain too little of the mismatch, such as none of a few contacts with a stop."""
     opened, parts = _find_with_opened(first, left, catalogue, progress, time_left)
     if _adds_confirmed(first, opened, parts):
         return opened, True
@@ -258,9 +257,9 @@ def _find_in_parts(
 
 
 def _adds_confirmed(first: SearchResult, opened: SearchResult, parts: int) -> bool:
-    """Whether a search with opened samples names all that the first did, and more, which what is still held out
-    confirms; or leaves little with a part of that, where the first had taken up too much. parts: as of
-    `_find_with_opened`; those finer than halves lie between what was fitted, so that no more than noise may be left."""
+    """Whether a search with opened samples names more effects than the first, confirmed by the samples still held out:
+    in addition to all named by the first, or to a part of them if that leaves little. parts: as of `_find_with_opened`;
+    parts finer than halves lie between fitted samples, so that their error must be at most `EXPLAINED_ERROR`."""
     before, found = first.found.after if first.judgement.named else first.found.retuned, opened.found
     if parts > HALVES and np.nanmax(found.after.score.test, initial=0.0) > EXPLAINED_ERROR:
         return False
@@ -270,7 +269,7 @@ def _adds_confirmed(first: SearchResult, opened: SearchResult, parts: int) -> bo
         return False
     if not first.judgement.named:
         return True
-    # Fitted to the same samples: what the opened ones do to the first effect is no merit of the second.
+    # The first effects are refitted to the opened samples, so that this gain is not credited to the new effect.
     context, fitted = opened.context, before.fitted
     start = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
     refitted = context.with_test_score(context.candidate(refine(context, start)))
@@ -285,7 +284,7 @@ def _sites(candidate: FittedCandidate) -> set[tuple[str, int]]:
 def _exchange_and_prune(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> Explanation:
-    """Exchange and backward elimination after forward selection; where they crash, nothing is named."""
+    """Exchange and backward elimination after forward selection; where the elimination crashes, nothing is named."""
     nothing = replace(found, after=found.retuned, steps=())
     exchanged = exchange_effects(context, found, catalogue, progress, time_left)
     newest = found.steps[-1].newest if found.steps else ""
@@ -293,6 +292,7 @@ def _exchange_and_prune(
 
 
 def _judge_with_prediction(context: SearchContext, found: Explanation) -> Judgement:
+    """The judgement; "unexplained" where the explanation predicts nothing (`no_prediction`)."""
     judged = judge(found)
     if judged.named and is_without_prediction(context.whole, found.after):
         return Judgement("unexplained", False)

@@ -1,8 +1,8 @@
-"""Shortens periodic recordings to one settled period per segment, on which laws are compared first.
+"""Shortens recordings with a periodic drive to one settled period per segment, on which hypotheses are compared first.
 
-The further periods of a segment repeat the first but for noise. What is kept is joined end to end and simulated as one
-recording; a run-in before each kept stretch lets initial transients decay (Pintelon and Schoukens 2012, System
-Identification, ch. 2: transients of periodic excitation).
+All settled periods of a segment are equal except for noise. The kept samples are joined end to end and simulated as one
+recording; a run-in before each kept stretch lets the transients of the initial state decay (Pintelon and Schoukens,
+System Identification, 2012, ch. 2: transients of periodic excitation).
 """
 
 from collections.abc import Sequence
@@ -42,25 +42,25 @@ Places = npt.NDArray[np.int64]
 
 
 COARSER = 2
-"""Factor on the simulation step where laws are only ranked and their fits begun. The integration error stays far below
-that of the linearisation that predicts gains."""
+"""Factor on the simulation step where hypotheses are only ranked and their fits begun: the integration error stays far
+below the error of the linearised prediction of gains."""
 
 
 def coarsen(measure: ErrorMeasure) -> ErrorMeasure:
-    """The measure with longer simulation steps, where it simulates freely."""
+    """The measure with `COARSER` times the simulation step, if it simulates freely; else the measure itself."""
     return replace(measure, coarser=COARSER) if isinstance(measure, FreeSimulation) else measure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cut:
-    """Which samples of one record are kept, fitted, and repeats of others."""
+    """Which samples of one record are kept, which are fitted, and which are repeats of fitted ones."""
 
     kept: Places
-    """Samples that are simulated: those to fit with the run-in before them."""
+    """(k,): indices of the simulated samples: those to fit, with the run-in around them."""
     fit: Mask
-    """(n,): samples to fit among all of the record."""
+    """(n,): the samples to fit, among all n of the record."""
     repeat_of: Places
-    """(n,): for each sample, the fitted sample of which it is a repeat; itself where it is none."""
+    """(n,): index of the fitted sample of which a sample is a repeat; its own index where it is no repeat."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,26 +70,27 @@ class ShortRecordings:
     context: SearchContext
     """Context whose measure holds the kept samples alone: the samples to fit are also those to choose by."""
     kept: tuple[np.ndarray, ...]
-    """Per record of the long measure that has any, the samples that are kept."""
+    """(k,) per record of the long measure with kept samples: their indices."""
     fitted_sample: Places
     """(samples to fit of the long measure,): for each, the kept sample to fit of which it is a repeat."""
     place: Places
     """(kept samples to fit,): their indices among the samples to fit of the long measure."""
     whole: ErrorMeasure
-    """The long measure."""
+    """The long measure: of the whole recordings."""
 
     def has_same_errors(self, held: Fitted) -> bool:
-        """Whether the kept samples have nearly the errors that they have in the simulation of all samples: the mean
-        square difference is at most `RUN_IN_ERROR` times the cost. held: fitted on all samples."""
+        """Whether the run-in is long enough: the residuals of the kept samples differ from those in the simulation of
+        all samples by at most `RUN_IN_ERROR` times the cost, in mean square. held: fitted on all samples."""
         short, tuning = self.context.measure, self.context.tuning
         here = evaluate_fit(short, tuning, held.deviations, held.hypothesis)
         there = residuals_to_fit(self.whole, held.residuals).reshape(len(self.fitted_sample), -1)[self.place]
-        with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
+        with np.errstate(over="ignore", invalid="ignore"):  # a diverged simulation overflows
             apart = residuals_to_fit(short, here.residuals) - there.ravel()
             return float(np.mean(apart**2)) <= RUN_IN_ERROR * held.cost
 
     def repeat_sensitivity(self, known: Sensitivity) -> Sensitivity:
-        """The sensitivity on the long measure, from that on one period of each segment."""
+        """The sensitivity on the long measure, from that on one period of each segment: the Gram matrix counts each
+        kept sample as often as it repeats."""
         times = np.sqrt(np.bincount(self.fitted_sample, minlength=self._samples)).repeat(
             known.columns.shape[1] // self._samples
         )
@@ -101,7 +102,7 @@ class ShortRecordings:
         return sum(int(record.fit.sum()) for record in self.context.measure.records)
 
     def of(self, evidence: Evidence) -> Evidence:
-        """The first record's evidence at the kept samples."""
+        """The evidence of the first record, restricted to the kept samples."""
         kept, n = self.kept[0], len(evidence.command)
         fit = np.concatenate([record.fit for record in self.context.measure.records])[: len(kept)]
         cut = {
@@ -110,19 +111,19 @@ class ShortRecordings:
             if isinstance(value := getattr(evidence, field.name), np.ndarray) and len(value) == n and value.ndim
         }
         used: FloatArray = fit.astype(np.float64)
-        # The noise is per channel, independent of its length.
+        # The noise has a value per channel, which must not be cut even if there are as many channels as samples.
         return replace(
             evidence, **{**cut, "used": used, "noise": evidence.noise, "position_noise": evidence.position_noise}
         )
 
 
 def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings | None:
-    """The shortened recordings; None where little would be saved, where held effects depend on sampling times, and
-    where the first record, of which evidence is taken, has nothing to fit. held: fitted on the whole.
+    """The shortened recordings; None where little would be saved, where effects depend on time within it, or where the
+    first record, which gives the evidence, has no samples to fit. held: the base fit, on all samples.
 
-    A force with a memory (dry friction, play) may depend on samples that were cut out for longer than the linear
-    model's transients last: each piece begins with the positions and velocities that the simulation of all samples has
-    there (states of the forces continue from the piece before), and the run-in is doubled until the errors agree.
+    A force with memory (dry friction, play) may depend on earlier samples for longer than the linear model's transients
+    last. Each piece therefore begins with the positions and velocities of the simulation of all samples (states of the
+    forces continue from the piece before), and the run-in is doubled until the errors agree (`has_same_errors`).
     """
     measure = context.measure
     if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.references is not None:
@@ -138,7 +139,7 @@ def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings
             short = _continue_from(short, measure, held)
         if not remembers or short.has_same_errors(held):
             return short
-        # A diverged simulation never agrees, and all samples before those to fit may be kept already.
+        # A diverged simulation never agrees; the loop ends when a longer run-in adds no samples.
         if (now := sum(map(len, short.kept))) == kept:
             return None
         kept, before_s, after_s = now, 2 * before_s, 2 * after_s
@@ -151,7 +152,8 @@ def _shorten(
     periods: Sequence[tuple[Mask, Places]],
     around_s: tuple[float, float],
 ) -> ShortRecordings | None:
-    """The recordings shortened to the given periods; None where that saves little. around_s: as for `_cut`."""
+    """The recordings shortened to the given periods; None where more than `SHORT_SHARE` of the samples would be kept.
+    around_s: as for `_cut`."""
     cut = [_cut(record, each, around_s) for record, each in zip(measure.records, periods, strict=True)]
     before = sum(len(record.command) for record in measure.records)
     if not len(cut[0].kept) or sum(len(each.kept) for each in cut) > SHORT_SHARE * before:
@@ -167,7 +169,7 @@ def _shorten(
 
 
 def _continue_from(short: ShortRecordings, measure: FreeSimulation, held: Fitted) -> ShortRecordings:
-    """The shortened recordings, each piece begun in the state that the whole simulation of a fit has there."""
+    """The shortened recordings, each piece started from the state that the simulation of all samples has there."""
     records = [record for record in measure.records if record.fit.any()]
     model, effects = short.context.tuning.tune(held.deviations), held.hypothesis.list_placed_effects()
     pieces = []
@@ -188,8 +190,9 @@ def _index_fitted(measure: ErrorMeasure, cut: Sequence[_Cut]) -> Places:
 
 
 def _run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) -> tuple[float, float]:
-    """Seconds before and after a stretch that its errors depend on: a simulation's transients decay with the model; a
-    needed force depends on the motion before and after, as far as the model's inverse rings."""
+    """Seconds before and after a stretch on which its errors depend: `RUN_IN_CONSTANTS` time constants of the model for
+    a simulation; for a predicted force, which depends on earlier and later motion, of the model's inverse (its zeros)
+    and of the band limit."""
     if isinstance(measure, FreeSimulation):
         return RUN_IN_CONSTANTS / max(-growth_rate(model), np.finfo(float).tiny), 0.0
     rates = np.abs(zeros_of(model, 2 * np.pi * measure.band_hz).real)
@@ -198,7 +201,7 @@ def _run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) 
 
 
 def _last_periods(record: Observed) -> tuple[Mask, Places]:
-    """`fit` and `repeat_of` of a `_Cut`: of each settled segment the last period is fitted."""
+    """`fit` and `repeat_of` of a `_Cut`: in each settled segment, only the last period is fitted."""
     fit, repeat_of = record.fit.copy(), np.arange(len(record.fit))
     for periods in find_settled_periods(record.recording):
         inside = slice(periods.segment.start, periods.segment.stop)
@@ -211,7 +214,7 @@ def _last_periods(record: Observed) -> tuple[Mask, Places]:
 
 
 def _cut(record: Observed, periods: tuple[Mask, Places], around_s: tuple[float, float]) -> _Cut:
-    """The samples to fit with their run-in. around_s: seconds that are kept before and after each stretch to fit."""
+    """The samples to fit with their run-in. around_s: seconds kept before and after each stretch to fit."""
     fit, repeat_of = periods
     before, after = (int(np.ceil(min(s * record.recording.sample_rate_hz, len(fit)))) for s in around_s)
     needed, edges = fit.copy(), np.diff(np.concatenate([[0], fit.astype(np.int8), [0]]))
@@ -229,8 +232,8 @@ def _join_pieces(measure: FreeSimulation, cut: Sequence[_Cut]) -> FreeSimulation
 
 
 def _cut_in_pieces(measure: PredictedForce, cut: Sequence[_Cut]) -> PredictedForce | None:
-    """The measure with each kept stretch as a record of its own; None where a stretch does not drive an axis that the
-    whole record drives, for errors are relative to the command."""
+    """The measure with each kept stretch as a separate record; None where a stretch does not drive an axis that the
+    whole record drives, because errors are relative to the command."""
     records, motions = [], []
     for record, motion, each in zip(measure.records, measure.motions, cut, strict=True):
         driven = np.abs(record.command).max(axis=0) > 0
@@ -256,9 +259,9 @@ def fits_on_short_recordings(
     timeless: Sequence[Hypothesis],
     timed: Sequence[Hypothesis],
 ) -> list[Fitted]:
-    """First fits on all samples, the best first, screened on short recordings. timed: hypotheses that depend on
-    sampling times, which short recordings cannot judge: they are fitted where the share of the cost that they are
-    predicted to remove is not far below that of the others."""
+    """First fits on all samples, the best first, of hypotheses that were screened on short recordings. timed:
+    hypotheses that depend on sampling times, which short recordings cannot judge; fitted only where their predicted
+    reduction of the cost is not far below the others' (`_keep_promising`)."""
     short, guard = replace(short_form.context, measure=coarsen(short_form.context.measure)), context.guard
     begun = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
     known = sensitivity_at(short, base.deviations, base.hypothesis, with_forces=True)
@@ -269,7 +272,7 @@ def fits_on_short_recordings(
 
     def whole(fitted: Fitted) -> Fitted:
         there = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
-        # Slow motion under friction, which one period does not show, would be counted as error of the law.
+        # One step on all samples: slow motion under friction, which one period lacks, is no error of the law.
         return fit(context.measure, context.tuning, there, of_all, 1) if forced else there
 
     each, found = guard.over(context.map_, FITTING), first_fits(short, begun, known, screened)
@@ -282,15 +285,15 @@ def fits_on_short_recordings(
         )
         promising = _keep_promising((begun, found), begun_whole, screened)
         fits += each(whole, first_fits(coarse, begun_whole, of_all, promising))  # type: ignore[arg-type]
-    # A law whose parameters the short recordings do not determine may diverge on all samples.
+    # Hypotheses whose parameters the short recordings do not determine may diverge on all samples: left out.
     return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda law: law.cost)
 
 
 def _keep_promising(
     others: tuple[Fitted, Sequence[Fitted]], begun_whole: Fitted, screened: Sequence[ScreenedHypothesis]
 ) -> list[ScreenedHypothesis]:
-    """The hypotheses whose predicted gain, as a share of the cost of `begun_whole`, is not far below the best share of
-    others; shares, because the others' costs are of other samples and steps. others: their base, and fits."""
+    """The hypotheses whose predicted relative reduction of the cost is at least `WORTH_FITTING` of the best one among
+    the others. It is relative because costs of the others refer to other samples and steps. others: base and fits."""
     base, fits = others
     best = max((1 - law.cost / base.cost for law in fits), default=0.0)
     return [law for law in screened if 1 - law.cost / begun_whole.cost >= max(WORTH_FITTING * best, 0.0)]

@@ -1,4 +1,9 @@
-"""Candidate hypotheses: every effect of the catalogue at every axis or channel, with starting values from the data."""
+"""Candidate hypotheses: every effect of the catalogue at every axis or channel, with starting values from the data.
+
+Each effect's estimator (`Effect.starts`) reads its starting values off the missing force, the motion and the residuals
+of the base fit (`Evidence`); clock drift is also found by grid search. Hypotheses beyond the recorded range are left
+out.
+"""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -21,7 +26,7 @@ WITHIN: dict[str, dict[str, Literal["travel", "command"]]] = {
     "force_deadband": {"width": "command"},
     "force_saturation": {"limit": "command"},
 }
-"""Parameters that cannot be larger than the recorded travel or command."""
+"""By effect, the parameters that cannot exceed the recorded range of travel, or the largest recorded command."""
 
 
 def candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = map) -> tuple[Hypothesis, ...]:
@@ -49,14 +54,14 @@ def candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = m
 
 
 def within_data(hypothesis: Hypothesis, evidence: Evidence) -> bool:
-    """Whether the newest effect's parameters lie within what was recorded: no ripple repeats within less than its pitch
-    of travel, no dead band or limit lies beyond the largest command."""
+    """Whether the newest effect's parameters lie within the recorded range: the travel covers a pitch of a ripple, and
+    the largest command reaches a dead band's width or a saturation limit."""
     return is_within_data(hypothesis, len(hypothesis.claims) - 1, evidence)
 
 
 def is_within_data(hypothesis: Hypothesis, number: int, evidence: Evidence, pitches: float = 1.0) -> bool:
-    """Whether the parameters of the hypothesis's claim `number` lie within what was recorded. pitches: of a ripple that
-    must have been travelled."""
+    """`within_data` for the claim with index `number`. pitches: number of pitches of a ripple that the travel must
+    cover."""
     limits, used = WITHIN.get(hypothesis.claims[number].effect.name, {}), evidence.used > 0
     for placed in hypothesis.of_claim(number):
         for name, reached in limits.items():
@@ -68,11 +73,14 @@ def is_within_data(hypothesis: Hypothesis, number: int, evidence: Evidence, pitc
 
 
 def _all(effect: Effect, sites: tuple[int, ...], evidence: Evidence) -> list[Hypothesis]:
+    """Hypotheses of the effect at all sites with the same parameters; empty where the effect does not allow that."""
     starts = effect.starts(evidence, ALL_SITES)[:STARTS_PER_CLAIM] if "all" in effect.sites else ()
     return [hypothesis_of_claim(Claim(effect, "all", sites), [values]) for values in starts]
 
 
 def _each(effect: Effect, sites: tuple[int, ...], starts: Sequence[tuple[Values, ...]]) -> list[Hypothesis]:
+    """The hypothesis of the effect at all sites, each with its own parameters; empty where the effect does not allow
+    that, or no site has starting values."""
     first = [values[0] for values in starts if values]
     if "each" not in effect.sites or not first:
         return []
@@ -81,14 +89,16 @@ def _each(effect: Effect, sites: tuple[int, ...], starts: Sequence[tuple[Values,
 
 
 def _faint(effect: Effect, values: Values) -> Values:
-    """Starting values for an axis at which the estimator finds none: a tenth of another axis's."""
+    """Starting values for an axis at which the estimator finds none: those of another axis, the main parameter a tenth
+    of it if the effect vanishes at 0."""
     main = effect.parameters[0]
     return {**values, main.name: values[main.name] / 10 if main.none == 0 else values[main.name]}
 
 
 def clock_drift_by_trial(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothesis, ...]:
-    """Starting values for clock drift by grid search, for recordings too short to show the growing delay. Empty where
-    the effect's own estimator finds some, where it may not be named, or where no trial is better."""
+    """Hypotheses of clock drift with starting values by grid search, for recordings too short for the effect's own
+    estimator. Empty where that estimator finds some, where clock drift is not in the catalogue, or where no trial fits
+    better than no drift."""
     effect = next((known for known in catalogue if known.name == CLOCK_DRIFT), None)
     if effect is None or effect.starts(evidence, ALL_SITES):
         return ()
@@ -103,7 +113,8 @@ def clock_drift_by_trial(catalogue: Sequence[Effect], evidence: Evidence) -> tup
 
 
 def _best_drift(evidence: Evidence) -> float:
-    """The drift in ppm with the least misfit on a grid; 0 where none is better than no drift."""
+    """The drift in ppm with the least squared error of the shifted prediction on a grid; 0 where none takes more than
+    `CLOCK_LEAST_SHARE` of the error without drift. Step: a fraction of the middle period at the recording's end."""
     used, noise = evidence.used > 0, evidence.noise
     n, step = len(used), _middle_period(evidence) / CLOCK_TRIALS_PER_PERIOD
     furthest = min(int(1e-6 * LARGEST_PPM * n / step), MOST_CLOCK_TRIALS)
@@ -119,7 +130,8 @@ def _best_drift(evidence: Evidence) -> float:
 
 
 def _middle_period(evidence: Evidence) -> float:
-    """Samples."""
+    """Period, in samples, below and above whose frequency half of the predicted response's power lies; channels are
+    weighted by their noise."""
     moving: FloatArray = (evidence.predicted - evidence.predicted.mean(axis=0)) / evidence.noise
     power = np.cumsum(np.sum(np.abs(np.fft.rfft(moving, axis=0)) ** 2, axis=1))
     return len(moving) / max(int(np.searchsorted(power, power[-1] / 2)), 1)

@@ -1,4 +1,4 @@
-"""Time limits of a search; what was found until then is the result."""
+"""Time limits of a search. A search that reaches its limit ends with what it has found so far."""
 
 from collections.abc import Callable, Iterable
 from functools import wraps
@@ -13,7 +13,7 @@ OUT_OF_TIME = (
 
 
 class OutOfTimeError(Exception):
-    """Raised within the search, and caught by it."""
+    """Raised within the search where the time is over, and caught by it."""
 
 
 def always() -> bool:
@@ -22,9 +22,10 @@ def always() -> bool:
 
 
 class CountedBudget:
-    """A TimeBudget that ends after so many questions, so that the same work is done on every machine."""
+    """A `TimeBudget` that ends after a number of calls, so that the same work is done on every machine."""
 
     def __init__(self, most: int) -> None:
+        """most: number of calls that return True."""
         self._most, self._asked = most, count()
 
     def __call__(self) -> bool:
@@ -32,10 +33,11 @@ class CountedBudget:
 
 
 def limit_map(map_: Mapper, time_left: TimeBudget) -> Mapper:
-    """The same map; raises OutOfTimeError before a piece of work that would begin after the time limit.
+    """The map with a time limit; it raises OutOfTimeError before a piece of work that would begin after the limit.
 
-    Where pieces are worked on in other processes, a count is asked here again, for what was asked there: each counts
-    once. A clock is not: pieces that began in time are kept, however late they are done.
+    Pieces may run in other processes, which have copies of the budget. The calls made there are returned with the
+    results, and a `CountedBudget` is called as often again here, so that each call counts once. A clock is not called
+    again: pieces that began in time are kept, however late they end.
     """
     asked = [0]
 

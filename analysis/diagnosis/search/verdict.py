@@ -1,4 +1,7 @@
-"""The verdict on a finished search: no mismatch, wrong parameters, named physics, or unexplained; and remarks on it."""
+"""The verdict on a finished search: no mismatch, wrong parameters, named physics, or unexplained; and remarks on it.
+
+Errors are rms errors over rms noise (`FitScore`). The limits are in `settings`, section "The verdict".
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -60,7 +63,7 @@ class Judgement:
 
     verdict: Verdict
     named: bool
-    """The effects of `Explanation.after` are to be named."""
+    """Whether the effects of `Explanation.after` may be named."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,10 +72,11 @@ class Unconfirmed:
 
     hypothesis: Hypothesis
     gain: float
-    """Share of the held-out error power that goes with it."""
+    """Share of the held-out error power that the effect removes."""
     why_not: str
+    """Reason why it is not named, in words."""
     claim: int = -1
-    """Which of the hypothesis's effects is meant."""
+    """Index of the effect among the hypothesis's claims."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,18 +84,20 @@ class SearchResult:
     """Result of a search: the fits, the verdict, and candidates that are not named."""
 
     context: SearchContext
-    """The search's shared state, with the roles of samples as used in the end."""
+    """The search's shared state, with the final roles of the samples (fit, choose, test)."""
     found: Explanation
     judgement: Judgement
     remarks: tuple[str, ...] = ()
+    """Sentences for the user."""
     errors: FloatArray | None = None
-    """`final_errors`, where the search needed them."""
+    """Standard errors of the final fit (`final_errors`), where the search needed them."""
     unconfirmed: tuple[Unconfirmed, ...] = ()
-    """The largest gain first."""
+    """Effects that were found and are not named, the largest gain first."""
 
 
 def judge(found: Explanation) -> Judgement:
-    """The verdict by the samples to fit and to choose by; held-out ones can only withdraw a name, or `explained`."""
+    """The verdict by the errors on the samples to fit and to choose by. Held-out samples can only withdraw names
+    (`_is_confirmed`), or turn "explained" into "partly_explained" or "unexplained"."""
     if not found.after.fitted.hypothesis.claims or not _is_confirmed(found):
         if found.before.score.worst_channel <= NOISE_ALONE:
             return Judgement("no_mismatch", False)
@@ -106,7 +112,7 @@ def judge(found: Explanation) -> Judgement:
 
 
 def search_remarks(found: Explanation) -> tuple[str, ...]:
-    """Sentences for the user: what the search did not do, and what it found and does not name."""
+    """Sentences for the user: that time ran out, and which effects were found but are not named."""
     early = (OUT_OF_TIME,) if found.ended_early else ()
     barred = (ONLY_REFINES,) if found.barred else ()
     undetermined = (
@@ -117,19 +123,21 @@ def search_remarks(found: Explanation) -> tuple[str, ...]:
 
 
 def as_good_as_noise(found: Explanation) -> bool:
-    """Whether little more than noise is left, on the samples to fit and to choose by."""
+    """Whether the error on the samples to fit and to choose by is little more than noise (`leaves_little`)."""
     return leaves_little(found.retuned, found.after)
 
 
 def worth_naming(found: Explanation) -> bool:
-    """Whether the effects are worth a name beside a remainder, on the samples to fit and to choose by."""
+    """Whether the effects are named although a mismatch remains: the error is at most `NAMED_ERROR`, or they take
+    `NAMED_SHARE` of the mismatch, or they lower the mean log error by `NAMED_GAIN`."""
     taken = found.retuned.score.mean_log_error - found.after.score.mean_log_error
     share = share_of_mismatch(found.retuned, found.after)
     return found.after.score.worst_channel <= NAMED_ERROR or share >= NAMED_SHARE or taken >= NAMED_GAIN
 
 
 def _is_confirmed(found: Explanation) -> bool:
-    """Whether the held-out samples confirm the explanation; yes where nothing was held out."""
+    """Whether the explanation lowers the mean logarithm of the held-out errors by at least `CONFIRMED_SHARE` of it;
+    also true where that is at most `HELD_OUT_TOO_SMALL`, or where nothing was held out."""
     whole, left = (float(np.mean(np.log(candidate.score.test))) for candidate in (found.retuned, found.after))
     if not np.isfinite(whole):
         return True
@@ -137,7 +145,8 @@ def _is_confirmed(found: Explanation) -> bool:
 
 
 def confirms_addition(without: FittedCandidate, with_it: FittedCandidate) -> bool:
-    """Whether the held-out samples, in their worst channel without it, confirm what `with_it` adds to a name."""
+    """Whether the held-out samples confirm what `with_it` adds to `without`: the logarithm of the worst channel's
+    error, above `HELD_OUT_ALONE_ERROR` without the addition, falls by at least `CONFIRMED_SHARE`."""
     worst = float(np.max(without.score.test))
     if not np.isfinite(worst) or worst <= HELD_OUT_ALONE_ERROR:
         return False
@@ -152,7 +161,8 @@ def shares_taken(without: FittedCandidate, steps: Sequence[FittedCandidate]) -> 
 
 
 def may_move_further(result: SearchResult) -> bool:
-    """Whether a mismatch is left, or three effects were needed, where a model was re-tuned as far as it may."""
+    """Whether to search with a wider bound: a mismatch remains or three effects were needed, and a parameter of the
+    model is at its bound. Never with certain effects, reference recordings, or band powers."""
     context, found = result.context, result.found
     verdict, ends = result.judgement.verdict, (found.retuned, *found.steps, found.after)
     left = verdict in ("unexplained", "partly_explained")
@@ -162,8 +172,8 @@ def may_move_further(result: SearchResult) -> bool:
 
 
 def is_plainer(again: SearchResult, result: SearchResult) -> bool:
-    """Whether a search with a wider bound explains, by effects or by parameters alone, what the first does not, or by
-    fewer effects; by a model that is possible, and away from the wider bound."""
+    """Whether a search with a wider bound explains the recordings, by effects or by parameters alone, and the first
+    does not or needs more effects; with a physically possible model (`Tuning.is_possible`) inside the wider bound."""
     found, tuning = again.found, again.context.tuning
     if result.judgement.verdict == "explained" and len(found.steps) >= len(result.found.steps):
         return False

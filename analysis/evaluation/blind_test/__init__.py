@@ -1,6 +1,7 @@
-"""Scoring of a diagnosis' answers to blind cases.
+"""Scores a diagnosis on blind cases: simulated or real devices whose missing effects are concealed from it.
 
-`outcome` (one case, revealed) -> `confidence_intervals` (shares, medians and means) -> `calibration`, `detection`,
-`follow_up` -> `score` (a bank); `judge_control`, `injected` and `lab_kit` judge controls, injected faults and a lab's
-own test. Begin at `score.py`.
+Order of the data: `outcome` (a case after its label is revealed), `confidence_intervals` (shares, medians and means),
+then `calibration` (stated probabilities), `detection` (thresholds) and `follow_up` (a further recording), collected by
+`score` for a whole bank. `controlled` and `injected` judge control cases and injected faults, `lab_kit` a laboratory's
+own test, and `wording` puts results in sentences. Begin at `score.py`.
 """

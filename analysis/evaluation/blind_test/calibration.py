@@ -1,4 +1,9 @@
-"""Calibration of stated probabilities: reliability in bins of equal count."""
+"""Calibration of stated probabilities: reliability curve and expected calibration error, in bins of equal count.
+
+    error = sum over bins of |sum of stated probabilities - number of right names| / number of names
+
+Its interval is the percentile bootstrap over names (2.5 and 97.5 %).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +17,8 @@ from equalizer.signals.signal import FloatArray
 BINS = 10
 """Bins of the calibration curve, with equally many answers each."""
 TIED = 3
-"""Decimals to which probabilities are compared. Names that tie share their right answers equally, in any bin."""
+"""Decimals to which probabilities are rounded for comparison. Names of equal probability share their right answers
+equally, so that the bin into which each falls does not matter."""
 ANSWERABLE = ("nothing", "single", "pair")
 """Kinds whose answer is in the catalogue, to which the stated probabilities refer."""
 
@@ -22,12 +28,15 @@ class Bin:
     """A bin of names with similar stated probabilities, and the share of these names that are right."""
 
     stated: float
-    """Mean probability of its names."""
+    """Mean stated probability of its names."""
     right: float
+    """Share of its names that are right."""
     low: float
+    """Lower end of Wilson's 95 % interval of `right`."""
     high: float
-    """95 % of `right`, after Wilson."""
+    """Upper end of that interval."""
     of: int
+    """Number of its names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +52,8 @@ class Calibration:
 
 
 def calibration(outcomes: Sequence[Outcome], kinds: Sequence[str] = ANSWERABLE) -> Calibration:
-    """Calibration over all named effects: a name is right where the device has the effect, at any axis."""
+    """Calibration over all named effects of the cases of these kinds: a name is right where the device has the effect,
+    at any axis."""
     named = [(outcome, effect) for outcome in outcomes if outcome.kind in kinds for effect in outcome.named]
     if not named:
         return Calibration(None, None, None, ())
@@ -55,17 +65,19 @@ def calibration(outcomes: Sequence[Outcome], kinds: Sequence[str] = ANSWERABLE) 
 
 
 def _split_bins(stated: FloatArray) -> list[np.ndarray[tuple[int], np.dtype[np.int64]]]:
+    """Indices of the names in each bin, in rising order of probability; at most `BINS`, none empty."""
     order = np.argsort(stated, kind="stable")
     return [part for part in np.array_split(order, BINS) if len(part)]
 
 
 def _calibration_error(stated: FloatArray, right: FloatArray) -> float:
+    """Expected calibration error by the equation of this file. right: 1 for a right name, else 0."""
     even = _average_ties(stated, right)
     return float(sum(abs(stated[part].sum() - even[part].sum()) for part in _split_bins(stated)) / len(stated))
 
 
 def _average_ties(stated: FloatArray, right: FloatArray) -> FloatArray:
-    """Share of right answers among those of equal stated probability, (n,): ties are averaged."""
+    """(n,): for each name, the share of right names among those with the same stated probability."""
     _, group = np.unique(np.round(stated, TIED), return_inverse=True)
     mean: FloatArray = np.bincount(group, weights=right) / np.bincount(group)
     return np.asarray(mean[group])

@@ -1,4 +1,7 @@
-"""Outcomes of ambiguous answers after one further recording, proposed or drawn at random."""
+"""Outcomes of ambiguous answers after one further recording, either proposed by the diagnosis or drawn at random.
+
+The comparison shows whether the proposed recordings discriminate rivals better than chance.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,20 +11,22 @@ from analysis.evaluation.blind_test.confidence_intervals import Figure, share
 
 @dataclass(frozen=True, slots=True)
 class FollowUp:
-    """A device with a single effect, whose first recording left several names."""
+    """A device with a single concealed effect, whose first recording left several names."""
 
     number: int
+    """Number of the case in its bank."""
     effect: str
-    """The concealed one."""
+    """Name of the concealed effect."""
     returned: tuple[str, ...]
     """Effects that were returned before the follow-up."""
     proposed: str
     """Proposed recording, in the diagnosis's words; empty where no recording of its menu would discriminate."""
     after_proposed: tuple[str, ...]
-    """The returned set with that recording beside the first; empty where none was proposed."""
+    """Effects returned from both recordings, the first and the proposed one; empty where none was proposed."""
     drawn: str
     """A recording drawn at random from the menu; it may be the proposed one."""
     after_drawn: tuple[str, ...]
+    """Effects returned from both recordings, the first and the drawn one."""
 
     @property
     def resolved(self) -> bool:
@@ -35,8 +40,8 @@ class FollowUp:
 
 
 def follow_up_figures(found: Sequence[FollowUp]) -> tuple[Figure, ...]:
-    """Shares of ambiguous answers that a further recording resolved, proposed or random: of all, and of those with a
-    proposal."""
+    """Shares of ambiguous answers that the proposed or the random recording resolved: of all answers, and of those with
+    a proposal."""
     asked = [each for each in found if each.proposed]
     return (
         share("several names, the right one left by the proposed recording", found, lambda each: each.resolved),

@@ -1,4 +1,10 @@
-"""Relative error of a discovered law against the true one, along motion that no recording contains."""
+"""Relative error of a discovered law against the true law, along a simulated motion that no recording contains.
+
+    error = |P (f_true - f_found)| / |P f_true|        on each axis with a true law; the worst axis counts
+
+f: contribution of the laws over the samples; P: projection onto the complement of the columns that the model itself
+fits: acceleration, velocity, position and a constant for forces; acceleration and a constant for readings.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,24 +18,26 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreshMotion:
-    """(samples,) each, SI, by the names that laws use: x, vx, ax, fx, ..., t."""
+    """Simulated motion with the contributions of the true laws."""
 
     columns: Mapping[str, FloatArray]
+    """(samples,) each, SI, by the names of variables in laws: x, vx, ax, fx, ..., t."""
     added: Mapping[str, FloatArray]
-    """Contribution of the true laws to each axis's force (N) or reading (m/s^2), by axis."""
+    """(samples,) each, by letter of the axis: contribution of the true laws to its force (N) or reading (m/s^2)."""
     response: bool
     """Whether `added` belongs to the reading, not to the force."""
     rate_hz: float
 
 
 def law_error(laws: Sequence[Law], fresh: FreshMotion) -> float:
-    """Relative rms error on the worst axis that has a true law; inf where a law gives no finite number. Mass, damping,
-    stiffness and a constant of that axis (of a reading: a gain and a constant) are projected out, because the model
-    fits them itself."""
+    """The relative error of the module's equation, on the worst axis that has a true law; inf where a found law gives
+    a number that is not finite. laws: the found laws."""
     return max(_axis_error(laws, fresh, axis) for axis in fresh.added)
 
 
 def _axis_error(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
+    """The relative error on one axis. A law that replaces a command or a response contributes its difference from
+    it."""
     true, found = fresh.added[axis], np.zeros(len(fresh.added[axis]))
     for law in laws:
         if law.axis[-1] != axis or (law.acts_on == "response") != fresh.response:
@@ -51,10 +59,12 @@ def _axis_error(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
 
 
 def _begin_at_rest(fresh: FreshMotion) -> Mapping[str, FloatArray]:
-    """The signals with a sample of rest before them: what a law remembers began there, as the device did."""
+    """The signals preceded by a sample of zeros, because the states of laws with memory start at rest, as the simulated
+    device did."""
     columns = {name: np.concatenate([[0.0], column]) for name, column in fresh.columns.items()}
     return columns | {"t": np.concatenate([[fresh.columns["t"][0] - 1 / fresh.rate_hz], fresh.columns["t"]])}
 
 
 def _normalise(column: FloatArray) -> FloatArray:
+    """The column with a Euclidean norm of 1, so that units do not affect the QR decomposition."""
     return np.asarray(column / max(float(np.linalg.norm(column)), 1e-300))

@@ -1,4 +1,7 @@
-"""Outcome of a single case of a bank of laws: the concealed law, the diagnosis, and its error."""
+"""Outcome of a single case of a bank of laws: the concealed law, the diagnosis, and the error of the law it found.
+
+An answer is right if its structure is (place, axis, variables, memory) and its function is within `CLOSE`.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,32 +12,38 @@ from equalizer.effects.discovered_law import has_memory
 from equalizer.laws.law import Law, law_of
 
 CLOSE = 0.05
-"""Relative error up to which a law counts as the same function."""
+"""Relative error (`law_error`) up to which a law counts as the concealed function."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrueLaw:
-    """The law that was concealed in a case: formula, axes, numbers, and all forms of it that count as right."""
+    """The law that was concealed in a case: formula, axes, parameters, and all forms of it that count as right."""
 
     law: str
+    """Name of the law."""
     formula: str
     axes: tuple[str, ...]
+    """Letters of the axes at which it acts."""
     acts_on: tuple[str, ...]
     """Ways in which it can be expressed: as a force, a command or a response."""
     variables: tuple[tuple[str, ...], ...]
-    """Per axis, all readings of it: variables, sorted, with spaces between."""
+    """Per axis, the sets of variables that count as right: each as sorted names, separated by spaces."""
     memory: bool
+    """Whether the law has states, such as a hysteresis."""
     numbers: Mapping[str, float]
+    """Its parameters, by name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawOutcome(AnsweredCase):
-    """A case of a bank of laws. kind: law, nothing, decoy (an effect of the catalogue) or mode (a linear one)."""
+    """A case of a bank of laws. kind: law, nothing, decoy (an effect of the catalogue) or mode (a linear mode)."""
 
     concealed: str
+    """What was concealed, by name."""
     truth: TrueLaw | None
+    """The concealed law; None where no law was concealed."""
     errors: tuple[float, ...] = ()
-    """Error of the reported laws (`law_error`): in the visited range, and at a higher level."""
+    """Errors of `laws` (`law_error`): first in the visited range, then at a higher level; empty where not computed."""
 
     @property
     def named(self) -> tuple[Law, ...]:
@@ -48,34 +57,34 @@ class LawOutcome(AnsweredCase):
 
     @property
     def laws(self) -> tuple[Law, ...]:
-        """Named, or where none is, the candidates."""
+        """The named laws; the candidates where none is named."""
         return self.named or self.candidates
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the effects that the catalogue holds."""
+        """Names of the named effects that are in the catalogue."""
         return (
             () if self.diagnosis is None else tuple(each.effect for each in self.diagnosis.effects if each.law is None)
         )
 
     @property
     def structured(self) -> bool:
-        """Place, axis, variables and memory are right."""
+        """Whether place, axis, variables and memory of `laws` are right."""
         return self.truth is not None and bool(self.laws) and _has_true_structure(self.laws, self.truth)
 
     @property
     def close(self) -> bool:
-        """Whether `laws` are the concealed function, within `CLOSE` over the visited range."""
+        """Whether the error of `laws` is at most `CLOSE` in the visited range."""
         return bool(self.laws) and bool(self.errors) and self.errors[0] <= CLOSE
 
     @property
     def close_louder(self) -> bool:
-        """Whether `laws` are the concealed function, within `CLOSE` at a higher level than recorded."""
+        """Whether the error of `laws` is at most `CLOSE` at a higher level than recorded."""
         return bool(self.laws) and len(self.errors) > 1 and self.errors[1] <= CLOSE
 
     @property
     def wrongly_explained(self) -> bool:
-        """A law is named as the explanation although nothing is there, or a law of another structure."""
+        """Whether a law is named with the verdict "explained" although its structure is wrong, or no law is present."""
         return bool(self.named) and self.verdict == "explained" and not self.structured
 
     @property
@@ -85,18 +94,20 @@ class LawOutcome(AnsweredCase):
 
     @property
     def missed(self) -> bool:
-        """Whether the answer is wrong: the diagnosis failed, named a false law, explained wrongly, or returned a law
-        that shows with another structure or function, or not at all."""
+        """Whether the answer is wrong: the diagnosis failed, named a law where there is none, or explained wrongly; or
+        the concealed law is detectable, and no law of its structure and function was returned."""
         if self.diagnosis is None or self.false_law or self.wrongly_explained:
             return True
         return self.truth is not None and self.detectable and not (self.structured and self.close)
 
 
 def _collect_laws(found: Sequence[NamedEffect] | Sequence[Candidate]) -> tuple[Law, ...]:
+    """The laws among effects or candidates of the document."""
     return tuple(law_of(each.law.expression, each.law.acts_on, each.law.axis) for each in found if each.law is not None)
 
 
 def _has_true_structure(laws: Sequence[Law], truth: TrueLaw) -> bool:
+    """Whether the laws act at the true axes and, per axis, have the true variables, memory and place of action."""
     laws_by_axis = {axis: [law for law in laws if law.axis[-1] == axis] for axis in {law.axis[-1] for law in laws}}
     if set(laws_by_axis) != set(truth.axes):
         return False

@@ -1,4 +1,8 @@
-"""Score of a bank of laws: shares of right and wrong answers, each with its interval."""
+"""Score of a bank of laws: shares of right and wrong answers, each with its 95 % interval.
+
+Cases with a concealed law count for naming only where its effect is detectable (`outcome.DETECTABLE`). False alarms are
+counted on devices without a missing effect, and on decoys: devices with an effect of the catalogue or a linear mode.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,8 +22,8 @@ class LawScore:
 
 
 def law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
-    """Score of a bank: rates over cases with a law, with nothing missing and with decoys, and median processor
-    seconds."""
+    """Score of a bank: rates over cases with a law, without a missing effect and with decoys, and the median processor
+    time (s)."""
     laws = [each for each in outcomes if each.truth is not None]
     shown = [each for each in laws if each.detectable]
     nulls = [each for each in outcomes if each.kind == "nothing"]
@@ -45,4 +49,5 @@ def law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
 
 
 def _is_explained_by_other_effect(outcome: LawOutcome) -> bool:
+    """Whether the verdict is "explained" by effects of the catalogue, without a law."""
     return outcome.verdict == "explained" and bool(outcome.names) and not outcome.named

@@ -1,4 +1,8 @@
-"""Document of a reproduction: the content of `reproduction.json`, format `hapteq-reproduction`, version 1."""
+"""Document of a reproduction: the content of `reproduction.json`, format `hapteq-reproduction`, version 1.
+
+Each published figure comes with its findings: what the paper reports, the reproduced value, and the rule by which it
+counts as reproduced. Units are part of the names, or of the descriptions, which also appear in the JSON Schema.
+"""
 
 import json
 from typing import Annotated, Any, Literal
@@ -96,14 +100,14 @@ class Reproduction:
 
 
 def reproduction_to_json(reproduction: Reproduction) -> dict[str, Any]:
-    """Plain values, without format and version."""
+    """The document as plain values for JSON, without format and version."""
     plain: dict[str, Any] = _ADAPTER.dump_python(reproduction, mode="json")
     return plain
 
 
 def reproduction_from_json(document: dict[str, Any]) -> Reproduction:
-    """Parse the document of a reproduction. document: without format and version. Raises ReproductionError with every
-    problem, by its place."""
+    """Parse the document of a reproduction. document: plain values without format and version. Raises ReproductionError
+    with a sentence per problem that begins with its place in the document."""
     try:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
@@ -113,7 +117,7 @@ def reproduction_from_json(document: dict[str, Any]) -> Reproduction:
 
 
 def reproduction_schema() -> dict[str, Any]:
-    """JSON Schema of what `reproduction_to_json` gives."""
+    """JSON Schema of the values that `reproduction_to_json` returns."""
     return _ADAPTER.json_schema(mode="serialization")
 
 

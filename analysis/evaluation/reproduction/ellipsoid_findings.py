@@ -1,4 +1,7 @@
-"""Figure 3 compared with the acceleration ellipses of the simulated device."""
+"""Findings on the published figure 3: off-axis motion by frequency, from acceleration ellipses of the simulated device.
+
+Coupling is the ratio of off-axis to along-axis amplitude at the driven frequency (`PhasorEllipse.off_axis_ratio`).
+"""
 
 from collections.abc import Sequence
 
@@ -7,7 +10,7 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.wording import number
 
 ALIKE = 1.25
-"""Largest ratio of couplings that count as nearly the same."""
+"""Largest ratio of the largest to the smallest coupling that counts as "nearly the same"."""
 
 _DIFFERS = (
     "The simulated device's mount was given its modes so that the coupling follows the published one over frequency: "
@@ -21,7 +24,8 @@ _DIFFERS = (
 
 
 def ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
-    """Findings on the published figure 3: off-axis motion by frequency, beside the simulated device."""
+    """Findings on the published figure 3. results: an ellipse per frequency; a finding that needs frequencies which are
+    absent is left out."""
     coupling = {
         result.frequency_hz: result.phasor.off_axis_ratio
         for result in results
@@ -45,6 +49,7 @@ def ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
 
 
 def _find_coupling(result: EllipsoidResult) -> Finding:
+    """Coupling and shape of the ellipse at one frequency, without a judgement: the paper prints no number."""
     ratio, axes = result.phasor.off_axis_ratio, result.moments.normalised_axes
     along = "" if ratio is None else f"off the direction over along it {100 * ratio:.0f} %; "
     return Finding(
@@ -58,6 +63,7 @@ def _find_coupling(result: EllipsoidResult) -> Finding:
 
 
 def _low_frequency_finding(coupling: dict[float, float]) -> Finding | None:
+    """Whether coupling is nearly the same at 5, 10 and 15 Hz. coupling: by frequency in Hz."""
     low = [coupling[f] for f in (5.0, 10.0, 15.0) if f in coupling]
     if len(low) < 2:
         return None
@@ -74,6 +80,7 @@ def _low_frequency_finding(coupling: dict[float, float]) -> Finding | None:
 
 
 def _high_frequency_finding(coupling: dict[float, float]) -> Finding | None:
+    """Whether coupling at 35 Hz is less than at 25 Hz. coupling: by frequency in Hz."""
     if not {25.0, 35.0} <= coupling.keys():
         return None
     ratio = coupling[35.0] / coupling[25.0]

@@ -1,4 +1,8 @@
-"""Figure 5 compared with the equalized response of the simulated device."""
+"""Findings on the published figure 5: the response of the simulated device with and without the equalizer.
+
+The paper reports that equalization removes the resonance near 11 Hz, reduces coupling peaks by up to a factor of ten,
+and keeps the response fairly flat near the edge of the workspace. Flatness and coupling: `played_response`.
+"""
 
 from dataclasses import dataclass
 
@@ -10,41 +14,46 @@ from analysis.wording import number
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 RESONANCE_HZ = (9.0, 14.0)
-"""Range around the published resonance at 11 Hz."""
+"""Range around the published resonance near 11 Hz."""
 REMOVED = 1 / 3
-"""Share of a resonance's height in dB up to which it counts as essentially removed."""
+"""Largest remaining share of a resonance's height in dB that counts as "essentially removed"."""
 ORDER_DB = (10.0, 30.0)
-"""About a factor of ten."""
+"""Reductions of the coupling peaks, in dB, that count as an order of magnitude (20 dB)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EqualizedRows:
-    """The rows of figure 5, all from swept sines, and two of friction. Forces are scaled by their mean gain."""
+    """The rows of figure 5, all played with swept sines, and two rows on friction, played with a multisine. The
+    responses without an equalizer are normalised by their mean gain (`normalise_gain`)."""
 
     plain: PlayedResponse
+    """At the centre, without the equalizer."""
     equalized: PlayedResponse
+    """At the centre, with the equalizer."""
     edge_plain: PlayedResponse
+    """Near the edge of the workspace, without the equalizer."""
     edge: PlayedResponse
-    """Results with the model of the centre."""
+    """Near the edge, equalized with the model of the centre."""
     edge_blended: PlayedResponse
-    """Results with blended forces of models from other places."""
+    """Near the edge, with forces blended from the models of other places."""
     broad: PlayedResponse
-    """Result at the centre, all frequencies at once."""
+    """At the centre, equalized, all frequencies at once (multisine)."""
     frictionless: PlayedResponse
-    """The same on the device without friction, with a model identified on that."""
+    """As `broad`, on the device without friction, with a model identified on that device."""
 
     @property
     def drawn(self) -> tuple[PlayedResponse, ...]:
-        """Rows drawn as figure 5."""
+        """The rows that are drawn as figure 5."""
         return self.plain, self.equalized, self.edge, self.edge_blended
 
     @property
     def of_friction(self) -> tuple[PlayedResponse, ...]:
-        """Rows of the picture on friction: swept sine, all frequencies at once, device without friction."""
+        """The rows of the figure on friction: swept sine, multisine, and multisine on the device without friction."""
         return self.equalized, self.broad, self.frictionless
 
     @property
     def all(self) -> tuple[PlayedResponse, ...]:
+        """All rows, in the order of the table."""
         return (
             self.plain, self.equalized, self.edge_plain, self.edge, self.edge_blended, self.broad, self.frictionless,
         )  # fmt: skip
@@ -53,8 +62,8 @@ class EqualizedRows:
 def find_equalized(
     rows: EqualizedRows, held_out: tuple[float, float] | None, remarks: tuple[str, ...] = ()
 ) -> FigureFindings:
-    """Findings of figure 5. held_out: error of the centre's model on what was kept from it, and the same of the device
-    without friction."""
+    """Findings on figure 5. held_out: relative error of the centre's model on a multisine that was not fitted, and the
+    same for the device without friction; None = not computed. remarks: of the analyses."""
     findings = (
         _resonance(rows),
         _peaks(rows),
@@ -93,6 +102,7 @@ _DIFFERS = (
 
 
 def _resonance(rows: EqualizedRows) -> Finding:
+    """Whether the resonance near 11 Hz is essentially removed: its height falls to at most `REMOVED` in dB."""
     before, after = _height_db(rows.plain), _height_db(rows.equalized)
     low, high = RESONANCE_HZ
     return Finding(
@@ -107,6 +117,7 @@ def _resonance(rows: EqualizedRows) -> Finding:
 
 
 def _peaks(rows: EqualizedRows) -> Finding:
+    """Whether the largest reduction of a coupling peak at the centre is about an order of magnitude (`ORDER_DB`)."""
     fall = _peaks_db(rows.plain.response) - _peaks_db(rows.equalized.response)
     low, high = ORDER_DB
     return Finding(
@@ -133,6 +144,7 @@ def _worst_coupling(what: str, before: PlayedResponse, after: PlayedResponse) ->
 
 
 def _edge_flat(rows: EqualizedRows) -> Finding:
+    """Whether the model of the centre at least halves the deviation from flatness (dB) near the edge."""
     before, after = describe_played(rows.edge_plain).flatness_db, describe_played(rows.edge).flatness_db
     return Finding(
         what="Flatness at the edge, model of the centre",
@@ -147,6 +159,7 @@ def _edge_flat(rows: EqualizedRows) -> Finding:
 
 
 def _edge_coupling(rows: EqualizedRows) -> Finding:
+    """Whether the reduction of coupling near the edge is positive, and less than half of that at the centre, in dB."""
     before, after = describe_played(rows.edge_plain).coupling_db, describe_played(rows.edge).coupling_db
     centre = describe_played(rows.plain).coupling_db - describe_played(rows.equalized).coupling_db
     return Finding(
@@ -200,7 +213,7 @@ def _held_out_finding(held_out: tuple[float, float] | None) -> Finding | None:
 
 
 def _height_db(played: PlayedResponse) -> float:
-    """Height of the resonance in dB, on the worst axis."""
+    """Height of the resonance in dB: range of the level within `RESONANCE_HZ` along an axis, of the worst axis."""
     low, high = RESONANCE_HZ
     near = (played.frequency_hz >= low) & (played.frequency_hz <= high)
     level = 20 * np.log10(np.abs(np.einsum("lii->li", played.response[near])))
@@ -208,7 +221,8 @@ def _height_db(played: PlayedResponse) -> float:
 
 
 def _peaks_db(response: ComplexArray) -> FloatArray:
-    """(axes (axes - 1),): the highest point of every off-axis channel."""
+    """(axes (axes - 1),): largest magnitude of each off-axis channel over frequency, in dB. response: (lines, axes,
+    axes)."""
     off = ~np.eye(response.shape[1], dtype=bool)
     peaks: FloatArray = 20 * np.log10(np.abs(response).max(axis=0)[off])
     return peaks

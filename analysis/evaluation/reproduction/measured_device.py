@@ -1,4 +1,7 @@
-"""Results of sweeps over the whole frequency range: transfer functions, resonances, coupling onset."""
+"""Results of sweeps over the whole frequency range of a device: transfer functions, resonances and coupling onset.
+
+They are the input of the findings on the published figures 4 and 1 (`response_findings`).
+"""
 
 from dataclasses import dataclass
 
@@ -12,5 +15,7 @@ class MeasuredDevice:
     """Measured frequency response of a device, with the resonances and the coupling onset found in it."""
 
     response: FrequencyResponse
+    """Transfer functions from each force to each acceleration."""
     resonances: tuple[Resonance, ...]
     onset: CouplingOnset
+    """Frequency from which on the axes couple."""

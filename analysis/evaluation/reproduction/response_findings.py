@@ -1,4 +1,8 @@
-"""Figures 4 and 1 compared with the transfer functions of the simulated device."""
+"""Findings on the published figures 4 and 1, from the transfer functions of the simulated device.
+
+Figure 4 shows the transfer functions from every force to every acceleration, figure 1 the frequency bands that follow
+from the onset of coupling and from the limit of direction perception. Frequencies are compared within `NEAR`.
+"""
 
 from collections.abc import Sequence
 
@@ -13,11 +17,11 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.frequency_response.resonances import COUPLING, Resonance
 
 NEAR = 0.2
-"""Largest relative difference of frequencies that count as near each other."""
+"""Largest relative difference of two frequencies that count as near each other."""
 SLOPE_HZ = (4.5, 9.0)
-"""Range below the resonance in which the slope is measured."""
+"""Range below the resonance in which the slope along the axes is measured."""
 LARGE = 3.0
-"""Ratio to the median in the middle band from which a resonance counts as large."""
+"""Ratio of the gain to its median from 15 to 60 Hz, above which a resonance counts as large."""
 
 _GEOMETRY = (
     "Link lengths, inertias, friction and modes of the omega.3 are not public. The simulated device is of its size; a "
@@ -29,7 +33,7 @@ _GEOMETRY = (
 def response_findings(
     response: FrequencyResponse, resonances: Sequence[Resonance], onset: CouplingOnset
 ) -> FigureFindings:
-    """Figure 4. response: as estimated from sweeps over the whole range."""
+    """Findings on figure 4. response: transfer functions estimated from sweeps over the whole frequency range."""
     findings = (
         _low_resonance(resonances),
         _large_resonances(response, resonances),
@@ -56,7 +60,8 @@ def response_findings(
 
 
 def band_findings(bands: Sequence[FrequencyBand], limit_hz: float | None, used_limit_hz: float) -> FigureFindings:
-    """Figure 1. limit_hz: what figure 2's thresholds gave here, None where nothing; used_limit_hz: what was drawn."""
+    """Findings on figure 1. limit_hz: limit of direction perception from the thresholds of figure 2, None where they
+    give none. used_limit_hz: the limit that was drawn."""
     published = {"low": "up to about 10 Hz", "middle": "about 10 to 35 Hz", "high": "from 35 Hz on"}
     edges = {"low": (None, 10.0), "middle": (10.0, 35.0), "high": (35.0, None)}
     found = [_band(band, published[band.name], edges[band.name]) for band in bands]
@@ -82,10 +87,12 @@ def band_findings(bands: Sequence[FrequencyBand], limit_hz: float | None, used_l
 
 
 def _is_near(value: float, published: float) -> bool:
+    """Whether a value differs from the published one by at most the share `NEAR` of it."""
     return abs(value - published) <= NEAR * published
 
 
 def _low_resonance(resonances: Sequence[Resonance]) -> Finding:
+    """Whether there is a resonance near 11 Hz that couples the axes; the most prominent one counts."""
     low = [resonance for resonance in resonances if _is_near(resonance.frequency_hz, 11.0)]
     found = max(low, key=lambda each: each.prominence_db, default=None)
     couples = found is not None and COUPLING in found.seen_in
@@ -105,6 +112,7 @@ def _low_resonance(resonances: Sequence[Resonance]) -> Finding:
 
 
 def _large_resonances(response: FrequencyResponse, resonances: Sequence[Resonance]) -> Finding:
+    """Whether the first large resonance is near 80 Hz. Gain: largest singular value of the response matrix."""
     gain = np.linalg.norm(response.response, ord=2, axis=(1, 2))
     middle = (response.frequency_hz >= 15) & (response.frequency_hz <= 60) & response.reliable
     level = float(np.median(gain[middle])) if middle.any() else np.inf
@@ -127,6 +135,7 @@ def _large_resonances(response: FrequencyResponse, resonances: Sequence[Resonanc
 
 
 def _onset(onset: CouplingOnset) -> Finding:
+    """Whether coupling begins near 10 Hz."""
     here = "no coupling was found"
     if onset.frequency_hz is not None:
         between = "" if onset.interval_hz is None else " (95 %: {:.2f} to {:.2f} Hz)".format(*onset.interval_hz)
@@ -143,6 +152,7 @@ def _onset(onset: CouplingOnset) -> Finding:
 
 
 def _slope(response: FrequencyResponse) -> Finding | None:
+    """Slope in dB per octave of the mean gain along the axes, by a line fit; None with fewer than 3 reliable lines."""
     lines = response.within(*SLOPE_HZ)
     lines = lines.of_lines(lines.reliable)
     if len(lines) < 3:
@@ -162,6 +172,7 @@ def _slope(response: FrequencyResponse) -> Finding | None:
 
 
 def _unreliable(response: FrequencyResponse) -> Finding | None:
+    """Whether the lowest reliable line is near 3.5 Hz; None without any reliable line."""
     if not response.reliable.any():
         return None
     first = float(response.frequency_hz[response.reliable][0])
@@ -177,6 +188,7 @@ def _unreliable(response: FrequencyResponse) -> Finding | None:
 
 
 def _band(band: FrequencyBand, published: str, edges: tuple[float | None, float | None]) -> Finding:
+    """Whether a band's edges are near the published ones. edges: published, in Hz; None = not compared."""
     low, high = edges
     as_published = (low is None or _is_near(band.low_hz, low)) and (high is None or _is_near(band.high_hz, high))
     return Finding(
@@ -191,6 +203,7 @@ def _band(band: FrequencyBand, published: str, edges: tuple[float | None, float 
 
 
 def _limit(limit_hz: float | None) -> Finding:
+    """Whether the limit of direction perception is near 35 Hz."""
     return Finding(
         what="Limit of direction",
         published="35 Hz",

@@ -1,4 +1,8 @@
-"""Figure 2 compared with the study of simulated participants."""
+"""Findings on the published figure 2: thresholds of direction discrimination by frequency, from simulated participants.
+
+Group means are compared pairwise with simultaneous p-values (Tukey-Kramer, `PairDifference`). Thresholds are force
+amplitudes in N, and those at the cap are censored. The limit of direction perception follows `LIMIT_RULE`.
+"""
 
 from dataclasses import dataclass
 from statistics import mean
@@ -12,7 +16,7 @@ from analysis.wording import format_signed
 SIGNIFICANT_P = 0.05
 """Level of significance of the published analysis."""
 LIKE = 0.25
-"""Two means that differ by less than this share of the larger one are fairly similar."""
+"""Largest difference of two means, as a share of the larger mean, that counts as "fairly similar"."""
 
 LIMIT_RULE = (
     "the lowest tested frequency at which the group mean lies significantly above that of the lowest frequency and at "
@@ -32,17 +36,22 @@ _DIFFERS = (
 
 @dataclass(frozen=True, slots=True)
 class _Means:
+    """Access to the study's means, comparisons and censored thresholds by frequency."""
+
     analysis: StudyAnalysis
 
     def mean_at(self, frequency_hz: float) -> float | None:
+        """Group mean of the thresholds in N; None where no run was completed."""
         values = [value for value in self.analysis.table.groups().get(frequency_name(frequency_hz), ()) if value]
         return mean(values) if values else None
 
     def pair(self, first_hz: float, second_hz: float) -> PairDifference | None:
+        """Difference of the means at two frequencies, second minus first; None where they were not compared."""
         names = (frequency_name(first_hz), frequency_name(second_hz))
         return next((p for p in self.analysis.comparisons.pairs if (p.first, p.second) == names), None)
 
     def cut(self, frequency_hz: float) -> int:
+        """Number of thresholds that the cap censored at this frequency."""
         table = self.analysis.table
         if frequency_hz not in table.frequencies_hz:
             return 0
@@ -51,7 +60,7 @@ class _Means:
 
 
 def direction_limit_hz(analysis: StudyAnalysis) -> float | None:
-    """Direction limit by LIMIT_RULE in Hz; None where no frequency fulfils it."""
+    """Limit of direction perception in Hz by `LIMIT_RULE`; None where no tested frequency fulfils it."""
     means = _Means(analysis)
     lowest, *others = analysis.table.frequencies_hz
     for frequency_hz in others:
@@ -62,8 +71,7 @@ def direction_limit_hz(analysis: StudyAnalysis) -> float | None:
 
 
 def study_findings(analysis: StudyAnalysis) -> FigureFindings:
-    """Findings on the published figure 2: level, rise and cut of thresholds over frequency, beside the simulated
-    study."""
+    """Findings on the published figure 2: means, differences and censoring of the thresholds over frequency."""
     means = _Means(analysis)
     tested = analysis.table.frequencies_hz
     findings = [
@@ -89,6 +97,7 @@ def study_findings(analysis: StudyAnalysis) -> FigureFindings:
 
 
 def _level(means: _Means, frequency_hz: float) -> Finding:
+    """The mean threshold at one frequency, without a judgement: the paper prints no number."""
     value, cut = means.mean_at(frequency_hz), means.cut(frequency_hz)
     marks = f", {cut} of {len(means.analysis.table.subjects)} thresholds cut by the cap" if cut else ""
     return Finding(
@@ -102,6 +111,7 @@ def _level(means: _Means, frequency_hz: float) -> Finding:
 
 
 def _rise(means: _Means, low_hz: float, high_hz: float, published: str, significant: bool) -> Finding | None:
+    """Whether the mean rises between two frequencies, with the published significance at `SIGNIFICANT_P`."""
     pair, low, high = means.pair(low_hz, high_hz), means.mean_at(low_hz), means.mean_at(high_hz)
     if pair is None or low is None or high is None:
         return None
@@ -119,6 +129,7 @@ def _rise(means: _Means, low_hz: float, high_hz: float, published: str, signific
 
 
 def _find_censoring(means: _Means, analysis: StudyAnalysis) -> Finding | None:
+    """Whether the cap censors some thresholds at 35 Hz, but not all."""
     if 35.0 not in analysis.table.frequencies_hz:
         return None
     cut, all_of_them = means.cut(35.0), len(analysis.table.subjects)
@@ -134,6 +145,7 @@ def _find_censoring(means: _Means, analysis: StudyAnalysis) -> Finding | None:
 
 
 def _similar(means: _Means) -> Finding | None:
+    """Whether the means at 35 and 45 Hz are fairly similar (`LIKE`)."""
     first, second = means.mean_at(35.0), means.mean_at(45.0)
     if first is None or second is None:
         return None

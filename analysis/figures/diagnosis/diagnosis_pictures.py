@@ -1,4 +1,7 @@
-"""All figures of one diagnosis, in the order of the report."""
+"""All figures of one diagnosis, in the order of the report.
+
+Each figure is an independent piece of work, so that a figure whose drawing crashes can be left out (`Guard`).
+"""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -16,14 +19,15 @@ from analysis.figures.picture import Picture, count_in_samples
 
 
 def diagnosis_pictures(found: Findings, guard: Guard | None = None) -> tuple[Picture, ...]:
-    """Draw the figures for which there are data. guard: catches a figure whose drawing crashes, which is left out."""
+    """Draw the figures for which there are data. guard: notes crashes and leaves the figure out; without it, or while
+    it is off, exceptions propagate."""
     drawn = (guard or Guard()).parts(map, diagnosis_drawings(found))
     return tuple(picture for several in drawn for picture in several)
 
 
 def diagnosis_drawings(found: Findings) -> list[Part]:
-    """Each gives some of the pictures, and needs nothing of the others."""
-    # Where a motion is imposed and the force measured, levels are the motion's, in a unit of their own.
+    """The drawings as independent pieces of work; each returns its pictures, none where there are no data."""
+    # Where a motion is imposed and the force is measured, levels are those of the motion, and have no force unit.
     imposed = any(unit.startswith("N") for series in found.time_series for unit in series.units)
     unit = "" if imposed else found.given.system.force
     held = found.time_series, found.noise_rms, found.channel_errors
@@ -43,9 +47,11 @@ def diagnosis_drawings(found: Findings) -> list[Part]:
 
 
 def _with_time_labels(draw: Callable[[], Sequence[Picture]], timed: bool) -> Sequence[Picture]:
+    """The pictures; with labels in samples instead of seconds where the time axis is unknown."""
     return draw() if timed else [count_in_samples(picture) for picture in draw()]
 
 
 def _remainder(found: Findings) -> list[Picture]:
+    """The picture of the residual spectra; none where no samples were held out."""
     spectra = remainder_spectra(found.time_series, found.floor)
     return [remainder_picture(spectra)] if spectra else []

@@ -1,4 +1,7 @@
-"""Figure of a real recording: a held-out excerpt, measured and predicted, and the errors of all models."""
+"""Figure of a real recording: a held-out excerpt, measured and predicted, and the held-out errors of all models.
+
+Errors are rms errors relative to the signal, on a logarithmic axis; the noise is the lower limit of any model.
+"""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,11 +14,11 @@ from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREEN, GREY, ORANGE, draw_no_data_note, new_figure, plain_axes
 
 _LOWEST = 1e-4
-"""Share of the signal below which nothing is drawn."""
+"""Smallest error, relative to the signal, that is drawn; smaller ones are drawn at this value."""
 
 
 def real_picture(answer: RealAnswer) -> Picture:
-    """Picture of a recording's held-out data, with its errors as alternative text."""
+    """Picture of a recording's held-out data, with the errors as its text for screen readers."""
     rows = error_rows(answer)
     text = "; ".join(f"{name} {100 * value:.3g} %" for name, value, _ in rows)
     return Picture(
@@ -29,7 +32,8 @@ def real_picture(answer: RealAnswer) -> Picture:
 
 
 def error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
-    """Curve, share of the signal, colour."""
+    """Per model: name, held-out error relative to the signal, colour. Unknown errors and zeros are left out; empty
+    where nothing was held out."""
     if answer.held_out is None:
         return []
     errors = answer.held_out
@@ -44,6 +48,7 @@ def error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
 
 
 def _draw_answer(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]]) -> Figure:
+    """The excerpt on the left and the errors on the right; a note where either is missing."""
     if excerpt is None or not rows:
         return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")
     figure = new_figure(8.8, 3.4)
@@ -56,6 +61,7 @@ def _draw_answer(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]
 
 
 def _draw_excerpt(axes: Axes, excerpt: DrawnExcerpt) -> None:
+    """Measured and predicted curves over time; the ordinate ends at 1.6 times the largest measured magnitude."""
     plain_axes(axes)
     measured = np.array(excerpt.measured)
     shown = scale_of(excerpt.unit, float(np.max(np.abs(measured), initial=0.0)))
@@ -72,6 +78,7 @@ def _draw_excerpt(axes: Axes, excerpt: DrawnExcerpt) -> None:
 
 
 def _draw_errors(axes: Axes, rows: list[tuple[str, float, str]]) -> None:
+    """Horizontal bars of the errors, labelled in per cent of the signal. rows: as from `error_rows`."""
     plain_axes(axes)
     at = np.arange(len(rows))
     values = [max(value, _LOWEST) for _, value, _ in rows]
@@ -91,4 +98,5 @@ def _draw_errors(axes: Axes, rows: list[tuple[str, float, str]]) -> None:
 
 
 def _plain_name(name: str) -> str:
+    """The name with a hyphen for every character that is no letter or digit."""
     return "".join(sign if sign.isalnum() else "-" for sign in name)

@@ -1,4 +1,7 @@
-"""Figure of the residual spectrum on held-out data, beside the noise."""
+"""Figure of the residual spectra on held-out data, compared with the spectra of the signal and the noise.
+
+Where the residual of the completed model equals the noise, nothing is left to explain at that frequency.
+"""
 
 from collections.abc import Sequence
 
@@ -15,13 +18,13 @@ from analysis.figures.picture import Picture
 from analysis.figures.style import GREY, draw_no_data_note, new_figure, plain_axes, power_of_ten
 
 _COLUMNS = 3
-"""Panels side by side."""
+"""Largest number of panels in a row."""
 _SIGNAL = Line2D([], [], color=GREY, linewidth=0.9, label="measured")
 _NOISE = Line2D([], [], color=GREY, linewidth=4, alpha=0.4, label="noise")
 
 
 def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
-    """Picture of the residual spectra, with caption and alternative text."""
+    """Picture of the residual spectra, with its caption and its text for screen readers."""
     return Picture(
         name="remainder",
         title="What is left over on held-out data",
@@ -33,8 +36,8 @@ def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
 
 
 def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
-    """Figure with a panel per spectrum: signal, residuals re-tuned and completed, and noise; a note where there are
-    none."""
+    """Figure with a panel per channel: densities of the signal, of the residuals of the re-tuned and the completed
+    model, and of the noise; a note where there are no spectra."""
     if not spectra:
         return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")
     columns = min(_COLUMNS, len(spectra))
@@ -52,6 +55,7 @@ def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
 
 
 def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
+    """The densities of one channel on logarithmic axes."""
     plain_axes(axes)
     axes.loglog(spectrum.frequency_hz, spectrum.measured, color=GREY, linewidth=0.9)
     if np.isfinite(spectrum.noise).any():
@@ -62,13 +66,14 @@ def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
-    # Minor ticks are half of the time that it takes to draw.
+    # Minor ticks would double the time to draw the figure.
     axes.yaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_minor_locator(NullLocator())
     axes.tick_params(labelsize=8)
 
 
 def _alternative_text(spectrum: RemainderSpectrum) -> str:
+    """Largest ratio of the completed model's residual to the noise, and its frequency, in words."""
     over = spectrum.after / spectrum.noise
     if not np.isfinite(over).any():
         return f"{spectrum.channel}: the noise is not known."

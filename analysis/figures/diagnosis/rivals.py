@@ -1,4 +1,8 @@
-"""Figure of the rival explanations of a named effect, and the error that each leaves."""
+"""Figures of the rival explanations in each round of the search, with the error that each of them leaves.
+
+Errors are geometric means, over the channels, of the rms error over the rms noise (1 = noise alone), on the samples
+that decided the choice and, where computed, on held-out samples.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +24,7 @@ from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
 MOST_RIVALS = 8
-"""Most rivals that are drawn."""
+"""Largest number of explanations that are drawn in a figure."""
 _SEEN = "The data that were fitted to and chosen by; rivals are not tried on held-out data."
 _BOTH = "Filled: the data that were fitted to and chosen by; open: held-out data, by which nothing was chosen."
 _ORDINALS = ("first", "second", "third", "fourth", "fifth")
@@ -31,6 +35,7 @@ class TriedExplanation:
     """An explanation with its errors: geometric mean over channels of error / noise; 1 = noise alone."""
 
     words: str
+    """Effect and axis, in words."""
     seen: float
     """Error on the data that were fitted to and chosen by."""
     test: float
@@ -38,8 +43,8 @@ class TriedExplanation:
 
 
 def list_explanations(round_: Sequence[FittedCandidate], axes: Sequence[str]) -> tuple[TriedExplanation, ...]:
-    """The best fit of each hypothesis: first the round's choice, which need not have the smallest error where it is
-    simpler and as good; then the others by their errors."""
+    """The best fit of each hypothesis of a round: first the round's choice, which may have a larger error than a less
+    simple one; then the others, the smallest error first. axes: displayed names of the axes."""
     best: dict[object, TriedExplanation] = {}
     for item in round_:
         words = ", ".join(_claim_words(claim, axes) for claim in item.fitted.hypothesis.claims[-1:])
@@ -49,7 +54,7 @@ def list_explanations(round_: Sequence[FittedCandidate], axes: Sequence[str]) ->
 
 
 def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Picture, ...]:
-    """One per effect for which several were tried."""
+    """A picture per round in which several explanations were tried; folded where none of them was added."""
     retuned = _make_explanation("re-tuned, no physics", explanation.retuned.score)
     pictures = []
     several = [number for number, round_ in enumerate(explanation.rounds, start=1) if len(round_) > 1]
@@ -76,7 +81,8 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
 
 
 def draw_rivals(tried: Sequence[TriedExplanation], retuned: TriedExplanation, held: bool = True) -> Figure:
-    """The chosen one on top, marked where it is held to be true."""
+    """Figure with a row per explanation, the chosen one on top. held: whether the chosen explanation was added, and is
+    marked."""
     if not tried:
         return draw_no_data_note(new_figure(7.4, 1.4), "Nothing was tried.")
     figure = new_figure(8.8, 1.05 + 0.3 * len(tried))
@@ -104,6 +110,7 @@ def draw_rivals(tried: Sequence[TriedExplanation], retuned: TriedExplanation, he
 
 
 def _draw_mark(axes: Axes, at: float, words: str, side: Literal["left", "right"]) -> None:
+    """A label above the axes at the abscissa `at`. side: horizontal alignment of the text, as in Matplotlib."""
     axes.annotate(
         words, (at, 1), xycoords=("data", "axes fraction"), xytext=(5 if side == "right" else -5, 2),
         textcoords="offset points", ha=side, fontsize=8.5, annotation_clip=False,
@@ -116,6 +123,7 @@ def _alternative_text(rival: TriedExplanation) -> str:
 
 
 def _scale_axis(axes: Axes, values: FloatArray) -> None:
+    """Set the abscissa to the range of the errors; logarithmic if that exceeds 4."""
     low, high = min(0.9, 0.9 * float(values.min(initial=1.0))), 1.15 * float(values.max(initial=1.0))
     axes.set_xscale("log" if high > 4 else "linear")
     axes.set_xlim(low, max(high, 1.5))
@@ -124,6 +132,7 @@ def _scale_axis(axes: Axes, values: FloatArray) -> None:
 
 
 def _claim_words(claim: Claim, axes: Sequence[str]) -> str:
+    """Effect and axis of a claim, or how its axes share parameters, in words."""
     noun = noun_of(claim.effect.name)
     if claim.spread != "one" or place_of_effect(claim.effect) == "hand":
         return f"{noun}, {'all alike' if claim.spread == 'all' else 'each its own'}" if len(claim.sites) > 1 else noun
@@ -132,6 +141,7 @@ def _claim_words(claim: Claim, axes: Sequence[str]) -> str:
 
 
 def _make_explanation(words: str, score: FitScore) -> TriedExplanation:
+    """The explanation with the geometric means of its errors."""
     seen = np.concatenate([score.fit, score.choose])
     return TriedExplanation(words, _geometric_mean(seen), _geometric_mean(score.test))
 

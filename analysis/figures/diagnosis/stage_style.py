@@ -1,4 +1,7 @@
-"""Style of a diagnosis' three predictions in all its figures: colour, dash and name."""
+"""Style of the three predictions in all figures of a diagnosis: colour, dash, line width and name.
+
+The stages are the model as given, the re-tuned model, and the completed model with the effects found.
+"""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -8,6 +11,7 @@ from matplotlib.lines import Line2D
 from analysis.figures.style import BLACK, BLUE, ORANGE, PURPLE
 
 Dash = Literal["-"] | tuple[float, tuple[float, ...]]
+"""Line style of Matplotlib: solid, or an offset with the lengths of dashes and gaps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,11 +19,13 @@ class Stage:
     """Style of a prediction (as given, re-tuned or completed) in all figures of a diagnosis."""
 
     name: str
-    """Name of the field in `Findings`."""
+    """Key of the stage in the values of `Findings`, such as `channel_errors`."""
     words: str
+    """Name of the stage in a legend."""
     colour: str
     dash: Dash
     width: float
+    """Line width in points."""
 
     @property
     def handle(self) -> Line2D:
@@ -32,3 +38,4 @@ RETUNED = Stage("retuned", "re-tuned", PURPLE, (0, (4, 1.6)), 1.4)
 AFTER = Stage("after", "with what was found", BLUE, "-", 1.4)
 STAGES = (BEFORE, RETUNED, AFTER)
 MEASURED = Line2D([], [], color=BLACK, linewidth=2.6, alpha=0.35, label="measured")
+"""Legend entry of the measured signal."""

@@ -1,4 +1,8 @@
-"""Figures of the missing force over the states of motion, and of its loops, without reference to named effects."""
+"""Figures of the missing force over the states of motion, and of its hysteresis loops.
+
+The missing force (`result.curves.state_maps`) does not depend on which effects are named. It is drawn as single samples
+and as means per bin over four state variables; the loops show the force over about one period of the motion.
+"""
 
 from collections.abc import Sequence
 
@@ -16,11 +20,12 @@ from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
 _SEEN = 0.998
-"""Share of the samples within a panel's limits, so that outliers do not flatten the rest."""
+"""Share of the samples within the limits of a panel, so that outliers do not compress all other samples."""
 
 
 def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
-    """Pictures of the first axis: its states, then its loops."""
+    """Two pictures of the first axis, its states and its loops; empty without maps. Other axes are only mentioned with
+    their share of missing force."""
     if not maps:
         return ()
     first = maps[0]
@@ -50,6 +55,7 @@ def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
 
 
 def _draw_states(maps: StateMaps) -> Figure:
+    """Four panels, one per state variable, with a common ordinate."""
     figure = new_figure(8.8, 5.6)
     scale = scale_of(maps.unit, max(float(np.abs(view.mean).max(initial=0.0)) for view in maps.views))
     limits = _limits([np.concatenate([view.cloud, view.mean]) for view in maps.views], scale.factor)
@@ -69,6 +75,8 @@ def _draw_states(maps: StateMaps) -> Figure:
 
 
 def _draw_view(axes: Axes, view: StateView, factor: float) -> None:
+    """Samples, means with two standard errors, and the completed model's residual. factor: from SI to the shown
+    unit."""
     along = scale_of(view.unit, float(np.abs(view.cloud_at).max(initial=0.0)))
     axes.plot(along.factor * view.cloud_at, factor * view.cloud, ".", color=GREY, markersize=2.2, alpha=0.35, zorder=1)
     axes.axhline(0, color=GREY, linewidth=0.8, zorder=2)
@@ -83,6 +91,7 @@ def _draw_view(axes: Axes, view: StateView, factor: float) -> None:
 
 
 def _draw_loops(maps: StateMaps) -> Figure:
+    """Two panels with a common ordinate: measured force, and forces of the model before and after its completion."""
     figure = new_figure(8.8, 3.9)
     every = [each for loop in maps.loops for each in (loop.measured, loop.before, loop.after)]
     scale = scale_of(maps.unit, float(np.abs(np.concatenate(every)).max(initial=0.0)))
@@ -101,6 +110,7 @@ def _draw_loops(maps: StateMaps) -> Figure:
 
 
 def _draw_loop(axes: Axes, loop: Loop, factor: float) -> None:
+    """Forces of one loop over its state variable. factor: from SI to the shown unit of force."""
     along = scale_of(loop.unit, float(np.abs(loop.at).max(initial=0.0)))
     at = along.factor * loop.at
     axes.plot(at, factor * loop.measured, color=BLACK, linewidth=2.6, alpha=0.35)
@@ -112,6 +122,7 @@ def _draw_loop(axes: Axes, loop: Loop, factor: float) -> None:
 
 
 def _limits(values: Sequence[FloatArray], factor: float) -> tuple[float, float]:
+    """Limits of the ordinate in the shown unit: quantiles that contain the share `_SEEN` of all values, and 0."""
     whole = factor * np.concatenate(values)
     low, high = np.quantile(whole, [(1 - _SEEN) / 2, (1 + _SEEN) / 2])
     room = 0.06 * max(float(high - low), 1e-300)
@@ -119,6 +130,7 @@ def _limits(values: Sequence[FloatArray], factor: float) -> tuple[float, float]:
 
 
 def _alternative_text(view: StateView, unit: str) -> str:
+    """Smallest and largest mean of the missing force and where they occur, in words. unit: of the force, SI."""
     if not len(view.mean):
         return f"Against {view.along}: too few samples."
     low, high = int(np.argmin(view.mean)), int(np.argmax(view.mean))
@@ -129,6 +141,8 @@ def _alternative_text(view: StateView, unit: str) -> str:
 
 
 def _loop_text(maps: StateMaps) -> str:
+    """Rms difference of the models' forces from the measured force in the first loop, relative to its standard
+    deviation, in words."""
     loop = maps.loops[0]
     size = max(float(np.std(loop.measured)), 1e-300)
     kinds = ((maps.model, loop.before), (maps.completed, loop.after))

@@ -1,4 +1,8 @@
-"""Measured coverage of each interval near the cap, as sentences beside the interval and as a table."""
+"""Measured coverage of each confidence interval near the force cap, as sentences for reports and as a table.
+
+Coverage is the share of simulated studies whose 95 % interval holds the true value. `measured_coverage` has the counts;
+a report shows the sentence with the interval it belongs to, docs/statistics.md has the table.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +11,7 @@ from analysis.psychophysics.catch_trials import wilson_interval
 from analysis.wording import conjoin, format_signed, number
 
 CASES_HZ = {25.0: "0.85 N", 35.0: "3 N, the cap", 45.0: "4 N, above the cap"}
-"""Frequencies of the simulated studies that are reported, and the median threshold there; at 5 Hz it is 0.35 N."""
+"""Reported frequencies (Hz) of the simulated studies, and the true median threshold at each; at 5 Hz it is 0.35 N."""
 NAMES = {
     "model": "difference to 5 Hz by the model of all answers, dB",
     "means": "difference to 5 Hz by reversal means, paired, dB",
@@ -17,22 +21,26 @@ NAMES = {
     "single": "single threshold by likelihood, one participant alone",
     "one-way": "type-1 error of the one-way analysis at equal medians of 2.2 N:",
 }
+"""Name of each analysis, and the text for its interval."""
 ONLY_BELOW = ("run", "single")
-"""Have a size only where it is below the cap: near it, their mean error says how such sizes are chosen."""
+"""Analyses that give an estimate only where it is below the cap. Near the cap their mean error is due to this
+selection, so sentences leave it out."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredCoverage:
-    """Coverage of an interval in simulated studies: ten people (single: one), published staircase, cap of 3 N."""
+    """Coverage of an interval in simulated studies of ten people (single: one), published staircase, cap of 3 N."""
 
     analysis: str
+    """A name of `NAMES`."""
     frequency_hz: float
-    """0 where all frequencies are judged together."""
+    """0 where all frequencies are tested together."""
     bias_db: float | None
-    """Mean error of what has a size."""
+    """Mean error of the estimates, over the cases that have one; None for an analysis that gives none in dB."""
     covered: int
-    """Intervals of 95 % that held the truth; of a type-1 error, studies that found a difference."""
+    """Number of 95 % intervals that held the true value; for a type-1 error, of studies that found a difference."""
     intervals: int
+    """Number of all intervals; for a type-1 error, of all studies."""
 
     @property
     def percent(self) -> str:
@@ -43,7 +51,7 @@ class MeasuredCoverage:
 
 
 def coverage_lines(rows: Sequence[MeasuredCoverage]) -> list[str]:
-    """A table in Markdown."""
+    """The table in Markdown, one line per row, ordered as `NAMES`."""
     lines = ["| interval | median threshold | bias (dB), of what has a size | holds the truth |", "|---|---|---|---|"]
     for name, title in NAMES.items():
         for row in rows:
@@ -54,7 +62,8 @@ def coverage_lines(rows: Sequence[MeasuredCoverage]) -> list[str]:
 
 
 def coverage_sentence(rows: Sequence[MeasuredCoverage], analysis: str) -> str:
-    """Coverage and bias of one analysis, at each median threshold. Empty where nothing was measured."""
+    """Sentence on the coverage and bias of one analysis (a name of `NAMES`) at each median threshold; empty where
+    nothing was measured."""
     texts = []
     for row in rows:
         if row.analysis == analysis and row.frequency_hz:
@@ -69,3 +78,4 @@ def coverage_sentence(rows: Sequence[MeasuredCoverage], analysis: str) -> str:
 
 
 _SIMULATED = "Measured near the cap, simulated with the published staircase"
+"""Beginning of every sentence."""

@@ -1,4 +1,9 @@
-"""Was direction the cue? Per frequency and cue: what it could do, beside what the answers did."""
+"""Whether a cue other than the direction explains the answers, per frequency and cue, with warnings as sentences.
+
+Two kinds of evidence: the d' that the cue alone would give a participant with a stated internal noise (`cue_ability`),
+and whether the answers depended on the cue among trials of the same direction (`answers_on_delivery`), with Holm's
+correction over all cues and frequencies.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -23,7 +28,7 @@ LEVEL = 0.05
 
 @dataclass(frozen=True, slots=True)
 class CueFinding:
-    """One cue at one frequency."""
+    """Findings on one cue at one frequency, over all participants."""
 
     frequency_hz: float
     cue: Cue
@@ -31,23 +36,24 @@ class CueFinding:
     difference_db: float
     """Median of the participants' differences, first direction minus second by angle."""
     largest_db: float
-    """Largest of them, by size."""
+    """The participants' difference of largest magnitude, with its sign."""
     spread_db: float
     """Median of the standard deviations within a direction."""
     abilities: tuple[float, ...]
     """Median d' of the cue alone, for each internal noise of `INTERNAL_NOISE_DB`."""
     observed_d_prime: float | None
-    """Mean d' of the answers at this frequency; includes the cue, if it was used."""
+    """Mean over participants of d' of the answers at this frequency, by all cues that were used; None where no
+    participant was shown both directions."""
     noticed_by: tuple[str, ...]
-    """Participants whose stimuli are shown to differ so much that an internal noise of `USUAL_NOISE_DB` gives d' of
-    1."""
+    """Participants for whom even the end of the difference's interval nearer to 0 gives a d' of 1 or more, with an
+    internal noise of `USUAL_NOISE_DB`."""
     answers: AnswersOnDelivery
     p_holm: float | None
-    """p-value of `answers`, corrected for all cues and frequencies (Holm); None where they could not be tested."""
+    """p value of `answers` with Holm's correction over all cues and frequencies; None where no test was possible."""
 
     @property
     def followed(self) -> bool:
-        """Whether answers followed the cue, at `LEVEL` after the correction; False where that could not be tested."""
+        """Whether answers depended on the cue, at `LEVEL` after the correction; False where no test was possible."""
         return self.p_holm is not None and self.p_holm < LEVEL
 
 
@@ -71,6 +77,7 @@ def cue_findings(trials: Iterable[Trial]) -> tuple[CueFinding, ...]:
 def _finding(
     group: DeliveredTrials, people: tuple[CueAbility, ...], regressed: AnswersOnDelivery, p_holm: float | None
 ) -> CueFinding:
+    """The finding on the cue of `regressed`. people: abilities of all participants by this cue, at least one."""
     return CueFinding(
         frequency_hz=group.frequency_hz,
         cue=regressed.cue,
@@ -87,7 +94,7 @@ def _finding(
 
 
 def _average_d_prime(group: DeliveredTrials) -> float | None:
-    """Mean over participants; None where none was shown both directions."""
+    """Mean of d' over participants; None where no participant was shown both directions."""
     found = []
     for place in range(len(group.subjects)):
         mine = group.person == place
@@ -99,8 +106,8 @@ def _average_d_prime(group: DeliveredTrials) -> float | None:
 
 
 def cue_warnings(found: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tuple[str, ...]:
-    """Warnings for the interpretation of the thresholds; empty where no cue is notable. Of missing measurements only
-    those of some trials: that a study measured no harmonics at all is not listed."""
+    """Warnings for the interpretation of the thresholds; empty where no cue is notable. A gap is named only where some
+    trials lack a measurement, not where all do, as in a study that measured no harmonics."""
     noticed = [_describe_noticed(each) for each in found if each.noticed_by]
     followed = [
         f"{each.cue.value} at {each.frequency_hz:g} Hz ({format_signed(each.answers.slope or 0.0)} logits per dB, "
@@ -141,6 +148,7 @@ def gap_text(gaps: Sequence[CueGap]) -> str:
 
 
 def _describe_noticed(finding: CueFinding) -> str:
+    """Phrase on a cue with its difference, the participants who notice it, and the share Phi(d' / 2) right by it."""
     ability = finding.abilities[INTERNAL_NOISE_DB.index(USUAL_NOISE_DB)]
     right = 100.0 * NormalDist().cdf(ability / 2.0)
     return (

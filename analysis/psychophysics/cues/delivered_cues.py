@@ -1,7 +1,12 @@
-"""Differences between two directions as delivered, other than the direction itself: strength, spectrum, coupling.
+"""Cues of each trial other than the direction: intensity, spectrum and coupling of the delivered vibration, in dB.
 
-All in dB, so that they can be compared with one internal noise. Harmonics and motion across the direction count by
-their contribution to the amplitude if in phase with it, an upper bound.
+With the amplitudes of the acceleration along the direction (a), across it (c) and of the harmonics (h), in m/s^2, and
+the level of the staircase L in N:
+
+    intensity 20 log10(a / L)      spectrum 20 log10(1 + h / a)      coupling 20 log10(1 + c / a)
+
+Spectrum and coupling are the contributions of h and c to the amplitude if they were in phase with it, an upper bound.
+In dB all three can be compared with the same internal noise of a participant.
 """
 
 import math
@@ -20,7 +25,7 @@ class Cue(StrEnum):
     """A quantity other than the direction by which two directions may differ as delivered."""
 
     INTENSITY = "intensity"
-    """Delivered along the direction, over the level of the staircase; varies as a roved level does."""
+    """Amplitude along the direction, over the level of the staircase; where levels are roved, it varies with them."""
     SPECTRUM = "spectrum"
     """Contribution of the harmonics to the amplitude."""
     COUPLING = "coupling"
@@ -29,28 +34,28 @@ class Cue(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DeliveredTrials:
-    """The counted and measured test trials at one frequency, (n,) each."""
+    """The counted test trials at one frequency with a measured acceleration; arrays are (n,)."""
 
     frequency_hz: float
     subjects: tuple[str, ...]
     person: NDArray[np.intp]
-    """Places in `subjects`."""
+    """Index of each trial's participant in `subjects`."""
     side: FloatArray
-    """+1: the first direction of the two as angles in the plane; -1: the other. Labels may be swapped between people,
-    the device's directions are not. Without angles: label 1 and 2."""
+    """+1: the direction at the smaller angle in the plane was shown; -1: the other. Labels may be swapped between
+    people, angles are not. Without angles: +1 for label 1, -1 for label 2."""
     answer: FloatArray
     """The direction that was answered, in the same signs."""
     nominal_db: FloatArray
     """Level of the staircase, re 1 N."""
     played_db: FloatArray
-    """Level that was played, re 1 N: as the staircase's, unless it was roved."""
+    """Level that was played, re 1 N; equal to `nominal_db` unless levels were roved."""
     values_db: dict[Cue, FloatArray]
-    """NaN where a trial was not measured for the cue; without cues that no trial was measured for."""
+    """Values by cue; NaN where a trial has no measurement of the cue. A cue without any measurement is missing."""
 
 
 @dataclass(frozen=True, slots=True)
 class CueGap:
-    """Trials at one frequency without information on one cue, among those with a measured amplitude."""
+    """Number of trials at one frequency without a measurement of a cue, among those with a measured acceleration."""
 
     frequency_hz: float
     cue: Cue
@@ -59,7 +64,7 @@ class CueGap:
 
 
 def select_delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
-    """Cues by rising frequency; only measured trials."""
+    """The counted test trials with a measured acceleration, grouped by frequency, ascending; empty without any."""
     chosen = [t for t in trials if t.phase is Phase.TEST and t.counts and t.delivered_mps2 and t.level_n > 0]
     turned = _find_turned_sessions(chosen)
     found = []
@@ -84,7 +89,7 @@ def select_delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, .
 
 
 def cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
-    """Missing measurements by frequency and cue; only where something is missing."""
+    """Missing measurements by frequency (ascending) and cue; empty where nothing is missing."""
     gaps = []
     for group in select_delivered_trials(trials):
         n = len(group.person)
@@ -97,9 +102,9 @@ def cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
 
 
 def _find_turned_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
-    """Participant and session where label 1 is the direction at the larger angle. Labels go with the session: a
-    participant who comes twice may have them the other way round. A session in which only one of the two was measured
-    is compared with the larger angle of all sessions."""
+    """Participant and session of each session in which label 1 is the direction at the larger angle. Labels belong to
+    the session: they may be swapped when a participant comes again. A session with trials of one direction only is
+    compared with the larger angle of all sessions."""
     angles: dict[tuple[str, str], dict[int, float]] = {}
     for trial in trials:
         if trial.angle_deg is not None:
@@ -110,7 +115,8 @@ def _find_turned_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
 
 
 def _is_turned(known: dict[int, float], larger: float | None) -> bool:
-    """known: angles of a session by label; larger: angle of the study's two directions, None where they are not two."""
+    """Whether label 1 is the larger angle. known: angles of a session by label; larger: larger angle of the study's two
+    directions, None where their number is not two."""
     if len(known) == 2:
         return known[1] > known[2]
     ((label, angle),) = known.items()
@@ -118,21 +124,24 @@ def _is_turned(known: dict[int, float], larger: float | None) -> bool:
 
 
 def _known(rows: list[Trial], value: Callable[[Trial], float | None]) -> list[float]:
-    """NaN where a trial has no value; empty where none has."""
+    """Value of each trial, NaN where it has none; empty where no trial has a value."""
     values = [value(trial) for trial in rows]
     known = any(each is not None for each in values)
     return [math.nan if each is None else each for each in values] if known else []
 
 
 def _intensity(trial: Trial) -> float | None:
+    """Delivered amplitude over the level of the staircase, m/s^2 per N."""
     return (trial.delivered_mps2 or math.nan) / trial.staircase_n
 
 
 def _spectrum(trial: Trial) -> float | None:
+    """1 + h / a; None without a measurement of the harmonics."""
     return None if trial.harmonics_mps2 is None else 1.0 + trial.harmonics_mps2 / (trial.delivered_mps2 or math.nan)
 
 
 def _coupling(trial: Trial) -> float | None:
+    """1 + c / a; None without a measurement across the direction."""
     return None if trial.off_axis_mps2 is None else 1.0 + trial.off_axis_mps2 / (trial.delivered_mps2 or math.nan)
 
 
@@ -144,4 +153,5 @@ _VALUES: dict[Cue, Callable[[Trial], float | None]] = {
 
 
 def _db(values: list[float]) -> FloatArray:
+    """20 log10 of amplitudes or levels; NaN for NaN."""
     return 20.0 * np.log10(np.array(values, dtype=np.float64))

@@ -1,4 +1,4 @@
-"""Psychometric curves of one-interval identification: sensitivity against the level, with two derivatives.
+"""Psychometric functions of one-interval identification: sensitivity q(t) over the level, with two derivatives.
 
 An unbiased attentive participant answers right with the probability 1/2 + F(t)/2, so the evidence for the direction
 shown has the mean q(t) with Phi(q) = 1/2 + F(t)/2 (half of d'). Three shapes of F, each over levels in dB:
@@ -26,6 +26,7 @@ from equalizer.signals.signal import FloatArray
 TARGET = 0.5 ** (1 / 3)
 """Share of right answers at a threshold: where one wrong and three right answers in a row are equally likely."""
 NEPER_PER_DB = math.log(10.0) / 20.0
+"""Natural logarithm of an amplitude ratio of 1 dB."""
 SUREST = 30.0
 """t beyond which no answer of an attentive participant is wrong: exp(-exp(30)) is 0 in floating point."""
 
@@ -39,6 +40,7 @@ class Family(StrEnum):
 
 
 _SHARE = 2.0 * TARGET - 1.0
+"""F at the threshold, so that 1/2 + F/2 is `TARGET`."""
 AT_THRESHOLD = {
     Family.WEIBULL: math.log(-math.log(1.0 - _SHARE)),
     Family.LOGISTIC: math.log(_SHARE / (1.0 - _SHARE)),
@@ -46,7 +48,7 @@ AT_THRESHOLD = {
 }
 """t0 of each family."""
 USUAL_SLOPE = {Family.WEIBULL: 2.0, Family.LOGISTIC: 3.0, Family.GAUSS: 1.9}
-"""Equally steep at the threshold: a Weibull slope of 2 over newtons, where a search begins."""
+"""Slopes at which a search begins: a Weibull slope of 2 over newtons, and slopes about as steep at the threshold."""
 
 
 def sensitivity(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -59,7 +61,7 @@ def sensitivity(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, 
 
 
 def evidence_at(t: FloatArray, family: Family) -> FloatArray:
-    """q(t) alone, in a quarter of the time."""
+    """q(t) without its derivatives, in the shape of t: a quarter of the time of `sensitivity`."""
     t = np.minimum(t, SUREST)
     match family:
         case Family.WEIBULL:
@@ -81,7 +83,7 @@ def share_right(evidence: FloatArray, lapse: float) -> FloatArray:
 
 
 def _log_survival(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """log(1 - F) and its first two derivatives."""
+    """log(1 - F) and its first two derivatives by t."""
     match family:
         case Family.WEIBULL:
             log_rest = -np.exp(t)

@@ -1,4 +1,9 @@
-"""The hierarchical psychometric model fitted to all answers of a study."""
+"""Fit of the hierarchical psychometric model to all answers of a study, by penalized maximum marginal likelihood.
+
+Each person has a threshold per frequency, a slope and a criterion, drawn from normal distributions whose parameters are
+estimated (`marginal`). The persons' parameters are integrated out, first by Laplace's method (`objective`), then by
+adaptive quadrature (`refine`). `inference` takes intervals from the scores and the curvature of the fit.
+"""
 
 from dataclasses import dataclass
 
@@ -15,28 +20,32 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HierarchicalFit:
-    """The fitted parameters of population and persons, for k frequencies and n persons, with derivatives there."""
+    """Fitted parameters of the population and of n persons at k frequencies, with the derivatives at the maximum."""
 
     answers: Answers
     family: Family
     parameters: FloatArray
     """(k + 6,): see `marginal.Layout`."""
     latent: FloatArray
-    """(n, k + 2): each person's thresholds in dB, log-slope, criterion; modes given their answers and the others."""
+    """(n, k + 2): posterior modes of each person's thresholds (dB), log-slope and criterion, at the population's
+    parameters."""
     shared_means: FloatArray
-    """(n, 2): posterior means of each person's log-slope and criterion, thresholds integrated out: at the common mode
-    of all, slopes are too steep, as each threshold follows its own answers."""
+    """(n, 2): posterior means of each person's log-slope and criterion with the thresholds integrated out. In the joint
+    mode (`latent`) slopes are too steep, because each threshold adapts to its own answers."""
     shared_errors: FloatArray
-    """(n, 2): posterior standard deviations of these."""
+    """(n, 2): posterior standard deviations of `shared_means`."""
     log_likelihood: float
+    """Log marginal likelihood of all answers, without the penalty."""
     scores: FloatArray
     """(n, k + 6): gradient of each person's log marginal likelihood at the parameters."""
     curvature: FloatArray
     """(k + 6, k + 6): Hessian of minus the penalized log marginal likelihood."""
     converged: bool
+    """Whether the last search settled within its number of steps."""
 
     @property
     def layout(self) -> Layout:
+        """Indices of the parameters."""
         return Layout(len(self.answers.frequencies_hz))
 
     @property
@@ -53,7 +62,7 @@ class HierarchicalFit:
 
 def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prior | None = None) -> HierarchicalFit:
     """Maximum a posteriori fit of the population parameters, with all persons' latent parameters integrated out: first
-    by Laplace's method, then by quadrature. Needs two persons."""
+    by Laplace's method, then by quadrature. answers: of two persons at least. prior: None: the defaults of `Prior`."""
     objective = Objective(answers, family, prior or Prior())
     found = Refinement(objective).maximum(maximise(objective, objective.begin).x)
     return HierarchicalFit(

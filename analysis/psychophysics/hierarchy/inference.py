@@ -1,9 +1,10 @@
 """Inference from the hierarchical fit: persons are the sampling units and carry the uncertainty.
 
-Each person's influence on the means is n A^-1 s_i, with A the curvature of the fit and s_i the person's score. Mean
-plus influence is a person's pseudo-threshold in dB: with the thresholds known exactly it would be the threshold itself,
-and what follows the textbook's analysis within participants. Its standard errors are the cluster-robust ones (sandwich)
-with n / (n - 1), so unequal spreads and a family that does not fit widen the intervals as they should.
+Each person's influence on the means is n A^-1 (s_i - mean of s), with A the curvature of the fit and s_i the person's
+score. Mean plus influence is a person's pseudo-threshold in dB. If the thresholds were known exactly, it would be the
+threshold itself, and the analysis of pseudo-thresholds the usual analysis within participants. The standard errors are
+cluster-robust (sandwich) with the factor n / (n - 1), so that they stay valid where spreads are unequal or the family
+of curves does not fit.
 
 Source: K.-Y. Liang, S. L. Zeger, Biometrika 73 (1986), 13-22; G. Kauermann, R. J. Carroll, J. Am. Stat. Assoc. 96
 (2001), 1387-1396 (few clusters, t with n - 1 degrees of freedom).
@@ -24,8 +25,8 @@ from analysis.psychophysics.hierarchy.refine import Refinement
 from equalizer.signals.signal import FloatArray
 
 BOUND_ROOT, BOUND_STEPS = 0.03, 8
-"""A bound is found when its likelihood root, some 2.3, is met this closely: 97.5 % is then 97.4 to 97.6 %. The steps
-end a search on a likelihood that is no line at all, on the safe side."""
+"""Tolerance of the signed root of the likelihood ratio at a bound, whose target is about 2.3 (97.5 % becomes 97.4 to
+97.6 %), and largest number of steps. A search that uses all steps returns the farther, conservative, end."""
 FAR_DB = 32.0
 """Farthest search for a bound below the estimate, in dB."""
 
@@ -41,12 +42,13 @@ class MedianThreshold:
     frequency_hz: float
     db: float
     lower_db: float | None
-    """Lower bound; None: the answers do not contradict a median `FAR_DB` below the estimate, or they come from too few
-    people (below the cap from two, above it from one)."""
+    """Lower bound; None: the answers do not contradict a median `FAR_DB` below the estimate, or too few people have
+    enough answers (two or fewer for a median below the cap, one or none for a median above it)."""
     upper_db: float | None
-    """None where the median is above the cap: then lower_db is a one-sided bound, and no size is known. None, too,
-    where two people or fewer have enough answers."""
+    """Upper bound; None where the median is above the cap: lower_db is then a one-sided bound, and the estimate itself
+    is an extrapolation. Also None where two people or fewer have enough answers."""
     above_cap: bool
+    """Whether the estimate is above the cap."""
 
     @property
     def newton(self) -> float:
@@ -55,10 +57,12 @@ class MedianThreshold:
 
     @property
     def lower_n(self) -> float | None:
+        """Lower bound in N; None where `lower_db` is None."""
         return None if self.lower_db is None else float(10.0 ** (self.lower_db / 20.0))
 
     @property
     def upper_n(self) -> float | None:
+        """Upper bound in N; None where `upper_db` is None."""
         return None if self.upper_db is None else float(10.0 ** (self.upper_db / 20.0))
 
 
@@ -67,17 +71,19 @@ class DirectionLimit:
     """Frequency at which the median participant's threshold reaches the cap."""
 
     frequency_hz: float | None
-    """The frequency; None where it lies outside the range that was played, or is reached from below more than once."""
+    """None where the median is above the cap from the lowest frequency on, never reaches it, or crosses it upwards more
+    than once."""
     lower_hz: float | None
     """Lower bound; None: below the lowest frequency played."""
     upper_hz: float | None
     """Upper bound; None: above the highest frequency played."""
     words: str
+    """Sentences on the limit and its scope, for reports."""
 
 
 def pseudo_thresholds(fit: HierarchicalFit) -> FloatArray:
-    """Pseudo-thresholds (n, k) in dB, by influence functions: their mean is the estimate, their spread its
-    uncertainty."""
+    """Pseudo-thresholds (n, k) in dB, by influence functions: their mean is the estimate of the median threshold, their
+    standard deviation over sqrt(n) its standard error."""
     centred = fit.scores - fit.scores.mean(axis=0)
     influence = fit.answers.persons * np.linalg.solve(fit.curvature, centred.T).T
     pseudo: FloatArray = fit.means_db + influence[:, : fit.layout.k]
@@ -87,9 +93,9 @@ def pseudo_thresholds(fit: HierarchicalFit) -> FloatArray:
 def median_thresholds(
     fit: HierarchicalFit, cap_db: float, confidence: float, prior: Prior | None = None
 ) -> tuple[MedianThreshold, ...]:
-    """Two-sided intervals below the cap, one-sided profile bounds above it, each the lower end that a two-sided
-    interval of the confidence has: the data choose which of them is reported (see `lower_bound`). With two people at a
-    frequency there is no interval: a t distribution with one degree of freedom holds nearly every threshold."""
+    """Median threshold at each frequency. Below the cap: two-sided t interval over pseudo-thresholds. Above it: profile
+    bound at the level of the lower end of a two-sided interval (see `lower_bound`). With two people at a frequency
+    there is no interval below the cap: with one degree of freedom it would contain nearly every threshold."""
     errors = mean_errors(pseudo_thresholds(fit), fit.answers.played)
     half = student.ppf(0.5 + confidence / 2, errors.df) * errors.error
     medians = []
@@ -107,13 +113,14 @@ def median_thresholds(
 def lower_bound(
     fit: HierarchicalFit, place: int, confidence: float, prior: Prior, df: float | None = None
 ) -> float | None:
-    """One-sided bound of a mean by profile likelihood, with the t distribution's quantile in place of the normal's.
+    """Lower bound in dB of the mean of index `place` by profile likelihood, with the quantile of the t distribution in
+    place of the normal one. confidence: one-sided.
 
-    A bound that is only reported where the estimate is above the cap is wrong more often than its confidence says,
-    where the true median is near the cap: then each of the two ends may be wrong by half of what is left, and no more.
+    A caller that reports the bound only where the estimate is above the cap must pass (1 + c) / 2 for an interval of
+    confidence c: choosing between interval and bound by the data costs coverage near the cap.
     Source: G. J. Feldman, R. D. Cousins, Phys. Rev. D 57 (1998), 3873-3889.
 
-    df: degrees of freedom, None for those of all persons. None where no bound is found within `FAR_DB` below the
+    df: degrees of freedom; None: n - 1 of all persons. Returns None where no bound is found within `FAR_DB` below the
     estimate.
     """
     search = Refinement(Objective(fit.answers, fit.family, prior))
@@ -124,10 +131,9 @@ def lower_bound(
     along = along / along[place]
 
     def root(below_db: float) -> float:
-        """Signed root of the likelihood ratio: of a quadratic likelihood, a straight line."""
-        # The other parameters begin where a quadratic likelihood would have them; where that ends too low to go on,
-        # also where they are at the estimate, for with few answers the cost has several minima, and a profile is the
-        # lowest of them.
+        """Root of the likelihood ratio with the mean held below_db lower; linear if the log-likelihood is quadratic."""
+        # The other parameters start where a quadratic likelihood has them. With few answers the cost has several
+        # minima: where the root reaches its target, a second search starts with the others at the estimate.
         cost = search.lowest_cost(fit.parameters - below_db * along, held=place)
         if math.sqrt(max(0.0, 2.0 * (cost - best))) >= wanted:
             cost = min(cost, search.lowest_cost(fit.parameters - below_db * unit, held=place))
@@ -157,11 +163,11 @@ def direction_limit(
     known: NDArray[np.bool_] | None = None,
     shown_above: Sequence[float] = (),
 ) -> DirectionLimit:
-    """Estimate the direction limit from pseudo-thresholds (n, k). Between the frequencies played: straight lines over
-    the logarithm of frequency. The interval holds every frequency whose median threshold may be the cap: its own
-    interval contains the cap. known: (n, k), see `mean_errors`; None: all. shown_above: frequencies whose median has a
-    profile bound above the cap: there an interval by influence functions is as wide as the model's extrapolation. From
-    such a frequency on the limit cannot lie, up to the next whose estimate is below the cap."""
+    """Estimate the direction limit from pseudo-thresholds (n, k), interpolated linearly over the log of the frequency.
+    Its interval goes from the lowest to the highest frequency at which the interval of the median contains the cap.
+    known: (n, k), see `mean_errors`; None: all. shown_above: frequencies whose profile bound is above the cap, where
+    intervals by influence functions are too wide; the limit is excluded from each of them up to the next frequency with
+    an estimate below the cap."""
     grid = np.geomspace(frequencies_hz[0], frequencies_hz[-1], 2001)
     weights = np.array([np.interp(np.log(grid), np.log(frequencies_hz), row) for row in np.eye(len(frequencies_hz))])
     lines = pseudo @ weights
@@ -176,8 +182,8 @@ def direction_limit(
     for place, frequency_hz in zip(places, frequencies_hz, strict=True):
         if frequency_hz in shown_above:
             may_be[place : next((other for other in below if other > place), None)] = False
-    # The frequencies of the grid may all miss an interval that is narrower than their distance: the limit lies between
-    # that before the crossing and the next.
+    # An interval narrower than a step of the grid may contain none of its frequencies; the frequencies on either side
+    # of a crossing always count.
     may_be[crossings] = may_be[crossings + 1] = True
     possible = np.flatnonzero(may_be)
     lower = float(grid[possible[0]]) if len(possible) and possible[0] > 0 else None
@@ -197,7 +203,7 @@ _LIMIT_WORDS = (
 
 
 def _back_below(middle: FloatArray, at: np.intp, cap_db: float, grid: FloatArray) -> str:
-    """Above the limit the directions may be felt again; empty where they are not."""
+    """Sentence where the median threshold falls below the cap again above the limit; empty where it does not."""
     below = np.flatnonzero(middle[at + 1 :] < cap_db)
     if not len(below):
         return ""
@@ -205,6 +211,7 @@ def _back_below(middle: FloatArray, at: np.intp, cap_db: float, grid: FloatArray
 
 
 def _no_limit(middle: FloatArray, cap_db: float, crossings: int, frequencies_hz: tuple[float, ...]) -> str:
+    """Sentences on why there is no single limit."""
     if crossings > 1:
         reason = f"The median threshold crosses the cap {crossings} times."
     elif middle[0] >= cap_db:

@@ -1,8 +1,10 @@
-"""The likelihood of a person's answers, its derivatives, and the information that such answers are expected to give.
+"""Log-likelihood of each person's answers, with gradient, Hessian and expected (Fisher) information.
 
-Per cell: P(right) = lapse + (1 - 2 lapse) Phi(q(t) - side criterion), where half of all lapses are right by chance.
-t = t0 + exp(b) ln(10)/20 (level - theta). A person has the latent parameters z = (theta_1 ... theta_k, b, c): a
-threshold per frequency in dB, the logarithm of the slope, and the criterion in units of d'.
+Per cell of answers at one level and direction:
+    P(right) = lapse + (1 - 2 lapse) Phi(q(t) - side c),      t = t0 + exp(b) ln(10)/20 (level - theta).
+A person has the latent parameters z = (theta_1 ... theta_k, b, c): a threshold per frequency in dB, the logarithm of
+the slope, and the criterion in units of d'. side is +1 for direction 1 and -1 for direction 2; q and t0 are those of
+`curve`. Answers are binomial. Derivatives are exact, by the chain rule over t, b and c.
 """
 
 import math
@@ -17,24 +19,25 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Derivatives:
-    """Derivatives of the log-likelihood of each person with respect to their d = k + 2 latent parameters."""
+    """Log-likelihood of n persons, with derivatives by their d = k + 2 latent parameters and by the lapse rate."""
 
     value: FloatArray
-    """(n,)"""
+    """(n,): log-likelihood, without the binomial coefficients."""
     first: FloatArray
-    """(n, d)"""
+    """(n, d): gradient."""
     second: FloatArray
-    """(n, d, d)"""
+    """(n, d, d): Hessian."""
     information: FloatArray
-    """(n, d, d): expected from other answers at the same levels; never indefinite, unlike minus the second."""
+    """(n, d, d): Fisher information at the levels played; positive semidefinite, unlike minus the Hessian."""
     by_lapse: FloatArray
-    """(n,)"""
+    """(n,): derivative of the value by the lapse rate."""
     first_by_lapse: FloatArray
-    """(n, d)"""
+    """(n, d): derivative of the gradient by the lapse rate."""
 
 
 class TrialLikelihood:
-    """Answers with what does not change during a fit."""
+    """Log-likelihood of a study's answers at given latent parameters. The indices of runs and persons are prepared
+    once."""
 
     def __init__(self, answers: Answers, family: Family) -> None:
         self.answers, self.family = answers, family
@@ -44,7 +47,7 @@ class TrialLikelihood:
         self._runs = answers.run[self._starts]
 
     def evaluate(self, latent: FloatArray, lapse: float) -> Derivatives:
-        """latent: (n, k + 2)."""
+        """Values and derivatives at latent parameters (n, k + 2) and this lapse rate."""
         side, pace = self.answers.side, np.exp(latent[:, self.frequencies]) * NEPER_PER_DB
         tau, a, q1, q2 = self._evidence(latent, pace)
         e = _Evidence(a, self.answers.right, self.answers.wrong, lapse)
@@ -72,8 +75,8 @@ class TrialLikelihood:
         )
 
     def trace_derivatives(self, latent: FloatArray, lapse: float, inverse: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Trace of inverse (n, d, d) times the change of the information by each latent number (n, d), and by the
-        lapse rate (n,)."""
+        """Trace of `inverse` (n, d, d) times the derivative of the information by each latent parameter (n, d), and by
+        the lapse rate (n,)."""
         k, run, person = self.frequencies, self.answers.run, self._person
         pace = np.exp(latent[:, k]) * NEPER_PER_DB
         tau, a, q1, q2 = self._evidence(latent, pace)
@@ -95,7 +98,7 @@ class TrialLikelihood:
         return np.concatenate([own, rest[:2].T], axis=1), rest[2]
 
     def _evidence(self, latent: FloatArray, pace: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Per cell: t - t0, mean of the evidence, and the first two derivatives of q."""
+        """Per cell (m,): t - t0, mean of the evidence q - side c, and the first two derivatives of q by t."""
         cells, k = self.answers, self.frequencies
         tau = pace[self._person] * (cells.level_db - latent[:, :k].ravel()[cells.run])
         q, q1, q2 = sensitivity(AT_THRESHOLD[self.family] + tau, self.family)
@@ -109,7 +112,8 @@ class TrialLikelihood:
 
 
 class _Evidence:
-    """Per cell, all by the mean of the evidence a: probabilities and their derivatives (m,)."""
+    """P(right) = p(a) per cell (m,) at the evidence a, with derivatives by a (`p1`) and by the lapse rate; the
+    log-likelihood, its derivatives by p, and the Fisher information by a (`weight`)."""
 
     def __init__(self, a: FloatArray, right: FloatArray, wrong: FloatArray, lapse: float) -> None:
         density, attentive = np.exp(-(a**2) / 2) / math.sqrt(2.0 * math.pi), 1.0 - 2.0 * lapse
@@ -125,12 +129,13 @@ class _Evidence:
 
 
 def _gradient(sums: FloatArray, pace: FloatArray) -> FloatArray:
-    """(n, d) from sums (3, n, k) by t, b and c. pace: -dt/dtheta (n, 1)."""
+    """Gradient (n, d) from sums over cells (3, n, k) of derivatives by t, b and c. pace: -dt/dtheta (n, 1)."""
     return np.concatenate([-pace * sums[0], sums[1:].sum(axis=2).T], axis=1)
 
 
 def _hessian(sums: FloatArray, pace: FloatArray) -> FloatArray:
-    """(n, d, d) from sums (6, n, k) by tt, tb, tc, bb, bc, cc."""
+    """Hessian (n, d, d) from sums over cells (6, n, k) of second derivatives by tt, tb, tc, bb, bc, cc. pace: as in
+    `_gradient`."""
     _, n, k = sums.shape
     out = np.zeros((n, k + 2, k + 2))
     places = np.arange(k)

@@ -1,9 +1,10 @@
-"""Nodes of the adaptive quadrature: where each person's latent parameters probably lie, by Laplace's method.
+"""Nodes and weights of adaptive Gauss-Hermite quadrature over each person's latent parameters.
 
-Given what a person shares over frequencies (deviation u, log-slope b, criterion c) the thresholds at single frequencies
-are independent. So there are outer nodes over u, b and c, and at each of them inner nodes for the threshold of every
-frequency. Both are those of Gauss and Hermite's rule, centred and scaled by Laplace's method: person by person, and the
-inner ones anew at every outer node.
+Given the parameters that a person shares over all frequencies (deviation u, log-slope b, criterion c), the thresholds
+at single frequencies are independent. The quadrature is therefore nested: outer nodes over u, b and c, and at each of
+them inner nodes over the threshold at every frequency. Nodes are centred and scaled for each person by the posterior
+moments, first from Laplace's method, then from the last evaluation; inner nodes are centred by the regression of the
+thresholds on u, b and c.
 
 Source: J. C. Naylor, A. F. M. Smith, J. R. Stat. Soc. C 31 (1982), 214-225; S. Rabe-Hesketh, A. Skrondal, A. Pickles,
 J. Econometrics 128 (2005), 301-323 (nested).
@@ -36,43 +37,44 @@ class Counts:
 
 
 COARSE, FINE, FIXED = Counts(3, 5, 3, 5), Counts(5, 5, 3, 7), Counts(5, 7, 3, 7)
-"""The fine nodes put medians within 0.03 dB of where twice as many of each kind do, also where most are above the cap.
-Where they do not settle, because a person's distribution has two maxima, there are more, which keep their places."""
+"""Numbers of nodes. With FINE, medians are within 0.03 dB of those with twice as many of each kind, also where most are
+above the cap. FIXED has more nodes, which keep their places, for fits that do not settle with FINE because a person's
+posterior has two maxima."""
 
 
 LEAST_SHARE = 1e-4
-"""Share of the variance of the nodes themselves that is added to that of the distribution: it is never 0, as it would
-be where all weight falls on a single node. By hand."""
+"""Share of the variance of the node positions that is added to the posterior variance, which would be 0 where all
+weight is on a single node. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moments:
-    """Posterior distribution of each person's latent parameters, as far as nodes need it; n persons, k frequencies."""
+    """Posterior moments of each person's latent parameters that place the nodes; n persons, k frequencies."""
 
     shared: FloatArray
     """(n, 3): means of u, b and c."""
     covariance: FloatArray
-    """(n, 3, 3): of these."""
+    """(n, 3, 3): covariance of u, b and c."""
     threshold: FloatArray
-    """(n, k): means of the thresholds."""
+    """(n, k): means of the thresholds, dB."""
     regression: FloatArray
-    """(n, k, 3): of the thresholds on u, b and c."""
+    """(n, k, 3): regression coefficients of the thresholds on u, b and c."""
     variance: FloatArray
-    """(n, k): of the thresholds at given u, b and c."""
+    """(n, k): variances of the thresholds at given u, b and c, dB²."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nodes:
-    """n persons, q outer nodes, k frequencies, r inner nodes."""
+    """Positions and log weights of the nodes: n persons, q outer nodes, k frequencies, r inner nodes."""
 
     shared: FloatArray
-    """(n, q, 3): u, b, c."""
+    """(n, q, 3): outer nodes, u (dB), b and c (d')."""
     log_weight: FloatArray
-    """(n, q)"""
+    """(n, q): of the outer nodes."""
     threshold: FloatArray
-    """(n, q, k, r)"""
+    """(n, q, k, r): inner nodes, dB."""
     log_weight_inside: FloatArray
-    """(n, 1, k, r)"""
+    """(n, 1, k, r): of the inner nodes, the same at every outer node."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +84,15 @@ class Population:
     means: FloatArray
     """(k,): mean threshold at each frequency, dB."""
     shared_sd: float
-    """Between people, of the deviation that a person has at all frequencies, dB."""
+    """Standard deviation between people of the deviation u that a person has at all frequencies, dB."""
     own_sd: float
-    """Of a person's further deviation at each single frequency, dB."""
+    """Standard deviation of a person's further deviation at each single frequency, dB."""
     slope: float
     """Mean of the log-slope b."""
     slope_sd: float
+    """Standard deviation of the log-slope b."""
     criterion_sd: float
-    """Of the criterion c, in units of d'; its mean is 0."""
+    """Standard deviation of the criterion c, in units of d'; its mean is 0."""
     lapse: float
     """Lapse rate, the same for all people."""
 
@@ -103,12 +106,13 @@ class Population:
 
 
 def laplace_moments(parameters: FloatArray, mode: FloatArray, information: FloatArray) -> Moments:
-    """Posterior moments of each person by Laplace's method. mode: (n, k + 2), information of the answers there: (n, k +
-    2, k + 2)."""
+    """Posterior moments of each person by Laplace's method. mode: (n, k + 2), posterior mode; information: (n, k + 2,
+    k + 2), expected information of the answers there."""
     k = mode.shape[1] - 2
     population, places = Population.of(parameters, k), np.arange(k)
     own, shared = population.own_sd**2, population.shared_sd**2
-    # u given all thresholds is normal: its mean is `drawn` times the sum of their deviations.
+    # u given all thresholds is normal: its mean is `drawn` times the sum of their deviations from the population means,
+    # its variance is `rest`.
     rest = 1.0 / (1.0 / shared + k / own)
     drawn = rest / own
     weights = np.zeros((3, k + 2))
@@ -123,8 +127,8 @@ def laplace_moments(parameters: FloatArray, mode: FloatArray, information: Float
 
 
 def place_nodes(moments: Moments, counts: Counts) -> Nodes:
-    """Nodes with log weights for each person: outer nodes for what is shared, inner nodes for each threshold. counts:
-    number of nodes by latent number."""
+    """Nodes with log weights for each person: outer nodes for u, b and c, inner nodes for each threshold, both scaled
+    by the moments. counts: number of nodes by latent parameter."""
     root = np.linalg.cholesky(moments.covariance)
     places, log_weights = _outer_rule(counts)
     steps = np.einsum("nab,qb->nqa", root, places)
@@ -140,7 +144,8 @@ def place_nodes(moments: Moments, counts: Counts) -> Nodes:
 
 
 def weigh_nodes(nodes: Nodes, weight: FloatArray, inside: FloatArray) -> Moments:
-    """Moments of the posterior distribution. weight: (n, q), inside: (n, q, k, r), probabilities of the nodes."""
+    """Posterior moments by the nodes. weight: (n, q), posterior probabilities of the outer nodes; inside: (n, q, k, r),
+    those of the inner nodes at each outer node."""
     shared = np.einsum("nq,nqa->na", weight, nodes.shared)
     away = nodes.shared - shared[:, None]
     covariance = np.einsum("nq,nqa,nqb->nab", weight, away, away)
@@ -158,13 +163,15 @@ def weigh_nodes(nodes: Nodes, weight: FloatArray, inside: FloatArray) -> Moments
 
 @cache
 def _rule(count: int) -> tuple[FloatArray, FloatArray]:
-    """Places, and logarithms of weights that make sums of f / (normal density without 2 pi) into integrals."""
+    """Gauss-Hermite positions x, and log(w / sum of w) + x² / 2: the sum of exp(log weight) f(x) is then the integral
+    of f over the real line, divided by sqrt(2 pi), the constant of the normal prior densities."""
     places, weights = np.polynomial.hermite_e.hermegauss(count)
     return places, np.log(weights / weights.sum()) + places**2 / 2.0
 
 
 @cache
 def _outer_rule(counts: Counts) -> tuple[FloatArray, FloatArray]:
+    """Product rule over u, b and c: standard positions (q, 3) and log weights (q,)."""
     rules = [list(zip(*_rule(count), strict=True)) for count in (counts.shared, counts.slope, counts.criterion)]
     nodes = list(product(*rules))
     places = np.array([[place for place, _ in node] for node in nodes])

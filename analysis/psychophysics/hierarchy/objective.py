@@ -1,4 +1,9 @@
-"""Penalized marginal likelihood of the population's parameters, and the search for its maximum by Laplace's method."""
+"""Penalized log marginal likelihood of the population's parameters, and its maximum by Laplace's method.
+
+Objective: sum of the persons' log marginal likelihoods (`marginal`) plus the log density of a weak prior (`Prior`),
+which keeps standard deviations, lapse rate and means finite where the answers do not determine them. The maximum is
+found by L-BFGS-B with the exact gradient; `refine` starts from it.
+"""
 
 from dataclasses import dataclass
 
@@ -15,29 +20,30 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Prior:
-    """Prior distributions of the population parameters, and their reasons."""
+    """Prior distributions of the population parameters, weak enough for the answers of a study to outweigh them."""
 
     lapse_right: float = 40.0
     lapse_wrong: float = 1.0
-    """Beta distribution of the lapse rate on the scale of its logit: as if one lapse in 41 sure trials had been seen.
-    Attentive adults lapse in 0 to 5 %; some hundred trials above threshold outweigh it."""
+    """Beta distribution of the lapse rate, as a density of its logit: as if one lapse had been seen in 41 trials far
+    above threshold. Attentive adults lapse in 0 to 5 %; some hundred trials above threshold outweigh the prior."""
     spread: float = 1.0
-    """Added log SD of each spread: keeps it off 0, about one standard error of an estimate that would be 0. Y. Chung
-    et al., Psychometrika 78 (2013), 685-709: gamma distribution of shape 2, rate towards 0."""
+    """Factor of the log SD in the log prior of each standard deviation: the gamma distribution of shape 2 and rate
+    towards 0 of Y. Chung et al., Psychometrika 78 (2013), 685-709. It moves an estimate that would be 0 by about one
+    standard error."""
     mean_sd_db: float = 30.0
-    """SD of a normal distribution of each mean around the average level played. Holds a mean that the answers do not
-    (all guess at the cap) at a finite place; a mean 10 dB away from that level moves by 0.01 dB."""
+    """SD of a normal distribution of each mean around the average level played. It keeps a mean finite that the answers
+    do not determine (all guess at the cap); a mean 10 dB away from that level moves by 0.01 dB."""
 
 
 LOG_SD_BOUNDS = ((-5.0, 3.5), (-5.0, 3.5), (-5.0, 0.7), (-5.0, 1.1))
-"""Bounds of the logarithm of each spread, in the order of `Layout.log_sds`: 0.007 to 33 dB, to 2 in log-slopes, to 3 in
-d'. At the lower bound persons do not differ, at the upper one they have nothing in common."""
+"""Bounds of the log standard deviations, in the order of `Layout.log_sds`: 0.007 to 33 dB, up to 2 in log-slopes, up to
+3 in d'. At the lower bound persons are alike; at the upper bound they have practically nothing in common."""
 LAPSE_BOUNDS = (float(logit(1e-4)), float(logit(0.3)))
 """Bounds of the lapse rate (logit): 0.01 % to 30 %."""
 
 
 class Objective:
-    """Minus the penalized log marginal likelihood, for a search."""
+    """Minus the penalized log marginal likelihood with its gradient, as a function to minimise."""
 
     def __init__(self, answers: Answers, family: Family, prior: Prior) -> None:
         self.answers, self.family = answers, family
@@ -50,12 +56,13 @@ class Objective:
         self._middle_db = float(np.average(answers.level_db, weights=answers.right + answers.wrong))
 
     def __call__(self, parameters: FloatArray) -> tuple[float, FloatArray]:
+        """Value and gradient (size,) at the parameters (size,) of `Layout`."""
         value, scores = self.marginal.evaluate(parameters)
         penalty, slope = self.penalty(parameters)
         return -float(value.sum()) - penalty, -scores.sum(axis=0) - slope
 
     def penalty(self, parameters: FloatArray) -> tuple[float, FloatArray]:
-        """Log density of the prior, and its gradient."""
+        """Log density of the prior up to a constant, and its gradient (size,)."""
         layout, prior = self.layout, self.prior
         lapse = float(expit(parameters[layout.lapse]))
         slope = np.zeros(layout.size)
@@ -87,22 +94,24 @@ class Objective:
 
 
 def find_starting_parameters(answers: Answers, family: Family) -> FloatArray:
-    """Starting values of the population parameters: means from the levels played, usual spreads."""
+    """Starting values of the population parameters (k + 6,): means from the levels played, else usual values."""
     k = len(answers.frequencies_hz)
     trials = answers.right + answers.wrong
     place = answers.run % k
     played = np.bincount(place, weights=trials, minlength=k)
     total = np.bincount(place, weights=trials * answers.level_db, minlength=k)
     means = np.where(played > 0, total / np.maximum(played, 1), total.sum() / played.sum())
+    # SDs of 2.5 dB (persons), 2.0 dB (person x frequency), 0.30 (log-slope) and 0.20 d' (criterion); lapse rate 2 %.
     return np.concatenate([means, [0.9, 0.7, np.log(USUAL_SLOPE[family]), -1.2, -1.6, logit(0.02)]])
 
 
 def maximise(objective: Objective, begin: FloatArray, held: int | None = None) -> OptimizeResult:
-    """Maximise the penalised likelihood; with `held`, that parameter is fixed at its value in `begin` (profile)."""
+    """Maximise the penalised likelihood from `begin` (size,), first clipped to the bounds. held: index of a parameter
+    that is fixed at its value in `begin` (profile likelihood)."""
     bounds = objective.bounds
     if held is not None:
         bounds[held] = (float(begin[held]), float(begin[held]))
-    # Quadrature goes on from here: some hundredths of a standard error are enough.
+    # The search by quadrature continues from here, so an error of some hundredths of a standard error is acceptable.
     options = {"maxiter": 300, "ftol": 1e-7, "gtol": 1e-3, "maxcor": 20}
     begin = np.clip(begin, *np.array([(-np.inf if a is None else a, np.inf if b is None else b) for a, b in bounds]).T)
     return minimize(objective, begin, jac=True, method="L-BFGS-B", bounds=bounds, options=options)

@@ -1,4 +1,8 @@
-"""Observed shares of right answers by level, and the curve of a person, for figures of psychometric functions."""
+"""Observed shares of right answers by level, and fitted curves, for figures of psychometric functions.
+
+Levels are binned; each bin has the share of right answers with Wilson's 95 % interval. The curve of a person is the
+probability of a right answer of `curve.share_right`, averaged over both directions.
+"""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -18,7 +22,7 @@ BIN_DB = 2.0
 
 
 class FittedCurves(Protocol):
-    """What a figure needs of a fit, of a study or of a single person."""
+    """The part of a fit that figures need: `PrimaryAnalysis` of a study, or `SinglePersons`."""
 
     @property
     def frequencies_hz(self) -> tuple[float, ...]:
@@ -51,19 +55,21 @@ class ObservedShare:
 
     @property
     def share(self) -> float:
+        """Share of right answers, 0 to 1."""
         return self.right / self.trials
 
 
 def shares_of_person(answers: Answers, person: int, place: int) -> tuple[ObservedShare, ...]:
-    """Over levels in dB re 1 N, ascending. person, place: numbers of the person and the frequency."""
+    """Observed shares of a person at one frequency, by bins of levels in dB re 1 N, ascending. person, place: indices
+    of the person and the frequency. Empty without answers."""
     return _shares(answers, answers.run == person * len(answers.frequencies_hz) + place, answers.level_db)
 
 
 def shares_of_people(answers: Answers, fit: FittedCurves, place: int) -> tuple[ObservedShare, ...]:
     """Observed shares of all people at one frequency, over levels in dB re each person's own threshold by the model.
 
-    Against the levels themselves they would say little: a staircase holds everyone near 79 %, so that the low levels
-    are those of sensitive people, and the shares of all people together are the same at all levels.
+    Over absolute levels the shares would be nearly constant: a staircase keeps each person near 79 %, so that low
+    levels come from sensitive people and high levels from insensitive people.
     """
     thresholds_db = np.array([to_db(person.thresholds_n[place]) for person in fit.persons])
     chosen = answers.run % len(answers.frequencies_hz) == place
@@ -85,6 +91,7 @@ def person_curve(above_db: FloatArray, person: PersonEstimate, fit: FittedCurves
 
 
 def _shares(answers: Answers, chosen: NDArray[np.bool_], level_db: FloatArray) -> tuple[ObservedShare, ...]:
+    """Shares of the chosen cells by bins of `level_db`. chosen, level_db: (m,), an entry per cell."""
     level, right, trials = level_db[chosen], answers.right[chosen], (answers.right + answers.wrong)[chosen]
     bins, found = np.round(level / BIN_DB), []
     for number in np.unique(bins):

@@ -1,10 +1,11 @@
-"""The marginal likelihood of each person by adaptive quadrature, with its exact gradient and Hessian.
+"""Log marginal likelihood of each person by adaptive Gauss-Hermite quadrature, with gradient and Hessian.
 
-With one node each this would be Laplace's method, which puts medians some 0.13 dB too low, because the likelihood of a
-threshold is skewed: the volume under it is not that of the normal density of the expected information.
+Laplace's method (`marginal`) puts medians some 0.13 dB too low, because the likelihood of a threshold is skewed: its
+integral is not that of the normal density with the expected information. The nodes are those of `nodes`.
 
-The derivatives need none of the nodes: the gradient is the mean over the person's posterior distribution of the
-gradient with everything known; the Hessian is the mean of that Hessian plus the covariance of that gradient.
+With L the log density of a person's answers and latent parameters z, and E over the posterior distribution of z:
+    gradient = E[dL]  (Fisher's identity),      Hessian = E[d²L] + Cov[dL]  (Louis' identity),
+so that no derivative of the node positions is needed.
 
 Source: R. A. Fisher, Proc. Camb. Philos. Soc. 22 (1925), 700-725; T. A. Louis, J. R. Stat. Soc. B 44 (1982), 226-233.
 """
@@ -31,12 +32,13 @@ class Integrals:
     scores: FloatArray
     """(n, size): its gradient."""
     hessian: FloatArray
-    """(size, size): of the sum over persons."""
+    """(size, size): Hessian of the sum of the values over persons."""
     moments: Moments
+    """Posterior moments by these nodes, to place the nodes of the next evaluation."""
 
 
 class _Person:
-    """A person's answers by run and level, as the likelihood at many nodes needs them."""
+    """A person's answers by run and level, arranged so that the evidence q is computed once per level and node."""
 
     def __init__(self, answers: Answers, person: int, family: Family) -> None:
         self._family, self._k = family, len(answers.frequencies_hz)
@@ -44,7 +46,7 @@ class _Person:
         place, level_db = answers.run[chosen] % self._k, answers.level_db[chosen]
         new = (np.diff(place, prepend=-1) != 0) | (np.diff(level_db, prepend=np.nan) != 0)
         self._place, self._level_db = place[new], level_db[new]
-        # Each kind of answer at a level: shown direction and whether right; only those that were given.
+        # An entry per level, shown direction, and right or wrong; only for answers that were given.
         counts = np.stack([answers.right[chosen], answers.wrong[chosen]], axis=1)
         cell, kind = np.nonzero(counts)
         self._count = counts[cell, kind][:, None, None]
@@ -71,7 +73,7 @@ class _Person:
 
 
 class Quadrature:
-    """Answers, prepared for integrals at many population parameters."""
+    """A study's answers, prepared for integrals at many values of the population parameters."""
 
     def __init__(self, answers: Answers, family: Family) -> None:
         self.k, self.people = len(answers.frequencies_hz), answers.persons
@@ -88,7 +90,8 @@ class Quadrature:
 
 
 def integrate(quadrature: Quadrature, parameters: FloatArray, moments: Moments, counts: Counts) -> Integrals:
-    """moments: at these parameters, or near them."""
+    """Log marginal likelihoods and derivatives at the parameters (size,) of `Layout`. moments: posterior moments at
+    these parameters, or at parameters close to them. counts: number of nodes."""
     k = quadrature.k
     population = Population.of(parameters, k)
     nodes = place_nodes(moments, counts)
@@ -125,7 +128,8 @@ def _normalise(log_terms: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _gradient(mean: FloatArray, deviations: FloatArray, population: Population) -> FloatArray:
-    """(n, q, size): with everything known, averaged over the thresholds. mean: (n, q, k, 3), deviations: (n, q, 3)."""
+    """(n, q, size): gradient of L at the outer nodes, averaged over the inner nodes. mean: (n, q, k, 3), averages by
+    mean, log SD and lapse rate; deviations: (n, q, 3), of u, b and c in standard deviations."""
     layout = Layout(mean.shape[2])
     out = np.empty((*mean.shape[:2], layout.size))
     out[..., : layout.k] = mean[..., 0]
@@ -136,7 +140,8 @@ def _gradient(mean: FloatArray, deviations: FloatArray, population: Population) 
 
 
 def _covariance_inside(covariance: FloatArray) -> FloatArray:
-    """(size, size) from the (k, 3, 3) covariances of the gradient by mean, log SD and lapse rate at each frequency."""
+    """Covariance of the gradient within outer nodes (size, size), from the covariances (k, 3, 3) by mean, log SD and
+    lapse rate at each frequency: thresholds at different frequencies are independent there."""
     layout = Layout(len(covariance))
     places, summed = np.arange(layout.k), covariance.sum(axis=0)
     out = np.zeros((layout.size, layout.size))
@@ -149,8 +154,8 @@ def _covariance_inside(covariance: FloatArray) -> FloatArray:
 
 
 def _hessian_known(scores: FloatArray, bent: float, population: Population, persons: int) -> FloatArray:
-    """(size, size): mean of the Hessian with everything known. It follows from the gradient, because the densities are
-    normal; bent: the part of the lapse rate."""
+    """(size, size): posterior mean of the Hessian of L, summed over persons. It follows from the gradient, because the
+    population densities are normal. bent: second derivative by the logit of the lapse rate."""
     layout, total = Layout(len(population.means)), scores.sum(axis=0)
     out = np.zeros((layout.size, layout.size))
     places = np.arange(layout.k)

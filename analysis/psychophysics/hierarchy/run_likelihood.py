@@ -1,13 +1,13 @@
 """Maximum-likelihood threshold of each single run, with a likelihood interval.
 
-One run of some 60 trials does not determine a slope: it is averaged over a distribution of slopes, criteria and lapse
-rates (`Nuisance`): as all answers of the person give them in the model of all answers, or of what is usual. The
-threshold is the run's alone, not drawn towards anything, and so is the interval.
+One run of some 60 trials does not determine a slope. The likelihood of the threshold is therefore averaged over a
+distribution of slope, criterion and lapse rate (`Nuisance`), from the model of all answers or from usual values. No
+prior of the threshold enters: estimate and interval rest on the run's answers alone, without shrinkage.
 
-A run with only right answers has no most probable threshold: the lower, the more probable. It gets no size and only an
-upper bound, as a run whose most probable threshold is above the cap gets only a lower one. A bound is the end that the
-two-sided interval has: the answers choose which of them is reported, and a bound of the confidence itself would then be
-wrong more often than it says (G. J. Feldman, R. D. Cousins, Phys. Rev. D 57 (1998), 3873-3889).
+After right answers only, the likelihood rises towards low thresholds without a maximum: there is no estimate, only an
+upper bound. Where the estimate is above the cap there is only a lower bound. Each bound is that end of the two-sided
+interval: because the answers decide what is reported, a one-sided bound at the same confidence would hold too rarely
+(G. J. Feldman, R. D. Cousins, Phys. Rev. D 57 (1998), 3873-3889).
 
 Source: S. S. Wilks, Ann. Math. Stat. 9 (1938), 60-62 (half the chi-squared quantile below the highest log-likelihood).
 """
@@ -25,7 +25,7 @@ from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, F
 from equalizer.signals.signal import FloatArray
 
 GRID_DB, BEYOND_DB = 0.1, 30.0
-"""Step of the threshold grid, and how far it reaches below the levels played and above them and the cap."""
+"""Step of the grid of thresholds (dB), and its reach below the lowest level and above the highest level or the cap."""
 NODES = 7
 """Nodes of the Gauss-Hermite rule that averages over slopes, or over criteria."""
 SAME_HEIGHT = 1e-9
@@ -49,23 +49,23 @@ class Nuisance:
 
 @dataclass(frozen=True, slots=True)
 class RunLikelihood:
-    """Threshold of one person at one frequency by those answers alone, in dB re 1 N. Its interval holds every threshold
-    that the answers do not contradict."""
+    """Threshold of one person at one frequency by those answers alone, in dB re 1 N. The interval holds all thresholds
+    whose log-likelihood is within half the chi-squared quantile (1 degree of freedom) of the maximum."""
 
     subject: str
     frequency_hz: float
     trials: int
-    """All runs of the person at this frequency together."""
+    """Number of answers, of all runs of the person at this frequency together."""
     db: float | None
-    """None where the most probable threshold is above the cap: then `lower_db` is a one-sided bound. None, too, where
-    `below` is True: then `upper_db` is a one-sided bound."""
+    """Maximum-likelihood estimate. None where it is above the cap: `lower_db` is then a one-sided bound. Also None
+    where `below` is True: `upper_db` is then a one-sided bound."""
     lower_db: float | None
-    """None: no lower end within 30 dB below the levels played."""
+    """Lower end; None: no lower end within `BEYOND_DB` below the levels played."""
     upper_db: float | None
-    """None: no upper end; the answers do not contradict a participant who feels no direction at all."""
+    """Upper end; None: the answers do not contradict a participant who feels no direction at all, or `db` is None
+    because it is above the cap."""
     below: bool
-    """True where no threshold within 30 dB below the levels played is more probable than a lower one, as after right
-    answers only."""
+    """True where the likelihood is highest at the lower end of the grid, as after right answers only."""
 
 
 def run_likelihoods(
@@ -75,8 +75,8 @@ def run_likelihoods(
     family: Family = Family.WEIBULL,
     confidence: float = 0.95,
 ) -> tuple[RunLikelihood, ...]:
-    """Threshold and interval of each person at each frequency, in the order of the runs' numbers. people: what their
-    runs do not determine, in the order of the answers' subjects. cap_db: in dB re 1 N."""
+    """Threshold and interval of each person at each frequency with answers, in the order of the runs' indices. people:
+    an entry per subject of the answers. cap_db: cap in dB re 1 N. confidence: of the two-sided interval."""
     k = len(answers.frequencies_hz)
     found = []
     for run in np.unique(answers.run):
@@ -91,7 +91,8 @@ def run_likelihoods(
 def _likelihood(
     answers: Answers, run: int, person: Nuisance, cap_db: float, family: Family
 ) -> tuple[FloatArray, FloatArray]:
-    """Thresholds (g,) in dB, and the log-likelihood at each, averaged over what is not known."""
+    """Grid of thresholds (g,) in dB, and the logarithm of the likelihood at each, averaged over slope, criterion and
+    lapse rate."""
     cells = answers.run == run
     level, side = answers.level_db[cells], answers.side[cells]
     grid = np.arange(level.min() - BEYOND_DB, max(level.max(), cap_db) + BEYOND_DB, GRID_DB)
@@ -108,7 +109,7 @@ def _likelihood(
 
 
 def _nodes(sd: float) -> list[tuple[float, float]]:
-    """Places and weights of Gauss and Hermite's rule for a normal distribution."""
+    """Positions and weights of Gauss-Hermite quadrature for a normal distribution with mean 0 and this sd."""
     if sd == 0.0:
         return [(0.0, 1.0)]
     places, weights = np.polynomial.hermite_e.hermegauss(NODES)
@@ -118,7 +119,8 @@ def _nodes(sd: float) -> list[tuple[float, float]]:
 def _profile_interval(
     grid: FloatArray, height: FloatArray, cap_db: float, confidence: float
 ) -> tuple[float | None, float | None, float | None, bool]:
-    """Most probable threshold, lower and upper end, and whether it lies below the grid."""
+    """Estimate, lower end, upper end, and whether the maximum is at the lower end of the grid (`RunLikelihood`). grid,
+    height: (g,)."""
     best = float(grid[height.argmax()])
     below, above = bool(height[0] >= height.max() - SAME_HEIGHT), best > cap_db
     inside = np.flatnonzero(height >= height.max() - chi2.ppf(confidence, 1) / 2)

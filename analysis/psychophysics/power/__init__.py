@@ -1,6 +1,6 @@
-"""Power analysis: studies simulated without device, session or file, and the result of each analysis.
+"""Statistical power by simulation: whole studies in memory, without device, session or file, and their analyses.
 
-`staircase_kernel` and `psi_kernel` (a run) -> `simulated_study` (many people; `felt_delivery`: as a device delivers) ->
-`power_curve` (power, type-1 error, coverage by sample size), `compare_rules` (rules of levels). Begin at
-`simulated_study.py`.
+`staircase_kernel` or `psi_kernel` (a run of a simulated participant, compiled) -> `simulated_study` (many people;
+`felt_delivery`: the stimuli as a device delivers them) -> `power_curve` (power, type-1 error and coverage by sample
+size). `compare_rules` compares rules of levels by their error per trial. Begin at `simulated_study.py`.
 """

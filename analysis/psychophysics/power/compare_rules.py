@@ -1,10 +1,11 @@
-"""Rules that choose levels, compared by their error per trial, on the same simulated people with the same draws.
+"""Comparison of rules that choose levels (staircases, Psi) by the error of a threshold, on simulated people.
 
-Each person takes one run under every rule. The draws of a person belong to the person: trial 7 has the same random
-number under every rule, so that rules are compared pairwise.
+Each person takes one run under every rule, with the same random numbers: trial 7 has the same draw under every rule, so
+that differences between rules are paired.
 
-Source of the measure: M. M. Taylor, C. D. Creelman, J. Acoust. Soc. Am. 41 (1967), 782-787: variance times trials,
-their "sweat factor"; here its root, the error that a single trial's worth of such answers would leave.
+Measure of efficiency: the sweat factor of M. M. Taylor, C. D. Creelman, J. Acoust. Soc. Am. 41 (1967), 782-787, is the
+variance of the estimate times the number of trials. Here: its square root with the mean square error in place of the
+variance, in dB.
 """
 
 import math
@@ -33,7 +34,7 @@ from protocols.procedure.staircase import (
 )
 
 _KEY = 0x9517
-"""Separates these draws from those of whole studies."""
+"""Word of the seed that separates these draws from those of whole studies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,31 +43,34 @@ class RuleResult:
 
     rule: str
     runs: int
-    """With a threshold."""
+    """Number of runs that ended with a threshold; the errors are over these. NaN without any."""
     trials: float
-    """Mean of a run."""
+    """Mean number of trials per run, over all runs."""
     bias_db: float
     sd_db: float
-    """Mean and standard deviation of the error of one run's estimate."""
+    """Mean and standard deviation of the error of one run's estimate, estimated minus true threshold."""
     error_db: float
-    """Root of the mean square error of a run."""
+    """Root mean square error of one run's estimate."""
     error_per_trial_db: float
-    """Times the root of the mean number of trials."""
+    """`error_db` times the square root of `trials`."""
     highest_n: float
-    """Highest of all levels."""
+    """Highest level played in any run, N."""
 
 
 class ComparedPerson(NamedTuple):
     """One simulated person at one frequency."""
 
     threshold_db: float
-    """In dB re 1 N."""
+    """True threshold, in dB re 1 N."""
     slope: float
+    """Slope of the psychometric function, in the units of `hierarchy.curve`."""
     criterion: float
+    """Response criterion c, in units of d'."""
 
 
 def list_compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
-    """The protocol's up-down rule with each reading of its steps, and Psi with as many trials as such a run takes."""
+    """Rules by name: the protocol's up-down rule with each interpretation of its change of step (`StepChange`), and Psi
+    with 30 and 60 trials."""
     names = {
         StepChange.AFTER_REVERSAL: "staircase, new step after the reversal",
         StepChange.AT_REVERSAL: "staircase, new step at the reversal",
@@ -85,6 +89,7 @@ def compare_rules(crowd: Crowd, rules: Mapping[str, StaircaseRule], people: int,
 
 
 def _result(name: str, rule: StaircaseRule, crowd: Crowd, people: int, seed: int) -> RuleResult:
+    """Result of one rule over all people."""
     errors, trials, highest = [], [], 0.0
     for number in range(people):
         true_db, state, top_n = play(crowd, rule, (seed, _KEY, number))
@@ -115,7 +120,7 @@ def play(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> tuple[float
     slope = (crowd.slope or USUAL_SLOPE[crowd.family]) * math.exp(crowd.slope_log_sd * random.standard_normal())
     person = ComparedPerson(float(true_db), slope, crowd.criterion_sd * random.standard_normal())
     draws = random.random((MOST_TRIALS, 2))
-    # After the others, so that these are the same with roving and without.
+    # The draws of roving come last, so that all others are the same with roving and without it.
     state, played_n = answer_trials(crowd, rule, person, np.column_stack([draws, random.random(MOST_TRIALS)]))
     return person.threshold_db, state, max(played_n)
 
@@ -137,7 +142,7 @@ def answer_trials(
 
 
 def _is_right(crowd: Crowd, steps: float, criterion: float, draw: FloatArray) -> bool:
-    """steps: slope times dB above the threshold."""
+    """Whether a trial is answered right. steps: slope times dB above the threshold; draw: (3,), of `answer_trials`."""
     q = float(sensitivity(np.array([AT_THRESHOLD[crowd.family] + NEPER_PER_DB * steps]), crowd.family)[0][0])
     side = 1.0 if draw[0] < 0.5 else -1.0
     right = crowd.lapse + (1.0 - 2.0 * crowd.lapse) * NormalDist().cdf(q - side * criterion)

@@ -1,4 +1,10 @@
-"""Power, type-1 error, coverage and bias of a study, by analysis and sample size."""
+"""Power, type-1 error, coverage and bias of a planned study, by analysis and sample size, from simulated studies.
+
+Each simulated study is tested at one pair of frequencies at the 5 % level by three analyses: the hierarchical model
+(t test over pseudo-thresholds), means of runs in dB (paired t test), and the published procedure (Tukey's test in
+newtons: |difference| > q sqrt(MS_within / n)). Power is the share of studies that find the difference; without a true
+difference this share is the type-1 error.
+"""
 
 import math
 from collections.abc import Sequence
@@ -17,26 +23,29 @@ from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from protocols.definition.staircase_rule import StaircaseRule
 
 CONFIDENCE = 0.95
-"""Confidence of the intervals of power and type-1 error."""
+"""Confidence of the contrasts' intervals; every test has the level 1 - CONFIDENCE."""
 
 
 @dataclass(frozen=True, slots=True)
 class StudyVerdict:
-    """One simulated study: one pair of frequencies, at the 5 % level."""
+    """Results of one simulated study for one pair of frequencies, at the 5 % level."""
 
     people: int
     trials: int
+    """Number of trials of all people together."""
     primary_found: bool
-    """Whether the hierarchical model of all answers finds the difference, by a t test over people. False, here and
-    below, where the differences of all people are equal, so that no test is possible."""
+    """Whether the hierarchical model of all answers finds the difference, by a t test over people. False where the
+    differences of all people are equal, so that no test is possible; also in `primary_covers` and `means_found`."""
     primary_covers: bool
+    """Whether the model's 95 % interval holds the true difference."""
     primary_error_db: float
-    """Estimated minus true difference."""
+    """Estimated minus true difference, by the model."""
     means_found: bool
-    """The same by reversal means in dB (Psi: posterior means, here and below), paired t test."""
+    """Whether a paired t test of reversal means in dB (Psi: posterior means) finds the difference."""
     means_error_db: float
+    """Estimated minus true difference, by these means."""
     published_found: bool
-    """The same by reversal means in newtons, one-way ANOVA, Tukey's test of the pair."""
+    """Whether Tukey's test after a one-way ANOVA of means in newtons finds the difference."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +55,7 @@ class Share:
     value: float
     lower: float
     upper: float
-    """Wilson's 95 % interval: how well the simulated studies determine the share."""
+    """Limits of Wilson's 95 % interval, due to the limited number of simulated studies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,20 +67,21 @@ class PowerPoint:
     studies: int
     trials_per_person: float
     primary: Share
-    """Share of studies that find the difference; without an effect this is the type-1 error."""
     means: Share
     published: Share
+    """Share of studies in which each analysis finds the difference; without a true difference, the type-1 error."""
     coverage: Share
     """Coverage of the primary analysis's 95 % interval."""
     primary_bias_db: float
     means_bias_db: float
+    """Mean error of the estimated difference, dB."""
 
 
 def judge_study(
     crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...], contrast_hz: tuple[float, ...] = ()
 ) -> StudyVerdict:
-    """Two people at least; thresholds of all people must be complete, so the rule must have no trial limit.
-    contrast_hz: as of `find_judged_pair`."""
+    """Simulate a study and test it. people: two at least. rule: without a trial limit, because all runs must have a
+    threshold. seed: of all draws. contrast_hz: as for `find_judged_pair`."""
     study = simulate_study(crowd, rule, people, seed)
     pair_hz = find_judged_pair(crowd.frequencies_hz, contrast_hz)
     first, second = (crowd.frequencies_hz.index(frequency_hz) for frequency_hz in pair_hz)
@@ -99,13 +109,13 @@ def judge_study(
 
 
 def find_judged_pair(frequencies_hz: tuple[float, ...], contrast_hz: tuple[float, ...]) -> tuple[float, float]:
-    """First minus second: the declared contrast, or without one the highest frequency minus the lowest.
-    frequencies_hz: in ascending order."""
+    """The pair to test, first minus second: the declared contrast, or without one the highest frequency minus the
+    lowest. frequencies_hz: in ascending order."""
     return (contrast_hz[0], contrast_hz[1]) if contrast_hz else (frequencies_hz[-1], frequencies_hz[0])
 
 
 def true_difference_db(crowd: Crowd, contrast_hz: tuple[float, ...] = ()) -> float:
-    """Median threshold at the first frequency of `find_judged_pair` over that at the second."""
+    """True difference in dB: median threshold at the first frequency of `find_judged_pair` over that at the second."""
     medians_n = dict(zip(crowd.frequencies_hz, crowd.medians_n, strict=True))
     first_hz, second_hz = find_judged_pair(crowd.frequencies_hz, contrast_hz)
     return 20.0 * float(np.log10(medians_n[first_hz] / medians_n[second_hz]))
@@ -113,12 +123,13 @@ def true_difference_db(crowd: Crowd, contrast_hz: tuple[float, ...] = ()) -> flo
 
 @cache
 def _critical_range(groups: int, df: int) -> float:
-    """Tukey's, for equal sizes as here. Kept, because it takes as long as a whole study."""
+    """Quantile of the studentized range for Tukey's test with groups of equal size. Cached: computing it takes as long
+    as simulating a study."""
     return float(studentized_range.ppf(CONFIDENCE, groups, df))
 
 
 def power_point(verdicts: Sequence[StudyVerdict]) -> PowerPoint:
-    """verdicts: of studies with equally many people, one at least."""
+    """Shares and biases over simulated studies. verdicts: at least one, all with the same number of people."""
     n = len(verdicts)
     return PowerPoint(
         people=verdicts[0].people,
@@ -134,5 +145,6 @@ def power_point(verdicts: Sequence[StudyVerdict]) -> PowerPoint:
 
 
 def _wilson_share(found: Sequence[bool]) -> Share:
+    """Share of true values, with Wilson's 95 % interval."""
     lower, upper = wilson_interval(sum(found), len(found))
     return Share(sum(found) / len(found), lower, upper)

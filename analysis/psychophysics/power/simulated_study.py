@@ -1,4 +1,9 @@
-"""Simulated studies in the form that the analyses take: counted answers, and thresholds of runs."""
+"""Simulation of whole studies: people drawn from a population answer all their runs under a staircase rule or Psi.
+
+True thresholds are normal in dB: median of the frequency + deviation of the person + deviation of person x frequency,
+the model that `hierarchy.marginal` fits. Slopes are log-normal, criteria normal. The result has the form that the
+analyses take: counted answers, and the threshold of each run.
+"""
 
 import math
 from collections.abc import Sequence
@@ -27,70 +32,72 @@ from protocols.definition.staircase_rule import StaircaseRule
 from protocols.procedure.staircase import to_db
 
 _HABITS = 0x4AB1
-"""Last word of the seed from which habits (guessing, drift, order of runs) are drawn, so that all other draws stay
-those of a study without habits."""
+"""Last word of the seed from which habits (guessing, drift, order of runs) are drawn, so that all other draws are the
+same as in a study without habits."""
 FAMILIES = (Family.WEIBULL, Family.LOGISTIC, Family.GAUSS)
 """Families of curves in the order of the kernel's numbers (`staircase_kernel.evidence`)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Crowd:
-    """The people that studies are drawn from. Thresholds: level at which an attentive, unbiased answer is right in
-    79.37 %, normal in dB."""
+    """Population from which the people of a study are drawn. A threshold is the level at which an attentive, unbiased
+    participant answers right with probability 79.37 %; thresholds are normal in dB."""
 
     frequencies_hz: tuple[float, ...]
     """Frequencies in ascending order."""
     medians_n: tuple[float, ...]
+    """Median threshold at each frequency, N."""
     person_sd_db: float = 2.5
-    """Standard deviation between people that all frequencies share."""
+    """Standard deviation between people of the deviation common to all frequencies."""
     frequency_sd_db: tuple[float, ...] | float = 1.7
-    """Standard deviation between people at single frequencies: one value for all, or one each."""
+    """Standard deviation of the further deviation at each frequency: one value for all frequencies, or one each."""
     slope: float | None = None
-    """Median; None: as steep as a Weibull slope of 2 over newtons."""
+    """Median slope; None: `USUAL_SLOPE` of the family, as steep as a Weibull slope of 2 over newtons."""
     slope_log_sd: float = 0.25
     """Standard deviation between people of the slope's natural logarithm."""
     lapse: float = 0.02
-    """Share of wrong answers at the strongest level."""
+    """Lapse rate: probability of a wrong answer at the highest levels."""
     criterion_sd: float = 0.15
     """Standard deviation between people of the criterion, in units of d'."""
     family: Family = Family.WEIBULL
     guessers: float = 0.0
-    """Share of people who guess."""
+    """Share of people who guess in every trial."""
     criterion_drift_sd: float = 0.0
-    """Standard deviation between people of the criterion's drift per 100 trials; the runs then come in random order."""
+    """Standard deviation between people of the criterion's drift per 100 trials, in units of d'."""
     unsure: float = 0.0
     """Distance from the criterion, in standard errors, within which people ask for the same trial again; see
     `Participant`."""
     repeats: int = 0
-    """Most such repeats in a run."""
+    """Largest number of such repeats in a run."""
     delivery: FeltDelivery | None = None
     """Delivery of the commands by a device; None: people feel the commands. Thresholds are those on an ideal device."""
     rove_db: float = 0.0
-    """Range from which the amplitude of each trial is drawn around the staircase's level, as a protocol's
-    `stimulus.rove_db`; Psi plays its levels as they are."""
+    """Width of the range around the staircase's level from which each amplitude is drawn, as `stimulus.rove_db` of a
+    protocol. Levels of Psi are not roved."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedStudy:
-    """The answers and thresholds of runs of a simulated study, beside the true thresholds."""
+    """Answers, thresholds of runs, and true thresholds of a simulated study."""
 
     answers: Answers
     threshold_n: FloatArray
-    """(people, frequencies): arithmetic mean of the averaged reversals in newtons; NaN without all reversals. Of Psi:
-    mean of the posterior, at most the cap."""
+    """(people, frequencies): arithmetic mean of the averaged reversal levels, N; NaN for a run without all reversals.
+    For Psi: posterior mean, at most the cap."""
     threshold_db: FloatArray
     """(people, frequencies): mean of the same levels in dB."""
     cap_reversals: FloatArray
-    """(people, frequencies): averaged reversals that are peaks at the cap; of Psi, 1 where a threshold is cut."""
+    """(people, frequencies): number of averaged reversals at the cap; for Psi, 1 where the threshold is cut by the cap,
+    else 0."""
     trials: int
-    """Of all runs together."""
+    """Number of trials of all runs together."""
     true_db: FloatArray
     """(people, frequencies): true thresholds in dB re 1 N."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _RunThresholds:
-    """Thresholds of all simulated runs, (runs,) each."""
+    """Thresholds of all simulated runs, (runs,) each, as the fields of `SimulatedStudy`."""
 
     newton: FloatArray
     db: FloatArray
@@ -98,8 +105,8 @@ class _RunThresholds:
 
 
 def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...]) -> SimulatedStudy:
-    """Draw people from the crowd and play all their runs by this rule. The same seed gives the same study, on any
-    machine and in any order of work."""
+    """Draw people from the crowd and simulate all their runs under this rule. The same seed gives the same study on any
+    machine and in any order of simulations."""
     rng, k = np.random.default_rng(seed), len(crowd.frequencies_hz)
     true_db, participants = _draw_people(crowd, people, rng)
     seeds = rng.integers(0, 2**32, size=(people, k), dtype=np.uint64)
@@ -155,15 +162,15 @@ def _reversal_means(rule: StaircaseRule, tracks: Track, found: Sequence[RunFound
 
 
 def _posterior_means(rule: StaircaseRule, tracks: Track, found: Sequence[RunFound]) -> _RunThresholds:
-    """Posterior means of Psi, with the cap as in `thresholds.threshold_of`."""
+    """Posterior means of Psi, limited by the cap and marked as cut by it as in `thresholds.threshold_of`."""
     db = np.minimum([run.mean_db for run in found], to_db(rule.cap_n))
     cut = np.array([run.above_cap for run in found]) > MAYBE_ABOVE
     return _RunThresholds(np.minimum(10.0 ** (db / 20.0), rule.cap_n), db, cut.astype(np.float64))
 
 
 def _feel_delivery(participant: Participant, delivery: FeltDelivery | None, place: int) -> Participant:
-    """The participant, who feels what the device delivers at the frequency of index `place`; without a delivery, the
-    command itself."""
+    """The participant with the stimuli that the device delivers at the frequency of index `place`; unchanged without a
+    delivery: the commands are then felt as they are."""
     if delivery is None:
         return participant
     first, second = (np.array(table) * (1.0, 1.0, 1.0, delivery.masking) for table in delivery.tables[place])
@@ -189,7 +196,8 @@ def _play_sessions(
     tracks: Track,
     key: tuple[int, ...],
 ) -> list[RunFound]:
-    """Fills the tracks, person by person with their habits. Returns what each run came to, in the order of tracks."""
+    """Fill the tracks, person by person, with the runs of each person in random order. Returns the result of each run,
+    in the order of the tracks. seeds: (runs,); key: seed of the habits."""
     habits, k = np.random.default_rng(key), len(crowd.frequencies_hz)
     play = partial(play_psi, pack_psi(rule)) if rule.is_bayesian else partial(play_run, pack(rule, crowd.rove_db))
     found = [RunFound(0, 0)] * len(participants)

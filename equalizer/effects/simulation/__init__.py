@@ -1,7 +1,6 @@
-"""Plays commands through a mechanical model with its effects: actuator, mechanism and hand, sensor, in this order.
+"""Simulates a mechanical model with its effects under commands: actuator, mechanism and hand, sensor, in this order.
 
-`command_path` -> `bodies` (which masses, which forces) -> `stepping` (`mechanism_kernel`, `linear_step_kernel`, in the
-coordinates of `modal_form`) -> `sensor_path`, `interpolated_response`. `along_motion` gives forces along a measured
-motion instead. `*_kernel` files are compiled; each holds what it calls, or imports other kernels. Begin at
-`simulator.py`.
+`command_path` -> `bodies` (masses, forces) -> `stepping` (`mechanism_kernel`, `linear_step_kernel`, in the coordinates
+of `modal_form`) -> `sensor_path`, `interpolated_response`. `along_motion` computes the effects' forces along a measured
+motion instead. Files `*_kernel` are compiled by numba and call only compiled functions. Begin at `simulator.py`.
 """

@@ -1,4 +1,8 @@
-"""Forces of effects along a measured motion: of the actuators, and those that depend on the motion."""
+"""Forces along a measured motion: the actuators' force, and the motion-dependent forces of effects.
+
+Nothing is simulated: the laws are evaluated at the measured positions, velocities and accelerations, for a balance of
+forces. Sizes: n samples, m driven axes. Forces are in N (a rotation: N m).
+"""
 
 from collections.abc import Sequence
 
@@ -14,7 +18,7 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 RESTS = 0.01
-"""Share of the rms speed below which an axis with negligible mass may be at rest."""
+"""Share of the rms speed below which an axis with negligible mass counts as possibly at rest."""
 
 Motion = tuple[FloatArray, FloatArray, FloatArray]
 """Positions, velocities and accelerations of the driven axes, (n, m) each."""
@@ -23,7 +27,7 @@ Motion = tuple[FloatArray, FloatArray, FloatArray]
 def actuator_force(
     model: MechanicalModel, commands: FloatArray, sample_rate_hz: float, effects: Sequence[PlacedEffect], hold: Hold
 ) -> FloatArray:
-    """(n, m): force of the actuators for commands (n, m), mean over each sample's time."""
+    """(n, m): force of the actuators for commands (n, m), mean over each sample period."""
     fine = STEPS if moves_between_samples(model, effects, hold) else 1
     driven = drive_actuators(model, subdivide_commands(commands, fine, hold), 1 / (sample_rate_hz * fine), effects)
     return np.asarray(driven.mean.reshape(len(commands), fine, -1).mean(axis=1))
@@ -34,7 +38,8 @@ def force_along(
     sample_rate_hz: float,
 ) -> FloatArray:  # fmt: skip
     """(n, m): sum of the effects' forces at the driven axes along the motion. forces: (n, m) each, the commands, and
-    the force over each step that the motion requires beside the linear model, which friction at rest balances."""
+    the unbalanced force: actuator force minus the force that the linear model needs for the motion, mean over each
+    step. Friction at rest balances it. Raises ValueError for an axis that is not there or too many laws."""
     commands, pushing = forces
     bodies = bodies_of(model, [effect for effect in effects if isinstance(effect.effect.acts, AxisForce)])
     if not bodies.acts:
@@ -60,12 +65,13 @@ def force_along(
 
 
 def _hold_light_axes(per_newton: FloatArray, velocity: FloatArray, commands: FloatArray, step_s: float) -> None:
-    """Sets per_newton (3, m), what 1 N over a step adds to position, velocity and acceleration, to zero in place for an
-    axis without a real mass.
+    """Reduce in place, for axes with negligible mass, per_newton (3, m): what 1 N over a step adds to position,
+    velocity and acceleration.
 
-    An axis has no real mass where the commands could move it within one step by more than it ever moves: its mass is
-    the lower bound of a model without one, or the recording has no time axis. Friction would then be at rest everywhere
-    and would balance the whole missing force. With the measured motion kept, it is at rest only where that is.
+    The mass of an axis is negligible where the rms command would change its velocity within a step by more than the rms
+    velocity: the mass is at a fit's lower bound, or the recording has no time axis. Friction would then be at rest at
+    all times and would balance the whole missing force. With per_newton reduced, friction is at rest only where the
+    measured velocity is below about `RESTS` of its rms.
     """
     force, speed = (np.sqrt(np.mean(each**2, axis=0)) for each in (commands, velocity))
     light = (per_newton[2] * step_s * force > speed) & (speed > 0)
@@ -74,6 +80,6 @@ def _hold_light_axes(per_newton: FloatArray, velocity: FloatArray, commands: Flo
 
 
 def _own_axis_rows(per_newton: FloatArray) -> FloatArray:
-    """(k, m): response of each axis to its own force, from (k m, m)."""
+    """(k, m): effect of each axis's force on its own motion, from the effects on all axes (k m, m)."""
     m = per_newton.shape[1]
     return np.asarray(np.diagonal(per_newton.reshape(-1, m, m), axis1=1, axis2=2))

@@ -1,4 +1,8 @@
-"""Motion-dependent forces along a known motion, compiled."""
+"""Compiled loop that evaluates motion-dependent force laws along a known motion, for `along_motion`.
+
+A law reads the motion at a step's start and the motion that the step would have without the law's force (layout in
+`instant`). The latter is the measured motion at the step's end plus the effect of the force that is still unbalanced.
+"""
 
 from typing import Any
 
@@ -38,6 +42,7 @@ _THREE = types.UniTuple(_MATRIX, 3)  # type: ignore[no-untyped-call]
 _LAWS = types.UniTuple(types.FunctionType(LAW), LAWS)  # type: ignore[no-untyped-call]
 
 Motion = tuple[FloatArray, FloatArray, FloatArray]
+"""Positions, velocities and accelerations, (n, m) each."""
 
 
 @njit(inline="always")
@@ -64,12 +69,12 @@ def run_laws_along(  # noqa: PLR0913 - a kernel takes flat arrays
     motion: Motion, commands: FloatArray, per_newton: FloatArray,
     force: FloatArray, step_s: float,
 ) -> None:  # fmt: skip
-    """motion: positions, velocities and accelerations, (n, m) each. commands: (n, m), or (0, 0) where no law sees
-    them. per_newton: (3, m), what 1 N over a step adds to the motion. force: (n, m), what pushes beside the linear
-    model, known from the motion, each over the step that begins there; becomes the sum of the laws' forces.
-    Friction at rest does not follow from the motion, but from what pushes against it.
+    """Overwrite force (n, m) by the sum of the laws' forces over the step that begins at each sample.
 
-    places: (items, 6) law, axis, begin and end in `of`, begin and end in `memory`.
+    force, on entry: unbalanced force over each step (see `along_motion.force_along`), from which friction at rest
+    follows, because it does not follow from the motion. motion: positions, velocities and accelerations, (n, m) each.
+    commands: (n, m), or (0, 0) where no law reads them. per_newton: (3, m), what 1 N over a step adds to the motion.
+    places: (items, 6) law, axis, begin and end in `parameters`, begin and end in `memory`.
     """
     position, velocity, acceleration = motion
     sees = commands.shape[0] > 0
@@ -93,6 +98,7 @@ def run_laws_along(  # noqa: PLR0913 - a kernel takes flat arrays
                 at[LENGTH + SEEN * axis + SEEN_V_END] = at[V_FREE]
                 at[LENGTH + SEEN * axis + SEEN_A] = at[A_FREE]
             kept = memory[places[item, 4] : places[item, 5]]
+            # The law's force balances a part of the unbalanced force; the next law sees what remains.
             added = laws[places[item, 0]](parameters[places[item, 2] : places[item, 3]], kept, at)
             force[k, axis] += added
             pushing[axis] += added

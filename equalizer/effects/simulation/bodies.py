@@ -1,5 +1,9 @@
-"""The bodies of a model with its effects: the changed structure, its forces, and their motion under a driven
-command."""
+"""Bodies of a model with its effects: the changed linear structure, the forces on it, and its simulated motion.
+
+A port is a direction in the structure's coordinates along which a force acts and motion is output: each driven axis,
+and each joint that an effect adds. Sizes: n samples (n coordinates in `ports` and states), m commands, r ports,
+p responses.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -26,20 +30,21 @@ class Bodies:
     ports: FloatArray
     """(n, r): the directions along which forces act; the driven axes first, then joints."""
     acts: tuple[AxisForce | JointForce, ...]
-    """One per force: its law."""
+    """Action (law and its settings) of each force."""
     port: tuple[int, ...]
-    """One per force: index of the port at which it acts."""
+    """Index of the port at which each force acts."""
     parameters: tuple[FloatArray, ...]
     """Parameters of each force's law."""
 
     @property
     def sees(self) -> bool:
-        """Whether a law reads all axes and commands."""
+        """Whether any law reads the motion of all axes and the commands."""
         return any(isinstance(act, AxisForce) and act.sees for act in self.acts)
 
 
 def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies:
-    """Bodies of a model with its effects on structure and motion. Raises ValueError for an axis that is not there."""
+    """Bodies of a model with those of the effects that change the structure or add a motion-dependent force. Raises
+    ValueError for an axis that is not there."""
     structure = model
     for placed in effects:
         for site in placed.sites if isinstance(placed.effect.acts, (Structure, AxisForce, JointForce)) else ():
@@ -52,7 +57,7 @@ def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies
     acts: list[AxisForce | JointForce] = []
     where: list[int] = []
     parameters: list[FloatArray] = []
-    # Joints come first, so that friction found after them acts on the structure with joints.
+    # Joints first: the parameters of forces at an axis are then packed for the structure with joints.
     for placed in sorted(effects, key=lambda effect: isinstance(effect.effect.acts, AxisForce)):
         act = placed.effect.acts
         for site in placed.sites if isinstance(act, (AxisForce, JointForce)) else ():
@@ -63,6 +68,7 @@ def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies
                 structure, along = act.change(structure, site, placed.values)
                 ports.append(along)
             where.append(len(ports) - 1 if isinstance(act, JointForce) else site)
+    # Ports that were found before a joint added coordinates are padded with zeros.
     aligned = np.zeros((structure.coordinates, len(ports)))
     for number, port in enumerate(ports):
         aligned[: len(port), number] = port
@@ -74,18 +80,21 @@ class Restarts:
     """Restarts of a simulation from given states (multiple shooting)."""
 
     at: npt.NDArray[np.int64]
-    """(k,): samples, rising; before the first of them, the simulation starts at rest."""
+    """(k,): indices of samples, ascending; the simulation is from rest up to the first of them."""
     states: FloatArray
-    """(k, 2n), of the model without effects: positions, then velocities."""
+    """(k, 2n): positions, then velocities, of the coordinates of the model without effects."""
 
 
 def simulate_bodies(
     bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float, motion: bool = True,
     restarts: Restarts | None = None,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Simulate the bodies, from rest where there are no restarts. Returns (n, 3 r + 2 p): the ports' positions,
-    velocities and accelerations, the response and its rows' positions; and (n, r), the forces. Without the motion
-    (n, 2 p) and (n, 0). driven: n or n steps; size: n and steps."""
+    """Simulate the bodies, from rest or from the states of `restarts`.
+
+    Returns two arrays: (n, 3 r + 2 p), the positions, velocities and accelerations of the ports, the response, and the
+    positions of the response's rows; and (n, r), the forces at the ports. Without `motion` (n, 2 p) and (n, 0). driven:
+    one row per sample, or per step. size: number of samples n, and steps per sample. step_s: length of a step.
+    """
     linear, stepping, ports = _prepare_steps(bodies, driven, size, step_s)
     stride = len(driven.mean) // size[0]
     output = _output_matrix(linear, stepping.outward, ports, motion)
@@ -96,7 +105,7 @@ def simulate_bodies(
     inner, rows = len(output) - driven.end.shape[1], stepping.rows
     drive, last = driven.mean.reshape(size[0] * rows, -1), driven.end[stride - 1 :: stride]
     spare = np.zeros((min(stepping.block, size[0]) * rows, len(output)))
-    # A fit may try an unstable model.
+    # Overflow is no error: a fit may try an unstable model.
     with np.errstate(over="ignore", invalid="ignore"):
         for first, end in _blocks(size[0], stepping.block, restarts):
             if restarts is not None and first in restarts.at:
@@ -106,7 +115,7 @@ def simulate_bodies(
             np.matmul(drive[first * rows : end * rows], stepping.into, out=rows_of_block[:, :inner])
             stepping.run(rows_of_block, first)
             inputs = rows_of_block[::rows]
-            # An acceleration shows the force of its very instant, not the last step's mean.
+            # An acceleration depends on the actuator force at the instant itself, not on the mean over the last step.
             inputs[0, inner:], inputs[1:, inner:] = last[first - 1] if first else 0.0, last[first : end - 1]
             np.matmul(inputs, output, out=motion_rows[first:end])
             if motion:
@@ -117,8 +126,8 @@ def simulate_bodies(
 def simulate_states(
     bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float, at: npt.NDArray[np.int64]
 ) -> FloatArray:
-    """States just before given samples: positions and velocities of the structure's coordinates (k, 2n), simulated from
-    rest. The other arguments: as for `simulate_bodies`."""
+    """(k, 2n): positions and velocities of the structure's coordinates just before the samples `at` (k,), simulated
+    from rest. Other arguments as for `simulate_bodies`."""
     _, stepping, _ = _prepare_steps(bodies, driven, size, step_s)
     states, rows = np.zeros((len(at), len(stepping.outward))), stepping.rows
     drive = driven.mean.reshape(size[0] * rows, -1)
@@ -134,7 +143,7 @@ def simulate_states(
 def _prepare_steps(
     bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float
 ) -> tuple[LinearSteps, Stepping, tuple[int, ...]]:
-    """The linear steps, their stepping, and the ports at which forces act."""
+    """Matrices of a linear step, the stepping function, and the ports at which forces act or are read."""
     linear = linear_steps(bodies.structure, step_s, bodies.ports)
     ports = tuple(sorted({*bodies.port, *range(bodies.axes if bodies.sees else 0)}))
     steps, stride = size[1], len(driven.mean) // size[0]
@@ -145,6 +154,7 @@ def _prepare_steps(
 
 
 def _blocks(n: int, longest: int, restarts: Restarts | None) -> Iterator[tuple[int, int]]:
+    """Ranges (first, end) of samples of at most `longest`, in order; a block begins at each restart."""
     edges = sorted({0, *restarts.at[restarts.at < n].tolist()}) if restarts is not None else [0]
     for begin, stop in zip(edges, (*edges[1:], n), strict=True):
         for first in range(begin, stop, longest):
@@ -152,9 +162,12 @@ def _blocks(n: int, longest: int, restarts: Restarts | None) -> Iterator[tuple[i
 
 
 def extend_state(structure: MechanicalModel, state: FloatArray, joints: FloatArray) -> FloatArray:
-    """State (2n,) of a structure to which effects have added bodies, its last coordinates: those take their static
-    equilibrium, and where no spring holds them, the place at which their joint is at rest. state: without them. joints:
-    (n, j), directions of the joints."""
+    """State (2n,) of a structure to which effects have added bodies, its last coordinates. state: that of the model
+    without them. joints: (n, j), directions of the joints.
+
+    The added coordinates take the static equilibrium with zero travel of the joints, in the sense of least squares
+    (minimum norm where it is not unique), and move with it.
+    """
     known, n = len(state) // 2, structure.coordinates
     if n == known:
         return state
@@ -166,7 +179,8 @@ def extend_state(structure: MechanicalModel, state: FloatArray, joints: FloatArr
 
 
 def _output_matrix(linear: LinearSteps, outward: FloatArray, ports: tuple[int, ...], motion: bool) -> FloatArray:
-    """(s + r + m, rows): output matrix for each instant's state, forces at the ports, and commands."""
+    """(s + f + m, rows): from state, forces at the f ports and commands at an instant to the rows that
+    `simulate_bodies` returns."""
     p, (m, r) = len(linear.position), (linear.by_command.shape[1], linear.by_axis_force.shape[1])
     first = 0 if motion else 3 * r
     of_state = np.vstack((linear.motion, linear.response, linear.position))[first:]
@@ -176,8 +190,8 @@ def _output_matrix(linear: LinearSteps, outward: FloatArray, ports: tuple[int, .
 
 
 def kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
-    """The forces in the form of the compiled kernel: distinct laws once each; for every force the index of its law and
-    port, and the ranges of its parameters and of its memory. Raises ValueError for too many laws."""
+    """The forces in the form of the compiled kernel: each distinct law once, and for every force the indices of its law
+    and port and the ranges of its parameters and memory. Raises ValueError for more than `LAWS` distinct laws."""
     laws: list[object] = []
     places: list[tuple[int, ...]] = []
     used = kept = 0

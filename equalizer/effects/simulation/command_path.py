@@ -1,5 +1,9 @@
-"""Actuator force for held commands: the mean over each step, which moves masses, and the value at its end, which an
-acceleration sampled there shows at once."""
+"""Force of the actuators for sampled commands: effects at the command, then bandwidth, delay and limit of the model.
+
+Two values are computed per integration step: the mean over the step, which determines the motion (masses integrate the
+force), and the value at the step's end, which an acceleration sampled there contains directly. First-order lag T and
+step h: F_end = d F_start + (1 - d) u, with d = exp(-h / T); mean = u + (F_start - u) (1 - d) T / h.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,18 +19,18 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ActuatorForce:
-    """Forces of the actuators, step by step, in the unit of the commands."""
+    """Forces of the actuators in each step, in the unit of the commands (N or N m)."""
 
     mean: FloatArray
-    """(n steps, m): mean over each step."""
+    """(n * steps, m): mean over each step."""
     end: FloatArray
-    """(n steps, m): at each step's end, just before the next command takes effect."""
+    """(n * steps, m): at each step's end, just before the next command takes effect."""
     commanded: FloatArray | None = None
-    """(n steps, m): before effects and actuator; None: the same as `mean`."""
+    """(n * steps, m): the commands before effects and actuator; None: the same as `mean`."""
 
 
 def moves_between_samples(model: MechanicalModel, effects: Sequence[PlacedEffect], hold: Hold) -> bool:
-    """Whether the force changes between two commands."""
+    """Whether the actuator force changes between two samples, so that several steps per sample are needed."""
     fine = any(isinstance(placed.effect.acts, OnCommand) and placed.effect.acts.fine for placed in effects)
     return fine or hold is not Hold.ZERO_ORDER or model.actuator.delay_s > 0 or model.actuator.bandwidth_hz > 0
 
@@ -35,6 +39,7 @@ def drive_actuators(
     model: MechanicalModel, commands: ActuatorForce, step_s: float, effects: Sequence[PlacedEffect]
 ) -> ActuatorForce:
     """Force of the actuators: first the effects in their order, then the model's own bandwidth, delay and limit.
+    step_s: length of the steps of `commands` in s.
 
     Raises ValueError where an effect acts on a channel that is not there.
     """
@@ -66,7 +71,7 @@ def drive_actuators(
 
 
 def subdivide_commands(commands: FloatArray, steps: int, hold: Hold) -> ActuatorForce:
-    """Commands (n, m) divided into `steps` per sample, by how they move between samples."""
+    """Commands (n, m) divided into `steps` per sample, with the course between samples that `hold` states."""
     if steps == 1 or hold is Hold.ZERO_ORDER:
         commands = np.asarray(commands, dtype=np.float64)
         held = np.repeat(commands, steps, axis=0) if steps > 1 else commands
@@ -82,12 +87,12 @@ def subdivide_commands(commands: FloatArray, steps: int, hold: Hold) -> Actuator
     from scipy.signal import resample_poly
 
     samples = resample_poly(commands, 2 * steps, 1, axis=0)
-    # Of the points on the finer grid, every other one is in the middle of a step, the others are at step ends.
+    # On the grid of half steps, odd points are in the middle of a step (taken as its mean), even points at step ends.
     return ActuatorForce(samples[1::2], np.vstack([samples[2::2], samples[-1:]]))
 
 
 def lag_mean(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
-    """First-order lag, mean over each step; exact for commands (n, …) that are held over a step."""
+    """First-order lag, mean over each step, from zero; exact for commands (n, …) that are held over a step."""
     if time_constant_s <= 0:
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
@@ -98,7 +103,7 @@ def lag_mean(commands: FloatArray, step_s: float, time_constant_s: float) -> Flo
 
 
 def lag_at_end(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
-    """First-order lag at each step's end; commands (n, …)."""
+    """First-order lag, value at each step's end, from zero; exact for commands (n, …) that are held over a step."""
     if time_constant_s <= 0:
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
@@ -106,6 +111,7 @@ def lag_at_end(commands: FloatArray, step_s: float, time_constant_s: float) -> F
 
 
 def _filter_one_pole(commands: FloatArray, decay: float) -> FloatArray:
+    """Commands (n, …) through a first-order low pass with the pole `decay`."""
     out = np.empty(commands.shape)
     filter_one_pole(np.asarray(commands, dtype=np.float64).reshape(len(commands), -1), decay, out.reshape(len(out), -1))
     return out
@@ -121,5 +127,5 @@ def delay_mean(commands: FloatArray, step_s: float, delay_s: float) -> FloatArra
 
 
 def delay_at_end(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
-    """Held commands (n, …) delayed by delay_s, at each step's end."""
+    """Held commands (n, …) delayed by delay_s, at each step's end: only whole steps of the delay matter there."""
     return delay_mean(commands, step_s, np.floor(max(delay_s, 0.0) / step_s) * step_s)

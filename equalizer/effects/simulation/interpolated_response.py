@@ -1,4 +1,8 @@
-"""Reads a sampled response at other times, by windowed-sinc or linear interpolation."""
+"""Reads a sampled response at other times, by windowed-sinc or linear interpolation; used for delays and clock drift.
+
+The sinc is windowed by Kaiser's window and tabulated at fractions of a sample; `reading_kernel.read_at` interpolates
+the table linearly.
+"""
 
 from functools import cache
 
@@ -14,8 +18,8 @@ BETA = 8.0
 
 
 def read_other_times(response: FloatArray, per_sample: float, offset: float, linear_share: float = 0.0) -> FloatArray:
-    """(n, p) from (n, p): sample k is read at k per_sample + offset, in samples. linear_share: share (0 to
-    1) of linear interpolation, the rest is band-limited."""
+    """(n, p): response (n, p) with sample k read at the time k per_sample + offset, in samples; the first and the last
+    sample are held beyond the ends. linear_share: share (0 to 1) of linear interpolation; the rest is band-limited."""
     read = np.empty(response.shape)
     read_at(np.ascontiguousarray(response, dtype=np.float64), per_sample, offset, _sinc_weights(), linear_share, read)
     return read
@@ -23,7 +27,7 @@ def read_other_times(response: FloatArray, per_sample: float, offset: float, lin
 
 @cache
 def _sinc_weights() -> FloatArray:
-    """(phases + 1, taps): windowed sinc."""
+    """(phases + 1, taps): windowed sinc for each fraction of a sample from 0 to 1, each row normalised to the sum 1."""
     part = np.arange(PHASES + 1) / PHASES
     away = part[:, None] - np.arange(1 - TAPS // 2, TAPS // 2 + 1)
     window = np.i0(BETA * np.sqrt(np.maximum(1 - (away / (TAPS / 2)) ** 2, 0))) / np.i0(BETA)

@@ -1,4 +1,8 @@
-"""One step of a linear structure, and many of them without forces, compiled."""
+"""Compiled steps x[k+1] = A x[k] + b[k] of a linear structure: a single step, and a loop without further forces.
+
+x is the state (s,), b the contribution of the commands. A is either a full matrix (transposed) or consists of 2 x 2
+blocks, which cost O(s) instead of O(s²) per step; `modal_form` chooses.
+"""
 
 import numpy as np
 from numba import njit, types
@@ -6,13 +10,14 @@ from numba import njit, types
 from equalizer.signals.signal import FloatArray
 
 FAST = {"reassoc", "contract"}
+"""LLVM flags: sums may be reordered and products fused (vectorised loops); NaN and infinity keep their meaning."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 
 
 @njit(types.void(_MATRIX, _VECTOR, _VECTOR), cache=True, nogil=True, fastmath=FAST)
 def _advance_dense(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
-    """One step with a full matrix. advance: (s, s), transposed."""
+    """One step with a full matrix, in place. advance: (s, s), transposed; added: (s, ...); state: (s,)."""
     before = state.copy()
     state[:] = added[: state.shape[0]]
     for j in range(state.shape[0]):
@@ -22,8 +27,8 @@ def _advance_dense(advance: FloatArray, added: FloatArray, state: FloatArray) ->
 
 @njit(inline="always")
 def advance_state(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
-    """One step of the state (s,). advance: (4, s / 2) or (s, s), see `simulation.modal_form`. added: (s, ...), by
-    commands."""
+    """One step of the state (s,), in place. advance: (4, s / 2) or (s, s), see `modal_form.StepForm`. added: (s, ...),
+    contribution of the commands; only its first s numbers are used."""
     half = state.shape[0] // 2
     if advance.shape[1] != half:
         _advance_dense(advance, added, state)
@@ -36,8 +41,8 @@ def advance_state(advance: FloatArray, added: FloatArray, state: FloatArray) -> 
 
 @njit(types.void(_MATRIX, _MATRIX, _VECTOR), cache=True, nogil=True, fastmath=FAST)
 def advance_unforced(advance: FloatArray, rows: FloatArray, state: FloatArray) -> None:
-    """Motion without further forces. rows: (n, s ...), contribution of the commands over each step; overwritten by the
-    state before each. state: (s,), overwritten by that at the end."""
+    """Motion under the commands alone. rows: (n, s ...), contribution of the commands over each step; overwritten by
+    the state before each step. state: (s,), overwritten by the state at the end."""
     size = state.shape[0]
     added = np.empty(size)
     for k in range(rows.shape[0]):

@@ -1,6 +1,7 @@
-"""The motion of a linear structure under commands and under forces that depend on the motion, step by step, compiled.
+"""Compiled time stepping of a linear structure under commands and forces that depend on the motion.
 
-Between steps everything linear is exact; a motion-dependent force is found once per step and held over it.
+The linear part is exact (matrix exponential, see `stepping`). A motion-dependent force is held over a step and solved
+for implicitly by its law, from the motion at the step's end (see `instant`); several forces by Gauss-Seidel sweeps.
 """
 
 import warnings
@@ -41,22 +42,20 @@ from equalizer.effects.simulation.linear_step_kernel import FAST, advance_state
 from equalizer.laws.kernel import UNCOUNTED
 from equalizer.signals.signal import FloatArray
 
-# Laws are passed as values, so that a changed law is never run from a stale cached kernel; numba calls that
-# experimental.
-# Set once for the process: `catch_warnings` around a call would, in a thread, undo that of another thread.
+# Laws are passed as function values, so that a changed law is never run from a stale cached kernel; numba warns that
+# this feature is experimental. The filter is set once for the process, because `catch_warnings` is not thread-safe.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
 LAWS = 6
-"""How many different laws can act at once."""
+"""Largest number of different laws that can act at once."""
 SWEEPS = 12
-"""Most Gauss-Seidel sweeps over all forces per step, where there are several: each is solved again with the others'
-newest values."""
+"""Most Gauss-Seidel sweeps per step over several forces: each is solved again with the newest values of the others."""
 SETTLED = 1e-7
-"""Relative change of a force below which the others are not solved again. Of the motion 1e-6 at most then differs from
-the converged one (a joint with friction beside an axis with friction)."""
+"""Relative change of a force below which the others are not solved again. The motion then differs by at most 1e-6
+(relative) from the converged motion, for a joint with friction and an axis with friction."""
 OWN_ROWS = 4
-"""Rows of the table of forces: mean over the step, mean over the step before, force at the end, whether another has
-changed since it was solved."""
+"""Rows of the table of forces: mean over the step, mean over the step before, force at the step's end, and whether the
+force is to be solved again because another force has changed (1 or 0)."""
 _MEAN, _MEAN_BEFORE, _ENDS, _STALE = range(OWN_ROWS)
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
@@ -78,13 +77,14 @@ without forces; forces over the step and at its end."""
 
 
 def compile_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> Any:
-    """The law, ready to be called from the kernel. Its machine code is cached beside its own file."""
+    """The law, compiled for calls from the kernel. numba caches its machine code next to the file that defines the
+    law."""
     return njit(LAW, cache=True, error_model="numpy", **UNCOUNTED)(law)
 
 
 class LawAddress(types.WrapperAddressProtocol):
-    """A compiled law in the form that a kernel takes, its address looked up once: numba would look it up in every call,
-    which takes five times as long as the rest of the call."""
+    """A compiled law as argument of a kernel. Its address is looked up once; numba would do so in every call, which
+    takes five times as long as the rest of the call."""
 
     def __init__(self, law: Any) -> None:
         result = law.get_compile_result(LAW)
@@ -92,9 +92,11 @@ class LawAddress(types.WrapperAddressProtocol):
         self._address: int = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
 
     def __wrapper_address__(self) -> int:
+        """Address of the compiled function, for numba."""
         return self._address
 
     def signature(self) -> Any:
+        """Signature of the compiled function, for numba."""
         return LAW
 
 
@@ -129,6 +131,7 @@ def _apply_forces(by_force: FloatArray, state: FloatArray, ports: FloatArray) ->
 
 @njit(inline="always")
 def _store_row(state: FloatArray, ports: FloatArray, row: FloatArray) -> None:
+    """Write the state (s,) and the forces (r,) at this instant into a row."""
     for i in range(state.shape[0]):
         row[i] = state[i]
     for port in range(ports.shape[1]):
@@ -174,7 +177,7 @@ def _write_seen_ports(per_newton: FloatArray, port: int, ports: FloatArray, at: 
 
 @compile_law
 def no_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Law without force (0 N): fills the kernel's `LAWS` places where fewer laws act."""
+    """Law without force (0 N), which fills the unused of the kernel's `LAWS` places."""
     return 0.0
 
 
@@ -183,7 +186,7 @@ def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
     law: Any, parameters: FloatArray, memory: FloatArray, port: int, per_newton: FloatArray, ports: FloatArray,
     at: FloatArray,
 ) -> tuple[float, float]:  # fmt: skip
-    """Solve for one force, over the step and at its end, with all others held."""
+    """Solve for one force with all others held, and add it to the ports: its mean over the step, and its end value."""
     count = ports.shape[1]
     at[X], at[V] = ports[_NOW_X, port], ports[_NOW_V, port]
     at[X_FREE], at[V_FREE] = ports[_NEXT_X, port], ports[_NEXT_V, port]
@@ -206,8 +209,8 @@ def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, places: Integers, parameters: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
     own: FloatArray, at: FloatArray, before: FloatArray,
 ) -> None:  # fmt: skip
-    """Solve for several forces in turn (Gauss-Seidel), from their means over the last two steps extrapolated. own:
-    (OWN_ROWS, items). before: like memory, scratch. A force is solved again only where another has changed."""
+    """Solve for several forces in turn (Gauss-Seidel), starting from the extrapolation of their means over the last two
+    steps. A force is solved again only if another has changed. own: (OWN_ROWS, items). before: scratch, like memory."""
     for i in range(memory.shape[0]):
         before[i] = memory[i]
     for item in range(places.shape[0]):
@@ -246,7 +249,7 @@ def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
     commands: FloatArray, ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
     added: FloatArray, at: FloatArray, own: FloatArray, before: FloatArray,
 ) -> None:  # fmt: skip
-    """Motion under forces; rows, ports and state are overwritten.
+    """Motion under commands and motion-dependent forces; rows, ports and state are overwritten.
 
     rows: (n stride, s + r ...), contribution of the commands to the state over a step and to the ports' accelerations
     at its start; a sample's first row becomes the state before it and the forces (r,) at that instant. commands: (n

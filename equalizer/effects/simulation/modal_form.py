@@ -1,4 +1,9 @@
-"""Block-diagonal (modal) form of a linear step: pairs of coordinates that are decoupled from all others."""
+"""Block-diagonal (modal) form of a linear step: 2 x 2 blocks, each of a pair of eigenvalues, decoupled from the others.
+
+With x = W z, the step x[k+1] = A x[k] becomes z[k+1] = W^-1 A W z[k]. Each pair of columns of W spans the invariant
+plane of two eigenvalues of A (a complex pair, or two real ones), so that a step costs O(s) instead of O(s²). A is
+balanced first. Where the planes are ill-conditioned, the full matrix is kept.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,10 +14,10 @@ from scipy.linalg import matrix_balance
 from equalizer.signals.signal import FloatArray
 
 LARGEST_CONDITION = 1e4
-"""Largest condition number of the pairs' directions, balanced; above it rounding would show, and the full matrix is
-used."""
+"""Largest condition number of W for the balanced matrix; above it rounding errors would be too large, and the full
+matrix is used."""
 LARGEST_REST = 1e-12
-"""Largest residual coupling between the pairs that is neglected."""
+"""Largest residual coupling between the pairs that is neglected (magnitude of the elements outside the blocks)."""
 NEARLY_ONE = 1e-3
 """Ratio of the singular values of a pair's two directions below which they count as parallel; they are then replaced by
 a basis of the invariant plane."""
@@ -20,25 +25,26 @@ a basis of the invariant plane."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepForm:
-    """Coordinates z with x = outward z, and one step without forces in them."""
+    """Coordinates z with x = outward z, z = inward x, and the matrix of one step without inputs in them."""
 
     advance: FloatArray
     """Pairs: (4, s / 2), z_i becomes a_0i z_i + a_1i z_j and z_j becomes a_2i z_i + a_3i z_j, where j = i + s / 2. Else
     (s, s), transposed."""
     outward: FloatArray
-    """(s, s)"""
+    """(s, s): from z to x."""
     inward: FloatArray
-    """(s, s)"""
+    """(s, s): from x to z."""
 
 
 def step_form(advance: FloatArray) -> StepForm:
-    """Form in which to step. advance: (s, s), s even. In pairs where these are well separated, else the full matrix."""
+    """Form in which to compute the step advance (s, s), s even: pairs where these are well-conditioned, else the full
+    matrix; also for a matrix that is not finite."""
     size = len(advance)
     dense = StepForm(np.ascontiguousarray(advance.T), np.eye(size), np.eye(size))
     if not np.isfinite(advance).all():
         return dense
     balanced, scale = matrix_balance(advance, permute=False, separate=True)
-    # First all planes' first directions, then all second ones.
+    # Columns: the first directions of all planes, then all second ones, as `StepForm.advance` pairs them.
     basis = np.stack(list(_planes(balanced)), axis=2).reshape(size, size)
     if not np.linalg.cond(basis) < LARGEST_CONDITION:
         return dense
@@ -55,7 +61,7 @@ def step_form(advance: FloatArray) -> StepForm:
 
 
 def _planes(advance: FloatArray) -> Iterator[FloatArray]:
-    """(s, 2) each: an orthonormal basis of the plane in which a pair of eigenvalues moves."""
+    """(s, 2) each: orthonormal basis of the invariant plane of a pair of eigenvalues."""
     values, vectors = np.linalg.eig(advance)
     turning = np.flatnonzero(values.imag > 0)
     real = np.flatnonzero(values.imag == 0)
@@ -68,6 +74,7 @@ def _planes(advance: FloatArray) -> Iterator[FloatArray]:
     for each, other, first, second in pairs:
         plane, sizes, _ = np.linalg.svd(np.column_stack([each, other]), full_matrices=False)
         if sizes[1] < NEARLY_ONE * sizes[0]:
+            # Null space of (A - a I)(A - b I), for the eigenvalues a and b of nearly parallel eigenvectors.
             square = advance @ advance - (first + second).real * advance + (first * second).real * np.eye(len(advance))
             plane = np.linalg.svd(square)[2][-2:].T
         yield plane

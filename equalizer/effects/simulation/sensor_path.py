@@ -1,4 +1,9 @@
-"""A sensor's low pass and range, applied to a true response."""
+"""Sensor: first-order low pass and measuring range, applied to the true response.
+
+The low pass is discrete at the sample rate f_s and starts from zero, with the bandwidth f:
+
+    y[k] = d y[k-1] + (1 - d) x[k],    d = exp(-2 pi f / f_s)
+"""
 
 import numpy as np
 from numba import njit, types
@@ -10,7 +15,7 @@ _IN = types.Array(types.float64, 2, "A", readonly=True)
 
 @njit(types.void(_IN, types.float64, types.float64[:, ::1]), cache=True, nogil=True)
 def filter_one_pole(samples: FloatArray, decay: float, out: FloatArray) -> None:
-    """Fill out (n, c) with samples (n, c) through a first-order low pass. decay: its pole."""
+    """Fill out (n, c) with samples (n, c) through a first-order low pass, from zero. decay: its pole, 0 to 1."""
     now, share = np.zeros(out.shape[1]), 1 - decay
     for k in range(out.shape[0]):
         for channel in range(out.shape[1]):
@@ -19,7 +24,7 @@ def filter_one_pole(samples: FloatArray, decay: float, out: FloatArray) -> None:
 
 
 def low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -> FloatArray:
-    """First-order low pass, discrete: y += (1 - exp(-2 pi f / rate)) (x - y). response: (n, …); 0 Hz = none."""
+    """First-order low pass of the response (n, …), equation above, with the bandwidth in Hz; unchanged for 0 Hz."""
     if bandwidth_hz <= 0:
         return response
     decay = float(np.exp(-2 * np.pi * bandwidth_hz / sample_rate_hz))
@@ -29,7 +34,7 @@ def low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -
 
 
 def undo_low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -> FloatArray:
-    """The inverse of `low_pass`, sample by sample."""
+    """The exact inverse of `low_pass`: x[k] = (y[k] - d y[k-1]) / (1 - d)."""
     if bandwidth_hz <= 0:
         return response
     decay = float(np.exp(-2 * np.pi * bandwidth_hz / sample_rate_hz))

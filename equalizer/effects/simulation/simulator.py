@@ -1,4 +1,9 @@
-"""Simulates a mechanical model with its effects under commands: actuator, mechanism and hand, sensor, in this order."""
+"""Simulates a mechanical model with its effects under commands: actuator, mechanism and hand, sensor, in this order.
+
+Main function: `simulate_mechanism`. Variants: `simulate_response` without the motion of the axes, faster;
+`simulate_windows` with restarts from given states, for multiple shooting; `states_before` for these states. Sizes: n
+samples, m driven axes, p response channels (n also the model's coordinates in states).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,16 +27,16 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """A measured response, on which random effects are conditioned."""
+    """A measured response on which random effects, such as lost samples, are conditioned."""
 
     response: FloatArray
-    """(n, p)"""
+    """(n, p): as measured."""
     noise: FloatArray
-    """(p,): rms"""
+    """(p,): rms of the noise, in the unit of the response."""
     position: FloatArray | None = None
-    """(n, p), of the same rows"""
+    """(n, p): measured position of each response channel."""
     whole: int = 0
-    """Length of the whole recording in samples where these are its first; 0 = these are all."""
+    """Length in samples of the recording whose beginning this is; 0 = this is the whole recording."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,13 +46,13 @@ class SimulationResult:
     response: FloatArray
     """(n, p): as the sensor reads it, without noise."""
     position: FloatArray
-    """(n, p): the same rows' positions."""
+    """(n, p): position of each response channel, m (rotation: rad)."""
     axis_position: FloatArray
-    """(n, m), along the driven axes"""
+    """(n, m): positions along the driven axes."""
     axis_velocity: FloatArray
-    """(n, m)"""
+    """(n, m): velocities along the driven axes."""
     axis_force: FloatArray
-    """(n, m): force of motion-dependent effects there, N."""
+    """(n, m): force of motion-dependent effects at the driven axes, N (rotation: N m)."""
 
 
 def simulate_mechanism(
@@ -58,11 +63,11 @@ def simulate_mechanism(
     hold: Hold = Hold.ZERO_ORDER,
     measurement: Measurement | None = None,
 ) -> SimulationResult:
-    """Response and motion from rest. commands: (n, m), SI. `model.effects` are not simulated: see
-    `equalizer.effects.placing`. measurement: random effects, such as lost samples, are conditioned on it; without one
-    they are drawn at random.
+    """Response and motion from rest. commands: (n, m), SI. Only `effects` are simulated, not `model.effects`, which
+    `equalizer.effects.placing` converts. measurement: random effects are conditioned on it; without one they are drawn
+    at random.
 
-    Raises ValueError where an effect acts on an axis that is not there.
+    Raises ValueError where an effect acts on an axis that is not there, and for too many different force laws.
     """
     return _apply_sensor(
         model, _simulate_motion(model, commands, (sample_rate_hz, hold), effects), sample_rate_hz, effects, measurement
@@ -90,8 +95,8 @@ def simulate_windows(
     measurement: Measurement | None,
     restarts: Restarts,
 ) -> SimulationResult:
-    """Simulate with `simulate_mechanism`, restarted from given states. sampled: rate in Hz, and how commands move
-    between samples."""
+    """Simulate like `simulate_mechanism`, but restarted from given states. sampled: sample rate in Hz, and course of
+    the commands between samples."""
     return _apply_sensor(
         model, _simulate_motion(model, commands, sampled, effects, restarts=restarts), sampled[0], effects, measurement
     )
@@ -104,7 +109,8 @@ def states_before(
     effects: Sequence[PlacedEffect],
     at: npt.NDArray[np.int64],
 ) -> FloatArray:
-    """States of the model's own coordinates just before given samples: positions, then velocities (k, 2n)."""
+    """(k, 2n): positions, then velocities, of the model's own coordinates just before the samples `at` (k,), simulated
+    from rest; coordinates that effects add are left out."""
     bodies, driven, steps = _drive_bodies(model, commands, sampled, effects)
     states = simulate_states(bodies, driven, (len(commands), steps), 1 / (sampled[0] * steps), at)
     n, known = bodies.structure.coordinates, model.coordinates
@@ -114,7 +120,7 @@ def states_before(
 def _drive_bodies(
     model: MechanicalModel, commands: FloatArray, sampled: tuple[float, Hold], effects: Sequence[PlacedEffect]
 ) -> tuple[Bodies, ActuatorForce, int]:
-    """The bodies, what drives them, and the steps per sample."""
+    """The bodies, the actuator force that drives them, and the number of integration steps per sample."""
     bodies, (rate_hz, hold) = bodies_of(model, effects), sampled
     moves = moves_between_samples(model, effects, hold)
     steps = max((acts.steps for acts in bodies.acts), default=STEPS if moves else 1)
@@ -134,7 +140,7 @@ def _simulate_motion(
     axes: bool = True,
     restarts: Restarts | None = None,
 ) -> SimulationResult:
-    """The simulation without the sensor."""
+    """The simulated motion, with the true response before the sensor. axes: whether to output the driven axes."""
     bodies, driven, steps = _drive_bodies(model, commands, sampled, effects)
     looked, added = simulate_bodies(bodies, driven, (len(commands), steps), 1 / (sampled[0] * steps), axes, restarts)
     m, p, ports = bodies.axes if axes else 0, bodies.structure.outputs, bodies.ports.shape[1]
@@ -149,6 +155,7 @@ def _apply_sensor(
     effects: Sequence[PlacedEffect],
     measurement: Measurement | None,
 ) -> SimulationResult:
+    """The result as the sensor reads it: low pass of each channel, effects in the order of their stages, range."""
     on_response = [(placed.effect.acts, placed) for placed in effects if isinstance(placed.effect.acts, OnResponse)]
     on_response.sort(key=lambda item: item[0].stage)
     bandwidths = _bandwidths(model, played.response.shape[1], on_response)
@@ -170,6 +177,8 @@ def _apply_sensor(
 def _change_response(
     acts: OnResponse, placed: PlacedEffect, response: FloatArray, sample_rate_hz: float, measurement: Measurement | None
 ) -> FloatArray:
+    """The response after an effect. For an effect that depends on the recording's length, an excerpt is first extended
+    to that length by its last sample."""
     left_out = measurement.whole - len(response) if acts.of_whole and measurement is not None else 0
     if left_out <= 0:
         return acts.change(response, sample_rate_hz, placed.sites, placed.values)
@@ -178,6 +187,7 @@ def _change_response(
 
 
 def _low_pass_channels(response: FloatArray, sample_rate_hz: float, bandwidths_hz: Sequence[float]) -> FloatArray:
+    """The response (n, p) through the low pass of each channel."""
     if len(set(bandwidths_hz)) == 1:
         return low_pass(response, sample_rate_hz, bandwidths_hz[0])
     each = [low_pass(row, sample_rate_hz, hz) for row, hz in zip(response.T, bandwidths_hz, strict=True)]
@@ -187,6 +197,7 @@ def _low_pass_channels(response: FloatArray, sample_rate_hz: float, bandwidths_h
 def _bandwidths(
     model: MechanicalModel, channels: int, on_response: Sequence[tuple[OnResponse, PlacedEffect]]
 ) -> list[float]:
+    """Bandwidth in Hz of each channel's low pass: that of the model, replaced by effects; 0 = no low pass."""
     found = [model.sensor.bandwidth_hz] * channels
     for acts, placed in on_response:
         for channel in placed.sites if acts.bandwidth_hz is not None else ():

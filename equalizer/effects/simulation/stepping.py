@@ -4,10 +4,11 @@ Theory of operation. The structure M a + C v + K x = B u + F has the exact step 
 
     s(t + h) = A s(t) + B_u u + B_F F,    A = exp(h [[0, I], [-M^-1 K, -M^-1 C]])
 
-`modal_form` puts A into 2 x 2 blocks, so that a step costs O(n) instead of O(n²). Without motion-dependent forces a
-whole sample is one step. With them F depends on the state within the step: each force law is evaluated at the position,
-velocity and acceleration of its port, corrected for its own effect (`per_newton`), step by step in compiled code
-(`mechanism_kernel`). Many samples are stepped per call, because a call of compiled code costs as much as many steps.
+s = (x, v) is the state, u the command, F the forces at the ports, h the step. `modal_form` puts A into 2 x 2 blocks, so
+that a step costs O(n) instead of O(n²). Without motion-dependent forces a whole sample is one step. With them F depends
+on the state within the step: each force law is evaluated at the position, velocity and acceleration of its port,
+corrected for its own effect (`per_newton`), step by step in compiled code (`mechanism_kernel`). Many samples are
+stepped per call, because a call of compiled code costs as much as many steps.
 
 Reference: Van Loan, IEEE Trans. Autom. Control 23:395 (1978) (integrals of the matrix exponential).
 """
@@ -25,7 +26,8 @@ from equalizer.plant.linear_simulation import LinearSteps
 from equalizer.signals.signal import FloatArray
 
 BLOCK, BLOCK_UNDER_FORCES = 4096, 32768
-"""Samples per block. The first fits a processor's cache; passing laws to the kernel takes about 0.1 ms each time."""
+"""Samples per block without and with motion-dependent forces. The first fits the processor's cache; the second is
+longer, because passing the laws to the kernel takes about 0.1 ms per call."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,10 +37,13 @@ class Forces:
     ports: tuple[int, ...]
     """Indices of the ports at which the forces act."""
     laws: tuple[object, ...]
+    """Addresses of the compiled laws, `LAWS` of them."""
     places: Integers
-    """(items, 6)"""
+    """(items, 6): indices of law and port, ranges of parameters and memory of each force."""
     parameters: FloatArray
+    """Parameters of all forces, one after another."""
     memory: FloatArray
+    """Initial state variables of all forces, one after another."""
     acceleration: bool
     """Whether a law reads accelerations."""
     sees: bool
@@ -50,24 +55,25 @@ class Stepping:
     """Time stepping of the mechanism in blocks of samples, from rest; `run` keeps the state from block to block."""
 
     rows: int
-    """Rows per sample: of the drive, as wide as `into` is high, and of what `run` takes."""
+    """Rows per sample of the drive (inputs columns) and of the array that `run` takes."""
     into: FloatArray
-    """(inputs, s + r): what a row of these adds to the state, and to the accelerations of the ports with forces."""
+    """(inputs, s + r): from a row of the drive to its contributions to the state, and to the accelerations of the ports
+    with forces."""
     outward: FloatArray
     """(2n, s): from the stepped coordinates to positions and velocities."""
     block: int
     """Samples stepped per call."""
     run: Callable[[FloatArray, int], None]
-    """Steps one block after another, from rest. Arguments: rows (block rows, s + r ...) and the number of the first
-    sample. On entry a row holds what is added over its step; on return, the first row of each sample holds the state
-    and the forces just before it."""
+    """Steps one block, in succession from rest. Arguments: rows of the block (block rows, s + r ...), index of its
+    first sample. On entry a row holds the contributions of its step; on return, the first row of each sample holds the
+    state and the forces just before the sample."""
     begin: Callable[[FloatArray], None]
     """Continues from the given state (2n,) at the next block."""
 
 
 def step_without_forces(linear: LinearSteps, steps: int, stride: int) -> Stepping:
-    """Stepping without motion-dependent forces, a whole sample at once. stride: commands per sample; 1 where they are
-    held over all `steps`."""
+    """Stepping without motion-dependent forces, a whole sample at once. steps: steps of `linear` per sample; stride:
+    commands per sample, 1 where a command is held over all steps."""
     pushes = [linear.by_command]
     for _ in range(steps - 1):
         pushes.append(linear.advance @ pushes[-1])
@@ -85,7 +91,8 @@ def step_without_forces(linear: LinearSteps, steps: int, stride: int) -> Steppin
 
 
 def step_with_forces(linear: LinearSteps, forces: Forces, steps: int, stride: int, commanded: FloatArray) -> Stepping:
-    """Stepping under motion-dependent forces. commanded: (n stride, m), for laws that see the commands."""
+    """Stepping under motion-dependent forces. steps, stride: as above. commanded: (n * stride, m), the commands, for
+    laws that read them."""
     form = step_form(linear.advance)
     where, r = np.array(forces.ports), linear.by_axis_force.shape[1]
     output = linear.motion[np.concatenate([where, r + where, 2 * r + where])]
@@ -112,6 +119,7 @@ def step_with_forces(linear: LinearSteps, forces: Forces, steps: int, stride: in
 
     def begin(from_: FloatArray) -> None:
         state[:] = form.inward @ from_
+        # No extrapolation from the forces before the restart. The laws' memory is kept.
         own[:] = 0.0
         ports[:2] = (output[: 2 * len(where)] @ from_).reshape(2, -1)
 

@@ -1,6 +1,7 @@
 """An oscillator (mass on spring and damper) attached to a model, and its estimation from the missing force.
 
-An oscillator of mass m, natural frequency f0 and damping ratio z on a host with the acceleration a exerts on it
+An oscillator of mass m, natural frequency f0 and damping ratio z, attached to a host with acceleration a, exerts on the
+host at the frequency f the force
 
     F = -m a (1 + 2j z r) / (1 + 2j z r - r²),        r = f / f0
 
@@ -24,7 +25,7 @@ from equalizer.signals.spectral_density import cross_density, spectral_density
 WINDOW_S = 2.0
 """Window of the spectra (s): lines 0.5 Hz apart."""
 DRIVEN = 1e-4
-"""Least power of a line that is used, relative to the largest. By hand."""
+"""Least power of a line that is used, relative to the largest line. By hand."""
 CHANCE = 0.02
 """Share of the missing force's power that the best of all trials explains by chance. By hand."""
 DEPENDENT = 1e-9
@@ -58,7 +59,7 @@ class MissingForceSpectra:
     """Spectra of an axis's acceleration a and of the missing force F at all m driven axes."""
 
     frequency_hz: FloatArray
-    """(lines,)"""
+    """(lines,): frequencies of the lines that are used."""
     power: FloatArray
     """(lines,): power spectral density of the acceleration."""
     cross: ComplexArray
@@ -129,8 +130,7 @@ def likely_oscillators(
     for ratio in damping_ratios:
         shape = oscillator_reaction(missing.frequency_hz[:, None], natural, ratio) * root[:, None]
         shapes = np.vstack([shape.real, shape.imag])
-        # Orthogonal to what the linear parameters explain: the least-squares fit of a shape is then independent of
-        # them.
+        # Projected orthogonally to the linear terms (Frisch-Waugh): each shape can then be fitted by itself.
         own = shapes - basis @ (basis.T @ shapes)
         size = np.einsum("lt,lt->t", own, own)
         independent = size > DEPENDENT**2 * np.einsum("lt,lt->t", shapes, shapes)

@@ -1,23 +1,29 @@
-"""Detection of quantization: whether values lie on an evenly spaced lattice, and its step."""
+"""Detection of quantization: whether recorded values lie on an evenly spaced lattice, and its step.
+
+Without noise after rounding, the step follows from the differences between distinct values, refined by a straight line
+through value over lattice index. With noise after rounding, the histogram of the values has a ripple whose period is
+the step; it is found in the spectrum of the histogram.
+"""
 
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
 
 CLOSE = 0.02
-"""Shares of a step by which values may deviate from the lattice; single precision needs less."""
+"""Largest deviation of a value from the lattice, in steps. Rounding to single precision causes less."""
 NEARLY_ALL = 0.999
-"""Share of values that must lie on the lattice."""
+"""Share of the values that must exceed this for a lattice."""
 LEAST_VALUES, MOST_VALUES = 3, 0.2
-"""Least number of different values that make a lattice; and most, as a share of the samples."""
+"""Least number of occupied lattice points, and the largest, as a share of the number of samples."""
 PEAK = 12.0
-"""Least ratio of a peak in the histogram's spectrum to its surroundings."""
+"""Least ratio of a peak in the histogram's spectrum to the median around it."""
 BIN_SHARE = 0.2
-"""Width of a histogram's bin, relative to the noise."""
+"""Width of a bin of the histogram, relative to the rms noise."""
 
 
 def lattice_offset(values: FloatArray, step: float) -> float | None:
-    """Offset of the lattice of this step, between minus and plus half a step; None where values are not on one."""
+    """Offset of the lattice of this step, between minus and plus half a step, from the mean phase of the values; None
+    where the values do not lie on such a lattice."""
     if step <= 0:
         return None
     turn = np.exp(2j * np.pi * values / step)
@@ -49,8 +55,8 @@ def lattice_step(values: FloatArray) -> float | None:
 
 
 def confirm_lattice_step(values: FloatArray, other: float) -> float:
-    """The step of the lattice that values (n,) lie on; 0 = none. other: a step to test where there are too many
-    different values to find a lattice from them alone."""
+    """The step of the lattice on which values (n,) lie; 0 = no lattice. other: a step to test where no lattice is found
+    from the values alone, for instance because there are too many different values."""
     own = lattice_step(values)
     return own if own is not None else other if lattice_offset(values, other) is not None else 0.0
 
@@ -59,6 +65,7 @@ def staircase_step(values: FloatArray, noise: float) -> float | None:
     """The quantization step under noise, from the ripple in the histogram of values (n,); None without one."""
     span = float(np.ptp(values))
     bins = int(span / (BIN_SHARE * noise)) if noise > 0 else 0
+    # Too few bins hold no ripple; too many need too much memory.
     if not 64 <= bins <= 4_000_000:
         return None
     counts, edges = np.histogram(values, bins=bins)
@@ -66,7 +73,8 @@ def staircase_step(values: FloatArray, noise: float) -> float | None:
     padded = 8 * len(counts)
     spectrum = np.abs(np.fft.rfft(counts, padded)) / np.sqrt(len(values))
     per_unit = np.fft.rfftfreq(padded, width)
-    # Slow components of the histogram are the response's own distribution.
+    # Slow components belong to the distribution of the response; noise smooths ripples shorter than about 3 times its
+    # rms.
     inside = (per_unit > 10 / span) & (per_unit < 0.3 / noise)
     if not inside.any():
         return None

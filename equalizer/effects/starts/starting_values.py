@@ -1,4 +1,9 @@
-"""Partial regression of the missing force on laws of the motion, for the starting values of several effects."""
+"""Partial regression of the missing force on laws of the motion, for the starting values of several effects.
+
+The missing force is the additional force at a driven axis that would explain a model's residual. Effects whose force
+is linear in its strengths are fitted by least squares, F = sum of strength_i law_i(motion), after the terms that
+re-tuned mass, damping and stiffness explain were projected out (theorem of Frisch, Waugh and Lovell).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,12 +15,12 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 SLOW = 0.02
-"""Share of the rms velocity below which the direction of sliding is not known."""
+"""Speed, relative to the rms velocity, below which the direction of sliding is not known. Heuristic."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisMotion:
-    """Motion and missing force at one axis, only where samples count; all (n,)."""
+    """Motion and missing force at a driven axis, at selected samples; all (n,), in SI units (m or rad, s, N or N m)."""
 
     time_s: FloatArray
     position: FloatArray
@@ -36,12 +41,12 @@ class LawFit:
     strengths: FloatArray
     """(k,): factor of each law."""
     explained: float
-    """Share of the missing force's power that the laws explain beyond the linear terms."""
+    """Power that the laws explain, relative to that of the force after the nuisance regressors were projected out."""
 
 
 def axis_motion(evidence: Evidence, axis: int) -> AxisMotion:
-    """Motion and missing force of an axis at the samples that count; acceleration by central differences of
-    velocity."""
+    """Motion and missing force of a driven axis at the samples where `evidence.used` is above 0; acceleration by
+    central differences of velocity."""
     time_s = np.arange(len(evidence.command)) / evidence.sample_rate_hz
     acceleration = np.gradient(evidence.axis_velocity[:, axis], 1 / evidence.sample_rate_hz)
     every = AxisMotion(
@@ -52,13 +57,13 @@ def axis_motion(evidence: Evidence, axis: int) -> AxisMotion:
 
 
 def select_sliding_motion(evidence: Evidence, axis: int) -> AxisMotion:
-    """Motion of an axis, only where its sliding direction is certain."""
+    """Motion of an axis at the samples whose speed exceeds `SLOW` times its rms velocity."""
     motion = axis_motion(evidence, axis)
     return motion.where(np.abs(motion.velocity) > SLOW * np.sqrt(np.mean(motion.velocity**2)))
 
 
 def linear_part(motion: AxisMotion, constant: bool = True) -> FloatArray:
-    """(n, 3 or 4): position, velocity, acceleration and constant, the regressors of a linear model's errors."""
+    """(n, 3 or 4): position, velocity, acceleration and, if `constant`, 1: regressors of a linear model's errors."""
     shapes = [motion.position, motion.velocity, motion.acceleration]
     return np.column_stack([*shapes, np.ones_like(motion.position)] if constant else shapes)
 
@@ -67,7 +72,7 @@ class PartialRegression:
     """Least squares of laws with nuisance regressors projected out (Frisch-Waugh), fast for many trials of a law."""
 
     def __init__(self, force: FloatArray, nuisances: FloatArray) -> None:
-        """force: (n,); nuisances: (n, k)"""
+        """force: (n,); nuisances: (n, k), regressors to be projected out. Linearly dependent ones are permitted."""
         scale = np.linalg.norm(nuisances, axis=0)
         left, sizes, _ = np.linalg.svd(nuisances / np.where(scale > 0, scale, 1.0), full_matrices=False)
         self._known = left[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), np.finfo(float).tiny)]
@@ -76,11 +81,12 @@ class PartialRegression:
         self._power = max(float(self.force @ self.force), np.finfo(float).tiny)
 
     def _residual_without(self, shapes: FloatArray) -> FloatArray:
+        """Component of shapes (n,) or (n, k) orthogonal to the nuisance regressors."""
         return np.asarray(shapes - self._known @ (self._known.T @ shapes))
 
     def fit(self, *laws: FloatArray) -> LawFit:
-        """Least-squares fit of laws to the missing force, the linear part projected out. laws: (n,) each, evaluated
-        with the factor 1."""
+        """Least-squares fit of laws to the force, with the nuisance regressors projected out of both. laws: (n,) each,
+        evaluated with strength 1."""
         shapes = self._residual_without(np.column_stack(laws))
         size = np.linalg.norm(shapes, axis=0)
         shapes = shapes / np.where(size > 0, size, 1.0)
@@ -97,11 +103,12 @@ def regress_beside_linear(motion: AxisMotion, constant: bool = True) -> PartialR
 def best_trial(
     beside: PartialRegression, trials: Sequence[float], laws: Callable[[float], tuple[FloatArray, ...]]
 ) -> tuple[float, LawFit]:
-    """The trial whose laws explain most, and its fit."""
+    """The trial value of a nonlinear parameter whose laws explain most, and its fit. laws: from a trial value to (n,)
+    each. Raises ValueError without trials."""
     fits = [(trial, beside.fit(*laws(trial))) for trial in trials]
     return max(fits, key=lambda item: item[1].explained)
 
 
 def value_along(matrix: FloatArray, direction: FloatArray) -> float:
-    """Quadratic form: a mass, damping or stiffness matrix (n, n) along a direction (n,)."""
+    """Quadratic form d' M d of a mass, damping or stiffness matrix M (n, n) and a direction d (n,)."""
     return float(direction @ matrix @ direction)

@@ -1,6 +1,7 @@
 """Nonparametric frequency responses: their estimate from recordings, and their resonances and coupling.
 
-`experiments` (periods and windows of a recording) -> `noise_floor` -> `shared_lines` -> `transfer_estimate`
-(`reliable_lines` strikes out) -> `frequency_response`, the value that all others take. Smoothed by `local_polynomial`
-and `octave_bins`; read by `resonances`, `coupling_onset`, `frequency_bands`. Begin at `transfer_estimate.py`.
+Order of the data: `experiments` (spectra of periods or windows) -> `shared_lines` (instrumental-variable estimate, with
+variances from `noise_floor`) -> `transfer_estimate` (all lines; `reliable_lines` marks those not to be used) ->
+`frequency_response`, the result. `local_polynomial` and `octave_bins` smooth it; `resonances` (with `single_mode`),
+`coupling`, `coupling_onset` and `frequency_bands` evaluate it. Begin at `transfer_estimate.py`.
 """

@@ -1,7 +1,8 @@
-"""Experiments in a recording: spectra of whole periods, or of windows where nothing repeats.
+"""Experiments in a recording: spectra of whole periods, or of windows where the excitation is not periodic.
 
-An experiment is one excitation, repeated over one or more periods. Spectra are rfft / length without the lines at zero
-and at half the rate, so that white noise of variance s² has s² / length per line, with any window.
+An experiment is an excitation that is repeated over one or more periods. Spectra are rfft / length without the lines at
+zero and at half the sample rate, so that white noise of variance s² has the expected power s² / length at each line;
+windows are scaled to a mean square of 1 for the same reason.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,8 @@ from equalizer.signals.spectral_density import hann, line_spectra
 
 BROADBAND_KINDS = ("sweep", "multisine", "noise", "binary")
 TRANSIENT_S = 5.0
-"""Length of a transient: ten time constants of the slowest pole that a model may have, which leaves e^-10 of it."""
+"""Assumed length of a transient (s): ten time constants of 0.5 s, the ordinary decay bound of a state-space model
+(`ORDINARY_DECAY_S`), after which e^-10 of it remains."""
 _DRIVEN_KINDS = (*BROADBAND_KINDS, "sine", "slow", "step", "impact")
 
 
@@ -32,7 +34,7 @@ class Experiment:
     instrument: ComplexArray
     """(periods, lines, inputs): the excitation, where it was recorded, else the command."""
     borrowed: float = 0.0
-    """Share of the last period's samples that are the mean of the others."""
+    """Share of the last period's samples that were replaced by the mean of the other periods."""
 
     @property
     def periods(self) -> int:
@@ -56,7 +58,7 @@ class Experiment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExperimentSet:
-    """All experiments of some recordings, with remarks on what was left out."""
+    """All experiments of some recordings, with remarks on data that were left out."""
 
     experiments: tuple[Experiment, ...]
     remarks: tuple[str, ...]
@@ -69,8 +71,9 @@ def instrument_signal(recording: Recording) -> FloatArray:
 
 
 def periodic_experiments(recordings: Sequence[Recording]) -> ExperimentSet:
-    """Whole periods of every periodic broadband segment that is not kept for testing. Of the first, the transient is
-    left out and what comes after it is used, unless it is the only one; periods with missing samples are dropped."""
+    """Whole periods of every periodic broadband segment without the role "test". The first period counts only if there
+    is no other, or, where a period lasts at least twice `TRANSIENT_S`, with its transient replaced (`borrowed`).
+    Periods with missing samples are dropped."""
     experiments: list[Experiment] = []
     alone, gaps = 0, 0
     for recording in recordings:
@@ -98,7 +101,8 @@ def periodic_experiments(recordings: Sequence[Recording]) -> ExperimentSet:
 
 
 def window_experiments(recordings: Sequence[Recording], window_s: float) -> ExperimentSet:
-    """Hann windows that overlap by half, over everything that drives the plant."""
+    """Hann windows of window_s seconds, overlapping by half, over all driven segments without the role "test" or,
+    without segments, the whole recording."""
     experiments: list[Experiment] = []
     for recording in recordings:
         length = max(8, round(window_s * recording.sample_rate_hz))
@@ -107,7 +111,7 @@ def window_experiments(recordings: Sequence[Recording], window_s: float) -> Expe
         for segment in _driven_segments(recording):
             starts = range(segment.start, segment.stop - length + 1, length // 2)
             whole = [start for start in starts if _is_whole(recording, start, length)]
-            # Unlike periods, windows are not alike: each is an experiment of its own.
+            # Windows, unlike periods, do not contain the same excitation: each is an experiment of its own.
             experiments += [_make_experiment(recording, [start], length, window) for start in whole]
     remark = f"No periodic excitation: averaged over Hann windows of {window_s:g} s (H1), which blur narrow resonances."
     return ExperimentSet(tuple(experiments), (remark,), periodic=False)
@@ -126,6 +130,8 @@ def _is_whole(recording: Recording, start: int, length: int) -> bool:
 
 
 def _make_experiment(recording: Recording, starts: Sequence[int], length: int, window: FloatArray) -> Experiment:
+    """Spectra of the periods that begin at `starts`, without their mean. window: (length,), mean square 1."""
+
     def spectra(samples: FloatArray) -> ComplexArray:
         periods = np.stack([samples[start : start + length] for start in starts])
         return line_spectra((periods - periods.mean(axis=1, keepdims=True)) * window[:, None])
@@ -141,8 +147,9 @@ def _make_experiment(recording: Recording, starts: Sequence[int], length: int, w
 def _add_first_period(
     recording: Recording, experiment: Experiment, counted: Sequence[int], first: int, over: int
 ) -> Experiment:
-    """Add the first period, whose transient is replaced by the mean of the other periods: for a linear plant, command
-    and response are then those of the steady state throughout."""
+    """Add the first period, its first `over` samples (the transient) replaced by the mean of the other periods: for a
+    linear plant, command and response are then those of the steady state throughout. first: index of its start;
+    counted: starts of the other periods."""
 
     def spectra(samples: FloatArray) -> ComplexArray:
         period = samples[first : first + experiment.length].copy()

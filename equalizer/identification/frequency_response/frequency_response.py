@@ -1,4 +1,5 @@
-"""A measured frequency response, line by line, with its noise variance and coherence."""
+"""A measured frequency response, line by line, with its noise variance and coherence: the value that the estimate from
+recordings returns, and that models are fitted to."""
 
 from dataclasses import dataclass
 
@@ -12,19 +13,20 @@ BoolArray = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrequencyResponse:
-    """Frequency response from the total command to the response, both as sampled: `response[k]` is taken just before
-    `command[k]`."""
+    """Frequency response G(f) from the samples of the total command to those of the response; response sample k is
+    taken just before command sample k is written. Raises ValueError where shapes disagree or frequencies do not
+    rise."""
 
     frequency_hz: FloatArray
     """(lines,), rising."""
     response: ComplexArray
-    """(lines, outputs, inputs)"""
+    """(lines, outputs, inputs): complex gain at each line, in output_unit per input_unit."""
     noise_variance: FloatArray
     """(lines, outputs, inputs): expected |error|² of each entry of `response`; NaN where not known."""
     coherence: FloatArray
     """(lines, outputs): share of the response's power that the commands explain, 0 to 1; NaN where not known."""
     reliable: BoolArray
-    """(lines,): False where the estimate should not be used, for the reasons that `remarks` name."""
+    """(lines,): False where the estimate should not be used; `remarks` state the reasons."""
     sample_rate_hz: float
     input_channels: tuple[str, ...]
     output_channels: tuple[str, ...]
@@ -50,11 +52,11 @@ class FrequencyResponse:
         return len(self.frequency_hz)
 
     def within(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
-        """The lines of a band, its ends included."""
+        """The response on the lines of a band (Hz), its ends included."""
         return self.of_lines((self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz))
 
     def of_lines(self, chosen: BoolArray) -> "FrequencyResponse":
-        """The response on chosen lines. chosen: (lines,)."""
+        """The response on the lines where the mask `chosen` (lines,) is true."""
         return FrequencyResponse(
             self.frequency_hz[chosen],
             self.response[chosen],

@@ -23,10 +23,10 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalPolynomial:
-    """Smoothing weights of the neighbours of each line (W in the equation above)."""
+    """Smoothing weights of the neighbours of each line: W in the equation of the module docstring."""
 
     window: npt.NDArray[np.int64]
-    """(lines, taken): indices of the neighbours of each line, itself included."""
+    """(lines, taken): indices of the `taken` neighbours of each line, which include the line itself."""
     weights: FloatArray
     """(lines, taken): weights of the neighbours; real, of sum 1."""
     order: int
@@ -34,8 +34,9 @@ class LocalPolynomial:
 
     @classmethod
     def over(cls, response: FrequencyResponse, neighbours: int, order: int) -> Self:
-        """Weights for the lines of a response. neighbours: lines on either side. Raises ValueError where a polynomial
-        of this order needs more lines than `neighbours` gives, or there are fewer lines than it takes."""
+        """Weights for the lines of a response. neighbours: lines on either side. Raises ValueError for a negative
+        order, for fewer than order + 2 lines in a neighbourhood, or for fewer lines in the response than in a
+        neighbourhood."""
         taken, lines = 2 * neighbours + 1, len(response)
         if order < 0:
             raise ValueError(f"order is {order}; a polynomial has order 0 or above")
@@ -52,7 +53,7 @@ class LocalPolynomial:
         return cls(window, fitted, order)
 
     def apply(self, values: ComplexArray) -> ComplexArray:
-        """(lines, ...): the smoothed values; from values of the same shape."""
+        """Smoothed values, (lines, ...), of values of the same shape."""
         smooth: ComplexArray = np.einsum("lk,lk...->l...", self.weights, values[self.window])
         return smooth
 
@@ -66,15 +67,15 @@ class LocalPolynomial:
 def smooth_response(
     response: FrequencyResponse, neighbours: int = 8, order: int = 2, about: ComplexArray | None = None
 ) -> FrequencyResponse:
-    """Smooth each line over itself and `neighbours` lines on either side; near the ends of the band over as many lines,
-    but more of them on one side.
+    """Smooth each line over itself and `neighbours` lines on either side; near the ends of the band over the same
+    number of lines, of which more lie towards its middle.
 
     about: (lines, outputs, inputs), response of an approximate model: only the difference from it is smoothed, so that
     a resonance narrower than the neighbourhood is not blunted.
 
-    The new noise variance follows from the old one, or, where that is larger, from the scatter of the lines about the
-    polynomial, so that lack of fit is included. Errors of adjacent lines are then no longer independent. Raises
-    ValueError where there are fewer lines than a polynomial takes.
+    The noise variance of the result is that of the weighted sum or, where that is larger, follows from the scatter of
+    the lines about the polynomial, so that lack of fit is included. Errors of adjacent lines are then no longer
+    independent. Raises ValueError as `LocalPolynomial.over` does.
     """
     local = LocalPolynomial.over(response, neighbours, order)
     known = 0.0 if about is None else about
@@ -99,14 +100,15 @@ def _weights(response: FrequencyResponse) -> FloatArray:
 
 
 def _powers(frequency_hz: FloatArray, window: npt.NDArray[np.int64], order: int) -> FloatArray:
-    """(lines, taken, order + 1): powers 0 to `order` of the distance from the line itself, scaled to at most 1."""
+    """(lines, taken, order + 1): powers 0 to `order` of the frequency difference from the line, scaled to at most 1."""
     away = frequency_hz[window] - frequency_hz[:, None]
     powers: FloatArray = (away / np.abs(away).max(axis=1, keepdims=True))[:, :, None] ** np.arange(order + 1)
     return powers
 
 
 def _scatter(response: FrequencyResponse, local: LocalPolynomial) -> FloatArray:
-    """(lines, outputs, inputs): variance about an unweighted polynomial in each window, per degree of freedom."""
+    """(lines, outputs, inputs): residual variance of an unweighted polynomial fit in each window, per degree of
+    freedom."""
     basis, _ = np.linalg.qr(_powers(response.frequency_hz, local.window, local.order))
     values = response.response[local.window]
     explained = np.abs(np.einsum("lko,lkpm->lopm", basis, values)) ** 2

@@ -1,4 +1,8 @@
-"""Noise of a frequency response estimate: from differences between periods, from rest, or from scatter of lines."""
+"""Noise variance of a frequency response estimate, from three sources: the sample variance between periods, the
+spectrum of the response at rest, or, where neither exists, the scatter between neighbouring lines.
+
+Spectra are rfft / length; a noise density s is the power per line times that length, so that it does not depend on it.
+"""
 
 from collections.abc import Sequence
 
@@ -10,27 +14,27 @@ from equalizer.signals.signal import ComplexArray, FloatArray, runs_of
 from equalizer.signals.spectral_density import hann
 
 SETTLING_S = 0.5
-"""Settling time after the last excitation, before samples count as rest."""
+"""Settling time (s) after the last excitation, before samples count as rest."""
 _REST_WINDOW_S = 0.5
-"""Length of a window at rest."""
+"""Length of a window at rest (s)."""
 _THIRD_DIFFERENCE_GAIN = 20.0
-"""1² + 3² + 3² + 1²: ratio of the variance of a third difference to that of a line."""
+"""Variance of a third difference over that of a line: 1² + 3² + 3² + 1², from its coefficients 1, -3, 3, -1."""
 
 
 def period_variance(residuals: ComplexArray) -> FloatArray:
-    """Noise power of a single period (lines, outputs): sample variance over periods. residuals: (periods, lines,
-    outputs), periods >= 2."""
+    """Noise power of a single period, (lines, outputs): the sample variance over periods. residuals: (periods, lines,
+    outputs), at least two periods."""
     around = residuals - residuals.mean(axis=0)
     power: FloatArray = np.sum(np.abs(around) ** 2, axis=0) / (len(residuals) - 1)
     return power
 
 
 def line_scatter(response: ComplexArray) -> FloatArray:
-    """Expected |error|² per entry, from third differences between neighbouring lines, which are small for a smooth
-    curve.
+    """Expected |error|² of each entry, from third differences between neighbouring lines, which are small for a smooth
+    curve. response: (lines, ...). NaN everywhere for fewer than five lines.
 
-    Includes distortion that repeats exactly (friction in a sweep). Too large where resonances are as narrow as the line
-    spacing. response: (lines, ...). NaN everywhere for less than five lines.
+    The estimate includes distortion that repeats from period to period (friction in a sweep), and is too large where
+    resonances are as narrow as the line spacing.
     """
     if len(response) < 5:
         return np.full(response.shape, np.nan)
@@ -41,20 +45,20 @@ def line_scatter(response: ComplexArray) -> FloatArray:
 
 
 def smooth_over_lines(power: FloatArray, lines: int) -> FloatArray:
-    """Running mean over an odd number of lines. power: (lines, ...)."""
+    """Running mean of power (lines, ...) over `lines` lines, an odd number; at the ends the last value is repeated."""
     if not len(power):
         return power
-    # Imported here: it takes longer than many an estimate.
+    # Imported here, because importing SciPy's ndimage takes longer than many estimates.
     from scipy.ndimage import uniform_filter1d
 
     smooth: FloatArray = uniform_filter1d(power, max(1, min(lines, len(power))), axis=0, mode="nearest")
-    # The running sum keeps rounding errors of strong lines that have left it, and may be negative.
+    # A running sum keeps rounding errors of strong lines after these have left the window, and may become negative.
     return np.asarray(np.maximum(smooth, 0.0))
 
 
 def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> FloatArray | None:
-    """Noise power density of the response at rest, as s(f) with s / length the power per line of a period of that
-    length. Returns (lines, outputs), or None without a rest of sufficient length."""
+    """Noise power density s(f) of the response at rest, (lines, outputs), such that s / length is the noise power per
+    line of a period of that length; None without a rest of sufficient length. All recordings have the same rate."""
     powers, lines_hz = [], np.empty(0)
     for recording in recordings:
         length = round(_REST_WINDOW_S * recording.sample_rate_hz)
@@ -64,8 +68,9 @@ def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> Flo
 
 
 def rest_powers(recording: Recording, samples: FloatArray, length: int) -> list[FloatArray]:
-    """Power density (length // 2 - 1, channels) of each Hann window of samples (n, channels) at rest, without missing
-    samples; the windows overlap by half."""
+    """Power density (length // 2 - 1, channels) of each Hann window of samples (n, channels) at rest; windows overlap
+    by half, and those with missing samples are left out."""
+    # The mean square of a Hann window is 3/8: scaled to 1, so that the window does not change the noise power.
     window = np.sqrt(8 / 3) * hann(length)[:, None]
     powers = []
     for start, stop in rest_intervals(recording, SETTLING_S):
@@ -78,15 +83,17 @@ def rest_powers(recording: Recording, samples: FloatArray, length: int) -> list[
 
 
 def interpolate_rest(mean: FloatArray, lines_hz: FloatArray, frequency_hz: FloatArray) -> FloatArray:
-    """(lines, channels): the mean of `rest_powers`, smoothed, at other frequencies."""
-    # The lowest lines are left out: subtracting the mean of a window removes part of their noise.
+    """Smooth the mean of `rest_powers` over lines and interpolate it at frequency_hz: (lines, channels). The two lowest
+    lines of `mean` are overwritten in place."""
+    # Subtracting the mean of a window removes part of the noise of the lowest lines: replaced by the next line's.
     mean[:2] = mean[2:3]
     smooth = smooth_over_lines(mean, 9)
     return np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)
 
 
 def rest_intervals(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
-    """Intervals (start, stop) without excitation, after settling. Recordings begin at rest."""
+    """Intervals (start, stop) of samples without excitation, after settling_s seconds; an interval at the very start
+    counts from sample 0, because recordings begin at rest."""
     rests = runs_of((instrument_signal(recording) == 0).all(axis=1))
     settling = round(settling_s * recording.sample_rate_hz)
     return [(start + (settling if start else 0), stop) for start, stop in rests]

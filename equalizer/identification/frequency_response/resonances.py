@@ -1,4 +1,9 @@
-"""Resonances of a measured response: peaks of its gain or of its coupling, with a mode fitted to each."""
+"""Resonances of a measured response: peaks of its gain or of its coupling, with a mode fitted to each.
+
+Peaks are searched on averages over bins of equal width in octaves: of the largest singular value of the response matrix
+(gain), and of the Frobenius norm of its off-diagonal entries (coupling). A mode with one pole pair is then fitted to
+the lines around each peak (`single_mode`); its 95 % intervals are quantiles of refits with added noise.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -11,18 +16,20 @@ from equalizer.identification.frequency_response.single_mode import fit_single_m
 from equalizer.signals.signal import FloatArray
 
 GAIN, COUPLING = "gain", "coupling"
+"""Names of the two curves in which peaks are searched."""
 
 
 @dataclass(frozen=True, slots=True)
 class ResonanceSearch:
-    """Settings of the peak search, and of the 95 % intervals: number of noise draws and random seed."""
+    """Settings of the peak search, and of the 95 % intervals: number of noise draws and random seed. Heuristic
+    values."""
 
     prominence_db: float = 3.0
     """Prominence: ratio of a peak to the higher of the minima on its two sides."""
     bin_octaves: float = 1 / 48
-    """Width of the averaging before peaks are searched for."""
+    """Width (octaves) of the bins that are averaged before peaks are searched."""
     reach_octaves: float = 1 / 8
-    """Half-width of the interval to which a mode is fitted."""
+    """Half-width (octaves) of the interval around a peak to which a mode is fitted."""
     draws: int = 200
     seed: int = 1
 
@@ -38,10 +45,10 @@ class Resonance:
     damping_ratio: float
     damping_interval: tuple[float, float]
     width_hz: float
-    """Half-power bandwidth, 2 damping_ratio frequency_hz."""
+    """Half-power bandwidth (Hz), 2 damping_ratio frequency_hz."""
     prominence_db: float
     seen_in: tuple[str, ...]
-    """GAIN: a peak of the largest singular value; COUPLING: of all off-axis entries together."""
+    """Curves that have this peak. GAIN: largest singular value; COUPLING: norm of the off-diagonal entries."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +59,11 @@ class _Peak:
 
 
 def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None = None) -> tuple[Resonance, ...]:
-    """Resonances in rising order, between the first and the last reliable line. response: as estimated, not smoothed.
+    """Resonances between the first and the last reliable line, in ascending order of frequency. response: as estimated,
+    not smoothed.
 
-    Peaks that no single mode fits, and those with the same mode as a more prominent peak, are left out. Coupling is
-    included where there are as many outputs as inputs.
+    A peak that no single mode fits is left out; of peaks with the same mode the most prominent is kept. Coupling is
+    searched only where there are as many outputs as inputs.
     """
     search = search or ResonanceSearch()
     if not response.reliable.any():
@@ -78,6 +86,7 @@ def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None 
 
 
 def _find_peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
+    """Peaks of both curves, in dB, whose prominence is at least that of the settings."""
     curves = {GAIN: np.linalg.norm(binned.response, ord=2, axis=(1, 2))}
     if binned.response.shape[1] == binned.response.shape[2]:
         off_axis = binned.response * (1 - np.eye(binned.response.shape[1]))
@@ -95,7 +104,7 @@ def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearc
     """Fit a mode to a peak; None where no single mode fits, or where it is not distinct from noise."""
     factor = 2**search.reach_octaves
     near = lines.within(peak.frequency_hz / factor, peak.frequency_hz * factor)
-    # A hundred points suffice for one mode; more lines are averaged, which saves time and loses nothing.
+    # A hundred points suffice for a single mode: more lines are averaged in bins, which saves time.
     binned = octave_bins(near, 2 * search.reach_octaves / 100) if len(near) >= 6 else None
     if binned is None or len(binned.frequency_hz) < 6:
         return None
@@ -107,6 +116,7 @@ def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearc
     parts = np.random.default_rng(search.seed).standard_normal((2, search.draws, *entries.shape[1:]))
     drawn = entries + np.sqrt(noise / 2) * (parts[0] + 1j * parts[1])
     natural_drawn, damping_drawn = fit_single_mode(binned.frequency_hz, drawn)
+    # Where more than 5 % of the noisy refits find no mode, the peak is not distinct from noise.
     if np.isnan(natural_drawn).mean() > 0.05:
         return None
     return Resonance(
@@ -121,6 +131,7 @@ def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearc
 
 
 def _interval(drawn: FloatArray) -> tuple[float, float]:
+    """95 % interval of draws (draws,); NaN is left out."""
     low, high = np.nanquantile(drawn, (0.025, 0.975))
     return float(low), float(high)
 

@@ -1,8 +1,9 @@
 """Instrumental-variable estimate of the response at the lines that a set of experiments shares, with its errors.
 
-G = Y R^H (U R^H)^-1 at each line, with one column per experiment: U the total commands, Y the responses, R the
-excitations as instruments. A feedback that adds to the excitation is uncorrelated with the instruments, so that it
-causes no bias.
+G = Y R^H (U R^H)^-1 at each line, with one column per experiment: U (inputs, experiments) the total commands, Y
+(outputs, experiments) the responses, R (inputs, experiments) the excitations as instruments. Noise that a feedback adds
+to the command is uncorrelated with the instruments, so that it causes no bias. The noise variance follows from the
+residuals between periods, else between experiments, else from the scatter between lines (`noise_floor`).
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ from equalizer.identification.frequency_response.noise_floor import (
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _RANK_TOLERANCE = 1e-6
-"""Rank tolerance, relative to the strongest line's amplitude: anything smaller is rounding."""
+"""Singular value, relative to the largest at any line, below which it counts as zero (rounding)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,17 +32,17 @@ class SharedLines:
     response: ComplexArray
     """(lines, outputs, inputs)"""
     noise_variance: FloatArray
-    """(lines, outputs, inputs)"""
+    """(lines, outputs, inputs): expected |error|² of each entry of `response`."""
     coherence: FloatArray
-    """(lines, outputs)"""
+    """(lines, outputs): share of the response's power that the commands explain, 0 to 1."""
     excitation: ComplexArray
-    """(lines, inputs, experiments), scaled to unit noise density."""
+    """(lines, inputs, experiments): mean spectra, times the root of the effective number of samples."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Columns:
-    """One column per experiment, weighted by the root of its number of samples, so that the noise power equals its
-    density."""
+    """Mean spectra, a column per experiment, times the root of its effective number of samples (length times effective
+    periods), so that the noise power of a column equals the noise density."""
 
     command: ComplexArray
     """(lines, inputs, experiments)"""
@@ -57,11 +58,9 @@ def solve_shared_lines(
     rest_density: FloatArray | None,
     noise_lines: int,
 ) -> SharedLines:
-    """Estimate at the given lines. experiments: all with exactly these lines. rest_density: (lines, outputs) by
-    `rest_floor`.
-
-    Lines at which the experiments are not independent are left out.
-    """
+    """Estimate at the given lines. experiments: all with exactly these lines. rest_density: (lines, outputs), by
+    `rest_floor`, a lower bound where the noise is estimated from the scatter of lines. noise_lines: lines over which
+    noise is averaged. Lines at which the experiments are not independent are left out."""
     every = _columns(experiments)
     kept = _has_full_rank(every)
     columns = _Columns(every.command[kept], every.response[kept], every.instrument[kept], every.power[kept])
@@ -87,6 +86,8 @@ def solve_shared_lines(
 
 
 def _columns(experiments: Sequence[Experiment]) -> _Columns:
+    """Weighted mean spectra of the experiments as the columns of U, Y and R."""
+
     def stack(name: str) -> ComplexArray:
         weighted = [
             getattr(experiment, name).mean(axis=0) * np.sqrt(experiment.length * experiment.effective_periods)
@@ -99,7 +100,7 @@ def _columns(experiments: Sequence[Experiment]) -> _Columns:
 
 
 def _has_full_rank(columns: _Columns) -> BoolArray:
-    """(lines,): where excitations and commands both have full rank, the number of inputs."""
+    """(lines,): whether the excitations R and the commands U both have full rank, which is the number of inputs."""
     inputs, experiments = columns.command.shape[1:]
     kept = np.full(len(columns.command), experiments >= inputs)
     if experiments >= inputs and len(kept):
@@ -112,8 +113,8 @@ def _has_full_rank(columns: _Columns) -> BoolArray:
 def _density_from_periods(
     experiments: Sequence[Experiment], kept: BoolArray, response: ComplexArray
 ) -> FloatArray | None:
-    """Noise density (lines, outputs, experiments) from the residuals' variance between periods. Experiments with a
-    single period take the mean of the others; None where all have one."""
+    """Noise density (lines, outputs, experiments) from the variance of the residuals Y - G U between periods. An
+    experiment with a single period takes the mean of the others; None where all experiments have a single period."""
     found: list[FloatArray | None] = []
     for experiment in experiments:
         residuals = experiment.response[:, kept] - np.einsum("lpm,klm->klp", response, experiment.command[:, kept])
@@ -130,8 +131,8 @@ def _density_from_periods(
 
 
 def _density_from_residuals(columns: _Columns, response: ComplexArray) -> FloatArray | None:
-    """Noise density (lines, outputs, experiments) from the residuals between experiments, the same for all; None where
-    there are fewer than two more experiments than inputs."""
+    """Noise density (lines, outputs, experiments) from the residual power over all experiments per degree of freedom,
+    the same for each; None for fewer than inputs + 2 experiments."""
     inputs, experiments = columns.command.shape[1:]
     if experiments < inputs + 2:
         return None

@@ -1,20 +1,25 @@
-"""Fit of a single resonance to the lines around a peak: all entries share the pole, each has its own residues."""
+"""Least-squares fit of a single resonance to the lines around a peak, for many draws of the noise at once.
+
+All entries of a response matrix share the pole pair; each has its own numerator, a parabola in s, which also represents
+the modes outside the interval:  G(s) = (n0 + n1 s + n2 s²) / (s² + c1 s + c0),  with s = j f / f_m and f_m the
+geometric middle of the lines. Natural frequency f_m sqrt(c0), damping ratio c1 / (2 sqrt(c0)).
+"""
 
 import numpy as np
 
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _STARTING_ROUNDS, _NEWTON_ROUNDS = 3, 8
-"""Reweighted linear fits that give a start, and Newton steps from it."""
+"""Number of reweighted linear fits that give a starting value, and of Gauss-Newton steps from it."""
 
 
 def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Natural frequency (draws,) in Hz and damping ratio (draws,); NaN where no resonance fits.
+    """Natural frequency (draws,) in Hz and damping ratio (draws,); NaN where the fit is unstable or its natural
+    frequency is outside the lines. frequency_hz: (lines,), at least six. entries: (draws, lines, entries of the
+    matrix).
 
-    entries (draws, lines, entries): G = (a parabola in s per entry) / (s² + c1 s + c0) in least squares; the parabola
-    represents modes that are further away. Started by re-weighted linear equations (Sanathanan and Koerner), whose
-    damping is biased by noise; refined by Gauss-Newton steps on the least-squares error, which is not (variable
-    projection, Kaufman 1975). frequency_hz: (lines,), at least six.
+    Re-weighted linear equations (Sanathanan and Koerner) give starting values, whose damping is biased by noise;
+    Gauss-Newton steps on the least-squares error remove that bias (variable projection, Kaufman 1975).
     """
     middle = float(np.sqrt(frequency_hz[0] * frequency_hz[-1]))
     s = np.asarray(1j * frequency_hz / middle, dtype=np.complex128)
@@ -42,13 +47,13 @@ def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[Fl
 
 
 def _inverse_denominator(s: ComplexArray, c1: FloatArray, c0: FloatArray) -> ComplexArray:
-    """(draws, lines): 1 over the denominator s² + c1 s + c0."""
+    """(draws, lines): 1 / (s² + c1 s + c0)."""
     over: ComplexArray = 1 / (s**2 + c1[:, None] * s + c0[:, None])
     return over
 
 
 def _basis(numerator: ComplexArray, over: ComplexArray) -> ComplexArray:
-    """(draws, lines, 3): orthonormal basis of all numerators over the denominator."""
+    """(draws, lines, 3): orthonormal basis of the functions (n0 + n1 s + n2 s²) / (s² + c1 s + c0)."""
     basis: ComplexArray = np.linalg.qr(numerator * over[:, :, None])[0]
     return basis
 
@@ -62,7 +67,7 @@ def _project_out(basis: ComplexArray, values: ComplexArray) -> ComplexArray:
 def _solve_two_unknowns(
     first: ComplexArray, second: ComplexArray, right: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Real least squares of first x + second y = right, draw by draw."""
+    """Real x and y, (draws,) each, that solve first x + second y = right in least squares, draw by draw."""
 
     def dot(left: ComplexArray, other: ComplexArray) -> FloatArray:
         product: FloatArray = np.sum((np.conj(left) * other).real, axis=(1, 2))

@@ -1,7 +1,8 @@
-"""Estimate of the transfer functions of all channels from all recordings (the published figure 4).
+"""Estimate of the frequency responses of all channels from all recordings.
 
-Each line uses every experiment whose period contains it, weighted by its number of samples. Experiments of different
-periods are combined at the lines that they share.
+Such an estimate is figure 4 of Wilson, Chan, Salisbury and Niemeyer, "Multi-DOF Equalization of Haptic Devices for
+Accurate Rendering at High Frequencies". Each line uses all experiments whose period contains it, weighted by their
+number of samples; experiments of different periods are combined at the lines that they share (`shared_lines`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,7 +30,8 @@ from equalizer.signals.signal import FloatArray, Signal
 
 
 class TransferEstimateError(ValueError):
-    """The transfer functions cannot be estimated from these recordings; the text says why, and which would do."""
+    """The transfer functions cannot be estimated from these recordings. The message states the reason and, where there
+    is any, the remedy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +40,15 @@ class EstimateSettings:
 
     rules: ReliabilityRules = field(default_factory=ReliabilityRules)
     noise_lines: int = 17
-    """Lines over which the noise variance is averaged."""
+    """Number of lines over which the noise variance is averaged."""
     window_s: float = 4.0
-    """Length of the windows where nothing is periodic: lines are 1 / window_s apart."""
+    """Length of the windows (s) where no excitation is periodic: lines are 1 / window_s apart."""
 
 
 def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
-    """Estimate the transfer function from total command to response. Raises TransferEstimateError where the recordings
-    do not belong together, or hold fewer independent experiments than there are inputs."""
+    """Estimate the transfer function from the total command to the response. Raises TransferEstimateError where there
+    is no recording, the recordings differ in rate, channels or units, no segment is broadband and whole, an output is
+    constant, or there are fewer independent experiments than inputs."""
     settings = settings or EstimateSettings()
     _check_alike(recordings)
     found = _collect_experiments(recordings, settings)
@@ -64,6 +67,7 @@ def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSetting
 
 
 def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSettings) -> ExperimentSet:
+    """Periodic experiments or, where there are none, windows, with remarks on the quality of the estimate."""
     found = periodic_experiments(recordings)
     if not found.experiments:
         found = window_experiments(recordings, settings.window_s)
@@ -82,9 +86,9 @@ def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSett
 
 
 def _group_by_lines(experiments: Sequence[Experiment], rate_hz: float) -> Iterator[tuple[FloatArray, list[Experiment]]]:
-    """Groups of lines that are contained in the same experiments, with those experiments reduced to the lines."""
+    """Frequencies (Hz) of each group of lines that the same experiments contain, and these experiments on the lines."""
     lengths = sorted({experiment.length for experiment in experiments})
-    # Lines as integers: k / length is the same line in every period that contains it.
+    # Lines as integer multiples of rate / common, common the least common multiple of the lengths: compared exactly.
     common = int(np.lcm.reduce(np.array(lengths, dtype=np.int64)))
     numbers = {length: np.arange(1, (length + 1) // 2, dtype=np.int64) * (common // length) for length in lengths}
     every = np.unique(np.concatenate(list(numbers.values())))
@@ -113,6 +117,7 @@ def _select_lines(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype
 def _join_parts(
     parts: Sequence[SharedLines], recordings: Sequence[Recording], found: ExperimentSet, settings: EstimateSettings
 ) -> FrequencyResponse:
+    """Join the groups of lines in ascending order of frequency, and judge the reliability of each line."""
     command, response = recordings[0].command, recordings[0].response
     if not parts:
         raise TransferEstimateError(_too_few_experiments_text(len(command.channels), found))
@@ -156,7 +161,8 @@ def _check_alike(recordings: Sequence[Recording]) -> None:
 
 
 def _refuse_still_outputs(recordings: Sequence[Recording]) -> None:
-    """Refused because a sensor that is stuck at a value would give a response made of rounding errors."""
+    """Raises TransferEstimateError for an output that is constant in every recording, as of a stuck sensor: its
+    response would consist of rounding errors."""
     rows = [recording.response.samples for recording in recordings]
     still = np.all([(samples == samples[:1]).all(axis=0) for samples in rows], axis=0)
     names = ", ".join(name for name, is_still in zip(recordings[0].response.channels, still, strict=True) if is_still)

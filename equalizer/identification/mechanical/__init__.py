@@ -1,6 +1,7 @@
-"""Mechanical models of recordings: masses, dampers, springs, modes, and how well each is known.
+"""Mechanical models fitted to recordings: masses, dampers, springs and modes.
 
-`mechanical_lines` (spectra by segment) -> `mechanical_start` -> `mechanical_order` with `mechanical_refinement` (one
-more unknown while held-out lines gain) -> `mechanical_model_of` (the model file's terms). `modal_*` is the same for
-sensors that are not collocated with the commands. Begin at `mechanical_fit.py`.
+Order of the data: `mechanical_lines` (spectra by segment) -> `mechanical_misfit` (weighted residuals) ->
+`mechanical_start` (rigid body) -> `mechanical_order` (modes are added while the error on held-out lines falls; each
+structure is fitted by `mechanical_refinement`) -> `mechanical_model_of` (coordinates of a model file). `modal_*`: the
+same for sensors that are not collocated with the commands. Begin at `mechanical_fit.py`.
 """

@@ -5,9 +5,11 @@ the data support. Steps of `fit_mechanical_model`:
 
 1. spectra of the segments to fit and to test (`mechanical_lines`), grouped by line (`mechanical_misfit`);
 2. a rigid body at the driven axes, fitted to the lowest band from several initial values (`mechanical_start`);
-3. modes are added one by one while the cross-validated error falls (`mechanical_order`); where sensors do not move as
-   the commands act, modes with free shapes at the sensors are tried (`modal_order`);
+3. modes are added one by one while the cross-validated error falls (`mechanical_order`); where sensors are not
+   collocated with the commands, modes with free shapes at the sensors are tried (`modal_order`);
 4. the chosen structure is fitted to all lines, and simulated on the segments that were kept for the test.
+
+a, v and x are acceleration, velocity and position (n,) of the coordinates; command in N or N m.
 """
 
 from collections.abc import Callable, Sequence
@@ -54,13 +56,13 @@ collocated with the commands are considered. By hand."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StructureChoice:
-    """The chosen structure: sensors collocated with the commands, or sensors elsewhere."""
+    """The chosen structure, with sensors collocated with the commands or elsewhere; result of `choose_structure`."""
 
     best: RefinedFit[Structure] | RefinedFit[ModalStructure]
     tried: tuple[OrderTried, ...]
     """All structures that were tried, with their errors."""
     reason: str
-    """Why this one was chosen, as a sentence."""
+    """Reason for the choice, as a sentence."""
 
 
 def choose_structure(
@@ -70,11 +72,11 @@ def choose_structure(
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
 ) -> StructureChoice:
-    """Oscillators on the driven axes, if they explain the lines; else modes with free shapes at the sensors, if those
-    explain more.
+    """Choose oscillators on the driven axes if they explain the lines, else modes with free shapes at the sensors if
+    these explain more.
 
     groups: lines of the segments to fit. starts: fits of the driven axes alone up to the first of `stage_ends`, from
-    several initial values. on_progress: takes the share done, 0 to 1.
+    several initial values. on_progress: called with the share done, 0 to 1.
     """
     best = choose_simplest(starts)
     if settings.joint:
@@ -97,8 +99,9 @@ def _fit_sensors_elsewhere(
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
 ) -> StructureChoice:
-    """A structure in which sensors need not move as the commands act: modes with free shapes, or, where a group holds a
-    transient, which `choose_modes` does not take, oscillators whose motion the axes' own sensors share."""
+    """Structure for sensors that are not collocated with the commands: modes with free shapes or, where a group
+    contains a transient, which `choose_modes` cannot fit, oscillators whose motion the driven axes' own sensors measure
+    too."""
     if not any(group.transient for group in groups):
         return StructureChoice(*choose_modes(groups, best.structure, band_hz, settings, on_progress))
     structure = replace(best.structure, shared=True)
@@ -107,10 +110,10 @@ def _fit_sensors_elsewhere(
 
 
 LINES_PER_GROUP, LINES_IN_ALL = 400, 1600
-"""Most lines of each group, and of all groups together, while the structure is searched, to limit time; the chosen one
-is then fitted to all lines."""
+"""Largest number of lines of each group, and of all groups together, while structures are searched, to limit computing
+time; the chosen structure is then fitted to all lines."""
 _LEAST_LINES = 8
-"""Fewest driven lines from which a model is fitted, per axis where a part of the band is used."""
+"""Fewest driven lines from which a model is fitted; times the number of axes where a part of the band is used."""
 _LOW_PARTS = (0.25, 0.5, 1.0)
 """Parts of the first stage's band, from its lower end and as shares of its octaves, to which the rigid body is fitted:
 a mode at higher frequencies would bias it."""
@@ -124,9 +127,9 @@ def fit_mechanical_model(
 ) -> MechanicalFit:
     """Fit a model from the total command to the response.
 
-    Response i must be the motion where and along which command i acts; further responses may lie anywhere. on_progress:
-    takes the share done, 0 to 1. name: of the model. Raises MechanicalFitRefused where the recordings do not determine
-    a model: unsuitable channels, too few driven lines, only noise, or an unstable fit.
+    Response i must be the motion at the point and in the direction of command i; further responses may be at any place.
+    on_progress: called with the share done, 0 to 1. name: of the model. Raises MechanicalFitRefused where the
+    recordings do not determine a model: unsuitable channels, too few driven lines, only noise, or an unstable fit.
     """
     settings = settings or MechanicalFitSettings()
     refuse_unsuitable(recordings)
@@ -212,7 +215,7 @@ def _fit_rigid_starts(
 
 
 def _rigid_structure(recording: Recording, settings: MechanicalFitSettings, band: tuple[float, float]) -> Structure:
-    """Structure without modes; its speed scale (rad/s) is the geometric middle of the band."""
+    """Structure without modes; its speed scale (rad/s) is 2 pi times the geometric mean of the band's ends (Hz)."""
     inputs, outputs = len(recording.command.channels), len(recording.response.channels)
     return Structure(
         inputs=inputs,
@@ -229,7 +232,7 @@ def _rigid_structure(recording: Recording, settings: MechanicalFitSettings, band
 
 
 def _find_covered_band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
-    """Lowest and highest line (Hz) of all segments."""
+    """Frequencies (Hz) of the lowest and the highest line of all segments."""
     return (
         float(min(segment.frequency_hz[0] for segment in segments)),
         float(max(segment.frequency_hz[-1] for segment in segments)),
@@ -246,7 +249,7 @@ def _refit(
 
 
 def _include_all_lines(groups: Sequence[LineGroup]) -> list[LineGroup]:
-    """The groups without lines that cross-validation leaves out."""
+    """The groups with no line held out for cross-validation, so that a fit uses all lines."""
     return [replace(group, left_out=np.zeros(len(group.left_out), dtype=bool)) for group in groups]
 
 

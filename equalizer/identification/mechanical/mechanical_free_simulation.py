@@ -1,7 +1,8 @@
 """Simulation error of a mechanical model on measured segments, channel by channel.
 
-Computed from spectra: the response to the commands plus that of the initial state, which is fitted. By Parseval's
-theorem that is the free simulation's error over the segment, without its mean.
+The error is computed from spectra: measured response minus the response to the commands minus that to the initial
+state, which is fitted by least squares. By Parseval's theorem its power is that of a free simulation's error over the
+segment, without the mean.
 """
 
 from collections.abc import Sequence
@@ -14,14 +15,14 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _STATE_LINES = 3000
-"""Most lines to which the initial state is fitted."""
+"""Approximate number of lines to which the initial state is fitted; more are thinned out to limit computing time."""
 
 
 def simulation_errors(
     model: MechanicalModel, segments: Sequence[SegmentLines], band_hz: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
-    """Two arrays (p + 1,): root-mean-square errors relative to the response, and the noise likewise, NaN where not
-    known; the last entry is over all channels, each in units of its response."""
+    """Two arrays (p + 1,): rms error, and rms noise (NaN where not known), of each channel relative to the rms of its
+    response; the last entry is the root mean square over the channels. band_hz: ends included."""
     p = model.outputs
     error, power, noise = np.zeros(p), np.zeros(p), np.zeros(p)
     for segment in segments:
@@ -38,17 +39,18 @@ def simulation_errors(
 
 
 def simulation_misfit(model: MechanicalModel, segment_lines: SegmentLines) -> ComplexArray:
-    """(lines, p): measured minus simulated spectrum, with the initial state that fits best."""
+    """(lines, p): measured minus simulated spectrum, in the response's unit, with the best-fitting initial state where
+    the segment has a transient."""
     response = sample_response(model, segment_lines.frequency_hz, segment_lines.rate_hz, segment_lines.hold)
     misfit = segment_lines.response - np.einsum("lpm,lm->lp", response, segment_lines.command)
     if not segment_lines.transient:
         return np.asarray(misfit)
     free = free_response(model, segment_lines.frequency_hz, segment_lines.rate_hz)
-    if model.quantity == "acceleration":
+    if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
         straight = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
         free = np.concatenate([free, straight], axis=2)
     every = max(1, len(free) // _STATE_LINES)
-    # The initial state contributes mostly at low frequencies, so the lines are thinned from the first one on.
+    # The initial state contributes mostly at low frequencies: the first 200 lines are all kept, the others thinned out.
     some = np.unique(np.concatenate([np.arange(min(200, len(free))), np.arange(0, len(free), every)]))
     size = np.linalg.norm(segment_lines.response, axis=0)[:, None] + 1e-300
     columns = (free[some] / size).reshape(-1, free.shape[2])

@@ -1,8 +1,8 @@
 """Spectra of commands and responses, segment by segment, with their noise: the data of a mechanical fit.
 
-Periodic segments give the mean of their periods: what does not repeat with the excitation (a feedback's share of the
-noise too) averages out, so that the excitation serves as the instrument. Others give the spectrum of the whole segment;
-the transient from the states at its ends is fitted with the model.
+A periodic segment gives the mean spectrum of its periods: noise, including noise that a feedback adds to the command,
+averages out, as with the excitation as an instrument. Any other segment gives the spectrum of its whole length; the
+transient from the states at its ends is fitted with the model. Spectra are rfft / length, in the signals' units.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,15 +18,17 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import line_spectra
 
 _SPARE = 8
-"""Least number of lines beyond the unknowns of a window."""
+"""Degrees of freedom of the residual in a window: lines beyond the number of unknowns. Heuristic."""
 
 
 def local_noise(command: ComplexArray, response: ComplexArray) -> FloatArray:
-    """(lines, p): expected |error|² of the response. command: (lines, m), response: (lines, p); NaN for too few.
+    """(lines, p): expected |error|² of the response. command: (lines, m), response: (lines, p). NaN for fewer lines
+    than a window has.
 
-    Noise of a spectrum of a single period: the residual of a smooth response and a smooth transient in a window of
-    neighbouring lines (the local polynomial method of Schoukens, Vandersteen, Barbé and Pintelon, 2009). Where a
-    resonance is narrower than the window, the noise is overestimated, never underestimated.
+    Noise of the spectrum of a single period: residual power, per degree of freedom, of the fit G(f) U + T(f) in a
+    window of neighbouring lines, with G linear and the transient T quadratic in frequency (local polynomial method of
+    Schoukens, Vandersteen, Barbé and Pintelon, 2009). It is overestimated where a resonance is narrower than the
+    window.
     """
     lines, m = command.shape
     unknowns = 2 * m + 3
@@ -49,19 +51,19 @@ def local_noise(command: ComplexArray, response: ComplexArray) -> FloatArray:
 
 
 EXCITED = 1e-2
-"""Least amplitude of a line, relative to the strongest: below it, the line was not excited."""
+"""Amplitude of a line, relative to the strongest, above which it counts as excited. Heuristic."""
 MOST_LINES = 2000
-"""Most lines of one segment that does not repeat: of more, every second, third... is used."""
+"""Largest number of lines of a segment with a transient; of more, every second, third, ... line is used."""
 _NOISE_LINES = 9
-"""Lines over which noise and signal are averaged."""
+"""Number of lines over which noise and signal power are averaged."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SegmentLines:
-    """One segment's spectra (rfft / length, without the mean)."""
+    """Spectra of a segment: rfft / length, without the mean."""
 
     frequency_hz: FloatArray
-    """(lines,), above zero"""
+    """(lines,), above zero, in ascending order."""
     command: ComplexArray
     """(lines, m)"""
     response: ComplexArray
@@ -69,15 +71,15 @@ class SegmentLines:
     noise: FloatArray
     """(lines, p): expected |error|² of `response`; NaN where not known."""
     excited: BoolArray
-    """(lines,)"""
+    """(lines,): whether the excitation has power there, see `EXCITED`."""
     transient: bool
-    """Whether its spectrum contains a transient from the states at both ends."""
+    """Whether the spectra contain a transient, from different states at the two ends."""
     rate_hz: float
     hold: Hold
 
 
 def segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None:
-    """Spectra of a segment; None where it is not excited, or has missing samples throughout."""
+    """Spectra of a segment; None where it is not excited, or has fewer than eight samples without gaps."""
     starts, length = _whole_periods(recording, segment)
     if not starts or length < 8:
         return None
@@ -93,7 +95,7 @@ def segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None
         noise = smooth_over_lines(period_variance(spectra[1]), _NOISE_LINES) / len(starts)
     else:
         noise = local_noise(command, response)
-    if transient:  # content between the segment's own lines counts as excited too
+    if transient:  # a line without power between excited lines counts as excited too
         size = np.sqrt(smooth_over_lines(size**2, _NOISE_LINES))
     frequency = np.arange(1, len(command) + 1) * rate / length
     excited = size > EXCITED * size.max()
@@ -101,8 +103,8 @@ def segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None
 
 
 def select_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] | None) -> tuple[SegmentLines, ...]:
-    """The excited lines of the band, its ends included. Periodic segments alike in period get the same lines; of one
-    that does not repeat, no more lines are kept than a model needs."""
+    """The excited lines of the band (Hz, ends included; None: all). Periodic segments with the same lines get those
+    that any of them excites; a segment with a transient keeps at most about `MOST_LINES`."""
     low, high = band_hz or (0.0, np.inf)
     found = []
     for segment in segments:
@@ -117,8 +119,7 @@ def select_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] |
 
 
 def have_same_lines(first: SegmentLines, second: SegmentLines) -> bool:
-    """Whether two segments without transients agree in rate, hold and number of lines, so that their lines are the
-    same."""
+    """Whether two segments have no transient and the same rate, hold and number of lines, hence the same lines."""
     return not (first.transient or second.transient) and (first.rate_hz, first.hold, len(first.frequency_hz)) == (
         second.rate_hz, second.hold, len(second.frequency_hz),
     )  # fmt: skip
@@ -140,8 +141,9 @@ def _select_lines(lines: SegmentLines, chosen: npt.NDArray[np.int64]) -> Segment
 def split_fit_and_test(
     recordings: Sequence[Recording],
 ) -> tuple[list[tuple[Recording, Segment]], list[tuple[Recording, Segment]]]:
-    """Segments to fit, and segments to keep for a test: by their roles; else the last of several segments, or the last
-    third of a single one."""
+    """Segments to fit, and segments to keep for a test. The test are the segments with the role "test"; without such,
+    the last of more than 2 m segments (m commands), or the last third of a single segment that is not periodic, else
+    none."""
     driven = [(recording, segment) for recording in recordings for segment in _driven_segments(recording)]
     test = [(recording, segment) for recording, segment in driven if segment.role == "test"]
     fit = [(recording, segment) for recording, segment in driven if segment.role != "test"]
@@ -161,6 +163,7 @@ def split_fit_and_test(
 
 
 def _driven_segments(recording: Recording) -> Iterator[Segment]:
+    """Segments other than rest and free decay; the whole recording where it has no segments."""
     if not recording.segments:
         yield Segment(0, len(recording), "noise")
     for segment in recording.segments:
@@ -169,8 +172,8 @@ def _driven_segments(recording: Recording) -> Iterator[Segment]:
 
 
 def _whole_periods(recording: Recording, segment: Segment) -> tuple[list[int], int]:
-    """Starts and length of the whole periods, without the first where there are others; or of the longest part without
-    gaps."""
+    """Starts and common length of the whole periods, without the segment's first period where there are others; without
+    such periods, start and length of the longest part without missing samples."""
     signals = [recording.command.samples, recording.response.samples]
     if recording.excitation is not None:
         signals.append(recording.excitation.samples)

@@ -1,4 +1,8 @@
-"""Weighted residuals of a mechanical model on measured lines, in units of their expected error, and the Jacobian."""
+"""Weighted residuals of a mechanical model on measured lines, and their Jacobian.
+
+Residual of an output at a line:  r = w (Y - G U),  with  w = 1 / sqrt(noise variance + (floor |Y|)²),  so that E|r|² is
+about 1; for segments with a transient, less the best fit of the free response of the states at both ends.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -14,15 +18,16 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 LARGEST = 0.25
-"""Largest scatter that is counted as noise, relative to a channel's largest response near a line. Segments differ more
-where resonances shift with the level, and those lines contain most of the motion."""
+"""Upper limit of the scatter that counts as noise, relative to a channel's largest response near a line; heuristic.
+Where resonances shift with the level, segments differ more, and without a limit lines with most of the motion would get
+little weight."""
 _LINES = 9
-"""Lines over which the misfit is averaged."""
+"""Number of lines over which scatter and response are averaged."""
 
 
 def add_scatter_noise(segments: Sequence[SegmentLines]) -> tuple[SegmentLines, ...]:
-    """Raise the segments' noise to the scatter between them, where more segments than inputs have the same lines. All
-    are of one band, by `select_band`.
+    """Raise the noise of segments to the scatter between them, where more segments than inputs have the same lines.
+    segments: of the same band, by `select_band`.
 
     Scatter is the residual of the best linear response: friction and other nonlinearities make segments with the same
     lines differ between realisations, directions and levels.
@@ -44,12 +49,13 @@ def _raise_noise(segment: SegmentLines, alike: Sequence[SegmentLines]) -> Segmen
 
 
 def _command_size(segment_lines: SegmentLines) -> float:
+    """Rms magnitude of the command over lines and inputs."""
     return max(float(np.sqrt(np.mean(np.abs(segment_lines.command) ** 2))), 1e-300)
 
 
 def _scatter(alike: Sequence[SegmentLines], sizes: Sequence[float]) -> FloatArray:
-    """(lines, p): residual power of the best linear response at each line, per degree of freedom, for a command of size
-    1."""
+    """(lines, p): residual power of the best linear response at each line, per degree of freedom, for a command of rms
+    magnitude 1. sizes: rms magnitude of each segment's command."""
     m = alike[0].command.shape[1]
     driven = np.array([other.excited / size for other, size in zip(alike, sizes, strict=True)]).T[:, :, None]
     command = np.stack([other.command for other in alike], axis=1) * driven
@@ -66,28 +72,29 @@ def _scatter(alike: Sequence[SegmentLines], sizes: Sequence[float]) -> FloatArra
 
 
 LEFT_OUT_EVERY = 4
-"""Every fourth line is held out for the choice of the order."""
+"""Every fourth line is held out for cross-validation of structures."""
 _RUN_AWAY = 1e120
-"""Largest amplitude of a transient's spectrum: the square of a larger one overflows."""
+"""Amplitude of a transient's spectrum above which it is not fitted, because squares in the fit would overflow."""
 _STEP = 1e-6
 """Relative step of finite differences."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineGroup:
-    """Segments with the same lines, compressed by QR: residual = target - root G, of unit expected power."""
+    """Weighted spectra of segments with the same lines, compressed by QR: residual = target - root G, with E|.|² = 1
+    per uncompressed entry."""
 
     frequency_hz: FloatArray
     root: ComplexArray
-    """(lines, p, rows, m)"""
+    """(lines, p, rows, m): weighted commands, a row per segment until compressed."""
     target: ComplexArray
-    """(lines, p, rows)"""
+    """(lines, p, rows): weighted responses."""
     weight: FloatArray
-    """(lines, p)"""
+    """(lines, p): 1 / expected error of the response, of the first segment of the group."""
     left_out: BoolArray
     """(lines,): held out for cross-validation of structures."""
     count: FloatArray
-    """(lines,): number of misfits that were compressed into the rows."""
+    """(lines,): number of residuals that were compressed into the rows."""
     transient: bool
     rate_hz: float
     hold: Hold
@@ -103,7 +110,7 @@ class LineGroup:
         return replace(part, left_out=_every_fourth_line(len(part.frequency_hz)))
 
     def of_lines(self, chosen: BoolArray) -> "LineGroup":
-        """The chosen lines, (lines,)."""
+        """The group on the lines where the mask `chosen` (lines,) is true."""
         return LineGroup(
             self.frequency_hz[chosen], self.root[chosen], self.target[chosen], self.weight[chosen],
             self.left_out[chosen], self.count[chosen], self.transient, self.rate_hz, self.hold,
@@ -111,7 +118,8 @@ class LineGroup:
 
 
 def line_groups(segments: Sequence[SegmentLines], floor: float) -> tuple[LineGroup, ...]:
-    """Group the segments: periodic ones with the same lines are compressed into one group."""
+    """Weighted groups of the segments; periodic segments with the same lines are compressed into a common group. floor:
+    expected error of a linear model, relative to the response's magnitude."""
     found: list[LineGroup] = []
     for segment in add_scatter_noise(segments):
         weight = _line_weights(segment, floor)
@@ -131,7 +139,7 @@ def line_groups(segments: Sequence[SegmentLines], floor: float) -> tuple[LineGro
 
 
 def misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list[ComplexArray]:
-    """Residuals per group (lines, p, rows), with transients fitted to the lines that are not left out."""
+    """Residuals of each group, (lines, p, rows), after transients were fitted to the lines that are not held out."""
     form, found = pole_form(model), []
     for group in groups:
         response = sample_response(model, group.frequency_hz, group.rate_hz, group.hold, form)
@@ -143,7 +151,8 @@ def misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list[Complex
 
 
 def transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) -> ComplexArray:
-    """Weighted spectra of the free response, (lines, p, columns). form: the model's."""
+    """Weighted spectra of the free response to each state, (lines, p, columns). form: pole-residue form of the
+    model."""
     free = free_response(model, group.frequency_hz, group.rate_hz, form)
     if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
         straight = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
@@ -152,7 +161,7 @@ def transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) ->
 
 
 def stack_real(parts: Sequence[ComplexArray]) -> FloatArray:
-    """Real vector of all parts, whose sum of squares is their sum of |.|²."""
+    """Real parts, then imaginary parts, of all arrays as a vector: its sum of squares is the sum of |.|²."""
     flat = np.concatenate([part.ravel() for part in parts])
     return np.concatenate([flat.real, flat.imag])
 
@@ -160,7 +169,7 @@ def stack_real(parts: Sequence[ComplexArray]) -> FloatArray:
 def numerical_jacobian(
     residuals: Callable[[FloatArray], FloatArray], unknowns: FloatArray, here: FloatArray, high: FloatArray
 ) -> FloatArray:
-    """Jacobian (len(here), unknowns) by finite differences; a step beyond `high` goes the other way. here: the
+    """Jacobian (len(here), unknowns) by forward differences, backward where a step would exceed the bound `high`. here:
     residuals at `unknowns`."""
     columns = np.empty((len(here), len(unknowns)))
     for k in range(len(unknowns)):
@@ -173,7 +182,7 @@ def numerical_jacobian(
 
 
 def _line_weights(segment: SegmentLines, floor: float) -> FloatArray:
-    """1 over the expected error: noise, and `floor` times the response's magnitude near the line."""
+    """(lines, p): 1 / sqrt(noise + floor² |response near the line|²), 0 at lines that are not excited."""
     power = np.abs(segment.response) ** 2
     size = smooth_over_lines(power, 5)
     noise = np.where(np.isfinite(segment.noise), segment.noise, 0.0)
@@ -195,6 +204,7 @@ def _can_be_folded(group: LineGroup, other: LineGroup) -> bool:
 
 
 def _fold_groups(group: LineGroup, other: LineGroup) -> LineGroup:
+    """Append the rows of `other`; more than m + 1 rows are reduced by QR, which keeps the sum of squares for any G."""
     root = np.concatenate([group.root, other.root], axis=2)
     target = np.concatenate([group.target, other.target], axis=2)
     if root.shape[2] > root.shape[3] + 1:  # m + 1 rows contain all information for the least squares
@@ -207,8 +217,9 @@ def _fold_groups(group: LineGroup, other: LineGroup) -> LineGroup:
 
 
 def _subtract_transient(group: LineGroup, basis: ComplexArray, misfit: ComplexArray) -> ComplexArray:
+    """Subtract the combination of basis columns, with real coefficients, that fits the lines not held out."""
     if not np.abs(basis).max(initial=0.0) < _RUN_AWAY:
-        return misfit  # A fit may try an unstable model.
+        return misfit  # the search may try an unstable model, whose free response overflows
     kept = ~group.left_out
     columns, wanted = basis[kept].reshape(-1, basis.shape[2]), misfit[kept].reshape(-1)
     real = np.concatenate([columns.real, columns.imag])

@@ -1,7 +1,9 @@
 """Starting values of a further mode: a grid search over frequency and damping.
 
-A small oscillator changes the response in proportion to its mass, so that linear least squares gives the share of the
-residual that it explains with all other unknowns re-adjusted.
+An oscillator with frequency w, damping ratio d and participation vector L adds, at the driven axes, the dynamic
+stiffness L L' s² (2 d w s + w²) / (s² + 2 d w s + w²). To first order the response changes in proportion to L L', so
+that for each w and d on the grid linear least squares gives the residual power that a further oscillator explains, with
+all present unknowns re-adjusted (their tangent space is projected out).
 """
 
 from collections.abc import Sequence
@@ -20,11 +22,12 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 _GRID = 60
 """Number of resonance frequencies that are tried."""
 _RATIOS = (0.01, 0.05, 0.25)
-"""Damping ratios that are tried."""
+"""Damping ratios that are tried. Heuristic."""
 _MOST_ROWS = 6000
-"""Most rows of the regression: more lines are thinned out."""
+"""Largest number of rows of the regression, over all groups; more lines are thinned out."""
 _SMALL_START = 0.02
-"""Root of the mode's mass over the whole mass, where the linear estimate gives none."""
+"""Least starting value of the root of the mode's mass over the mass scale, as the linear estimate may be zero or
+negative. Heuristic."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,13 +38,14 @@ class ModeStart:
     unknowns: FloatArray
     frequency_hz: float
     explained: float
-    """Part of the residual sum of squares that the mode explains, to first order in its mass."""
+    """Fall of the residual sum of squares by the mode, to first order in its mass."""
 
 
 def mode_starts(
     groups: Sequence[LineGroup], now: RefinedFit[Structure], band_hz: tuple[float, float], most: int = 2
 ) -> tuple[ModeStart, ...]:
-    """Starts for one more oscillator at the frequencies that explain most, best first."""
+    """Starting values of a further oscillator, at the `most` frequencies that explain most, best first; frequencies
+    differ by more than 10 % (0.1 in the natural logarithm)."""
     thinned = [_thin_group(group.without_left_out(), len(groups)) for group in groups]
     model = now.structure.model(now.unknowns)
     misfit = stack_real(misfits(thinned, model))
@@ -64,7 +68,7 @@ def mode_starts(
 
 
 def _tangent_basis(groups: Sequence[LineGroup], now: RefinedFit[Structure], misfit: FloatArray) -> FloatArray:
-    """Orthonormal basis of the residual changes that the present unknowns can produce."""
+    """(rows, parameters): orthonormal basis of the changes of the residuals by the present unknowns, to first order."""
     high = np.full(now.structure.parameters, np.inf)
     slope = numerical_jacobian(
         lambda unknowns: stack_real(misfits(groups, now.structure.model(unknowns))), now.unknowns, misfit, high
@@ -85,13 +89,14 @@ class _ModelMotion:
 
     group: LineGroup
     s: ComplexArray
-    """(lines,)"""
+    """(lines,): j 2 pi f, 1/s."""
     response: ComplexArray
-    """(lines, p, m)"""
+    """(lines, p, m): response to the commands."""
     shown: ComplexArray
-    """(lines,): response of a sensor to a position."""
+    """(lines,): frequency response of a sensor to a position, with the derivative that the response's quantity
+    takes."""
     moved: ComplexArray
-    """(lines, m, m): positions of the driven axes."""
+    """(lines, m, m): positions of the driven axes per unit command."""
 
 
 def _model_motion(group: LineGroup, model: MechanicalModel, structure: Structure) -> _ModelMotion:
@@ -99,6 +104,7 @@ def _model_motion(group: LineGroup, model: MechanicalModel, structure: Structure
     s = np.asarray(2j * np.pi * group.frequency_hz, dtype=np.complex128)
     z = np.exp(s / group.rate_hz)
     response = sample_response(model, group.frequency_hz, group.rate_hz, group.hold)
+    # A held force appears in an acceleration one sample later, in velocity and position half a sample later.
     late = (1.0 if order == 2 else 0.5) if group.hold.value == "zero-order" else 0.0
     shown = sensor_response(model.sensor.bandwidth_hz, z, group.rate_hz) * z ** (-late) * s**order
     moved = response[:, : structure.inputs] * np.array(structure.signs)[:, None] / shown[:, None, None]
@@ -106,7 +112,8 @@ def _model_motion(group: LineGroup, model: MechanicalModel, structure: Structure
 
 
 def _mode_columns(moving: Sequence[_ModelMotion], structure: Structure, speed: float, ratio: float) -> FloatArray:
-    """Change of the residuals per entry of L Lᵀ (pairs), then per entry of (sensor shape) Lᵀ."""
+    """Change of the weighted modelled response, (rows, columns): first per entry of L Lᵀ (lower triangle), then per
+    entry of (sensor shape) Lᵀ, sensor by sensor. speed: natural frequency in rad/s; ratio: damping ratio."""
     m, p = structure.inputs, structure.outputs
     parts = []
     for lines in moving:
@@ -140,7 +147,8 @@ def _make_start(
     own_entries = m * (m + 1) // 2
     own, others = symmetric_matrix(strengths[:own_entries], m), strengths[own_entries:].reshape(-1, m)
     root = np.sqrt(structure.mass_scale)
-    # One direction is used for both: that in which the mode is driven. Other responses get the mode's shape there.
+    # A mode has a single participation vector: the dominant direction of the estimated matrices, to which further
+    # sensors' shapes are then fitted.
     along = (
         np.linalg.svd(np.concatenate([own / root**2, others]))[2][0] if len(others) else np.linalg.eigh(own)[1][:, -1]
     )

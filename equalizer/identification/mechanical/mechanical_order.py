@@ -1,4 +1,9 @@
-"""Order selection of a mechanical model: structures grow while the error on held-out lines falls."""
+"""Order selection of a mechanical model by cross-validation: structures grow while the error on held-out lines falls.
+
+Forward selection: from the driven axes alone, the first larger structure is adopted that lowers the squared error on
+held-out lines (every fourth line) enough, see `improves_enough`. Candidates are a further mode, sensors that measure
+the modes' motion too, a delay, and a rotated sensor. The band is widened in stages. Thresholds are heuristic.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -12,25 +17,26 @@ from equalizer.identification.mechanical.mechanical_refinement import RefinedFit
 from equalizer.identification.mechanical.mechanical_structure import Structure, remove_mode, start_joint
 
 LEAST_GAIN = 0.08
-"""Smallest relative fall of the cross-validated squared error that a mode must bring where no linear model fits the
-device."""
+"""Smallest relative fall of the cross-validated squared error for which a larger structure is adopted; it limits the
+order where no linear model fits the device."""
 PER_UNKNOWN = 4.0
-"""Smallest gain per unknown, in units of that from noise alone."""
+"""Smallest fall of the squared error per additional unknown, in units of that expected from noise alone."""
 REACHED = 1.1
-"""Cross-validated error, in units of noise and floor, at which nothing is left to explain."""
+"""Cross-validated rms error, in units of noise and floor (1: all that can be explained), below which growth ends."""
 FIRST_STAGE, LEAST_STAGE, STAGE = 6.0, 0.05, 1.5
-"""Upper end of the first stage: times the band's lower end, but at least this share of its upper end; then the ratio
-from stage to stage."""
+"""FIRST_STAGE times the band's lower end, but at least LEAST_STAGE of its upper end, is the upper end of the first
+stage; STAGE is the largest ratio of the upper ends of consecutive stages."""
 CLEAR_DELAY = 4.0
-"""Ratio by which a delay must reduce the cross-validated squared error to be added before any mode."""
+"""Ratio by which additional unknowns of the rigid body (a delay) must reduce the cross-validated squared error."""
 SIMPLER = 1.02
-"""Ratio by which the cross-validated squared error may rise without springs to the ground."""
+"""Largest ratio of the cross-validated squared errors without and with springs to the ground, for omitting these."""
 BELOW_JOINT = 0.5
-"""Share of the band up to which a joint is not yet included."""
+"""Share of the band's upper end up to which a model without the joint is fitted first."""
 ALLOWED = (
     "What is left on lines that were not fitted is no more than noise, what differs between levels, and the share that "
     "no linear model is expected to explain."
 )
+"""Reason for the end of growth where the error on held-out lines is below `REACHED`."""
 JOINT_BEGUN = (1.1, 1.6)
 """Starting frequencies of the joint's resonance, times the band's upper end."""
 
@@ -43,8 +49,9 @@ def grow_by_stages(
     on_progress: Callable[[float], None],
     whole: bool = True,
 ) -> tuple[RefinedFit[Structure], tuple[OrderTried, ...], str]:
-    """Grow a structure while the band is widened upwards, so that modes below are fitted before those above. whole: at
-    the full band, delay, sensor rotation and sensor shapes are tried too."""
+    """Grow a structure while the band is widened upwards, so that lower modes are fitted before higher ones. Returns
+    the fit, all structures tried, and the reason for the end. whole: at the full band, a structure with several inputs
+    may also get a delay, a sensor rotation and shared sensors."""
     tried = [_record_trial("the driven axes alone", best, best.structure, True)]
     ends = stage_ends(band_hz)
     for number, end in enumerate(ends):
@@ -63,13 +70,15 @@ def grow_by_stages(
 
 @dataclass(frozen=True, slots=True)
 class _Limits:
+    """Extensions that `_larger_structures` may try."""
+
     most_modes: int
     fit_delay: bool
     whole_band: bool
 
 
 def stage_ends(band_hz: tuple[float, float]) -> tuple[float, ...]:
-    """Upper ends of the growing band in hertz."""
+    """Upper ends (Hz) of the growing band, in equal ratios of at most `STAGE`; the last is that of the band."""
     low, high = band_hz
     first = min(high, max(low * FIRST_STAGE, high * LEAST_STAGE))
     count = int(np.ceil(np.log(high / first) / np.log(STAGE))) + 1
@@ -79,6 +88,7 @@ def stage_ends(band_hz: tuple[float, float]) -> tuple[float, ...]:
 def _try_without_ground(
     groups: Sequence[LineGroup], best: RefinedFit[Structure], band_hz: tuple[float, float], tried: list[OrderTried]
 ) -> RefinedFit[Structure]:
+    """The fit without springs to the ground where the error hardly rises (`SIMPLER`), else `best`."""
     structure = replace(best.structure, grounded=False)
     free = refine_unknowns(groups, structure, best.structure.transfer_unknowns(best.unknowns, structure), band_hz)
     simpler = free.left_out <= SIMPLER * best.left_out
@@ -93,7 +103,8 @@ def _grow_structure(
     limits: "_Limits",
     tried: list[OrderTried],
 ) -> tuple[RefinedFit[Structure], str]:
-    """Add to a structure every part that improves it enough in this band; returns the fit, and why it ended there."""
+    """Adopt larger structures while they improve the fit enough in this band. Returns the fit and the reason for the
+    end."""
     while best.error >= REACHED:
         for what, larger in _larger_structures(groups, best, band_hz, limits):
             better = improves_enough(best, larger)
@@ -118,8 +129,8 @@ def grow_across_joint(
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
 ) -> tuple[RefinedFit[Structure], tuple[OrderTried, ...], str]:
-    """Grow a structure with an elastic joint: oscillators are found without it in the lower half of the band, where it
-    hardly shows."""
+    """Grow a structure with an elastic joint. Oscillators are first found without the joint in the lower half of the
+    band, where it has little effect. Returns the fit, all structures tried, and the reason for the end."""
     half = max(BELOW_JOINT * band_hz[1], stage_ends(band_hz)[0])
     lower = [part for group in groups if len((part := group.of_lines(group.frequency_hz <= half)).frequency_hz)]
     below, tried, _ = grow_by_stages(
@@ -143,7 +154,7 @@ def grow_across_joint(
 def _drop_spare_modes(
     groups: Sequence[LineGroup], now: RefinedFit[Structure], band_hz: tuple[float, float], tried: list[OrderTried]
 ) -> RefinedFit[Structure]:
-    """Remove oscillators that had substituted the joint."""
+    """Remove oscillators that became superfluous with the joint, the last first."""
     for mode in reversed(range(now.structure.modes)):
         fewer, unknowns = remove_mode(now.structure, now.unknowns, mode)
         fit = refine_unknowns(groups, fewer, unknowns, band_hz)
@@ -154,7 +165,8 @@ def _drop_spare_modes(
 
 
 def choose_simplest(starts: Sequence[RefinedFit[Structure]]) -> RefinedFit[Structure]:
-    """The best fit of those with the fewest unknowns, unless more unknowns reduce the error clearly."""
+    """The best fit with the fewest unknowns, unless a fit with more reduces the squared error by `CLEAR_DELAY` or
+    more."""
     fewest = min(each.structure.parameters for each in starts)
     best = min((each for each in starts if each.structure.parameters == fewest), key=lambda each: each.left_out)
     richer = min(starts, key=lambda each: each.left_out)
@@ -173,7 +185,7 @@ def improves_enough(now: RefinedFit[Structure], larger: RefinedFit[Structure]) -
 def _larger_structures(
     groups: Sequence[LineGroup], now: RefinedFit[Structure], band_hz: tuple[float, float], limits: _Limits
 ) -> Iterator[tuple[str, RefinedFit[Structure]]]:
-    """Fits of structures with one extension more, the cheaper ones first."""
+    """Fits of structures with a further extension, each with its description: modes first, then the others."""
     structure = now.structure
     starts = mode_starts(groups, now, band_hz) if structure.modes < limits.most_modes else ()
     for start in starts:

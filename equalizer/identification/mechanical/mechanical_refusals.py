@@ -1,4 +1,8 @@
-"""Conditions under which a mechanical fit is refused, with the remedy in the message."""
+"""Conditions under which a mechanical fit is refused; each message states the remedy.
+
+Before the fit: recordings that disagree in rate, hold, channels or units, mixed quantities, fewer responses than
+commands, too few samples, constant channels. After it: a model that explains no channel, or is unstable.
+"""
 
 from collections.abc import Sequence
 
@@ -12,13 +16,15 @@ from equalizer.signals.recording_checks import channels_text, unusable_channels
 from equalizer.signals.signal import FloatArray
 
 LEAST_SAMPLES = 64
-"""Fewest samples of a recording."""
+"""Fewest samples of the longest recording. Heuristic."""
 ALL_NOISE = 0.97
-"""Relative simulation error above which a model explains less than a twentieth of the response's power."""
+"""Relative rms simulation error above which a channel counts as not explained: less than 6 % (1 - 0.97²) of its power
+is. Heuristic."""
 
 
 def refuse_unsuitable(recordings: Sequence[Recording]) -> None:
-    """Check the recordings before a fit. Raises MechanicalFitRefused."""
+    """Check the recordings before a fit. Raises MechanicalFitRefused for any of the conditions in the module
+    docstring."""
     if not recordings:
         raise MechanicalFitRefused("there is no recording to fit a model to; give at least one")
     first = recordings[0]
@@ -48,6 +54,7 @@ def refuse_unsuitable(recordings: Sequence[Recording]) -> None:
 
 
 def _refuse_samples(recordings: Sequence[Recording]) -> None:
+    """Raises MechanicalFitRefused where all recordings are too short, or a channel is constant or empty throughout."""
     if (longest := max(len(recording) for recording in recordings)) < LEAST_SAMPLES:
         raise MechanicalFitRefused(f"{longest} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
     for side in ("command", "response"):
@@ -63,8 +70,8 @@ def _refuse_samples(recordings: Sequence[Recording]) -> None:
 
 
 def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
-    """Refuse a fit that explains no channel. error: (p + 1,), of the simulation relative to the response. Raises
-    MechanicalFitRefused where no channel is explained."""
+    """Raises MechanicalFitRefused for a fit that explains no channel. error: (p + 1,), rms error of the simulation
+    relative to the response, by channel and, last, over all."""
     if error[:-1].min() > ALL_NOISE:
         raise MechanicalFitRefused(
             f"the commands do not tell what {', '.join(channels)} will do: a fitted model leaves "
@@ -73,7 +80,8 @@ def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
 
 
 def refuse_unstable(final: RefinedFit[Structure] | RefinedFit[ModalStructure]) -> None:
-    """Refuse an unstable fit. Raises MechanicalFitRefused for a fit with unstable poles."""
+    """Raises MechanicalFitRefused for a fit with a pole whose real part (1/s) exceeds a thousandth of the speed scale,
+    which allows for rounding of poles at zero."""
     from equalizer.identification.mechanical.mechanical_response import pole_form
 
     form = pole_form(final.structure.model(final.unknowns))

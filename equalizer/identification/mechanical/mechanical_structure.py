@@ -1,9 +1,9 @@
 """Parametrisation of a mechanical model: masses, dampers and springs at the driven axes, and oscillators on them.
 
 M a + D v + K x = u at the m driven axes. An oscillator with frequency w, damping ratio d and participation vector L
-(root of its mass times its direction) has the relative coordinate e: e'' + 2 d w e' + w² e = -Lᵀ a. Responses measure
-the driven axes through `output` rows, the oscillators through separate rows. An elastic joint may connect the driven
-axes to the body that holds sensors and oscillators; see `insert_joint`.
+(root of its mass times its direction) has the relative coordinate e: e'' + 2 d w e' + w² e = -Lᵀ a. Responses are a
+linear combination of the driven axes' motions (rows of `output`) and the oscillators' (sensor shapes). An elastic joint
+may connect the driven axes to the body that carries sensors and oscillators; see `insert_joint`.
 """
 
 from dataclasses import dataclass, field, replace
@@ -16,17 +16,17 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 from equalizer.signals.signal import FloatArray
 
 DRIVEN_SHARE = 0.5
-"""Share of the mass without oscillators that is on the driven side of an elastic joint."""
+"""Share of the mass without oscillators that is assumed on the driven side of an elastic joint."""
 
 
 def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: float) -> MechanicalModel:
-    """The driven axes, the axes beyond the joint, oscillators relative to these. model: of the driven axes and
-    oscillators relative to them. stiffness: (m, m), positive definite. loss_s: the joint's damping over its stiffness.
+    """The model with an elastic joint (a cable, a belt, a flexible link) behind the m driven axes. model: coordinates
+    of the driven axes, then of oscillators. Result: driven axes, axes beyond the joint, oscillators relative to the
+    latter. stiffness: (m, m), N/m or N m/rad, positive definite. loss_s: the joint's damping over its stiffness (s).
 
-    Dampers and springs to the ground stay on the driven axes, where the drives are. Such a joint is a cable, a belt, a
-    flexible link. From force to response only the total mass and the joint's resonance are identifiable, not how the
-    mass is distributed over its two sides: half each is assumed, which does not change the resonance and everything
-    below it.
+    Dampers and springs to the ground stay on the driven axes, where the drives are. From force to response the total
+    mass and the joint's resonance are identifiable, but not how the mass is distributed over the two sides: half each
+    is assumed.
     """
     participation = model.mass[m:, :m]
     rest = model.mass[:m, :m] - participation.T @ participation
@@ -51,7 +51,7 @@ def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: 
 
 
 _WIDEST_LOG = 12.0
-"""Bound of the logarithms of masses, relative to their scale."""
+"""Bound of the logarithms on the diagonal of the mass's Cholesky factor."""
 _FARTHEST_MODE = 4.0
 """Largest ratio of a mode's frequency to the nearer end of the band, outside it."""
 _LARGEST_TURN = 0.3
@@ -59,31 +59,32 @@ _LARGEST_TURN = 0.3
 _MOST_DELAY_SAMPLES = 200.0
 """Largest delay of the command, samples."""
 _WIDEST_JOINT_LOG = 2.5
-"""Bound of the logarithms of the joint's parameters around their start."""
+"""Bound of the logarithms on the diagonal of the joint stiffness's Cholesky factor, about their value for a resonance
+at the band's upper end."""
 _JOINT_LOSS = 0.05
-"""Starting loss factor of the joint."""
+"""Starting loss factor of the joint at its resonance. Heuristic."""
 
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """The parts of a model; its unknowns are a vector, scaled to about one."""
+    """The parts of a model. Its unknowns are a vector (`parameters`,), scaled to the order of 1; see `slices`."""
 
     inputs: int
     outputs: int
-    """The first `inputs` of them are the driven axes' own motions."""
+    """Number of responses; the first `inputs` of them are the driven axes' own motions."""
     quantity: str
     mass_scale: float
     speed_scale: float
     """rad/s"""
     signs: tuple[float, ...]
-    """Sign of each driven axis's own sensor: -1 where it counts the other way."""
+    """Sign of each driven axis's own sensor: -1 where it is positive in the direction opposite to the command."""
     modes: int = 0
     grounded: bool = True
     """Whether there may be springs to the ground."""
     turned: bool = False
     """Whether the sensor's axes may be rotated against the commands' by a small angle."""
     shared: bool = False
-    """Whether the sensors of the driven axes measure a share of the oscillators' motion besides."""
+    """Whether the sensors of the driven axes also measure a share of the oscillators' motion."""
     joint: bool = False
     """Whether an elastic joint, such as cables, connects the driven axes to all other bodies."""
     delayed: bool = False
@@ -129,7 +130,8 @@ class Structure:
         )
 
     def transfer_unknowns(self, unknowns: FloatArray, other: "Structure") -> FloatArray:
-        """The unknowns converted to a larger structure, whose additional ones start at zero, or to a smaller one."""
+        """The unknowns converted to a larger structure, whose additional ones start at zero, or to a smaller
+        structure."""
         grown = np.zeros(other.parameters)
         for name, part in self.slices.items():
             there = other.slices[name]
@@ -219,19 +221,21 @@ class Structure:
 
 
 def pack_mass(mass: FloatArray) -> FloatArray:
-    """Unknowns of a mass (m, m), positive definite, in the structure's unit: its Cholesky factor, diagonal as logs."""
+    """Unknowns of a mass (m, m), positive definite, in units of `mass_scale`: its Cholesky factor, with the logarithm
+    of the diagonal."""
     lower = np.linalg.cholesky(mass)
     np.fill_diagonal(lower, np.log(np.diag(lower)))
     return np.asarray(lower[_triangle_indices(len(mass))])
 
 
 def pack_square_root(matrix: FloatArray) -> FloatArray:
-    """Unknowns of a damping or stiffness (m, m), positive definite: its Cholesky factor, so that it stays passive."""
+    """Unknowns of a damping or stiffness (m, m), positive definite, in the structure's units: its Cholesky factor, so
+    that the matrix stays positive semidefinite (passive)."""
     return np.asarray(np.linalg.cholesky(matrix)[_triangle_indices(len(matrix))])
 
 
 def start_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float) -> FloatArray:
-    """The unknowns with an isotropic joint whose resonance is at frequency_hz."""
+    """The unknowns with an isotropic joint whose resonance, for the mean mass of the axes, is at frequency_hz."""
     mass = structure.find_grounded_parts(unknowns)[0]
     m, part = structure.inputs, structure.slices["joint"]
     shared = float(np.trace(mass)) / m * DRIVEN_SHARE * (1 - DRIVEN_SHARE)

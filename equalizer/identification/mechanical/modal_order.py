@@ -1,4 +1,9 @@
-"""Order selection of modes with free shapes, for sensors that are not collocated with the commands."""
+"""Order selection of modes with free shapes, for sensors that are not collocated with the commands.
+
+Forward selection: a further mode is adopted while the squared error on held-out lines falls enough (`modal_search`
+finds it). Shapes (p, m) of full rank are then reduced to rank-one modes by singular value decomposition, and all
+unknowns are refined. Thresholds are heuristic.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -15,14 +20,15 @@ from equalizer.identification.mechanical.modal_structure import ModalStructure, 
 from equalizer.signals.signal import FloatArray
 
 LEAST_GAIN = 0.08
-"""Smallest relative fall of the cross-validated squared error that one more frequency, with all its shapes, must
-bring."""
+"""Smallest relative fall of the cross-validated squared error for which a further frequency, with its shape, is
+adopted."""
 REACHED = 1.02
-"""Cross-validated error, in units of noise and floor, above which a delay is tried."""
+"""Cross-validated rms error, in units of noise and floor, from which a delay is tried."""
 ALIKE = 1.1
-"""Ratio by which the cross-validated squared error may rise with fewer modes and a delay."""
+"""Largest ratio of the cross-validated squared errors with and without a delay, where it needs fewer modes."""
 LEAST_SHAPE = 0.15
-"""Least strength of a shape, relative to the frequency's strongest: weaker ones are left out."""
+"""Singular value of a shape, relative to the largest at the same frequency, below which its rank-one part is left
+out."""
 
 
 def choose_modes(
@@ -32,8 +38,9 @@ def choose_modes(
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
 ) -> tuple[RefinedFit[ModalStructure], tuple[OrderTried, ...], str]:
-    """Choose the number of modes. Groups must not contain transients. A delay is tried where modes alone leave
-    residuals: included from the first mode on, it would substitute modes that are still missing."""
+    """Choose the number of modes. Groups must not contain transients. Returns the fit, all orders tried, and the reason
+    for the choice. A delay is tried only where modes alone leave an error of `REACHED` or more, because a delay can
+    substitute missing modes."""
     most = settings.most_modes + structure.inputs
     best, tried, reason = _add_modes(
         ModalSearch(groups, structure, band_hz, fit_delay=False), structure, most, lambda s: on_progress(0.4 * s)
@@ -52,6 +59,7 @@ def choose_modes(
 def _add_modes(
     search: ModalSearch, structure: Structure, most: int, on_progress: Callable[[float], None]
 ) -> tuple[FoundModes, list[OrderTried], str]:
+    """Add modes, up to `most`, while the error on held-out lines falls enough; also the orders tried and the reason."""
     best = search.add_mode(None)
     tried = [_record_trial(best, structure, True)]
     for number in range(1, most):
@@ -69,6 +77,7 @@ def _add_modes(
 
 
 def _left_out_error(found: FoundModes) -> float:
+    """Rms error on the held-out lines, in units of the expected error."""
     return float(np.sqrt(found.left_out / max(found.left_out_count, 1)))
 
 
@@ -79,7 +88,8 @@ def balance_fit(fit: RefinedFit[ModalStructure]) -> RefinedFit[ModalStructure]:
 
 
 def _rank_one_modes(found: FoundModes, structure: Structure) -> tuple[ModalStructure, FloatArray]:
-    """Modes of rank one: a frequency whose shape has a higher rank becomes several modes."""
+    """Rank-one modes, as a structure and its unknowns: a frequency whose shape has a higher rank becomes several
+    modes."""
     half = len(found.logs) // 2
     rows = []
     for speed, ratio, shape in zip(found.logs[:half], found.logs[half:], found.shapes, strict=True):

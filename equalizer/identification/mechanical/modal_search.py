@@ -1,5 +1,11 @@
-"""Sequential search for the modes of a measured response by variable projection: frequencies and dampings are searched,
-shapes follow by linear least squares (Golub and Pereyra; Jacobian after Kaufman)."""
+"""Sequential search for the modes of a measured response by variable projection.
+
+    G(s) = sum over modes of  shape_k s^order / (s² + 2 d_k w_k s + w_k²),     shape_k (p, m), order 0, 1 or 2
+
+in continuous time; responses are sampled exactly for the commands' hold. Frequencies w and damping ratios d (and a
+delay) are searched by bounded nonlinear least squares; the shapes, which enter linearly, follow by linear least squares
+at each step (Golub and Pereyra 1973; Jacobian after Kaufman 1975, whose references are in `state_space.refinement`).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +21,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 _GRID = 80
 """Number of frequencies that are tried, on a logarithmic grid."""
 _RATIOS = (0.01, 0.04, 0.16, 0.64, 4.0)
-"""Damping ratios that are tried; above 1 the mode is overdamped."""
+"""Damping ratios that are tried; above 1 the mode is overdamped. Heuristic."""
 _STEP = 1e-6
 """Step of finite differences, in logarithms."""
 _MOST_DELAY_SAMPLES = 20.0
@@ -24,8 +30,7 @@ _MOST_DELAY_SAMPLES = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundModes:
-    """Modes whose shapes are free (p m numbers each), and their misfit on the held-out lines: the sum of squares and
-    its number of terms."""
+    """Modes with free shapes (p m numbers each), and their misfit on the held-out lines."""
 
     logs: FloatArray
     """(2 modes,): logs of frequencies (rad/s), then of damping ratios."""
@@ -33,20 +38,26 @@ class FoundModes:
     shapes: FloatArray
     """(modes, p, m)"""
     left_out: float
+    """Sum of squares of the weighted residuals on the held-out lines."""
     left_out_count: int
+    """Number of residuals in that sum."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solution:
+    """Shapes at given frequencies, damping ratios and delay, by linear least squares."""
+
     misfit: list[ComplexArray]
-    """Per group (lines, p, rows)"""
+    """Residuals of each group, (lines, p, rows)."""
     bases: list[FloatArray]
-    """Per output, orthonormal, over the fitted lines' real rows."""
+    """For each output, orthonormal columns that span what its shapes can explain, on the lines not held out: real, then
+    imaginary parts."""
     shapes: FloatArray
+    """(modes, p, m)"""
 
 
 class ModalSearch:
-    """Search on groups of lines without transients of segments that do not repeat."""
+    """Adds modes one at a time to the model of groups of lines, none of which may contain a transient."""
 
     def __init__(
         self, groups: Sequence[LineGroup], structure: Structure, band_hz: tuple[float, float], fit_delay: bool
@@ -60,7 +71,8 @@ class ModalSearch:
         self._kept = [~group.left_out for group in groups]
 
     def add_mode(self, now: FoundModes | None) -> FoundModes:
-        """Add a mode where it explains most, then refine all modes together."""
+        """Add a mode at the grid point that explains most, then refine all modes together. now: None for the first
+        mode."""
         logs = np.empty(0) if now is None else now.logs
         delay = self._known_delay if now is None else now.delay_s / self._structure.step_s
         solved = self._solve(np.append(logs, delay))
@@ -73,6 +85,8 @@ class ModalSearch:
         return self._refine(np.concatenate([logs[:half], [best[1]], logs[half:], [best[2]], [delay]]))
 
     def _refine(self, start: FloatArray) -> FoundModes:
+        """Bounded least squares over the unknowns: logs of w (rad/s), logs of damping ratios, delay (samples). The
+        delay is free only with at least two modes."""
         # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
         from scipy.optimize import least_squares
 
@@ -100,6 +114,7 @@ class ModalSearch:
         )
 
     def _solve(self, unknowns: FloatArray) -> _Solution:
+        """Shapes by linear least squares on the lines not held out, output by output, and residuals on all lines."""
         m, p, modes = self._structure.inputs, self._structure.outputs, len(unknowns) // 2
         basis = [self._mode_responses(group, unknowns) for group in self._groups]
         shapes = np.zeros((modes, p, m))
@@ -126,6 +141,8 @@ class ModalSearch:
         return _Solution(misfit, bases, shapes)
 
     def _jacobian(self, unknowns: FloatArray) -> FloatArray:
+        """Kaufman's approximation: derivative at fixed shapes, by finite differences, with the shapes' span projected
+        out."""
         solved = self._solve(unknowns)
         half = len(unknowns) // 2
         columns = []
@@ -150,7 +167,8 @@ class ModalSearch:
         return np.stack(columns, axis=1)
 
     def _compute_explained_by_mode(self, solved: _Solution, unknowns: FloatArray) -> float:
-        """Part of the residual sum of squares that one more mode explains, all shapes free."""
+        """Fall of the residual sum of squares by a further mode, all shapes free. unknowns: its three, as in
+        `_refine`."""
         answers = [self._mode_responses(group, unknowns)[:, 0] for group in self._groups]
         total = 0.0
         for out, basis in enumerate(solved.bases):
@@ -168,6 +186,7 @@ class ModalSearch:
         return total
 
     def _project_out(self, change: Sequence[ComplexArray], bases: Sequence[FloatArray]) -> FloatArray:
+        """Component of a change of the residuals that no change of the shapes can compensate, output by output."""
         parts = []
         for out, basis in enumerate(bases):
             column = _real_and_imaginary(
@@ -177,6 +196,7 @@ class ModalSearch:
         return np.concatenate(parts)
 
     def _stack_real(self, misfit: Sequence[ComplexArray]) -> FloatArray:
+        """Residuals on the lines not held out as a real vector, output by output, in the rows' order of the bases."""
         return np.concatenate(
             [
                 _real_and_imaginary(
@@ -187,7 +207,8 @@ class ModalSearch:
         )
 
     def _mode_responses(self, group: LineGroup, unknowns: FloatArray) -> ComplexArray:
-        """(lines, modes): responses of modes of unit mass, sampled exactly."""
+        """(lines, modes): responses of modes of unit mass by partial fractions, sampled exactly, with delay and sensor.
+        A damping ratio of 1 is shifted by 1e-6, because the two poles must differ."""
         half = len(unknowns) // 2
         speed, ratio = np.exp(unknowns[:half]), np.exp(unknowns[half : 2 * half])
         delay_s = max(float(unknowns[-1]), 0.0) / group.rate_hz

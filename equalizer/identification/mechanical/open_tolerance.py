@@ -1,4 +1,9 @@
-"""Tolerance of a model that was fitted to the same recordings in which missing physics is searched for."""
+"""Tolerance of a model that was fitted to the same recordings in which missing physics is searched for.
+
+A linear fit absorbs part of the missing physics: friction mainly as damping, a hardening spring as stiffness, a lag as
+mass. The standard deviations of its parameters, which follow from the residuals, do not include that error; a diagnosis
+therefore re-tunes the parameters within wider tolerances.
+"""
 
 from dataclasses import replace
 
@@ -8,13 +13,13 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 
 MASS, DAMPING, STIFFNESS, MODES = 0.1, 0.5, 0.2, 0.03
-"""Relative tolerances of mass, damping and stiffness (of the largest at any driven axis), and of a mode's frequency and
-mass. A linear fit absorbs friction mainly as damping, a hardening spring as stiffness, a lag as mass."""
+"""Least tolerances (one standard deviation): of mass, damping and stiffness relative to the largest at any driven axis,
+and of the modes' frequencies and masses, relative. Heuristic."""
 
 
 def widen_tolerance(model: MechanicalModel) -> MechanicalModel:
-    """The model with a wider tolerance than that of the fit, which follows from its residuals alone and ignores that a
-    linear model absorbs missing physics."""
+    """The model with its own tolerance, widened to at least the constants above times its largest mass, damping and
+    stiffness at any driven axis."""
     along = driven_axes(model)
     mass, damping, stiffness = (
         float(np.einsum("ni,nk,ki->i", along, part, along).max())

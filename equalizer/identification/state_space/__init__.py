@@ -1,7 +1,7 @@
 """State-space models of measured frequency responses.
 
-`weighted_lines` -> starts (`warped_subspace`, `canonical_variate`) -> `refinement` (maximum likelihood) ->
-`candidates` (the choice) -> `relaxed_poles`, `settled_recordings` (long decays) -> `bootstrap` (uncertainty) ->
-`held_out`, `misfit`.
-`order_report` compares orders; `refusals` state when no model is made. Begin at `identify.py`.
+Order of the data: `weighted_lines` (data) -> `warped_subspace`, `canonical_variate` (starting models) -> `refinement`
+(maximum likelihood) -> `candidates` (choice) -> `relaxed_poles`, `settled_recordings` (long decays) -> `bootstrap`
+(uncertainty) -> `misfit`, `held_out` (validation). `order_report` compares orders; `refusals` holds the conditions
+under which no model is fitted. Begin at `identify.py`.
 """

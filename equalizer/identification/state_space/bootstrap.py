@@ -1,4 +1,5 @@
-"""Uncertainty of an identified model by a parametric bootstrap: the model refitted to draws of the lines' noise.
+"""Uncertainty of an identified model by a parametric bootstrap: the model is refitted to its own response plus random
+noise with the lines' standard errors, once for each draw.
 
 Reference: Efron and Tibshirani, An Introduction to the Bootstrap (1993), chapter 6.
 """
@@ -16,9 +17,9 @@ from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import FloatArray
 
 BAND_POINTS = 200
-"""Points of the integral over the band."""
+"""Number of equally spaced frequencies of the integral over the band."""
 WIDTHS = np.sinh(np.linspace(-4, 4, 41))
-"""Frequencies about a slow pole, in half-widths of its peak: dense at the peak, up to 27 away."""
+"""Distances of frequencies from a slow pole, in half-widths of its peak: dense at the peak, up to 27."""
 STEPS = 3
 """Levenberg-Marquardt steps of each refit: a draw of the noise moves the minimum little."""
 
@@ -26,15 +27,13 @@ STEPS = 3
 def parameter_draws(
     fitted: FittedForm, lines: WeightedLines, radius: Radius, noise_factor: float, draws: int, seed: int
 ) -> FloatArray:
-    """Parametric bootstrap (draws, k), in the order of `IdentifiedModel.parameters`: each a fit to another draw of the
-    noise.
+    """Parametric bootstrap (draws, k), in the order of `IdentifiedModel.parameters`; each row is a fit to another draw
+    of the noise. lines: the fitted lines, binned or not. noise_factor: assumed standard error over 1 / weight, above 1
+    where residuals exceed the noise.
 
-    A covariance from the Jacobian is not used: with an order above what the band shows, the response depends on some
-    directions of the parameters only beyond first order, so that draws from a normal distribution are unstable models.
-    Refitting keeps every draw within the decay bound, at the cost of a few steps each (Efron and Tibshirani 1993).
-
-    lines: the fitted lines, binned or not; noise_factor: assumed noise over that of the weights, above 1 where
-    residuals exceed the noise.
+    A covariance from the Jacobian is not used: where the order is higher than the data determine, the response depends
+    on some directions of the parameters only beyond first order, and normally distributed draws would be unstable
+    models. Refitting keeps every draw within the decay bound.
     """
     random = np.random.default_rng(seed)
     modelled = fitted.response(lines.z)
@@ -50,7 +49,8 @@ def parameter_draws(
 
 
 def response_deviation(model: IdentifiedModel, frequency_hz: FloatArray) -> FloatArray:
-    """Standard error |δG| of each entry, (lines, p, m), from the model's samples. Raises ValueError without them."""
+    """Standard error of each entry of the response, (lines, p, m): rms deviation of the model's samples from the model.
+    Raises ValueError for a model without samples."""
     if model.samples is None:
         raise ValueError("the model holds no samples of its uncertainty; identify it again with draws > 0")
     middle = model_response(model, frequency_hz)
@@ -59,7 +59,8 @@ def response_deviation(model: IdentifiedModel, frequency_hz: FloatArray) -> Floa
 
 
 def scatter_of_draws(model: IdentifiedModel, frequency_hz: FloatArray, slow: tuple[SlowPole, ...]) -> float | None:
-    """Relative scatter as an integral over the band: also between lines, where a narrow resonance has its peak."""
+    """Rms standard error of the response over the band, relative to the response's rms; None without samples. The grid
+    is finer about slow poles, because a narrow resonance may have its peak between two lines."""
     if model.samples is None or len(frequency_hz) < 2:
         return None
     low, high = frequency_hz[0], frequency_hz[-1]

@@ -1,4 +1,9 @@
-"""Validation of a model: free simulation over the segments that were kept for a test."""
+"""Validation of a model: free simulation over the segments that were kept for a test.
+
+The model is simulated from rest some time before each segment, so that its state settles. The error is the rms of
+prediction - response in the model's band, relative to that of the response, over the last period of a periodic segment,
+else over the whole segment.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -11,9 +16,9 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 LEAD_S = 2.0
-"""Seconds simulated before a segment, where the recording has them, for the state to settle..."""
+"""Least run-in (s) before a segment, in which the state settles; shorter where the recording begins later."""
 DECAYS = 5.0
-"""...or this many time constants of the model's slowest pole, where those are longer."""
+"""Least run-in in time constants of the model's slowest pole; the longer of the two applies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,18 +26,21 @@ class HeldOut:
     """Error of a free simulation over the segments that were kept for a test; result of `validate_on_test`."""
 
     error: float
-    """Root-mean-square of prediction - response over that of the response, all channels, within the model's band."""
+    """Root mean square of prediction - response over that of the response, over all channels, within the model's
+    band."""
     noise: float | None
-    """Noise of the response in the same measure, from the differences between periods; None with fewer than three. The
-    error of a perfect model equals it."""
+    """Noise of the response in the same measure, from the residuals' differences between the last two periods; None
+    where a segment has fewer than three periods. The error of a perfect model equals it."""
     seconds: float
     """Seconds compared."""
 
 
 def validate_on_test(model: IdentifiedModel, recordings: Sequence[Recording]) -> HeldOut | None:
-    """Simulation error over all segments with the role "test"; None where there are none. The command is the total one.
+    """Simulation error over all segments with the role "test"; None where there are none. The command is the total
+    command.
 
-    Raises ValueError where channels or rate are not the model's.
+    Raises ValueError where the number of channels or the rate are not the model's, samples are missing in a segment, or
+    it is too short for the band.
     """
     parts = [_compare_segment(model, recording, segment) for recording, segment in _test_segments(recordings)]
     if not parts:
@@ -49,6 +57,8 @@ def validate_on_test(model: IdentifiedModel, recordings: Sequence[Recording]) ->
 
 @dataclass(frozen=True, slots=True)
 class _Part:
+    """Power of error, noise and response in the band, summed over lines and channels, and seconds of a segment."""
+
     error_power: float
     noise_power: float | None
     power: float
@@ -63,6 +73,7 @@ def _test_segments(recordings: Sequence[Recording]) -> Iterator[tuple[Recording,
 
 
 def _compare_segment(model: IdentifiedModel, recording: Recording, segment: Segment) -> _Part:
+    """Simulate from rest, from the run-in or the last gap in the command on, and compare. Raises ValueError."""
     _check_compatible(model, recording)
     rate_hz = recording.sample_rate_hz
     start = max(0, segment.start - _lead_samples(model))
@@ -79,7 +90,7 @@ def _compare_segment(model: IdentifiedModel, recording: Recording, segment: Segm
     error = measured - _band_spectrum(predicted[last:], rate_hz, model.band_hz)
     noise = None
     if segment.period and last - 2 * length >= segment.start - start:  # the first period contains the transient
-        # Computed from the residuals, so that free decay from period to period does not count as noise.
+        # From the residuals, so that a free decay from period to period does not count as noise.
         before = _band_spectrum((response - predicted)[last - length : last], rate_hz, model.band_hz)
         noise = _power(error - before) / 2
     return _Part(_power(error), noise, _power(measured), length / rate_hz)
@@ -93,12 +104,14 @@ def _lead_samples(model: IdentifiedModel) -> int:
 
 
 def _first_compared_sample(segment: Segment) -> int:
-    """First compared sample: that of the last period, when the transient is over, or that of the segment."""
+    """First compared sample: start of the last period, when the transient has decayed; without periods, of the
+    segment."""
     periods = (segment.stop - segment.start) // segment.period if segment.period else 0
     return segment.stop - segment.period if periods >= 1 else segment.start
 
 
 def _band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> ComplexArray:
+    """(lines, p): spectrum within the band, ends included. Raises ValueError where no line lies in it."""
     lines = np.fft.rfftfreq(len(samples), 1 / rate_hz)
     inside = (lines >= band_hz[0]) & (lines <= band_hz[1])
     if not inside.any():

@@ -1,4 +1,6 @@
-"""Misfit of a model: its residuals on the lines beyond their noise, and their correlation from line to line."""
+"""Misfit of a model: the power of its residuals in excess of the noise power of the lines, an upper bound of the misfit
+that the noise may hide, and the correlation of the residuals from line to line.
+"""
 
 from dataclasses import dataclass
 
@@ -11,23 +13,26 @@ from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 NOISE_TRUSTED = 1.1
-"""Residual power over noise power below which no misfit is claimed: the noise itself is estimated from few periods."""
+"""Residual power over noise power below which no misfit is reported, because the noise itself is estimated from few
+periods. Heuristic."""
 
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """Lack of fit of a model on measured lines: what differs beyond the noise, and what the noise may hide."""
+    """Lack of fit of a model on measured lines."""
 
     error: float
-    """Root mean square of model - estimate beyond the noise, relative to the response's; 0 where only noise is left."""
+    """Root mean square of model - estimate in excess of the noise, relative to the response's; 0 where the residual is
+    noise."""
     most: float
-    """Upper 95 % bound of the misfit that the noise may hide, likewise relative: from the scatter of noise and of its
-    estimate, and the degrees of freedom that the fit used. Not below `error`."""
+    """Upper 95 % bound of the misfit that the noise may hide, also relative to the response; accounts for the scatter
+    of the noise and of its estimate, and for the degrees of freedom that the fit used. Not below `error`."""
     cost: float
-    """Squared difference over noise variance, mean over all entries of the lines: about 1 where only noise is left."""
+    """Squared difference over noise variance, mean over all entries of the lines: about 1 where the residual is
+    noise."""
     smooth: float | None
-    """Correlation between neighbouring lines of the residual beyond the noise: near 1 for a linear response that the
-    model lacks, near 0 for lines that scatter; None where only noise is left, or where the noise itself was estimated
+    """Correlation between neighbouring lines of the residual in excess of the noise: near 1 for a linear response that
+    the model lacks, near 0 for lines that scatter; None where the residual is noise, or where the noise was estimated
     from the scatter of the lines."""
 
 
@@ -36,8 +41,8 @@ ONE_SIDED_95 = 1.645
 
 
 def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray, unknowns: int) -> Misfit:
-    """Misfit of modelled responses (lines, p, m). inside: (lines,), which lines count. unknowns: real numbers that were
-    fitted."""
+    """Misfit of modelled responses (lines, p, m). inside: (lines,), mask of the lines that count. unknowns: number of
+    real parameters that were fitted."""
     residual = (modelled - lines.response)[inside]
     weight = lines.weight[inside]
     size = float((np.abs(lines.response[inside]) ** 2).sum())
@@ -54,7 +59,8 @@ def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray, u
 
 
 def _lower_noise_bound(variance: FloatArray, unknowns: int) -> float:
-    """One-sided lower 95 % bound of the noise power that a fit leaves."""
+    """One-sided lower 95 % bound of the noise power in the residuals, by a normal approximation: the relative variance
+    2 / entries counts the scatter of the noise and that of its estimate. variance: noise variance of each entry."""
     total = float(variance.sum())
     entries = total**2 / max(float((variance**2).sum()), 1e-300)  # effective number of entries
     return total * (1 - unknowns / (2 * max(variance.size, 1)) - ONE_SIDED_95 * float(np.sqrt(2 / max(entries, 1.0))))

@@ -1,4 +1,8 @@
-"""Likely causes of a model's misfit, as sentences; where the evidence is insufficient, they say so."""
+"""Likely causes of a model's misfit, as sentences; where the evidence is insufficient, the sentences state that.
+
+Evidence: the residual power over the noise power (`cost`), the residuals' correlation between neighbouring lines, poles
+at the decay bound, the error on a test, and the levels of fit and test. All thresholds are heuristic.
+"""
 
 from collections.abc import Sequence
 
@@ -11,13 +15,15 @@ from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.signals.recording import Recording
 
 UNEXPLAINED = 1.5
-"""Cost above which residuals exceed the noise."""
+"""Cost (residual power over noise power) above which residuals count as larger than the noise."""
 SMOOTH = 0.5
-"""Correlation of neighbouring lines from which residuals count as a linear response that the model lacks."""
+"""Correlation of the residuals of neighbouring lines from which they count as a linear response that the model
+lacks."""
 HELD_OUT_BEYOND = 2.0
-"""Held-out error, relative to its noise and the misfit of the fit, above which it needs a cause of its own."""
+"""Held-out error, relative to the root sum of squares of its noise and the fit's misfit, above which a separate cause
+is reported."""
 LEVEL_RATIO = 1.25
-"""Ratio of the amplitudes of test and fit above which they are two levels."""
+"""Ratio of the largest amplitudes of test and fit segments above which their levels count as different."""
 LIMIT_SAMPLES = 10
 """Number of neighbouring pairs at the same extreme value above which a sensor counts as saturated."""
 
@@ -25,8 +31,8 @@ LIMIT_SAMPLES = 10
 def fit_remarks(
     cost: float, misfit: Misfit, relaxed: Sequence[SlowPole], bound_costs: bool, settings: IdentificationSettings
 ) -> list[str]:
-    """Remarks on the fit alone, sentences without their full stop. The bound comes first, because its effect resembles
-    all others."""
+    """Remarks on the fit alone, as sentences without full stop. Those on the decay bound come first, because its effect
+    resembles the other causes. bound_costs: see `RelaxedFit`."""
     bound_s, order = settings.decay_s, settings.order
     found = [
         f"the resonance at {pole.frequency_hz:.2f} Hz (damping ratio {100 * pole.damping_ratio:.2g} %) rings longer "
@@ -63,7 +69,8 @@ def fit_remarks(
 def held_out_remarks(
     tested: HeldOut | None, cost: float, misfit: Misfit, recordings: Sequence[Recording]
 ) -> tuple[str, ...]:
-    """Remarks, as whole sentences, on an error on the test that the fit does not explain."""
+    """Remarks, as whole sentences, on clipped sensors and on a test error that neither noise nor the fit's misfit
+    explains."""
     found = [
         f"The sensor is at its limit: {channel} stays at one extreme value."
         for channel in _find_clipped_channels(recordings)
@@ -88,6 +95,7 @@ def held_out_remarks(
 
 
 def _largest_amplitude(recordings: Sequence[Recording], *, test: bool) -> float:
+    """Largest stated amplitude of the segments with the role "test", or of all others; 0 without any."""
     found = [
         segment.amplitude
         for recording in recordings

@@ -1,7 +1,7 @@
-"""Modal form of a state-space model: blocks of two poles, [[a, 1], [b, a]] with poles a ± sqrt(b).
+"""Modal form of a discrete state-space model: A is block-diagonal, with blocks [[a, 1], [b, a]] and poles a ± sqrt(b).
 
-In this form a complex pair becomes two real poles continuously, which a fit needs. The order is even, because a block
-has two poles.
+A complex pair (b < 0) becomes two real poles (b > 0) continuously, so that a gradient-based fit can pass from a pair to
+two real poles. The order is even, because a block has two poles.
 """
 
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalForm:
-    """Poles and the outputs' shapes; states 2k and 2k + 1 belong to block k."""
+    """Poles (of the z plane) and output matrix; states 2k and 2k + 1 belong to block k."""
 
     a: FloatArray
-    """(blocks,)"""
+    """(blocks,): mean of the two poles."""
     b: FloatArray
-    """(blocks,)"""
+    """(blocks,): square of half their difference; negative for a complex pair."""
     C: FloatArray
-    """(p, 2 blocks)"""
+    """(p, 2 blocks): output matrix."""
 
     @property
     def state_matrix(self) -> FloatArray:
-        """(2 blocks, 2 blocks)"""
+        """A, (2 blocks, 2 blocks)."""
         n = 2 * len(self.a)
         A = np.zeros((n, n))
         first, second = np.arange(0, n, 2), np.arange(1, n, 2)
@@ -34,7 +34,7 @@ class ModalForm:
 
     @property
     def poles(self) -> ComplexArray:
-        """(2 blocks,)"""
+        """Poles, (2 blocks,): a + sqrt(b) of all blocks, then a - sqrt(b)."""
         root = np.sqrt(self.b.astype(np.complex128))
         return np.concatenate([self.a + root, self.a - root])
 
@@ -59,14 +59,14 @@ class ModalForm:
 
 
 def modal_form(A: FloatArray, C: FloatArray) -> ModalForm:
-    """The same poles and output shapes in blocks. A: (n, n) with n even, C: (p, n)."""
+    """Modal form of A (n, n) and C (p, n). Raises ValueError where the number of real poles is odd."""
     values, vectors = np.linalg.eig(A)
     return from_poles(values, C @ vectors)
 
 
 def from_poles(poles: ComplexArray, shapes: ComplexArray) -> ModalForm:
-    """The real modal form of given poles and output shapes. poles: (n,), conjugates included; shapes: (p, n), the
-    outputs' share in each."""
+    """The real modal form of given poles and output shapes. poles: (n,), conjugates included; shapes: (p, n), output of
+    each pole's mode. Raises ValueError where the number of real poles is odd or a conjugate is missing."""
     upper = np.flatnonzero(poles.imag > 0)
     real = np.flatnonzero(poles.imag == 0)
     real = real[np.argsort(poles[real].real)]

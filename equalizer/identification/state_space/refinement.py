@@ -4,11 +4,13 @@ Theory of operation. With known noise of each entry of the response, maximum lik
 
     J = sum over lines, outputs, inputs of |(G(z) - Y) / sd|²,        G(z) = C (z I - A)⁻¹ B + D
 
-B and D enter linearly. At given poles and C they are solved for (variable projection, Golub and Pereyra 1973), so that
-the search is over poles and C alone; the Jacobian of what is left is the partial one, projected off the span of B and D
-(Kaufman 1975). A step solves (J'J + damping diag(J'J)) step = -J'r. The damping follows the ratio of the cost's fall to
-the fall that the linear model predicts (Nielsen 1999): it falls to a third after a good step and doubles ever faster
-after bad ones. Poles that a step moves out of the allowed radius are put back inside: the model is always stable.
+Y is the measured response and sd the standard error of its entry. B and D enter linearly. At given poles and C they
+follow by linear least squares (variable projection, Golub and Pereyra 1973), so that the search is over poles and C
+alone; the Jacobian of the projected residual r is the partial derivative at fixed B and D, projected onto the
+orthogonal complement of their span (Kaufman 1975). A step solves (J'J + damping diag(J'J)) step = -J'r. The damping
+follows the ratio of the cost's fall to the fall that the linear model predicts (Nielsen 1999): a good step divides
+it by up to 3; bad steps multiply it by 2, 4, 8, ... Poles that a step moves out of the allowed radius are moved
+back inside, so that the model is always stable.
 
 References: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973), 413; Kaufman, BIT 15 (1975), 49; Nielsen, Damping
 Parameter in Marquardt's Method, report IMM-REP-1999-05, Technical University of Denmark.
@@ -24,8 +26,8 @@ from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 RANK = 1e-11
-"""Singular value, relative to the largest, below which a direction of B and D is set to zero: it would be filled with
-noise."""
+"""Singular value of the regressors, relative to the largest, below which the component of B and D is set to zero, as it
+would be determined by noise."""
 
 
 def solve_input_matrices(form: ModalForm, lines: WeightedLines) -> tuple[FloatArray, FloatArray]:
@@ -49,12 +51,13 @@ def weight_regressors(form: ModalForm, lines: WeightedLines) -> FloatArray:
 
 
 def stack_by_input(values: ComplexArray) -> FloatArray:
-    """(lines, p, m) complex as (m, 2 lines p) real, in the rows' order of `weight_regressors`."""
+    """Complex values (lines, p, m) as real (m, 2 lines p), in the order of the rows of `weight_regressors`."""
     flat = values.transpose(2, 0, 1).reshape(values.shape[2], -1)
     return np.concatenate([flat.real, flat.imag], axis=1)
 
 
 def _least_squares(phi: FloatArray, y: FloatArray) -> FloatArray:
+    """Least-squares solution with the columns scaled to unit norm, truncated at `RANK`."""
     size = np.linalg.norm(phi, axis=0)
     size[size == 0] = 1.0
     solved: FloatArray = np.linalg.lstsq(phi / size, y, rcond=RANK)[0] / size
@@ -62,14 +65,14 @@ def _least_squares(phi: FloatArray, y: FloatArray) -> FloatArray:
 
 
 FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e12
-"""Damping of the first step, and the largest, at which no step lowers the cost any more; relative to the diagonal of
-J'J."""
+"""Damping of the first step, and the damping above which the search ends, because no step lowers the cost; relative to
+the diagonal of J'J."""
 
 LEAST_GAIN = 1e-7
 """Relative fall of the cost in a step below which the search ends."""
 
 UNSEEN = 1e-13
-"""Share of a state's column that is independent of the others, below which the state counts as unobservable."""
+"""Diagonal entry of R in the QR decomposition of the scaled regressors below which a state counts as unobservable."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +86,7 @@ class FittedForm:
     """(p, m)"""
 
     def response(self, z: ComplexArray) -> ComplexArray:
-        """(lines, p, m)"""
+        """Response C (zI - A)^-1 B + D, (lines, p, m). z: (lines,)."""
         return np.asarray(self.form.from_states(z) @ self.B + self.D, dtype=np.complex128)
 
 
@@ -93,7 +96,7 @@ class _Point:
 
     form: ModalForm
     basis: FloatArray
-    """(m, rows, n + p): orthonormal basis of what B and D can explain."""
+    """(m, rows, n + p): for each input, orthonormal basis of the span of its regressors, which B and D can explain."""
     solved: FloatArray
     """(m, n + p): B and D of each input."""
     residual: FloatArray
@@ -102,7 +105,7 @@ class _Point:
 
 
 def refine(form: ModalForm, lines: WeightedLines, radius: Radius, most_steps: int = 60) -> FittedForm:
-    """Local optimum near a form by Levenberg-Marquardt, with all poles within the radius (for all blocks, or each)."""
+    """Local optimum near a form by Levenberg-Marquardt, with all poles within the radius (common, or (blocks,))."""
     point = _evaluate_form(form, lines)
     damping, growth = FIRST_DAMPING, 2.0
     for _ in range(most_steps):
@@ -130,7 +133,7 @@ def refine(form: ModalForm, lines: WeightedLines, radius: Radius, most_steps: in
 
 
 def complete_form(form: ModalForm, lines: WeightedLines) -> FittedForm:
-    """The form with its least-squares B and D; poles and outputs are not searched."""
+    """The form with its least-squares B and D; poles and C are not changed."""
     return FittedForm(form, *solve_input_matrices(form, lines))
 
 
@@ -150,7 +153,8 @@ def _apply_step(form: ModalForm, step: FloatArray, radius: Radius) -> ModalForm:
 
 
 def _evaluate_form(form: ModalForm, lines: WeightedLines) -> _Point:
-    """Project the measured response on the span of B and D (QR): what is left is the residual at these poles and C."""
+    """Solve for B and D at these poles and C by QR; the residual is the component outside the span of the
+    regressors."""
     phi = weight_regressors(form, lines)
     size = np.linalg.norm(phi, axis=1, keepdims=True)
     size[size == 0] = 1.0
@@ -158,7 +162,7 @@ def _evaluate_form(form: ModalForm, lines: WeightedLines) -> _Point:
     measured = stack_by_input(lines.weight * lines.response)
     along = np.einsum("jrs,jr->js", basis, measured)
     residual = np.einsum("jrs,js->jr", basis, along) - measured
-    # A state that is not observable (its column is zero, or a combination of others) would end the fit here.
+    # For a state that is not observable (its column is zero, or a combination of others) R is singular.
     unseen = np.abs(np.diagonal(triangle, axis1=1, axis2=2)) < UNSEEN
     triangle = triangle + np.eye(triangle.shape[1]) * np.where(unseen, 1.0, 0.0)[:, None]
     solved = np.linalg.solve(triangle, along[:, :, None])[:, :, 0] / size[:, 0]
@@ -166,7 +170,8 @@ def _evaluate_form(form: ModalForm, lines: WeightedLines) -> _Point:
 
 
 def _jacobian(point: _Point, lines: WeightedLines) -> FloatArray:
-    """(m, rows, parameters): for poles a, then b, then C row by row, with the span of B and D projected out."""
+    """(m, rows, parameters): partial derivatives of the residual by a, then b, then C row by row, with the span of B
+    and D projected out (Kaufman)."""
     form, z = point.form, lines.z
     p, n = form.C.shape
     blocks = n // 2

@@ -1,4 +1,9 @@
-"""Conditions under which an identification is refused, with the remedy in the message."""
+"""Conditions under which the identification of a state-space model is refused; each message states the remedy.
+
+In order: estimates that disagree, a band beyond half the sample rate, inputs without excitation, outputs that are
+always zero, a band without lines or with a gap, too much noise, and fewer lines than the order needs. Thresholds are
+heuristic.
+"""
 
 from collections.abc import Sequence
 
@@ -10,19 +15,21 @@ from equalizer.identification.state_space.warped_subspace import default_horizon
 from equalizer.identification.state_space.weighted_lines import WeightedLines, weight_lines
 
 LEAST_SIGNAL_TO_NOISE = 2.0
-"""Least ratio of amplitude to noise of the strongest entry at a typical line."""
+"""Least ratio of magnitude to standard error of the strongest entry at a typical (median) line, for a single entry;
+more entries raise it, as the largest of them is larger by chance."""
 LARGEST_GAP = 0.1
-"""Largest gap without a line, in octaves..."""
+"""Gap without a line, in octaves, above which a model is refused, if `SPACINGS` is exceeded too."""
 SPACINGS = 3.0
-"""...if it is also this many times the usual line spacing."""
+"""Gap, in median line spacings, above which a model is refused, if `LARGEST_GAP` is exceeded too."""
 
 
 class IdentificationRefused(ValueError):  # noqa: N818 - an answer that a user reads, as in the rest of the package
-    """No model can be fitted to the data; the text says why, and which would do."""
+    """No model can be fitted to the data. The message states the reason and the remedy."""
 
 
 def require_lines(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> WeightedLines:
-    """The band's lines, if a model can be fitted to them. Raises IdentificationRefused."""
+    """The lines of the band and its margin, weighted. Raises IdentificationRefused under the conditions of the module
+    docstring."""
     _refuse_mixed_responses(responses)
     high, rate = settings.band_hz[1], responses[0].sample_rate_hz
     if high >= rate / 2:
@@ -89,6 +96,8 @@ def _refuse_an_empty_band(
 
 
 def _refuse_a_hole(lines: WeightedLines, settings: IdentificationSettings) -> None:
+    """Raises IdentificationRefused for a gap wider than `LARGEST_GAP` and `SPACINGS`, which a model could fill at
+    will."""
     low, high = settings.band_hz
     ends = np.clip(np.concatenate([[low], lines.frequency_hz, [high]]), low, high)
     octaves, steps = np.diff(np.log2(ends)), np.diff(ends)
@@ -117,6 +126,7 @@ def _refuse_noise(lines: WeightedLines, settings: IdentificationSettings) -> Non
 
 
 def _refuse_too_high_an_order(lines: WeightedLines, settings: IdentificationSettings) -> None:
+    """Raises IdentificationRefused for fewer lines than the unknowns, or the subspace method's block rows, need."""
     p, m = lines.response.shape[1:]
     n = settings.order
     free = n * (p + m) + p * m

@@ -1,8 +1,9 @@
 """Relaxation of the decay bound for poles whose data demand it, by a likelihood-ratio test.
 
-A pole at the bound is either superfluous, because the order is higher than needed, and then costs nothing there, or it
-represents a resonance with a longer decay. The likelihood ratio decides: the fall of the cost when the bound is lifted,
-compared with that from noise alone at the best of all lines (chi-squared, Bonferroni over the lines).
+A pole at the bound of the decay is either superfluous, because the order is higher than needed, and then the bound does
+not raise the cost; or it represents a resonance with a longer decay. A likelihood-ratio test decides: twice the fall of
+the cost J (negative log-likelihood) when the bound is lifted, compared with the chi-squared distribution, with a
+Bonferroni correction for the number of lines at which noise could imitate a resonance.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,11 +26,12 @@ from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import FloatArray
 
 PERIODS_TOLD = 4.0
-"""Longest decay over the period (the inverse of the step from line to line): a resonance narrower than the line spacing
-is still determined by the flanks on both sides of it, until they, too, equal those of an undamped mode."""
+"""Longest resolvable time constant, in periods (1 / line spacing). The flanks of a resonance that is narrower than the
+line spacing still determine its decay, up to the point where they equal those of an undamped mode. Heuristic."""
 FALSE_ALARM = 1e-3
-"""Probability that noise alone relaxes a pole (significance level)."""
+"""Significance level: probability that noise alone relaxes a pole."""
 RELAXED = ", poles relaxed"
+"""Suffix of a candidate's name."""
 
 Search = Callable[[IdentificationSettings], Sequence[Candidate]]
 """Search for candidates from new starting models, under the given settings."""
@@ -40,6 +42,7 @@ class SlowPole:
     """A pole with a longer decay than the ordinary bound allows."""
 
     frequency_hz: float
+    """Natural frequency in hertz."""
     decay_s: float
     """Time constant in seconds."""
     damping_ratio: float
@@ -50,7 +53,7 @@ class RelaxedFit:
     """Candidate after the likelihood-ratio test of the decay bound; result of `relax_poles`."""
 
     candidate: Candidate
-    """The candidate with its poles relaxed; the given one where no pole needs a longer decay."""
+    """The candidate with its poles relaxed; the given candidate where no pole needs a longer decay."""
     bound_costs: bool
     """Whether a pole is at the bound although the fit would improve beyond noise without it."""
 
@@ -58,7 +61,9 @@ class RelaxedFit:
 def relax_poles(
     chosen: Candidate, search: Search, lines: WeightedLines, settings: IdentificationSettings
 ) -> RelaxedFit:
-    """Relax the poles of a candidate that need it; a bound that the settings state is kept."""
+    """Relax the decay bound for the poles of a candidate that need it, up to `longest_resolved_decay_s`. Where the
+    settings state `longest_decay_s`, the candidate is returned unchanged. search: finds candidates under the relaxed
+    bound."""
     limit_s = longest_resolved_decay_s(lines)
     if limit_s <= settings.decay_s:
         return RelaxedFit(chosen, bound_costs=False)
@@ -74,13 +79,14 @@ def relax_poles(
 
 
 def retighten(near: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
-    """Refine a candidate of another estimate of the same device, and keep of its relaxed poles those still needed."""
+    """Refine a candidate from another estimate of the same device on these lines; of its relaxed poles, those that are
+    no longer needed return to the ordinary bound."""
     again = refine_candidate(near.name, near.fitted, lines, settings, near.radius)
     return _tighten_poles(again, lines, settings, float(np.max(near.radius)))
 
 
 def slow_poles(chosen: Candidate, bound_s: float, sample_rate_hz: float) -> tuple[SlowPole, ...]:
-    """Poles of a candidate beyond the bound, slowest first."""
+    """Poles of a candidate with a time constant above bound_s, slowest first."""
     form = chosen.fitted.form
     first, second = form.poles.reshape(2, -1)
     slower = np.where(np.abs(first) >= np.abs(second), first, second)
@@ -95,13 +101,14 @@ def slow_poles(chosen: Candidate, bound_s: float, sample_rate_hz: float) -> tupl
 
 
 def longest_resolved_decay_s(lines: WeightedLines) -> float:
-    """Time constant in seconds above which these lines do not distinguish a decay from an undamped mode."""
+    """Time constant (s) above which these lines do not distinguish a decay from an undamped mode; 0 for a single
+    line."""
     steps = np.diff(np.unique(lines.frequency_hz))
     return PERIODS_TOLD / float(np.median(steps)) if len(steps) else 0.0
 
 
 def is_at_bound(found: FittedForm, radius: Radius) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(blocks,): whether a block's larger pole lies on the radius."""
+    """(blocks,): whether the larger pole of a block lies on the radius, to within 1e-7 of it."""
     return np.asarray(_pole_radii(found) >= radius * (1 - 1e-7))
 
 
@@ -112,7 +119,8 @@ def _pole_radii(found: FittedForm) -> FloatArray:
 
 
 def _bound_costs(chosen: Candidate, limit: float, lines: WeightedLines, settings: IdentificationSettings) -> bool:
-    """Whether the bound costs more than noise, for the poles on it: tested by a few steps without it."""
+    """Whether lifting the bound for the poles at it lowers the cost by more than noise does, judged from a limited
+    number of refinement steps."""
     on = is_at_bound(chosen.fitted, chosen.radius)
     if not on.any():
         return False
@@ -121,20 +129,21 @@ def _bound_costs(chosen: Candidate, limit: float, lines: WeightedLines, settings
     after = bins.cost(refine(chosen.fitted.form, bins, loose, MOST_STEPS[-1]).response(bins.z))
     if not _exceeds_noise(bins.cost(chosen.fitted.response(bins.z)) - after, after, bins, len(lines)):
         return False
-    # The gain of further steps with the bound is not counted.
+    # A fall of the cost that further steps achieve with the bound, too, is not counted.
     held = bins.cost(refine(chosen.fitted.form, bins, chosen.radius, MOST_STEPS[-1]).response(bins.z))
     return _exceeds_noise(held - after, after, bins, len(lines))
 
 
 def _has_outlying_line(chosen: Candidate, lines: WeightedLines) -> bool:
-    """Whether the residual of a line is an outlier: a resonance so narrow that no pole moved there."""
+    """Whether the residual of a line is an outlier, as from a resonance so narrow that no pole moved there in the
+    search."""
     left = (np.abs(lines.weight * (chosen.fitted.response(lines.z) - lines.response)) ** 2).sum(axis=(1, 2))
     entries = lines.response[0].size
     return bool(2 * left.max() / max(chosen.cost, 1.0) > chi2.isf(FALSE_ALARM / len(lines), 2 * entries))
 
 
 def _tighten_poles(free: Candidate, lines: WeightedLines, settings: IdentificationSettings, limit: float) -> Candidate:
-    """Return poles to the ordinary bound, slowest first, where that costs no more than noise."""
+    """Return poles to the ordinary bound, slowest first, where that raises the cost by no more than noise would."""
     ordinary = largest_radius(settings.decay_s, lines.sample_rate_hz)
     sizes, entries = _pole_radii(free.fitted), lines.response.size
     name = f"{free.name.removesuffix(RELAXED)}{RELAXED}"
@@ -152,6 +161,7 @@ def _tighten_poles(free: Candidate, lines: WeightedLines, settings: Identificati
 
 
 def _is_better(again: Candidate, chosen: Candidate, lines: WeightedLines) -> bool:
+    """Whether a pole is still relaxed, and the cost fell by more than noise alone explains."""
     entries = lines.response.size
     gained = entries * (chosen.cost - again.cost)
     return bool(np.any(again.radius > np.min(again.radius))) and _exceeds_noise(
@@ -160,8 +170,9 @@ def _is_better(again: Candidate, chosen: Candidate, lines: WeightedLines) -> boo
 
 
 def _exceeds_noise(gained: float, left: float, lines: WeightedLines, tried: int) -> bool:
-    """Whether the fall of the cost to `left` exceeds that of a resonance fitted to noise at the best of `tried` lines.
-    Where residuals exceed the noise, they count as the noise."""
+    """Whether the fall `gained` of the cost, to `left`, exceeds that of a resonance fitted to noise at the best of
+    `tried` lines: chi-squared with 2 (p + m + 1) degrees of freedom. Residuals larger than the noise count as the
+    noise."""
     p, m = lines.response.shape[1:]
     scale = max(left / lines.response.size, 1.0)
     return bool(2 * gained / scale > chi2.isf(FALSE_ALARM / tried, 2 * (p + m + 1)))

@@ -1,31 +1,36 @@
-"""Settings of an identification: band, order, decay bound and search."""
+"""Settings of the identification of a state-space model: band, order, bound of the decay, and search. Defaults without
+a stated reason are heuristic."""
 
 from dataclasses import dataclass
 
 WIDE_OCTAVES = 4.5
-"""Width of a band above which it is fitted on logarithmic bins: on a linear axis most lines are at its top."""
+"""Width of a band (octaves) above which it is fitted on logarithmic bins, because lines at equal distances in Hz are
+mostly at its upper end."""
 ORDINARY_DECAY_S = 0.5
-"""Longest time constant of a pole unless the data require more. Superfluous poles of an order go to the bound and cost
-nothing there; without it they may end anywhere inside the unit circle, with a slow decay that ruins a simulation."""
+"""Longest time constant of a pole (s) unless the data require more. Superfluous poles move to the bound, where they do
+not raise the cost; without a bound they may end anywhere inside the unit circle, and a slow decay among them would
+corrupt simulations."""
 
 
 @dataclass(frozen=True, slots=True)
 class IdentificationSettings:
-    """Band and order of a model, and settings of the search."""
+    """Band and order of a model, and settings of the search. Raises ValueError for a band that does not rise from above
+    0, an odd order, a bound of zero or less, or negative counts."""
 
     band_hz: tuple[float, float] = (5.0, 35.0)
     order: int = 26
     """Number of states; even, because poles are fitted in pairs."""
     longest_decay_s: float | None = None
-    """Longest time constant of a pole. None: ORDINARY_DECAY_S, and more for poles that need it (see
+    """Longest time constant of a pole (s). None: ORDINARY_DECAY_S, and more for poles that need it (see
     `relaxed_poles`)."""
     longer_horizons: tuple[int, ...] = (0, 2)
     """Block rows beyond the shortest useful horizon; each number gives a starting model."""
     spare_horizons: tuple[int, ...] = (1, 3, 4, 6)
-    """Likewise for a wide band: tried one after the other while the best fit leaves more than noise, because a fit may
-    end in a local optimum."""
+    """Further block rows for a wide band, tried one after the other while the best fit leaves residuals above the
+    noise, because a fit may end in a local optimum."""
     record_horizons: tuple[int, ...] = (16,)
-    """Past and future samples of the starts from time records."""
+    """Numbers of past and of future samples in canonical variate analysis of time records; each gives a starting
+    model."""
     margin: float = 0.1
     """Relative width of the margins beyond the band whose lines are fitted too, where they were measured."""
     draws: int = 30
@@ -48,18 +53,18 @@ class IdentificationSettings:
 
     @property
     def fitted_hz(self) -> tuple[float, float]:
-        """The band and its margin."""
+        """The band and its margins (Hz): the range of the lines that are fitted."""
         low, high = self.band_hz
         return low / (1 + self.margin), high * (1 + self.margin)
 
     @property
     def decay_s(self) -> float:
-        """Decay bound at the beginning of a search."""
+        """Bound of the time constants (s) at the beginning of a search."""
         return ORDINARY_DECAY_S if self.longest_decay_s is None else self.longest_decay_s
 
     @property
     def centre_hz(self) -> float:
-        """Geometric mean of the band's ends."""
+        """Geometric mean of the band's ends (Hz)."""
         low, high = self.band_hz
         return float((low * high) ** 0.5)
 

@@ -1,7 +1,8 @@
 """Subtraction of the free decay of slow poles from recordings, so that they are in the steady state.
 
-A period that begins and ends in different states contains, beside the periodic response, the free decay of the
-difference: C A^t (I - A^N)^-1 (x_0 - x_N). In periods shorter than about ten time constants it does not die out.
+A period of N samples that begins in the state x_0 and ends in x_N contains, in addition to the periodic response, the
+free decay C A^t (I - A^N)^-1 (x_0 - x_N), t = 0 ... N - 1. In periods shorter than about ten time constants it does not
+die out, and would bias the estimate of the frequency response. The states follow by simulation from rest.
 """
 
 from collections.abc import Sequence
@@ -17,16 +18,19 @@ from equalizer.signals.signal import FloatArray, Signal
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlowPart:
-    """The slowly decaying blocks of a model."""
+    """The slowly decaying blocks of a model in modal form."""
 
     A: FloatArray
+    """(n, n)"""
     B: FloatArray
+    """(n, m)"""
     C: FloatArray
+    """(p, n)"""
 
 
 def slow_part(identified: Identified, radius: float) -> SlowPart | None:
-    """The relaxed poles outside the radius; None where there are none. A pole at the limit of the lines' resolution is
-    left out, because its decay is not known."""
+    """The relaxed blocks with a pole of magnitude above `radius`; None where there are none. A pole at its own bound,
+    the limit of the lines' resolution, is left out, because its decay is not known."""
     fitted = identified.chosen.fitted
     sizes = np.abs(fitted.form.poles).reshape(2, -1).max(axis=0)
     beyond = (sizes > radius) & ~is_at_bound(fitted, identified.chosen.radius)
@@ -37,8 +41,8 @@ def slow_part(identified: Identified, radius: float) -> SlowPart | None:
 
 
 def subtract_free_decay(recordings: Sequence[Recording], slow: SlowPart) -> tuple[Recording, ...]:
-    """The recordings without the slow part's free decay in every period of their periodic segments. Segments with
-    missing samples, and all after them, stay as they are."""
+    """The recordings without the slow part's free decay in every period of their periodic segments. From the first
+    missing command sample on, periods are not changed, because the state is unknown."""
     return tuple(_settle_recording(recording, slow) for recording in recordings)
 
 
@@ -69,7 +73,7 @@ def _settle_recording(recording: Recording, slow: SlowPart) -> Recording:
 
 
 def _free_decay(slow: SlowPart, first: FloatArray, last: FloatArray, samples: int) -> FloatArray:
-    """Response (samples, p) of the free decay from the state's difference between period start and end."""
+    """Response (samples, p) of the free decay. first, last: (n,), states at the start and the end of the period."""
     once = np.linalg.matrix_power(slow.A, samples)
     x = np.linalg.solve(np.eye(len(slow.A)) - once, first - last)
     rows = np.empty((samples, len(slow.C)))

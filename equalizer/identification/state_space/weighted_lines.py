@@ -1,4 +1,8 @@
-"""Lines that a model is fitted to: measured responses with the inverse of their standard errors as weights."""
+"""Lines that a model is fitted to: measured responses with the inverse of their standard errors as weights.
+
+With circular complex Gaussian noise of variance E|error|² = 1 / weight², the weighted sum of squares is the negative
+log-likelihood, up to a constant.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +14,8 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 LEAST_NOISE = 1e-9
-"""Smallest noise relative to the strongest entry, so that noise-free data have finite weights."""
+"""Least standard error, relative to the largest magnitude of all entries, so that noise-free data have finite
+weights."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,30 +27,31 @@ class WeightedLines:
     response: ComplexArray
     """(lines, outputs, inputs)"""
     weight: FloatArray
-    """(lines, outputs, inputs), 1 / standard error."""
+    """(lines, outputs, inputs): 1 / standard error, with the standard error sqrt(E|error|²)."""
     sample_rate_hz: float
 
     @property
     def z(self) -> ComplexArray:
-        """The lines on the unit circle, (lines,)."""
+        """exp(2 pi j f / sample rate) of each line, (lines,)."""
         return np.asarray(np.exp(2j * np.pi * self.frequency_hz / self.sample_rate_hz), dtype=np.complex128)
 
     def __len__(self) -> int:
         return len(self.frequency_hz)
 
     def cost(self, modelled: ComplexArray) -> float:
-        """Twice the negative log-likelihood of a model's responses (lines, outputs, inputs), up to a constant."""
+        """Weighted sum of squares of a model's responses (lines, outputs, inputs): the negative log-likelihood up to a
+        constant, for noise whose E|error|² is 1 / weight²."""
         return float((np.abs(self.weight * (modelled - self.response)) ** 2).sum())
 
     def relative_error(self, modelled: ComplexArray) -> FloatArray:
-        """(lines,): Frobenius norm of the difference to the measured response over the latter's root mean square."""
+        """(lines,): Frobenius norm of modelled minus measured response, over the rms norm of the measured responses."""
         size = np.sqrt((np.abs(self.response) ** 2).sum(axis=(1, 2)).mean())
         return np.asarray(np.linalg.norm(modelled - self.response, axis=(1, 2)) / size, dtype=np.float64)
 
 
 def weight_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float, float]) -> WeightedLines:
-    """All reliable lines of the band, of all estimates together. Where a line's noise is not known, it is estimated
-    from differences to its neighbours."""
+    """All reliable lines of the band (Hz, ends included) of all estimates, in ascending order. Where the noise of an
+    entry is not known, it is estimated from differences between neighbouring lines (`scatter_variance`)."""
     inside = [estimate.within(*band_hz) for estimate in responses]
     chosen = [
         estimate.of_lines(estimate.reliable & np.isfinite(estimate.response).all(axis=(1, 2))) for estimate in inside
@@ -71,11 +77,13 @@ def _noise_variance(estimate: FrequencyResponse) -> FloatArray:
 
 
 def scatter_variance(response: ComplexArray) -> FloatArray:
-    """Noise variance (lines, p, m) by the median of second differences over all lines of an entry."""
+    """Noise variance (lines, p, m), the same at all lines, from the median over the lines of squared second differences
+    of each entry; for fewer than three lines |response|²."""
     if len(response) < 3:
         return np.abs(response) ** 2
     second = np.diff(response, n=2, axis=0)
-    # The median, which a sharp resonance does not change; ln 2 is the median of a unit exponential.
+    # The median, because a sharp resonance hardly changes it. A second difference has 1 + 4 + 1 = 6 times the variance;
+    # |.|² of circular noise is exponentially distributed, with the median ln 2 times its mean.
     typical = np.median(np.abs(second) ** 2, axis=0) / (6 * np.log(2))
     return np.asarray(np.broadcast_to(typical, response.shape), dtype=np.float64)
 
@@ -83,9 +91,9 @@ def scatter_variance(response: ComplexArray) -> FloatArray:
 def average_bins(
     lines: WeightedLines, bins: Sequence[slice], about: ComplexArray, centres: ComplexArray
 ) -> WeightedLines:
-    """Average the lines of each bin to one line at its centre. The difference from an approximate model is averaged
-    (`about`: its responses on `lines`, `centres`: at the bins' centres), so that resonances within a bin are not
-    blunted."""
+    """Weighted average of the lines of each bin, at its mean frequency. The difference from an approximate model is
+    averaged, so that resonances within a bin keep their height. about, centres: the model's responses on `lines` and at
+    the bins' centres."""
     power = lines.weight**2
     difference = power * (lines.response - about)
     weight = np.array([power[part].sum(axis=0) for part in bins])
@@ -99,7 +107,8 @@ def bin_centres_hz(lines: WeightedLines, bins: Sequence[slice]) -> FloatArray:
 
 
 def group_lines(lines: WeightedLines, smallest: int, octave_share: float) -> tuple[slice, ...]:
-    """Slices of neighbouring lines: at least `smallest` lines each, and all lines within that share of an octave."""
+    """Slices of neighbouring lines: at least `smallest` lines each, the last slice excepted, and all lines within
+    `octave_share` octaves of its first line."""
     edges, frequency = [0], lines.frequency_hz
     while edges[-1] < len(lines):
         start = edges[-1]

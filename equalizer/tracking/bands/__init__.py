@@ -1,5 +1,6 @@
-"""Three frequency bands with a method each: rigid model below, identified model, one degree of freedom above.
+"""Equalization in three frequency bands: rigid model (low), identified model (middle), one degree of freedom (high).
 
-`rigid_model`, `low_band`, `high_band` and `stylus` are the parts; `banded_equalizer` joins them for one model,
-`narrow_and_wide_models` for a narrow and a wide model of one place. Begin at `banded_equalizer.py`.
+Wanted acceleration -> `low_band` (by `rigid_model`), middle band (by `lqr`), `high_band` (with `stylus`) ->
+`banded_equalizer` (adds the forces) -> `banded_forces` (the result). `narrow_and_wide_models` does the same with a
+narrow and a wide model of a single place. Begin at `banded_equalizer.py`.
 """

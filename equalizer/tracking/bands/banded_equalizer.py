@@ -1,7 +1,9 @@
-"""Equalizer for arbitrary accelerations in three bands: rigid model, identified model, one degree of freedom above.
+"""Equalizer for arbitrary accelerations, with a method for each of three frequency bands, because an identified model
+is valid in a limited band only.
 
-Where one model covers the whole band of the wanted acceleration, both edges can be left out: the equalizer is then
-wide-band.
+Low: inverse dynamics of a rigid model along a planned motion (`low_band`). Middle: linear-quadratic tracking with the
+identified model (`lqr`). High: one degree of freedom along the direction of least force (`high_band`). The forces are
+added. Without edges in the split, the identified model plays the whole band.
 """
 
 from dataclasses import dataclass, field, replace
@@ -32,12 +34,13 @@ from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 PADDING_S = 0.3
-"""Zeros added before and after: the device does not answer a constant force with acceleration, so that its inverse
-starts early and ends late (non-causal)."""
+"""Least duration of the zeros added before and after. The inverse is non-causal: a constant force causes no lasting
+acceleration, so that forces begin before and end after the wanted acceleration."""
 LOW_BAND_DECAYS = 6.0
-"""Time constants of the low band's slow return to rest that are played too: cut off sooner, it ends with a jolt."""
+"""Duration of the padding, in time constants of the low band's return to rest. An earlier end would cause a jolt."""
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
-"""Range of the force weight. Below, forces drift where no model was identified; above, the level falls short."""
+"""Allowed range of the force weight, (m/s² per N)². Below it, forces drift at frequencies where no model was
+identified; above it, the delivered level is too low."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,35 +53,39 @@ class LowBand:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HighBand:
-    """High band, played with one degree of freedom; a stylus actuator, where there is any, takes its upper part."""
+    """High band, played with one degree of freedom; a stylus actuator, if present, plays its upper part."""
 
     source: ResponseSource
     """Response of the device over the whole high band."""
     settings: HighBandSettings = field(default_factory=HighBandSettings)
+    """Its `causal` is replaced by that of the split."""
     stylus: StylusActuator | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class CapPolicy:
-    """Cap on the norm of the force vector that enters the device, all bands added, and what is done above it."""
+    """Cap (N) on the norm of the total force vector of all bands, and the action where forces exceed it."""
 
     cap_n: float
     constrain: bool = False
-    """False: forces above the cap are refused. True: the middle band is solved again under the cap left by the other
-    bands."""
+    """False: forces above the cap raise ForceLimitError. True: the middle band is solved again, so that its sum with
+    the other bands is under the cap."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedEqualizer:
-    """The equalizer. Raises ValueError where an edge has no model beyond it, or the weight is outside 1e-3 to 1e-2."""
+    """The equalizer of one device. Raises ValueError where the split and the models disagree on bands or sample rate,
+    and for a force weight outside 1e-3 to 1e-2."""
 
     middle: IdentifiedModel
+    """Identified model, which plays the middle band."""
     split: LinearPhaseSplit | CausalSplit
-    """A causal split makes all of the playback causal: it begins with the first row, as at a contact."""
+    """With a causal split all forces are causal: they begin with the first wanted row, as at a contact."""
     low: LowBand | None = None
     high: HighBand | None = None
     weights: TrackingWeights = field(default_factory=TrackingWeights)
     spring: VirtualSpring = NO_SPRING
+    """Spring of the device's control loop, whose force is subtracted from the commands."""
 
     def __post_init__(self) -> None:
         for name, edge, band in (
@@ -105,17 +112,18 @@ class BandedEqualizer:
 
     @property
     def latency_samples(self) -> int:
-        """Rows of the forces before the one that belongs to the first wanted row: filter delay, and padding unless
-        causal."""
+        """Number of rows of the forces before the row of the first wanted sample: delay of the filters, and padding
+        unless causal."""
         return self.split.latency_samples + (0 if self.causal else self._padding)
 
     @property
     def latency_ms(self) -> float:
+        """`latency_samples` in ms."""
         return 1e3 * self.latency_samples / self.middle.sample_rate_hz
 
     def play(self, wanted: FloatArray, cap: CapPolicy | None = None) -> BandedForces:
-        """Forces of all three bands for a wanted acceleration. wanted: (n, p), m/s². Raises ForceLimitError or
-        TrackingError where the cap cannot be held."""
+        """Forces of all three bands for a wanted acceleration. wanted: (n, p), m/s²; cap: None = no limit. Raises
+        ForceLimitError for forces above the cap, TrackingError where no forces under it are found."""
         bands = self.split.split(self._pad(wanted))
         low, motion = self._low_forces(bands.low)
         problem = make_tracking_problem(self.middle, self.weights)
@@ -148,27 +156,31 @@ class BandedEqualizer:
 
     @property
     def _padding(self) -> int:
+        """Rows of zeros before and after the wanted acceleration."""
         decay_s = 0.0 if self.low is None else LOW_BAND_DECAYS / (2 * np.pi * self.low.corner_hz)
         return int(np.ceil(max(PADDING_S, decay_s) * self._rate_hz))
 
     def _pad(self, wanted: FloatArray) -> FloatArray:
-        """Pad with zeros, to a length with a fast FFT."""
+        """Pad wanted (n, p) with zeros, to a length for which the FFT is fast; causal: only after it."""
         before = 0 if self.causal else self._padding
         around = 2 * self.split.latency_samples
         after = next_fast_len(len(wanted) + before + self._padding + around) - len(wanted) - before - around
         return np.pad(np.asarray(wanted, dtype=np.float64), ((before, after), (0, 0)))
 
     def _plan_motion(self, acceleration: FloatArray, corner_hz: float) -> SlowMotion:
+        """Motion of an acceleration (N, m) above a corner, causal or with zero phase as the split is."""
         plan = plan_motion_causally if self.causal else plan_motion
         return plan(acceleration, self._rate_hz, corner_hz)
 
     def _low_forces(self, wanted: FloatArray) -> tuple[FloatArray, SlowMotion | None]:
+        """Forces (N, m) of the low band and its planned motion; zeros and None without a low band."""
         if self.low is None:
             return np.zeros((len(wanted), self.middle.B.shape[1])), None
         motion = self._plan_motion(wanted, self.low.corner_hz)
         return low_band_forces(motion, self.low.rigid, self._rate_hz), motion
 
     def _high_forces(self, wanted: FloatArray, others: FloatArray) -> tuple[HighBandForces | None, StylusShare | None]:
+        """Forces of the high band, and the share of the stylus. others: (N, m), the forces of the other bands."""
         if self.high is None:
             return None, None
         signal = project_to_one_dof(wanted) if self.causal else reduce_to_one_dof(wanted)
@@ -180,7 +192,8 @@ class BandedEqualizer:
         return high_band_forces(signal, self._rate_hz, self.high.source, others, settings), share
 
     def _spring_force(self, motion: SlowMotion | None, middle: FloatArray) -> FloatArray:
-        """The rendered spring's force along the motion of the two lower bands; the high band's motion is too small."""
+        """(N, m), N: force -(k x + b v) of the virtual spring along the motion of the low and the middle band; the
+        motion of the high band is too small to count. middle: (N, p), m/s², predicted acceleration there."""
         k, b = self.spring.stiffness_n_per_m, self.spring.damping_n_s_per_m
         if k == b == 0:
             return np.zeros_like(middle)
@@ -191,6 +204,8 @@ class BandedEqualizer:
     def _predict_bands(
         self, by_band: tuple[FloatArray, FloatArray, FloatArray], motion: SlowMotion | None, answer: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Predicted acceleration (N, p) of each band: by the high band's response where there is a high band, because
+        it covers all frequencies; else by each band's own model. answer: (N, p), the middle model's."""
         if self.high is not None:
             low, middle, high = (predict_acceleration(forces, self._rate_hz, self.high.source) for forces in by_band)
             return low, middle, high

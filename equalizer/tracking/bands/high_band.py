@@ -1,8 +1,9 @@
-"""The high band: acceleration matching with one degree of freedom, along the direction that costs the least force.
+"""The high band: acceleration matching with one degree of freedom, along the direction that needs the least force.
 
 Above the limit of direction perception a person feels the strength of a vibration but hardly its direction. The wanted
-acceleration is therefore reduced to one signal of the same spectral energy and played along one direction of force:
-each line is divided by the norm of the device's response there. The direction is free, and that of the smallest peak
+acceleration is therefore reduced to a single signal of the same spectral energy and played along a single direction d
+of force. With g the norm of the device's response G d at a spectral line and w the force weight, the magnitude of the
+force is that of the wanted signal times g / (g² + w). The direction is free: of those tried, that of the smallest peak
 force is chosen.
 """
 
@@ -16,12 +17,12 @@ from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
-"""Weight of |force|² beside |G|²: a smaller one amplifies noise at antiresonances, with a larger one weak lines fall
-short."""
+"""Allowed range of the weight of |force|², to be compared with |G|², (m/s² per N)². A smaller weight amplifies noise at
+antiresonances; with a larger weight the level at weak lines is too low."""
 WEIGHT = 1e-3
 """Default weight of the force against the error, (m/s² per N)²."""
 DIRECTIONS = 64
-"""Number of force directions tried over the half sphere besides the axes."""
+"""Number of force directions over the half sphere that are tried in addition to the three axes."""
 
 
 class ResponseSource(Protocol):
@@ -38,20 +39,22 @@ class ModelledResponse:
     model: IdentifiedModel
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
+        """(lines, p, m), m/s² per N: response of the model."""
         return model_response(self.model, frequency_hz)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredResponse:
-    """Measured frequency response as a `ResponseSource`: magnitude and phase are interpolated linearly between its
-    lines, and held constant outside."""
+    """Measured frequency response as a `ResponseSource`. Magnitude and unwrapped phase are interpolated linearly
+    between the lines, and constant below the first and above the last line."""
 
     frequency_hz: FloatArray
-    """(lines,), rising"""
+    """(lines,), rising."""
     response: ComplexArray
-    """(lines, p, m)"""
+    """(lines, p, m), m/s² per N."""
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
+        """(lines, p, m), m/s² per N: interpolated response."""
         flat = self.response.reshape(len(self.frequency_hz), -1)
         columns = []
         for column in flat.T:
@@ -66,10 +69,11 @@ class HighBandSettings:
     """Settings of the high band. Raises ValueError for a weight outside 1e-3 to 1e-2."""
 
     weight: float = WEIGHT
+    """Weight of |force|², (m/s² per N)²."""
     shared: bool = True
-    """Whether directions between the axes may be taken; False = a single axis."""
+    """Whether directions between the axes are tried (three axes only); False = the axes alone."""
     causal: bool = False
-    """Causal: forces start with the first row. The magnitude is matched, with minimum phase."""
+    """Whether forces start with the first row: the inverse then has the same magnitude and minimum phase."""
 
     def __post_init__(self) -> None:
         if not SMALLEST_WEIGHT <= self.weight <= LARGEST_WEIGHT:
@@ -81,21 +85,22 @@ class HighBandForces:
     """Forces along the tried direction with the smallest peak; result of `high_band_forces`."""
 
     forces: FloatArray
-    """(N, m)"""
+    """(N, m), N."""
     direction: FloatArray
-    """(m,), unit length, of the force"""
+    """(m,): unit vector of the force."""
     peak_n: float
-    """Peak of the sum of these and the other forces."""
+    """Peak (N) of the norm of the sum of these and the other forces."""
     peak_by_axis_n: FloatArray
-    """(m,): peak along each single axis, for comparison."""
+    """(m,): that peak (N) for forces along each single axis, for comparison."""
 
 
 def reduce_to_one_dof(wanted: FloatArray) -> FloatArray:
-    """(N,) from (N, p): at each line the norm over all axes, with the phase of their sum. Energy is preserved (Landin
-    et al., Dimensional reduction of high-frequency accelerations for haptic rendering, 2010)."""
+    """(N,) from (N, p): spectral reduction, at each line the norm over all axes with the phase of their sum. The energy
+    of every line is preserved (Landin et al., Dimensional reduction of high-frequency accelerations for haptic
+    rendering, 2010)."""
     spectrum = np.fft.rfft(wanted, axis=0)
     length = np.linalg.norm(spectrum, axis=1)
-    # The sum over axes vanishes where two of them oppose; the phase is then that of the stronger axis.
+    # The sum over axes vanishes where axes cancel each other; the phase is then that of the strongest axis.
     total = spectrum.sum(axis=1)
     strongest = np.take_along_axis(spectrum, np.abs(spectrum).argmax(axis=1)[:, None], axis=1)[:, 0]
     phase = np.angle(np.where(np.abs(total) > 1e-9 * length, total, strongest))
@@ -103,8 +108,8 @@ def reduce_to_one_dof(wanted: FloatArray) -> FloatArray:
 
 
 def project_to_one_dof(wanted: FloatArray) -> FloatArray:
-    """(N,) from (N, p): projection on the first principal direction, scaled to the energy of all axes. Causal, unlike
-    `reduce_to_one_dof`."""
+    """(N,) from (N, p): projection on the first principal direction, scaled to the energy of all axes. Unlike
+    `reduce_to_one_dof` it is causal: each row depends on the same row of `wanted`, apart from direction and scale."""
     direction = np.linalg.svd(wanted, full_matrices=False)[2][0]
     along = wanted @ direction
     size = float(np.linalg.norm(along))
@@ -118,9 +123,9 @@ def high_band_forces(
     others: FloatArray | None = None,
     settings: HighBandSettings | None = None,
 ) -> HighBandForces:
-    """Forces along the direction of the smallest peak. wanted: (N,), one degree of freedom; at rest at both ends,
-    unless causal: the inverse is two-sided and wraps around. others: (N, m), further forces, which count in the peak.
-    source: m/s² per N."""
+    """Forces along the direction of the smallest peak. wanted: (N,), m/s², one degree of freedom; unless causal, at
+    rest at both ends, because the two-sided inverse is circular. others: (N, m), N, further forces, which count in the
+    peak."""
     settings = settings or HighBandSettings()
     n = 2 * len(wanted) if settings.causal else len(wanted)
     response = source.at(lines_hz(n, sample_rate_hz))
@@ -128,7 +133,7 @@ def high_band_forces(
     spectrum = np.fft.rfft(wanted, n)
     candidates = _candidate_directions(response.shape[2], settings.shared)
     played = [_invert_along(spectrum, n, response @ direction, settings) for direction in candidates]
-    # The sign of the direction is not felt, but it matters beside the other forces.
+    # The sign of the direction is not felt, but it changes the peak of the sum with the other forces.
     ways = [sign * scalar[:, None] * d for scalar, d in zip(played, candidates, strict=True) for sign in (1.0, -1.0)]
     peaks = np.array([np.linalg.norm(forces + there, axis=1).max(initial=0.0) for forces in ways])
     best = int(peaks.argmin())
@@ -137,7 +142,7 @@ def high_band_forces(
 
 
 def predict_acceleration(forces: FloatArray, sample_rate_hz: float, source: ResponseSource) -> FloatArray:
-    """(N, p), m/s²: response of the source to forces (N, m), from rest."""
+    """(N, p), m/s²: response of the source to forces (N, m), in N, from rest; zero-padded to twice the length."""
     n = 2 * len(forces)
     spectrum = np.fft.rfft(forces, n, axis=0)[:, :, None]
     answer = (source.at(lines_hz(n, sample_rate_hz)) @ spectrum)[:, :, 0]
@@ -145,12 +150,13 @@ def predict_acceleration(forces: FloatArray, sample_rate_hz: float, source: Resp
 
 
 def lines_hz(samples: int, sample_rate_hz: float) -> FloatArray:
-    """(samples // 2 + 1,): frequencies of the lines of a real FFT of that many samples."""
+    """(samples // 2 + 1,): frequencies (Hz) of the lines of a real FFT of `samples` samples."""
     return np.asarray(np.fft.rfftfreq(samples, 1 / sample_rate_hz), dtype=np.float64)
 
 
 def _invert_along(spectrum: ComplexArray, n: int, answer: ComplexArray, settings: HighBandSettings) -> FloatArray:
-    """Force along a direction, (N,). answer: (lines, p), the device's to that direction."""
+    """Force along a direction, (N,), N. spectrum: wanted signal, n samples; answer: (lines, p), response to a unit
+    force along the direction, m/s² per N."""
     length = np.linalg.norm(answer, axis=1)
     inverse = (length / (length**2 + settings.weight)).astype(np.complex128)
     if settings.causal:
@@ -162,7 +168,7 @@ def _invert_along(spectrum: ComplexArray, n: int, answer: ComplexArray, settings
 
 
 def minimum_phase(gain: FloatArray) -> ComplexArray:
-    """(lines,): minimum-phase response with that gain, (lines,) of a real FFT of even length.
+    """(lines,): minimum-phase response with the given gain, (lines,) of a real FFT of even length, all above zero.
 
     By folding the real cepstrum (Oppenheim and Schafer, Discrete-Time Signal Processing).
     """
@@ -174,7 +180,8 @@ def minimum_phase(gain: FloatArray) -> ComplexArray:
 
 
 def _candidate_directions(inputs: int, shared: bool) -> list[FloatArray]:
-    """Directions of force that are tried: the axes, then a spiral over the half sphere."""
+    """Unit vectors (inputs,) that are tried: the axes; with three inputs, if `shared`, also a golden-angle spiral over
+    the half sphere."""
     axes = list(np.eye(inputs))
     if not shared or inputs != 3:
         return axes

@@ -1,4 +1,9 @@
-"""Rigid-body model of the device: force = mass a + damping v + stiffness x."""
+"""Rigid-body model of the device, force = M a + D v + K x, and its fit to a frequency response.
+
+Below the first resonance the device moves as a rigid body. At a spectral line, with s = 2 pi i f,
+
+    force per acceleration = M + D / s + K / s²        (m x m, N per m/s²)
+"""
 
 from dataclasses import dataclass
 
@@ -7,18 +12,18 @@ import numpy as np
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 WORST_CONDITION = 1e6
-"""Largest condition number of the response that is inverted."""
+"""Largest condition number of a response that is inverted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidModel:
-    """Matrices (m, m). Raises ValueError for inconsistent shapes."""
+    """Mass, damping and stiffness matrices, (m, m) each. Raises ValueError for inconsistent shapes."""
 
     mass_kg: FloatArray
     damping_n_s_per_m: FloatArray
     stiffness_n_per_m: FloatArray
     delay_s: float = 0.0
-    """Delay from a command to its acceleration, beyond the half sample of the hold."""
+    """Delay from a command to its acceleration, without the half sample of the hold."""
 
     def __post_init__(self) -> None:
         shapes = {np.shape(part) for part in (self.mass_kg, self.damping_n_s_per_m, self.stiffness_n_per_m)}
@@ -26,7 +31,7 @@ class RigidModel:
             raise ValueError(f"mass, damping and stiffness must be square matrices of one shape, not {sorted(shapes)}")
 
     def force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, m, m), N per m/s²; frequencies above zero."""
+        """(lines, m, m), N per m/s²: inverse response, advanced by `delay_s`. frequency_hz: (lines,), above zero."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)[:, None, None]
         force = self.mass_kg + self.damping_n_s_per_m / s + self.stiffness_n_per_m / s**2
         return np.asarray(force * np.exp(s * self.delay_s))
@@ -35,11 +40,12 @@ class RigidModel:
 def fit_rigid_model(
     frequency_hz: FloatArray, response: ComplexArray, sample_rate_hz: float, delay_s: float = 0.0
 ) -> RigidModel:
-    """Fit a rigid model by least squares on the relative error of the force, line by line.
+    """Fit a rigid model to a measured response, by linear least squares on the relative error of its inverse at each
+    line.
 
-    frequency_hz: (lines,), above zero, below the first resonance; response: (lines, m, m), m/s² per N, sampled as
-    recordings are. delay_s is not fitted: at low frequencies it cannot be distinguished from damping and mass. Raises
-    ValueError with fewer than two lines or an input that moves nothing.
+    frequency_hz: (lines,), above zero, below the first resonance; response: (lines, m, m), m/s² per N, with the delay
+    of the hold. delay_s is given, not fitted: at low frequencies it cannot be distinguished from damping and mass.
+    Raises ValueError for fewer than two lines, a frequency that is not above zero, or a singular response.
     """
     frequency_hz = np.asarray(frequency_hz, dtype=np.float64)
     if len(frequency_hz) < 2 or not (frequency_hz > 0).all():
@@ -49,7 +55,7 @@ def fit_rigid_model(
             "the response at a line does not move all axes, so that it has no inverse; identify with all axes driven"
         )
     m, s = response.shape[1], 2j * np.pi * frequency_hz
-    # A held command acts half a sample late on average, on any device.
+    # A zero-order hold delays a command by half a sample on average.
     late = np.exp(-s * (delay_s + 0.5 / sample_rate_hz))[:, None, None]
     inverse = np.linalg.inv(response / late)
     weight = 1 / np.linalg.norm(inverse, axis=(1, 2))

@@ -1,4 +1,8 @@
-"""A separate actuator at the stylus, which plays the highest frequencies in place of the motors."""
+"""A separate vibration actuator at the stylus, which plays the highest frequencies in place of the motors.
+
+A crossover divides the wanted acceleration between motors and actuator; the actuator's command is the regularised
+inverse of its measured response, line by line.
+"""
 
 from dataclasses import dataclass
 
@@ -10,17 +14,19 @@ from equalizer.tracking.bands.high_band import WEIGHT
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StylusActuator:
-    """Response and limits of the actuator. Raises ValueError for impossible numbers."""
+    """Measured response and limits of the actuator. Raises ValueError for unequal shapes of response and frequencies,
+    and for a crossover, transition or limit that is not a positive number."""
 
     frequency_hz: FloatArray
-    """(lines,), rising: where its response was measured. Nothing is sent to it outside."""
+    """(lines,), rising: frequencies at which its response was measured. It gets no command outside their range."""
     response: ComplexArray
-    """(lines,): acceleration of the stylus (m/s²) per unit of its command"""
+    """(lines,): acceleration of the stylus (m/s²) per unit of the command."""
     from_hz: float
-    """Crossover frequency, at half amplitude; the motors play what is below."""
+    """Crossover frequency, where both get half the amplitude; the motors play the part below."""
     limit: float
     """Largest command, in its unit."""
     transition_hz: float = 20.0
+    """Width of the crossover's transition."""
 
     def __post_init__(self) -> None:
         if np.shape(self.response) != np.shape(self.frequency_hz):
@@ -37,9 +43,9 @@ class StylusShare:
     """Split of a wanted acceleration between motors and stylus actuator; result of `share_with_stylus`."""
 
     command: FloatArray
-    """(N,), in the actuator's unit"""
+    """(N,), in the unit of the actuator's command."""
     played: FloatArray
-    """(N,), m/s²: predicted acceleration of the command."""
+    """(N,), m/s²: predicted acceleration due to the command."""
     motors: FloatArray
     """(N,), m/s²: the motors' share; the sum with `taken` is the wanted acceleration."""
     taken: FloatArray
@@ -47,8 +53,8 @@ class StylusShare:
 
 
 def share_with_stylus(wanted: FloatArray, sample_rate_hz: float, stylus: StylusActuator) -> StylusShare:
-    """Split wanted (N,), one degree of freedom, at rest at both ends, between stylus and motors. A command above the
-    actuator's limit is scaled down as a whole, and the rest goes back to the motors."""
+    """Split wanted (N,), m/s², one degree of freedom, at rest at both ends, between stylus and motors. A command above
+    the actuator's limit is scaled down as a whole, and the motors play the remainder."""
     n = len(wanted)
     lines = np.fft.rfftfreq(n, 1 / sample_rate_hz)
     rising = np.clip((lines - stylus.from_hz) / stylus.transition_hz + 0.5, 0, 1)

@@ -1,5 +1,6 @@
-"""Known nonlinear physics in the feedforward: the forces of effects that a diagnosis has named.
+"""Compensation of known nonlinear effects, such as friction or a dead band: their forces are added to the feedforward.
 
-`effect_roles` (what can be compensated) -> `known_forces`, `law_compensation` (along a motion) -> `effect_compensation`
-(added to the feedforward) and `subtract_effects` (subtracted from a recording). Begin at `effect_compensation.py`.
+`effect_roles` (which effects can be compensated) -> `known_forces` and `law_compensation` (forces along a motion) ->
+`effect_compensation` (added to the feedforward) and `subtract_effects` (subtracted from a recording before a model is
+identified). Begin at `effect_compensation.py`.
 """

@@ -1,9 +1,10 @@
 """Compensation of known nonlinear effects: their forces along the planned motion are added to the feedforward.
 
-A linear model that was identified on a device with friction has an equivalent of that friction in it, and friction
-added on top would be counted twice: worse than none. It is best to identify on recordings without the effects
-(`subtract_effects`). Where only a model is at hand, the equivalent for a sinusoid of the identification's amplitude is
-subtracted. This is an approximation: it does not describe an axis that stuck while another was swept.
+A linear model that was identified on a device with friction contains a linear equivalent of that friction; adding the
+complete friction would count it twice, which is worse than no compensation. It is best to identify on recordings from
+which the effects were subtracted (`subtract_effects`). Where there is only a model, the equivalent for a sinusoid of
+the identification's amplitude (`equivalent_impedance`, a describing function) is subtracted. This is an approximation:
+it does not describe an axis that stuck while another was swept.
 """
 
 from collections.abc import Iterator, Mapping
@@ -31,8 +32,9 @@ from equalizer.tracking.feedforward.planned_motion import PlannedMotion, planned
 from equalizer.tracking.learning.iteration import largest_share
 
 SLIP_SHARE = 0.05
-"""Velocity below which a friction force changes sign smoothly, relative to the axis's rms velocity. A smaller one would
-make the force chatter with errors of the planned velocity about zero; a larger one would compensate too little."""
+"""Velocity below which a friction force changes sign smoothly, relative to the axis's rms velocity. With a smaller
+velocity, errors of the planned velocity near zero would make the force chatter; with a larger velocity, too little
+would be compensated."""
 
 LEAST_SPEED = 1e-9
 """Velocity (m/s) assumed for an axis that did not move in the identification, which keeps divisions finite."""
@@ -43,12 +45,13 @@ class Compensation:
     """Result of `compensate`: forces with those of the known effects added, and which effects these are."""
 
     forces: FloatArray
-    """(N, m): forces to play instead of the given ones."""
+    """(N, m), N: forces to play instead of the given forces."""
     used: tuple[ModelEffect, ...]
+    """Compensated effects."""
     not_used: tuple[tuple[ModelEffect, str], ...]
     """Effects that are not compensated, with the reason."""
     share: float
-    """Share of the compensation that fits under the cap; 1 = all."""
+    """Factor, 0 to 1, by which the compensation was scaled to fit under the cap; 1 = complete."""
 
 
 def compensate(
@@ -59,12 +62,12 @@ def compensate(
     identified_with_n: float | None,
     cap_n: float | None = None,
 ) -> Compensation:
-    """Add the forces of known effects to forces (N, m) of the model alone, for wanted accelerations (N, p), from rest
-    to rest; p = m, axis by axis.
+    """Add the forces of known effects to the forces (N, m) of a linear model, for wanted accelerations (N, p), m/s²,
+    that begin and end at rest; p = m, in the same order of axes.
 
-    identified_with_n: amplitude of the sinusoidal forces (sweeps, one axis after the other) with which the model was
-    identified on the device that has the effects; None = the model is of a device without them. Raises ValueError for
-    an axis that the model does not have, and where forces and responses are not axis by axis.
+    identified_with_n: amplitude (N) of the sinusoidal forces (sweeps of one axis after the other) with which the model
+    was identified on the device with the effects; None = the model does not contain them. Raises ValueError for shapes
+    that differ, an amplitude that is not above zero, and an axis that the model does not have.
     """
     if forces.shape != wanted.shape:
         raise ValueError(f"forces of shape {forces.shape} do not go axis by axis with what is wanted, {wanted.shape}")
@@ -91,8 +94,9 @@ def compensate(
 
 
 def along_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion:
-    """Motion along the driven axes, on which the effects act, from that counted by the responses: the signs differ
-    where a model's input or output matrix says so."""
+    """Motion along the driven axes, on which the effects act, from the motion along the response channels: the sign of
+    an axis is reversed where the diagonal of the product of output matrix and driven axes is negative. Unchanged where
+    that product has fewer rows or columns than the motion has axes."""
     gains = physics.output @ driven_axes(physics)
     columns = motion.position.shape[1]
     if min(gains.shape) < columns:
@@ -102,7 +106,7 @@ def along_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion
 
 
 def axes_of(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:
-    """Columns of forces that an effect acts on: all where it names no axis. Raises ValueError for one not there."""
+    """Indices of the axes that an effect acts on; all where it names none. Raises ValueError for an unknown axis."""
     named = tuple(
         number
         for number, channels in enumerate(zip(inputs, outputs, strict=True))
@@ -116,7 +120,7 @@ def axes_of(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ..
 
 
 def axis_gains(physics: MechanicalModel, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> FloatArray:
-    """(m,): force at the handle over force commanded."""
+    """(m,): actual over commanded force of each axis, by the effects `force_gain`."""
     gain = np.ones(len(inputs))
     for effect in physics.effects:
         if effect.kind == "force_gain":
@@ -131,6 +135,7 @@ def slip_speed(velocity: FloatArray) -> float:
 
 
 def _effects_by_axis(effects: tuple[ModelEffect, ...], model: IdentifiedModel) -> Iterator[tuple[ModelEffect, int]]:
+    """Each effect with the index of each axis that it acts on."""
     for effect in effects:
         for axis in axes_of(effect, model.input_channels, model.output_channels):
             yield effect, axis
@@ -139,7 +144,8 @@ def _effects_by_axis(effects: tuple[ModelEffect, ...], model: IdentifiedModel) -
 def _force_beyond_model(
     effect: ModelEffect, axis: int, motion: PlannedMotion, model: IdentifiedModel, identified_with_n: float | None
 ) -> FloatArray:
-    """(N,): the effect's force along the motion, without its linear equivalent in the identified model."""
+    """(N,), N: force that compensates an effect along the motion, less the linear equivalent that the identified model
+    contains. Lines at which the axis did not move get the equivalent of `LEAST_SPEED`."""
     v = motion.velocity[:, axis]
     slip = slip_speed(v)
     law, force = force_law(effect, axis, motion, (model.input_channels, model.sample_rate_hz), slip)
@@ -158,8 +164,8 @@ def _force_beyond_model(
 def force_law(
     effect: ModelEffect, axis: int, motion: PlannedMotion, sampled: tuple[tuple[str, ...], float], slip: float
 ) -> tuple[Law, FloatArray]:
-    """The force (N,) to be added along a motion, and the law that gives it along one axis. sampled: channels of the
-    commands, and the rate, Hz."""
+    """The law of an effect along a single axis, and the force (N,) to be added along a motion. sampled: channels of the
+    commands, and the sample rate (Hz). slip: speed below which a change of sign is smoothed, m/s."""
     if effect.law is not None:
         letters = axis_names(sampled[0])
         against = compute_compensating_force(effect.law, letters, motion, sampled[1], slip)
@@ -171,13 +177,14 @@ def force_law(
 
 
 def _is_force(effect: ModelEffect) -> bool:
+    """Whether the effect is a discovered law of the force."""
     return effect.law is not None and effect.law.acts_on == "force"
 
 
 def _compensate_command_map(
     law: FoundLaw, played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None
 ) -> None:
-    """Change the forces in place so that the force behind a command map is the intended one."""
+    """Change the commands in place so that a command map (a discovered law) turns them into the intended forces."""
     if identified_with_n is not None:
         played[:, axis] *= linear_share(law, identified_with_n)
     meant = played[:, axis] + added[:, axis]
@@ -188,8 +195,9 @@ def _compensate_command_map(
 def _compensate_deadband(
     parameters: Mapping[str, float], played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None
 ) -> None:
-    """Change the forces in place so that the force behind the dead band is the intended one. Of intended forces below
-    the jump, which no command gives, none is played."""
+    """Change the commands in place so that the forces after a dead band are the intended forces: what the dead band
+    takes, (1 - jump) width (N), is added in the direction of the force, smoothly near zero. Intended forces below the
+    jump, which no command gives, are not played."""
     if identified_with_n is not None:
         played[:, axis] *= deadband_share(parameters, identified_with_n)
     meant = played[:, axis] + added[:, axis]

@@ -1,4 +1,7 @@
-"""Role of each effect in a feedforward: compensated, counted in the timing, or left alone, and then why."""
+"""Role of each effect in a feedforward: compensated by a force, used for scaling or timing, or not compensated.
+
+The texts are shown to the user as the reason why an effect is not compensated.
+"""
 
 import numpy as np
 
@@ -9,6 +12,7 @@ from equalizer.tracking.compensation.known_forces import LAWS
 from equalizer.tracking.compensation.law_compensation import reason_law_not_compensated
 
 IN_MODEL = "it is linear, so the identified model has it; compensating it again would count it twice"
+"""Reason for linear effects."""
 
 LEFT_ALONE = {
     "viscous_damping": IN_MODEL,
@@ -28,11 +32,15 @@ LEFT_ALONE = {
     "force_nonlinearity": "the identified model has the gain at the level that it was identified at",
     "slew_limit": "there is no faster force than that",
 }
+"""Reasons by name of the effect, for effects of mechanism and actuator that are not compensated."""
 SENSORS = "it is an error of the sensor: a force against it would turn that error into a real motion of the handle"
+"""Reason for all effects of the sensor but its lag."""
 SCALED = "in the identified model as far as it is linear; used to scale what is added"
 TIMED = "in the identified model; used to send what is added ahead of time"
+"""Reasons for the effects of `SCALING` and of `TIMING`."""
 
 SCALING, TIMING = ("force_gain",), ("amplifier_lag", "transport_delay", "sensor_lag")
+"""Effects that scale the added forces, and effects that determine by how much they are advanced (`lead_s`)."""
 
 
 def reason_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx", "fy", "fz")) -> str:
@@ -52,8 +60,9 @@ def reason_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx",
 
 
 def lead_s(physics: MechanicalModel, sample_rate_hz: float) -> float:
-    """Seconds from commanding a force to reading its effect: half a held sample, actuator, sensor. The identified model
-    includes this delay; forces that are added to its own must be advanced by it."""
+    """Delay (s) from a commanded force to its measured effect: half a sample of the hold, delays, and the time constant
+    1 / (2 pi f) of each first-order low pass of actuator and sensor, exact well below its corner f. The identified
+    model includes this delay; forces that are added to the model's forces must be advanced by it."""
     corners = [physics.actuator.bandwidth_hz, physics.sensor.bandwidth_hz]
     late = 0.5 / sample_rate_hz + physics.actuator.delay_s
     for effect in physics.effects:

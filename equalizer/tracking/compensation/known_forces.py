@@ -1,7 +1,10 @@
-"""Forces with which known effects resist a motion along an axis, and their linear equivalents (describing functions).
+"""Forces by which known effects resist a motion along an axis, and their linear equivalents (describing functions).
 
-Each law takes its parameters, position (m), velocity (m/s) and the speed below which a change of sign is smoothed, and
-gives the force (N) that must be added to the command: the effect's own, with the opposite sign. Rotations likewise.
+Each law F(parameters, x, v, slip) takes the position x (m), the velocity v (m/s), (N,) each, and the speed (m/s) below
+which a change of sign is smoothed: sign(v) becomes tanh(v / slip), with slip above zero. It returns the force (N) that
+must be added to the command: the effect's own force with the opposite sign. For rotations the units are rad, rad/s and
+N m. Reference for describing functions: Gelb and Vander Velde, Multiple-Input Describing Functions and Nonlinear
+System Design (1968).
 """
 
 from collections.abc import Callable, Mapping
@@ -13,31 +16,36 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 Law = Callable[[Mapping[str, float], FloatArray, FloatArray, float], FloatArray]
 
 CYCLE = 256
-"""Samples per cycle on which an equivalent is evaluated."""
+"""Samples per cycle of the sinusoid for which a describing function is evaluated."""
 AMPLITUDES = 48
-"""Amplitudes at which an equivalent is evaluated; between them it is interpolated."""
+"""Largest number of lines at which a describing function is evaluated; it is interpolated linearly between them."""
 
 
 def _smooth_sign(velocity: FloatArray, slip: float) -> FloatArray:
+    """tanh(v / slip), because a force that jumps cannot be played."""
     return np.asarray(np.tanh(velocity / slip))
 
 
 def _coulomb(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    """Coulomb friction, F = level sign(v)."""
     return parameters["level"] * _smooth_sign(v, slip)
 
 
 def _asymmetric_friction(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    """Coulomb friction with a level for each direction of motion."""
     return np.where(v > 0, parameters["level_positive"], parameters["level_negative"]) * _smooth_sign(v, slip)
 
 
 def _position_dependent_friction(
     parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
 ) -> FloatArray:
+    """Coulomb friction with the level max(0, level (1 + slope x + bend x²))."""
     level = parameters["level"] * (1 + parameters["slope_per_m"] * x + parameters["bend_per_m2"] * x**2)
     return np.asarray(np.maximum(level, 0.0) * _smooth_sign(v, slip))
 
 
 def _stribeck(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    """Stribeck friction, F = (coulomb + (static - coulomb) exp(-(v / speed)²)) sign(v)."""
     level = parameters["coulomb"] + (parameters["static"] - parameters["coulomb"]) * np.exp(
         -((v / parameters["speed"]) ** 2)
     )
@@ -47,7 +55,8 @@ def _stribeck(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, sli
 def _compute_presliding_hysteresis(
     parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
 ) -> FloatArray:
-    """Dahl's bristle by implicit steps: it bends with the motion and slips at the level."""
+    """Dahl's bristle model (1968): F = stiffness z with dz/dx = 1 - sign(v) z stiffness / level, by implicit Euler
+    steps from z = 0. At z = level / stiffness the bristle slips."""
     longest, bent = parameters["level"] / parameters["stiffness"], 0.0
     bends = np.empty_like(x)
     for k, travel in enumerate(np.diff(x, prepend=x[:1])):
@@ -56,14 +65,17 @@ def _compute_presliding_hysteresis(
 
 
 def _quadratic_damping(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    """F = coefficient v |v|."""
     return parameters["coefficient"] * v * np.abs(v)
 
 
 def _compute_hardening_force(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    """Cubic (Duffing) stiffness, F = k3 x³."""
     return np.asarray(parameters["k3"] * x**3)
 
 
 def _asymmetric_stiffness(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    """Quadratic stiffness, F = k2 x²."""
     return np.asarray(parameters["k2"] * x**2)
 
 
@@ -77,13 +89,15 @@ LAWS: dict[str, Law] = {
     "hardening_stiffness": _compute_hardening_force,
     "asymmetric_stiffness": _asymmetric_stiffness,
 }
+"""Laws by name of the effect."""
 
 
 def equivalent_impedance(
     law: Law, parameters: Mapping[str, float], frequency_hz: FloatArray, speed: FloatArray, slip_share: float
 ) -> ComplexArray:
-    """Sinusoidal describing function (lines,), N s/m: force over velocity at the fundamental, for velocity amplitudes
-    `speed` (lines,), m/s, above zero; from the second of two cycles, so that a bristle has settled.
+    """Sinusoidal describing function (lines,), N s/m: complex ratio of force to velocity at the fundamental, for
+    velocity amplitudes `speed` (lines,), m/s, above zero. From the second of two cycles, in which a bristle has
+    settled. slip_share: slip speed over velocity amplitude.
     """
     chosen = np.unique(np.linspace(0, len(frequency_hz) - 1, min(AMPLITUDES, len(frequency_hz))).round().astype(int))
     angle = 2 * np.pi * np.arange(2 * CYCLE) / CYCLE

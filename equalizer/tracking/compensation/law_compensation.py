@@ -1,9 +1,9 @@
 """Compensation of discovered laws in a feedforward.
 
-A discovered law is a formula that a diagnosis found and that no effect of the catalogue states. A law of the force is
-cancelled along the planned motion: -law(x, v, a) is added to the command. A law of the command (a command map g, static
-and of one command) is inverted: the command u with g(u) = intended force is sent. Laws of a sensor, and laws with
-memory of the command, are left alone with a reason.
+A discovered law is a formula that a diagnosis found because no effect of the catalogue explains the recordings. A law
+of the force is cancelled along the planned motion: -law(x, v, a) is added to the command. A law of the command (a
+static map g of a single command) is inverted: the command u with g(u) = intended force is sent. Laws of a sensor, and
+laws with memory of the command, are not compensated; `reason_law_not_compensated` gives the reason.
 """
 
 from collections.abc import Mapping
@@ -22,18 +22,19 @@ from equalizer.tracking.feedforward.planned_motion import PlannedMotion
 MOTION = ("", "v", "a")
 """Prefixes of the signals of a motion, before the letter of the axis: position, velocity, acceleration."""
 TABLE = 2001
-"""Samples of the table by which a command map is inverted."""
+"""Number of commands in the table by which a command map is inverted; also samples of the cycle in `linear_share`."""
 REACH = 2.0
-"""Range of that table at first, as a multiple of the largest intended force: enough for gains of 0.5 or more."""
+"""First range of that table, as a multiple of the largest intended force: enough for gains of 0.5 or more."""
 _MOST_DOUBLINGS = 3
-"""How often the range is doubled where the map does not reach the intended force in it: gains down to 1/16. A map that
-needs more is near saturation: its commands would use up the cap, and with it the compensation of all other effects."""
+"""Largest number of times that the range is doubled where the map does not reach the intended force: enough for gains
+down to 1/16. A map that needs more is near saturation, where commands would use up the cap, and with it the
+compensation of all other effects."""
 _FLAT = 1e-9
-"""Force within a dead band, relative to the largest force of the table."""
+"""Force, relative to the largest force of the table, below which a command counts as within a dead band."""
 _SPANS = tuple(10.0**decade for decade in range(5))
 """Ranges of commands, in the command's unit, within which a map is tested for rising."""
 PLAYED = 1000.0
-"""Sample rate (Hz) at which a law without memory is evaluated; any value gives the same result."""
+"""Sample rate (Hz) at which a law without memory is evaluated; the result does not depend on it."""
 COMMANDS = "it depends on the command, which its compensation would change, or on the time"
 REMEMBERS = "it has memory of earlier commands, so no map of the present command inverts it"
 SEVERAL = "it depends on several commands or on the time"
@@ -42,8 +43,8 @@ SENSED = "it is an error of the sensor: a force against it would turn that error
 
 
 def reason_law_not_compensated(law: Law, letters: tuple[str, ...]) -> str:
-    """Why a law is not compensated, as a clause after "because"; empty for a law that is. letters: those of the axes,
-    in their order."""
+    """Why a law is not compensated, as a clause after "because"; empty for a law that is compensated. letters: letters
+    of the axes, in the order of the commands."""
     known = {prefix + letter for letter in letters for prefix in MOTION}
     if law.acts_on == "response":
         return SENSED
@@ -60,8 +61,9 @@ def reason_law_not_compensated(law: Law, letters: tuple[str, ...]) -> str:
 def compute_compensating_force(
     law: Law, letters: tuple[str, ...], motion: PlannedMotion, rate_hz: float, slip: float
 ) -> FloatArray:
-    """(N,), in the unit of the command: the force to be added to the command, which cancels that of the law. slip: the
-    speed (m/s) below which a change of sign of a velocity is smoothed, because a force that jumps cannot be played."""
+    """(N,), in the unit of the command: the force to be added to the command, which cancels the force of the law along
+    a motion. slip: speed (m/s) below which a change of sign of a velocity is smoothed, because a force that jumps
+    cannot be played; rate_hz: sample rate of the motion."""
     columns = {
         prefix + letter: column[:, axis]
         for axis, letter in enumerate(letters)
@@ -71,16 +73,16 @@ def compute_compensating_force(
 
 
 def single_axis_law(law: Law, letters: tuple[str, ...], axis: int) -> ForceAgainst:
-    """The law along a sinusoid of this axis while the other axes rest, in the form that `equivalent_impedance` takes.
-    axis: its index in `letters`."""
+    """The law along a sinusoid of a single axis while the other axes rest, in the form that `equivalent_impedance`
+    takes. axis: index of the axis in `letters`. The parameters are ignored: the law contains its own."""
 
     def against(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
-        # Of a sinusoid, rms velocity over rms position is the angular frequency (rad/s).
+        # For a sinusoid, rms velocity over rms position is the angular frequency (rad/s).
         omega = float(np.sqrt(np.mean(v**2) / np.mean(x**2)))
         still = np.zeros((len(x), len(letters)))
         motion = PlannedMotion(still, still.copy(), still.copy())
         motion.position[:, axis], motion.velocity[:, axis], motion.acceleration[:, axis] = x, v, -(omega**2) * x
-        # The samples are two cycles, so that memory has settled in the second.
+        # The samples are two cycles: their number over the duration 2 (2 pi / omega) is the sample rate (Hz).
         return compute_compensating_force(law, letters, motion, len(x) / 2 * omega / (2 * np.pi), slip)
 
     return against
@@ -100,18 +102,19 @@ def linear_share(law: Law, amplitude: float) -> float:
 
 def invert_command_map(law: Law, meant: FloatArray, slip_n: float) -> FloatArray:
     """(N,): the commands that a command map turns into the intended forces `meant` (N,). slip_n: force below which the
-    command crosses a dead band smoothly, because a command that jumps cannot be played; 0 of an intended force of 0.
+    command crosses a dead band smoothly, because a command that jumps cannot be played; 0 if all intended forces are 0.
 
-    By linear interpolation in a table, whose range grows until the map reaches the largest intended force. Where the
-    map never does (saturation), the command is that of the nearest force in the first range. Raises ValueError where
-    the map falls in the first range.
+    By linear interpolation in a table, whose range is doubled until the map reaches all intended forces. Where the map
+    does not reach them (saturation), the command is that of the nearest force in the first range. Raises ValueError
+    where the map decreases somewhere in the first range.
     """
     commands, forces = _tabulate_to(law, meant)
     inverse = np.interp(meant, forces, commands)
     flat = commands[np.abs(forces) <= _FLAT * np.abs(forces).max()]
     if len(flat) < 2 or slip_n <= 0:
         return np.asarray(inverse)
-    # The command at rest is the one nearest to zero; from there to the edge of the dead band as the force rises.
+    # At zero force, the command is the value in the dead band nearest to zero; with rising force it approaches the edge
+    # of the dead band.
     rest = float(np.clip(0.0, flat[0], flat[-1]))
     edge = np.where(meant > 0, flat[-1], flat[0])
     beyond = np.where(meant == 0, 0.0, inverse - edge)
@@ -119,7 +122,8 @@ def invert_command_map(law: Law, meant: FloatArray, slip_n: float) -> FloatArray
 
 
 def _tabulate_to(law: Law, meant: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The table of the smallest range in which the map reaches the intended forces; the first where none does."""
+    """Commands and forces, (TABLE,) each, over the smallest range in which the map reaches the intended forces; over
+    the first range where it never does. Raises ValueError where the map decreases in the first range."""
     span = REACH * max(float(np.abs(meant).max()), np.finfo(np.float64).tiny)
     tables = (_tabulate(law, span * 2**doubling) for doubling in range(_MOST_DOUBLINGS + 1))
     first = next(tables)
@@ -134,22 +138,25 @@ def _tabulate_to(law: Law, meant: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _tabulate(law: Law, span: float) -> tuple[FloatArray, FloatArray]:
-    """(TABLE,) each: commands from -span to span, and the forces that a command map makes of them."""
+    """(TABLE,) each: commands from -span to span, and the forces into which the map turns them."""
     commands = np.linspace(-span, span, TABLE)
     return commands, evaluate(law, {law.variables[0]: commands}, PLAYED)
 
 
 def _is_rising(forces: FloatArray) -> bool:
+    """Whether forces (TABLE,) are finite and never decrease."""
     return bool(np.isfinite(forces).all() and (np.diff(forces) >= 0).all())
 
 
 def _smooth_signs(law: Law, slip: float) -> Law:
-    """The law with sign(v) replaced by tanh(v / slip) for each velocity v, as for the friction of the catalogue."""
+    """The law with sign(v) replaced by tanh(v / slip) for each velocity v, as in `known_forces`; unchanged
+    for a slip of 0."""
     tree = _smooth_node(law.tree, slip)
     return Law(format_formula(tree, None, None), law.numbers, law.units, law.acts_on, law.axis)
 
 
 def _smooth_node(node: Node, slip: float) -> Node:
+    """The expression tree with the replacements of `_smooth_signs`."""
     match node:
         case Apply("sign", (Variable(name) as velocity,)) if name.startswith("v") and slip > 0:
             return Apply("tanh", (Apply("/", (velocity, Number(slip))),))

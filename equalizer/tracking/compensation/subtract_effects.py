@@ -1,8 +1,9 @@
 """Subtraction of known effects from a recording: their forces along the measured motion are subtracted from the
-commands. A model identified from the result describes the linear part, and `compensate` then adds the complete effects.
+commands. A model identified from the result describes the linear part only; `compensate` then adds the complete forces
+of the effects.
 
-The force of an axis that sticks cannot be computed from its motion: all axes must move all the time (multisines on all
-axes, well above friction), which excludes sweeps of one axis after the other.
+The force of an axis that sticks cannot be computed from its motion. All axes must therefore move all the time
+(multisines on all axes, well above friction), which excludes sweeps of one axis after the other.
 """
 
 from dataclasses import replace
@@ -24,22 +25,22 @@ from equalizer.tracking.compensation.known_forces import pass_deadband
 from equalizer.tracking.feedforward.planned_motion import planned_motion
 
 HIGHEST_SHARE = 3.0
-"""Upper end of the band in which the motion is integrated, over the highest driven frequency: up to the third harmonic,
-the strongest that dry friction makes."""
+"""Upper end of the band in which the motion is integrated, relative to the highest driven frequency: it includes the
+third harmonic, the strongest harmonic of dry friction."""
 LOWEST_SHARE = 0.75
-"""Lower end of that band over the lowest driven frequency; below it, integration amplifies the sensor's noise and drift
-by 1/f². By hand."""
+"""Lower end of that band, relative to the lowest driven frequency; below it, double integration amplifies the noise and
+drift of the sensor by 1/f². Set by hand."""
 NYQUIST_SHARE = 0.45
-"""Highest frequency of that band over the sample rate: below Nyquist by the room of the band's edge."""
+"""Limit of the upper end, relative to the sample rate: it leaves room for the edge of the band below Nyquist."""
 
 
 def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz: tuple[float, float]) -> Recording:
-    """The recording with commands u - F(q, v) / g, where F is the force of the known effects along the measured motion
-    and g the gain of the axis's actuator.
+    """The recording with commands u - F(x, v) / g, where F is the force that would compensate the known effects along
+    the measured motion, and g the gain of the axis's actuator.
 
-    The response must be the acceleration, axis by axis with the commands. excited_hz: band of the commands' power. The
-    excitation is not changed. Effects that act on the command are applied to it, before forces are subtracted. Raises
-    ValueError for another response, missing samples, unknown axes.
+    The response must be the acceleration, one channel per command, in the same order. excited_hz: band of the commands'
+    power. The excitation is not changed. Effects that act on the command are applied to it before forces are
+    subtracted. Raises ValueError for another response, missing samples, and unknown axes.
     """
     inputs, outputs = recording.command.channels, recording.response.channels
     if recording.response.quantity != "acceleration" or len(inputs) != len(outputs):

@@ -1,6 +1,7 @@
-"""Feedforward forces of a single model for a wanted acceleration.
+"""Feedforward forces for a wanted acceleration, by the inverse of a single identified model.
 
-`trajectory` (a table) -> `band_split` -> `feedforward` (finite, by the tracker) or `periodic_inverse` (repeated in a
-loop) -> `quality`. `model_equalizer` implements the port `equalizer` for stimuli of a session; `baselines` are other
-ways to compute forces. Begin at `feedforward.py`.
+`trajectory` (CSV table) -> `band_split` -> `feedforward` (a finite record, by the tracker) or `periodic_inverse` (a
+periodic signal) -> `quality` (of the delivered acceleration). `model_equalizer` implements the interface of
+`equalizer` for the stimuli of a study. Tools: `band_part`, `planned_motion`, `virtual_spring`. `baselines` has simpler
+methods for comparison. Begin at `feedforward.py`.
 """

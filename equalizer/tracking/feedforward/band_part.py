@@ -1,17 +1,22 @@
-"""Zero-phase band-pass filtering of a finite record, in the frequency domain."""
+"""Zero-phase band-pass filtering of a finite record, in the frequency domain.
+
+The gain is 1 within the band and has raised-cosine edges outside it, because a sharp edge would ring for seconds.
+"""
 
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
 
 LOW_EDGE, HIGH_EDGE = 0.9, 1.06
-"""Raised-cosine edges: relative frequencies at which they begin; a sharp edge would ring for seconds."""
+"""Outer ends of the edges, where the gain is zero, relative to the lower and to the upper limit of the band."""
 QUIET_S = 1.0
-"""Zeros appended to the record, so that its end does not wrap around to its beginning."""
+"""Duration (s) of the zeros appended to the record, so that the end of the filtered record does not wrap around to its
+beginning."""
 
 
 def band_part(samples: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:
-    """Part of samples (N, channels) within the band. The samples must begin and end at rest, or be noise."""
+    """Part of samples (N, channels) within the band (Hz), in their unit. The samples must begin and end at zero, or be
+    noise: the record is zero-padded."""
     length = find_padded_length(len(samples), sample_rate_hz)
     lines = np.fft.rfft(samples, length, axis=0)
     share = band_share(np.asarray(np.fft.rfftfreq(length, 1 / sample_rate_hz), dtype=np.float64), band_hz)
@@ -20,7 +25,7 @@ def band_part(samples: FloatArray, sample_rate_hz: float, band_hz: tuple[float, 
 
 
 def band_share(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> FloatArray:
-    """Gain of the band pass (lines,): 1 in the band, 0 well outside."""
+    """Gain of the band pass, (lines,): 1 in the band, 0 outside its edges. A band from 0 Hz has no lower edge."""
     low, high = band_hz
     rise = np.ones_like(frequency_hz) if low == 0 else (frequency_hz / low - LOW_EDGE) / (1 - LOW_EDGE)
     fall = (HIGH_EDGE - frequency_hz / high) / (HIGH_EDGE - 1)
@@ -29,5 +34,5 @@ def band_share(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> FloatA
 
 
 def find_padded_length(samples: int, sample_rate_hz: float) -> int:
-    """Number of samples with QUIET_S of zeros appended."""
+    """Number of samples after `QUIET_S` of zeros is appended."""
     return samples + round(QUIET_S * sample_rate_hz)

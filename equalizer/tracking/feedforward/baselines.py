@@ -1,7 +1,8 @@
-"""Baseline methods that turn wanted accelerations into forces, for comparison: each gives its inverse line by line.
+"""Baseline methods of equalization for comparison: each is a matrix, per spectral line, from wanted accelerations to
+forces.
 
-Costs are multiply-adds per sample of a form that runs sample by sample at the response's rate; loops that are computed
-beforehand cost nothing while they play.
+Costs are multiply-adds per sample of an implementation that runs sample by sample at the sample rate of the response. A
+periodic command that is computed beforehand costs nothing while it is played.
 """
 
 from dataclasses import dataclass
@@ -17,11 +18,11 @@ from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, inverse_resp
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inverse:
-    """Matrix from wanted accelerations to forces, line by line."""
+    """Matrix from wanted accelerations to forces at each spectral line."""
 
     name: str
     response: ComplexArray
-    """(lines, m, p)"""
+    """(lines, m, p), N per m/s²."""
     multiply_adds: int
     """Multiply-adds per sample for all channels."""
 
@@ -29,7 +30,8 @@ class Inverse:
 def baseline_inverses(
     model: IdentifiedModel, measured: FrequencyResponse, frequency_hz: FloatArray
 ) -> tuple[Inverse, ...]:
-    """All baseline inverses from the data of one place, the identified model's last."""
+    """All baseline inverses from the data of one place; the last is that of the identified model. frequency_hz:
+    (lines,), above zero. Raises ValueError where the measured response does not cover them."""
     return (
         no_equalization(model, frequency_hz),
         static_gain(model, frequency_hz),
@@ -41,12 +43,13 @@ def baseline_inverses(
 
 
 def no_equalization(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """No equalization: the wanted number in m/s² is commanded in N."""
+    """No equalization: the wanted acceleration in m/s² is commanded as a force in N."""
     return Inverse("nothing", _constant_response(np.eye(*model.D.shape[::-1]), frequency_hz), 0)
 
 
 def static_gain(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """A common gain for all axes, for which the geometric mean of the delivered level over the lines is right."""
+    """A common gain for all axes: the inverse of the geometric mean, over lines and axes, of the direct responses'
+    magnitude."""
     along = np.abs(np.einsum("lii->li", model_response(model, frequency_hz)))
     gain = float(np.exp(-np.log(along).mean()))
     return Inverse(
@@ -55,17 +58,17 @@ def static_gain(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
 
 
 def acceleration_matching(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """Each axis by itself, its own response inverted as if there were no coupling (Kuchenbecker et al. 2006).
-
-    Cost: a transfer function of the model's order per axis."""
+    """Acceleration matching (Kuchenbecker et al. 2006, IEEE Trans. Vis. Comput. Graph. 12:219): the direct response of
+    each axis is inverted, and coupling between axes is neglected. Cost: a transfer function of the model's order per
+    axis."""
     along = np.einsum("lii->li", model_response(model, frequency_hz))
     inverse = np.einsum("li,ij->lij", 1 / along, np.eye(along.shape[1]))
     return Inverse("acceleration matching", inverse, along.shape[1] * (2 * model.order + 1))
 
 
 def rigid_body(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """Mass, damping and stiffness matrices, fitted so that their forces give the wanted acceleration over the given
-    lines: force = M a + B v + K x."""
+    """Rigid-body inverse dynamics, force = M a + B v + K x, with matrices fitted by least squares so that the model's
+    response to these forces is the wanted acceleration at the given lines."""
     G = model_response(model, frequency_hz)
     lines, p, m = G.shape
     w = 2 * np.pi * frequency_hz
@@ -77,13 +80,13 @@ def rigid_body(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
     matrices = np.linalg.lstsq(real / scale, np.vstack([wanted, 0 * wanted]), rcond=None)[0] / scale[:, None]
     M, B, K = matrices.reshape(3, m, p)
     inverse = sum(part[:, None, None] * matrix for part, matrix in zip(parts, (M, B, K), strict=True))
-    # Three matrices, and two integrations per axis.
+    # Cost: three matrices, and two integrations per axis.
     return Inverse("rigid-body dynamics", np.asarray(inverse, dtype=complex), 3 * m * p + 2 * p)
 
 
 def raw_estimate(measured: FrequencyResponse, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
-    """The measured response itself, interpolated linearly between its lines. Cost: a filter as long as one period of
-    the finest line. Raises ValueError for frequencies outside the lines."""
+    """Regularised inverse of the measured response, interpolated linearly between its reliable lines. Cost: FIR filters
+    as long as the inverse of the smallest line spacing. Raises ValueError for frequencies outside the lines."""
     lines = measured.of_lines(measured.reliable)
     low, high = (lines.frequency_hz[0], lines.frequency_hz[-1]) if len(lines) else (np.inf, -np.inf)
     if not len(lines) or frequency_hz.min() < low or frequency_hz.max() > high:
@@ -99,11 +102,13 @@ def raw_estimate(measured: FrequencyResponse, frequency_hz: FloatArray, weight: 
 
 
 def make_identified_inverse(model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
-    """The identified model's regularised inverse. Cost: its state, and the stored gains on it; less in modal form."""
+    """Regularised inverse of the identified model. Cost: state update and stored gains, with a full state matrix; less
+    in modal form."""
     m, p = model.D.shape[1], model.D.shape[0]
     cost = model.order**2 + 2 * model.order * m + m * p
     return Inverse("identified model", inverse_response(model, frequency_hz, weight), cost)
 
 
 def _constant_response(matrix: FloatArray, frequency_hz: FloatArray) -> ComplexArray:
+    """(lines, m, p): the same matrix at every line."""
     return np.broadcast_to(matrix.astype(complex), (len(frequency_hz), *matrix.shape)).copy()

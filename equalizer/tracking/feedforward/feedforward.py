@@ -1,7 +1,8 @@
-"""Feedforward forces for a wanted acceleration: band-limited, tracked by a model from the first row on, under a cap.
+"""Feedforward forces for a wanted acceleration, by finite-horizon linear-quadratic tracking with an identified model.
 
-The part of the wanted acceleration outside the band is not played, because the model is not valid there; its share is
-stated. There is one row of forces per row of the wanted acceleration, from rest.
+The wanted acceleration is first limited to the model's band, because the model is not valid outside it; the share that
+is not played is stated. There is one row of forces per row of the wanted acceleration, from rest. Forces above a cap
+are refused, or solved again under the cap with the loss stated (`constrained`).
 """
 
 from dataclasses import dataclass
@@ -24,23 +25,26 @@ from equalizer.tracking.lqr.tracking_problem import (
 )
 
 EDGE_ROOM_HZ = 1.0
-"""Margin beyond the model's band, so that the whole band is played."""
+"""Margin of the crossovers beyond the model's band, so that the whole band is played."""
 LEAKED = 3e-3
-"""Share of a signal that filters leak from outside the band: less than that inside the band counts as nothing."""
+"""Leakage of the filters from outside the band, relative to the rms of a signal. A signal with a smaller share inside
+the band has no content there."""
 NO_CAP_N = 1e9
-"""A cap that never acts, for forces whose sum is checked later."""
+"""A cap (N) without effect, for forces of which only the sum is checked later."""
 PROVED = 1e-3
-"""Relative duality gap to which forces under the cap are solved."""
+"""Relative duality gap at which the iteration for forces under the cap ends."""
 
 
 @dataclass(frozen=True, slots=True)
 class FeedforwardSettings:
-    """Weight of the forces (R = weight I, of |u|²), and cap on the norm of the force vector."""
+    """Weight of the forces, and cap on the norm of the force vector."""
 
     weight: float = 1e-3
+    """R = weight I, of |u|² against the squared tracking error, (m/s² per N)²."""
     cap_n: float = 3.0
     constrain: bool = False
-    """Above the cap: False refuses; True solves again under the cap and states the loss."""
+    """Where forces exceed the cap: False raises ForceLimitError; True solves again under the cap and states the
+    loss."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
@@ -48,19 +52,21 @@ class Feedforward(Summarised):
     """Forces for a wanted acceleration, and the model's prediction of what they achieve."""
 
     forces: Signal
-    """(N, m)"""
+    """(N, m), N."""
     wanted: FloatArray
-    """(N, p): the part of the wanted acceleration within the band, which is played."""
+    """(N, p), m/s²: the part of the wanted acceleration within the band, which is played."""
     predicted: FloatArray
-    """(N, p): the model's response."""
+    """(N, p), m/s²: the model's response to the forces, from rest."""
     error: float
     """Relative rms error of predicted against wanted acceleration, in the band."""
     left_out: float
-    """Rms share of the wanted acceleration that is outside the band, 0 to 1."""
+    """Rms of the part outside the band over rms of the wanted acceleration."""
     peaks: Peaks
     loss: TrackingLoss | None = None
+    """Tracking loss due to the cap; None where forces did not have to be constrained."""
 
     def summary(self) -> Summary:
+        """Length, predicted error, share that is not played, and highest force of an axis."""
         highest_n = float(np.abs(self.forces.samples).max(initial=0.0))
         return Summary(
             "Forces for wanted accelerations",
@@ -74,11 +80,11 @@ class Feedforward(Summarised):
 
 
 def feedforward(model: IdentifiedModel, wanted: Signal, settings: FeedforwardSettings | None = None) -> Feedforward:
-    """Solve for the forces for which the model accelerates as wanted, within its band.
+    """Compute forces to which the model responds with the wanted acceleration, within its band.
 
-    Finite-horizon LQR tracking from rest, which equals the least squares of the block-Toeplitz response with a weight
-    on the forces. wanted: (N, p), with the model's rate and output channels. Raises ForceLimitError above the cap,
-    TrackingError where nothing is wanted in the band, ValueError for a signal that is not the model's.
+    Finite-horizon LQR tracking from rest, which equals least squares with the block-Toeplitz matrix of the impulse
+    response and a weight on the forces. wanted: (N, p). Raises ForceLimitError for forces above the cap, TrackingError
+    where nothing is wanted in the band, ValueError where sample rate, number of channels or unit are not the model's.
     """
     settings = settings or FeedforwardSettings()
     check_wanted(model, wanted)
@@ -124,8 +130,8 @@ def band_edges(model: IdentifiedModel) -> BandEdges:
 def solve_causally(
     problem: TrackingProblem, wanted: FloatArray, settings: FeedforwardSettings, others: FloatArray | None = None
 ) -> tuple[FloatArray, TrackingLoss | None]:
-    """Forces (N, m) from the first row on; where the settings constrain, their sum with others (N, m) is under the
-    cap."""
+    """Forces (N, m), N, from the first row on, and the loss due to the cap (None without). With `settings.constrain`,
+    the sum of the forces with others (N, m) is under the cap."""
     free = track_padded(problem, wanted, CAUSAL).forces
     total = free if others is None else free + others
     if not settings.constrain or force_peaks(total, settings.cap_n).fits:

@@ -1,4 +1,8 @@
-"""Motion of the handle for a delivered acceleration: its integrals within a band, about the equilibrium."""
+"""Motion of the handle for a given acceleration: velocity and position by integration in the frequency domain.
+
+Division by 2 pi i f, and by its square, within a band that excludes zero frequency; the motion is about the
+equilibrium.
+"""
 
 from dataclasses import dataclass
 
@@ -10,7 +14,7 @@ from equalizer.tracking.feedforward.band_part import band_share, find_padded_len
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedMotion:
-    """(N, p) each: m, m/s, m/s²; or rad and its rates."""
+    """Position, velocity and acceleration, (N, p) each: m, m/s, m/s², or rad, rad/s, rad/s²."""
 
     position: FloatArray
     """Position relative to the equilibrium; components below the band are not included."""
@@ -21,8 +25,8 @@ class PlannedMotion:
 def planned_motion(
     wanted: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float], lead_s: float = 0.0
 ) -> PlannedMotion:
-    """Motion for wanted accelerations (N, p) that begin and end at rest. lead_s: time by which the motion is advanced.
-    Raises ValueError for a band that begins at zero: a constant acceleration has no bounded motion."""
+    """Motion for wanted accelerations (N, p), m/s², that begin and end at rest. lead_s: time (s) by which the motion is
+    advanced. Raises ValueError for a band that begins at zero: a constant acceleration has no bounded motion."""
     if band_hz[0] <= 0:
         raise ValueError(f"the band begins at {band_hz[0]:g} Hz; a motion about a resting place needs more than 0 Hz")
     length = find_padded_length(len(wanted), sample_rate_hz)
@@ -33,6 +37,7 @@ def planned_motion(
     spectrum = np.fft.rfft(wanted, length, axis=0) * share[:, np.newaxis]
 
     def integrate(times: int) -> FloatArray:
+        """(N, p): the acceleration in the band, integrated this number of times."""
         rows: FloatArray = np.fft.irfft(spectrum / s[:, np.newaxis] ** times, length, axis=0)[: len(wanted)]
         return rows
 

@@ -1,8 +1,8 @@
-"""Quality of an equalized response: flatness, coupling, direction.
+"""Quality of an equalized response: flatness, coupling between axes, and direction error.
 
-T, (lines, p, p), maps wanted to delivered accelerations; ideal is the identity. A sinusoid wanted along axis i is
-delivered as the ellipse Re(T[:, i] exp(i omega t)), whose major axis is the first left singular vector of the real
-p x 2 matrix (Re T[:, i], Im T[:, i]).
+T, (lines, p, p), is the response from wanted to delivered accelerations; ideally it is the identity. A sinusoid wanted
+along axis i is delivered as the ellipse Re(T[:, i] exp(j omega t)), j² = -1, whose major axis is the first left
+singular vector of the real p x 2 matrix (Re T[:, i], Im T[:, i]).
 """
 
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from equalizer.signals.signal import ComplexArray
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """Worst values over all lines; ideal are 0 dB, -infinity dB, 0 degrees."""
+    """Worst values over all lines and axes; the ideal values are 0 dB, -infinity dB and 0 degrees."""
 
     flatness_db: float
     """Largest |20 log10 |T_ii||: deviation of the delivered level along a wanted axis, in either direction."""
     coupling_db: float
-    """Largest 20 log10(|T_ji| / |T_ii|), j != i: off-axis response over that along the wanted axis."""
+    """Largest 20 log10(|T_ji| / |T_ii|), j != i: response along another axis relative to that along the wanted axis."""
     axis_error_deg: float
     """Largest angle between the wanted axis and the major axis of the delivered ellipse."""
 

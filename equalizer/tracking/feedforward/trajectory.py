@@ -1,4 +1,8 @@
-"""Trajectories of wanted accelerations or commanded forces as CSV tables, both ways."""
+"""Trajectories of wanted accelerations or commanded forces: read from and written to CSV tables.
+
+A table has a header, the time in its first column (s) and constant time steps. Its header determines its kind:
+accelerations of three axes, forces of three axes, or a transient along a single direction.
+"""
 
 import csv
 import io
@@ -10,18 +14,19 @@ from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray, Signal
 
 STEP_TOLERANCE = 0.01
-"""Largest relative deviation of a time step from the mean step, for the rate to count as constant. By hand."""
+"""Largest relative deviation of a time step from the mean step, for the rate to count as constant. Set by hand."""
 RATE_TOLERANCE = 1e-5
-"""Relative distance to a whole number of hertz to which a rate is rounded, because printed time stamps are rounded."""
+"""Largest relative distance from a whole number of hertz at which a rate is rounded to it, because printed time stamps
+are rounded."""
 
 
 class TableError(ListedProblemsError):
-    """A table that cannot be used. `problems`: one sentence each, with the line."""
+    """A CSV table is invalid. `problems`: one sentence each, with the line number where there is one."""
 
 
 @dataclass(frozen=True, slots=True)
 class TableKind:
-    """Layout of a CSV table: its header, and quantity and unit of the columns after the time."""
+    """Layout of a CSV table: header, and quantity and unit of all columns after the time."""
 
     name: str
     header: tuple[str, ...]
@@ -32,14 +37,14 @@ class TableKind:
 TRAJECTORY = TableKind("trajectory", ("time_s", "ax", "ay", "az"), "acceleration", "m/s^2")
 FORCES = TableKind("forces", ("time_s", "fx", "fy", "fz"), "force", "N")
 TRANSIENT = TableKind("transient", ("time_s", "a"), "acceleration", "m/s^2")
-"""Acceleration along one direction, which is chosen when it is played."""
-# A table is recognised by its header, so no two kinds may share one.
+"""Acceleration along a single direction, which is chosen at playback."""
+# The header identifies the kind of a table, so that all headers must differ.
 TABLE_KINDS = (TRAJECTORY, FORCES, TRANSIENT)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """Samples at a constant rate, undefined before the first and after the last."""
+    """Samples at a constant rate. Raises ValueError where quantity, unit or channels are not those of its kind."""
 
     signal: Signal
     """(n, 3): acceleration (m/s²) wanted, or force (N) commanded; (n, 1) for a transient."""
@@ -48,7 +53,7 @@ class Trajectory:
 
     @property
     def kind(self) -> TableKind:
-        """Layout of its table, by quantity and channels: FORCES, TRANSIENT or TRAJECTORY."""
+        """Layout of the table, by quantity and channels: FORCES, TRANSIENT or TRAJECTORY."""
         if self.signal.quantity == FORCES.quantity:
             return FORCES
         return TRANSIENT if self.signal.channels == TRANSIENT.header[1:] else TRAJECTORY
@@ -64,7 +69,8 @@ class Trajectory:
 
 
 def parse_trajectory(text: str) -> Trajectory:
-    """A table of one of `TABLE_KINDS`, recognised by its header. Raises TableError."""
+    """Parse a table of one of `TABLE_KINDS`. Raises TableError for text that is not CSV, an unknown header, fields that
+    are not finite numbers, fewer than two rows, and time steps that are not constant."""
     try:
         rows = list(csv.reader(io.StringIO(text.rstrip())))
     except csv.Error as error:
@@ -81,7 +87,8 @@ def parse_trajectory(text: str) -> Trajectory:
 
 
 def trajectory_csv(trajectory: Trajectory) -> str:
-    """Text that `parse_trajectory` reads back to the same numbers. Raises TableError on missing samples."""
+    """CSV text from which `parse_trajectory` reads the same samples. Raises TableError for missing or infinite
+    samples."""
     samples = trajectory.signal.samples
     if not np.isfinite(samples).all():
         raise TableError((f"a table of {trajectory.kind.name} cannot hold missing or infinite values",))
@@ -93,14 +100,15 @@ def trajectory_csv(trajectory: Trajectory) -> str:
 
 
 def require_rate(trajectory: Trajectory, rate_hz: float) -> None:
-    """Require the model's sample rate. Raises TableError where the rows are not at the model's rate."""
+    """Check that a trajectory has the model's sample rate, `rate_hz`. Raises TableError where it has another rate."""
     found = trajectory.signal.sample_rate_hz
     if abs(found - rate_hz) > RATE_TOLERANCE * rate_hz:
         raise TableError((f"the rows are at {found:g} Hz, but the model is at {rate_hz:g} Hz; resample them to it",))
 
 
 def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
-    """(n, columns), n >= 2. Raises TableError with the first lines that are wrong."""
+    """Numbers of the rows after the header, (n, columns), n >= 2. Raises TableError with the first wrong lines, six at
+    most."""
     width = len(kind.header)
     found, problems = [], []
     for line, row in enumerate(rows, start=2):
@@ -123,7 +131,8 @@ def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
 
 
 def _find_rate_hz(time_s: FloatArray) -> float:
-    """Sample rate of rows at these times (n,), rounded to whole hertz within `RATE_TOLERANCE`. Raises TableError."""
+    """Sample rate (Hz) of rows at these times (n,), rounded to whole hertz within `RATE_TOLERANCE`. Raises TableError
+    for times that do not increase and for steps that are not constant within `STEP_TOLERANCE`."""
     steps = np.diff(time_s)
     mean = float(time_s[-1] - time_s[0]) / len(steps)
     if mean <= 0 or (steps <= 0).any():

@@ -1,7 +1,7 @@
-"""The virtual spring that holds the handle at its place, and its share in the forces that are played.
+"""The virtual spring and damper by which the device's control loop holds the handle at its place.
 
-A model's input is the total force that enters the plant. Where a spring adds to the commands, its force along the
-planned motion is subtracted from them: u = f - s, with s = -(k x + b v).
+The input of a model is the total force f that enters the plant. Where the loop adds the force s of a spring to the
+commands, that force along the planned motion is subtracted from them: u = f - s, with s = -(k x + b v).
 """
 
 import math
@@ -27,10 +27,11 @@ class VirtualSpring:
                 raise ValueError(f"{name} is {value}; it must be a number that is not negative")
 
     def force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines,), N per m/s²: force of the spring on a handle that oscillates at these frequencies, all above
-        zero."""
+        """(lines,), N per m/s²: force of the spring over acceleration of the handle, -(k + b s) / s² with s = 2 pi i f.
+        frequency_hz: (lines,), above zero."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)
         return np.asarray(-(self.stiffness_n_per_m + self.damping_n_s_per_m * s) / s**2)
 
 
 NO_SPRING = VirtualSpring()
+"""Zero stiffness and damping."""

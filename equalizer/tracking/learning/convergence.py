@@ -1,8 +1,9 @@
 """Convergence test of iterative learning control, before anything is played.
 
-Forces that are corrected by u <- u + beta Gm⁻¹ e leave the error (I - beta G Gm⁻¹) e on a linear device: its largest
-singular value at a line is the worst-case share of the error that remains. Below 1 at every line, the error falls
-monotonically in the 2-norm; G is measured, Gm the model whose inverse is played.
+On a linear device with response G, a correction of the forces u <- u + beta Gm⁻¹ e, with the model Gm and the gain
+beta, leaves the error (I - beta G Gm⁻¹) e. The largest singular value of this matrix at a spectral line is the
+worst-case share of the error that remains. Where it is below 1 at every line, the 2-norm of the error decreases
+monotonically.
 
 Reference: Bristow, Tharayil and Alleyne, A Survey of Iterative Learning Control, IEEE Control Systems 26 (2006), 96.
 """
@@ -16,17 +17,19 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Convergence:
-    """Prediction for iterative learning with gain beta: worst-case share of an error that remains after a
-    correction."""
+    """Prediction for iterative learning with gain beta: worst-case share of the error that remains after one
+    correction, by line."""
 
     frequency_hz: FloatArray
     """(lines,): frequencies within the band."""
     surviving: FloatArray
-    """(lines,): largest singular value of I - beta G Gm⁻¹; of the worst response where several were given."""
+    """(lines,): largest singular value of I - beta G Gm⁻¹, the largest of all draws where several responses were
+    given."""
     beta: float
+    """Gain of the correction."""
     safe_beta: float
-    """Largest gain with which every error decreases at every line, in any direction; 0 where there is none. At most
-    2."""
+    """Upper bound of the gains with which every error decreases at every line, in any direction; 0 where no gain does,
+    limited to 2."""
 
     @property
     def converges(self) -> bool:
@@ -46,9 +49,9 @@ def convergence(
     band_hz: tuple[float, float],
     beta: float = 1.0,
 ) -> Convergence:
-    """Convergence of learning with the inverse of model (lines, p, p) on device (lines, p, p) or (draws, lines, p, p):
-    a second measurement, or draws from the model's uncertainty. Raises ValueError on other shapes, and where no line
-    lies in the band.
+    """Convergence of learning with the inverse of the response `model`, (lines, p, p), on a device with the response
+    `device`, (lines, p, p) or (draws, lines, p, p): a second measurement, or draws from the model's uncertainty. Both
+    in m/s² per N. Raises ValueError for other shapes, and where no line is in the band.
     """
     device = np.asarray(device)[np.newaxis] if np.ndim(device) == 3 else np.asarray(device)
     if model.ndim != 3 or model.shape[1] != model.shape[2] or device.shape[1:] != model.shape:
@@ -65,8 +68,8 @@ def convergence(
 
 
 def _safe_beta(played: ComplexArray) -> float:
-    """Largest gain with which |I - beta T| < 1 for all T of played (..., lines, p, p). As matrix inequalities the
-    condition reads T + T* > beta T* T, which is T⁻¹ + T⁻* > beta I."""
+    """Upper bound, 0 to 2, of the gains with |I - beta T| < 1 for all T of `played`, (..., lines, p, p). As matrix
+    inequalities the condition is T + T* > beta T* T, hence T⁻¹ + T⁻* > beta I: the smallest eigenvalue is the bound."""
     inverse = np.linalg.inv(played)
     lowest = np.linalg.eigvalsh(inverse + inverse.conj().swapaxes(-1, -2))[..., 0].min()
     return float(np.clip(lowest, 0.0, 2.0))

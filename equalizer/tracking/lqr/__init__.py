@@ -1,6 +1,7 @@
 """Finite-horizon linear-quadratic tracking (Anderson and Moore 1990): gains once, then two passes per trajectory.
 
-`tracking_problem` (the cost) -> `riccati` (the recursion; `riccati_kernel` compiled) -> `lqr` (forces). `constrained`
-and `limits` keep forces below a cap, `padding` makes room before and after. `rotation`, `changing_direction`, `preview`
-and `contact` reuse the stored gains. Begin at `lqr.py`.
+`tracking_problem` (model and cost) -> `riccati` (gains; `riccati_kernel` is compiled) -> `lqr` (forces of a trajectory;
+`lqr_kernel` is compiled). `limits` and `constrained` keep forces below a cap, `padding` adds zeros before and after.
+Built on the stored gains: `rotation`, `changing_direction`, `contact`; on stationary gains: `preview`. Begin at
+`lqr.py`.
 """

@@ -1,8 +1,10 @@
 """A transient whose direction changes while it is played: optimal forces from the model's present state, at each tick.
 
-The feedforward of the trajectory ahead is linear in the direction, and the gains do not depend on it: both are stored,
-and a new direction costs a combination of nine numbers per axis. Each tick solves the rest of the trajectory exactly.
-Overlapping transients have a LiveState each, and their forces are added. `restart` replaces a transient by another.
+The force of the tracker (`lqr`) is u_k = g_k - K_k x_k. The gains K do not depend on the direction, and the feedforward
+g is linear in it: g is stored for each element of the direction (9 for a rotation of three axes, 3 for a normal), and a
+new direction costs one linear combination per tick. Each tick is optimal for the remaining trajectory in the present
+direction. Overlapping transients have a LiveState each, and their forces are added. `restart` replaces a transient by
+another.
 """
 
 from dataclasses import dataclass
@@ -18,16 +20,16 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProbl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TurningTransient:
-    """Made by `make_rotatable_transient` or `normal_transient`. `lqr_kernel.tick` takes its arrays in a compiled
-    loop."""
+    """Stored gains and feedforward of a transient of N rows, made by `make_rotatable_transient` or `normal_transient`.
+    Its arrays are arguments of `lqr_kernel.tick`, for compiled loops."""
 
     problem: TrackingProblem
     K: FloatArray
-    """(N, m, n)"""
+    """(N, m, n): gains on the state."""
     g: FloatArray
-    """(N, m, directions)"""
+    """(N, m, c): feedforward per element of the direction, N; c = p p or p."""
     direction_shape: tuple[int, ...]
-    """(p, p): a direction is a rotation; (p,): a normal."""
+    """(p, p) where a direction is a rotation matrix; (p,) where it is a normal."""
 
     def __len__(self) -> int:
         return int(self.K.shape[0])
@@ -38,9 +40,9 @@ class LiveState:
     """State of a transient while it is played: its next row, and the state of the model."""
 
     tick: int
-    """The row that comes next."""
+    """Index of the next row."""
     x: FloatArray
-    """(n,): the state of the model."""
+    """(n,): state of the model before that row."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,21 +50,22 @@ class TurningResult:
     """Forces and predicted response of T ticks; result of `play`."""
 
     forces: FloatArray
-    """(T, m)"""
+    """(T, m), N."""
     predicted: FloatArray
-    """(T, p): the model's response."""
+    """(T, p), m/s²: the model's response."""
     state: LiveState
     """State after the last of these rows."""
 
 
 def make_rotatable_transient(gains: StoredGains, trajectory: FloatArray) -> TurningTransient:
-    """Transient of a trajectory (N, p), before it is rotated. The gains have a free end, or rest as final state."""
+    """Transient of a trajectory (N, p), m/s², before rotation. gains: for N rows, with a free end or rest as final
+    state. Raises TrackingError for another shape."""
     p = gains.problem.outputs
     return _make_transient(gains, every_rotation(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
 def normal_transient(gains: StoredGains, recording: FloatArray) -> TurningTransient:
-    """Transient of a recording (N,), to be played along a normal."""
+    """Transient of a recording (N,), m/s², to be played along a normal. Raises TrackingError for another shape."""
     p = gains.problem.outputs
     return _make_transient(gains, every_normal(recording, p), (p,))
 
@@ -73,23 +76,24 @@ def initial_state(transient: TurningTransient) -> LiveState:
 
 
 def restart(state: LiveState) -> LiveState:
-    """State at the first row, from the present motion: the former transient's free decay is compensated."""
+    """State at the first row of a new transient, from the present state of the model: the free decay of the former
+    transient is compensated."""
     return LiveState(0, state.x)
 
 
 def step(transient: TurningTransient, state: LiveState, direction: FloatArray) -> tuple[FloatArray, LiveState]:
-    """The force (m,) of this tick, and the next state. After the last row the force is zero.
+    """Force (m,), N, of this tick, and the next state. After the last row the force is zero. direction: (p, p) or (p,).
 
-    Raises TrackingError on another shape of the direction.
+    Raises TrackingError for another shape of the direction.
     """
     turned = play(transient, np.asarray(direction, dtype=np.float64)[np.newaxis], state)
     return turned.forces[0], turned.state
 
 
 def play(transient: TurningTransient, directions: FloatArray, state: LiveState | None = None) -> TurningResult:
-    """Many ticks, compiled. directions: (T, p, p) or (T, p), one per tick; state: None = from rest, first row.
+    """T ticks in a compiled loop. directions: (T, p, p) or (T, p), one per tick; state: None = first row, at rest.
 
-    Raises TrackingError on another shape of the directions.
+    Raises TrackingError for another shape of the directions.
     """
     problem, live = transient.problem, initial_state(transient) if state is None else state
     turns = np.asarray(directions, dtype=np.float64)
@@ -107,5 +111,6 @@ def play(transient: TurningTransient, directions: FloatArray, state: LiveState |
 
 
 def _make_transient(gains: StoredGains, wanted: FloatArray, direction_shape: tuple[int, ...]) -> TurningTransient:
+    """Transient from trajectories (c, N, p), one per element of the direction."""
     g = np.stack([costate_feedforward(gains, each) for each in wanted], axis=2)
     return TurningTransient(gains.problem, gains.gains.K, read_only(g), direction_shape)

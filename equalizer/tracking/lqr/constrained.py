@@ -1,10 +1,11 @@
-"""Optimal tracking under a cap on the force (ADMM): a constrained problem instead of clipping, with its loss stated.
+"""Optimal tracking under a cap on the force: a constrained problem, not clipping, with the tracking loss stated.
 
-    least  sum (y - r)' Q (y - r) + u' R u    with    |u_k + already_k| <= cap  at every tick
+    minimise  sum (y_k - r_k)' Q (y_k - r_k) + u_k' R u_k    subject to    |u_k + already_k| <= cap    for every k
 
-Alternating directions (Boyd et al., Distributed Optimization and Statistical Learning via ADMM, 2011): tracking with
-the gains of one Riccati recursion, then the nearest forces that are allowed, in turn. The multipliers give a lower
-bound of the cost (duality), so that the distance from the optimum is known.
+By the alternating direction method of multipliers, ADMM (Boyd et al., Distributed Optimization and Statistical Learning
+via the Alternating Direction Method of Multipliers, 2011). Two steps alternate: tracking with the gains of one Riccati
+recursion, and projection of the forces on the cap. The multipliers give a lower bound of the optimal cost (duality), so
+that the distance from the optimum is known.
 """
 
 from dataclasses import dataclass, replace
@@ -19,30 +20,33 @@ from equalizer.tracking.lqr.lqr_kernel import simulate
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, require_trajectory
 
 OVER_RELAXATION = 1.7
-"""Over-relaxation of ADMM; 1.5 to 1.8 converges fastest (Boyd and others 2011, section 3.4.3)."""
+"""Over-relaxation of ADMM; 1.5 to 1.8 converges fastest (Boyd et al. 2011, section 3.4.3)."""
 ROUNDS_BETWEEN_TUNING = 25
-"""Iterations between changes of ADMM's penalty: each change costs a Riccati recursion."""
+"""Iterations between changes of the penalty of ADMM, of which each costs a Riccati recursion."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrackingLoss:
-    """Tracking errors are rms of (predicted - wanted) over rms of wanted."""
+    """Tracking error and cost without and with the cap. Errors are rms of (predicted - wanted) over rms of wanted."""
 
     error_free: float
-    """Error of the best forces without a cap."""
+    """Error of the optimal forces without a cap."""
     error_capped: float
     """Error of the returned forces."""
     error_clipped: float
-    """Error of the unconstrained forces with clipping, for comparison; they are never played."""
+    """Error of those forces after clipping, for comparison; clipped forces are never played."""
     cost_free: float
+    """Value of the cost for the optimal forces without a cap."""
     cost_capped: float
+    """Value of the cost for the returned forces."""
     gap: float
-    """Relative duality gap: by how much the cost could be lower at most; 0 = proved optimal."""
+    """Relative duality gap: bound of the relative excess of the cost over the optimum; 0 = optimal."""
     rounds: int
+    """Iterations of ADMM."""
 
     @property
     def lost(self) -> float:
-        """How much the cap adds to the tracking error, in the same measure."""
+        """Increase of the relative tracking error due to the cap."""
         return self.error_capped - self.error_free
 
 
@@ -51,9 +55,9 @@ class CappedForces:
     """Result of `track_under_cap`: forces from rest under the cap, and the tracking error that the cap causes."""
 
     forces: FloatArray
-    """(N, m); together with the forces `already` there, every row is within the cap."""
+    """(N, m), N; the norm of each row of their sum with the forces `already` is within the cap."""
     predicted: FloatArray
-    """(N, p): the model's response."""
+    """(N, p), m/s²: the model's response."""
     loss: TrackingLoss
 
 
@@ -68,23 +72,27 @@ class CapSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _CappedTask:
+    """The constrained problem of one trajectory: wanted (N, p), forces `already` there (N, m), cap in N."""
+
     problem: TrackingProblem
     wanted: FloatArray
     already: FloatArray
     cap_n: float
 
     def nearest(self, forces: FloatArray) -> FloatArray:
+        """(N, m): projection of forces on those allowed under the cap."""
         return project_to_cap(forces + self.already, self.cap_n) - self.already
 
     def cost(self, forces: FloatArray) -> float:
+        """Value of the quadratic cost for forces (N, m) from rest."""
         outputs = _simulate_outputs(self.problem, forces)
         outputs[:, : self.problem.outputs] -= self.wanted
         weighed = (outputs @ self.problem.Q * outputs).sum() + (forces @ self.problem.R * forces).sum()
         return float(weighed)
 
     def lower_bound(self, forces: FloatArray, multipliers: FloatArray) -> float:
-        """Lower bound of the optimal cost (dual function). forces: minimum of cost + multipliers · forces, without a
-        cap."""
+        """Lower bound of the optimal cost, the dual function: cost(u) + λ·u - sum_k (cap |λ_k| - λ_k·already_k).
+        forces: u, which minimises cost(u) + λ·u without a cap; multipliers: λ, (N, m)."""
         reach = self.cap_n * np.linalg.norm(multipliers, axis=1).sum() - (multipliers * self.already).sum()
         return self.cost(forces) + float((multipliers * forces).sum() - reach)
 
@@ -96,10 +104,10 @@ def track_under_cap(
     already: FloatArray | None = None,
     settings: CapSettings | None = None,
 ) -> CappedForces:
-    """Track wanted (N, p), from rest. already: (N, m), further forces, which count against the cap.
+    """Track wanted (N, p), m/s², from rest. already: (N, m), N, further forces, which count against the cap.
 
-    Raises TrackingError where `already` alone is above the cap, or where the duality gap is not reached in the allowed
-    rounds.
+    Raises TrackingError for other shapes, where `already` alone is above the cap, and where the duality gap is not
+    reached within the allowed rounds.
     """
     r = require_trajectory(problem, wanted)
     there = np.zeros((len(r), problem.inputs)) if already is None else np.asarray(already, dtype=np.float64)
@@ -119,7 +127,8 @@ def track_under_cap(
 
 
 def _alternate_directions(task: _CappedTask, start: FloatArray, settings: CapSettings) -> tuple[FloatArray, float, int]:
-    """Alternating direction method of multipliers. Returns forces, relative duality gap and rounds."""
+    """ADMM with over-relaxation and scaled multipliers, in Boyd's notation: u from tracking, z projected on the cap,
+    `scaled` = λ / (2 weight). Returns the best z, its relative duality gap and the number of rounds."""
     weight = _initial_penalty(task.problem)
     gains = _compute_penalised_gains(task.problem, len(task.wanted), weight)
     z, scaled = task.nearest(start), np.zeros_like(start)
@@ -147,19 +156,22 @@ def _alternate_directions(task: _CappedTask, start: FloatArray, settings: CapSet
 
 
 def _penalty_factor(apart: FloatArray, moved: FloatArray) -> float:
-    """Factor on the penalty that balances primal and dual residual (Boyd et al., 3.4.1)."""
+    """Factor on the penalty that balances the primal residual u - z and the dual residual, the change of z (Boyd et
+    al., section 3.4.1)."""
     ratio = float(np.linalg.norm(apart) / max(float(np.linalg.norm(moved)), np.finfo(np.float64).tiny))
     return float(np.clip(np.sqrt(ratio), 0.2, 5.0)) if not 1 / 3 < ratio < 3 else 1.0
 
 
 def _initial_penalty(problem: TrackingProblem) -> float:
-    """Initial penalty: geometric mean of the force weight and the curvature of the model's direct response."""
+    """Initial penalty: geometric mean of the smallest force weight and the cost's curvature in the force of one
+    tick."""
     curvature = problem.stage_cost[problem.order :, problem.order :]
     return float(np.sqrt(max(np.linalg.eigvalsh(problem.R)[0], 1e-6) * max(np.trace(curvature), 1.0)))
 
 
 def _compute_penalised_gains(problem: TrackingProblem, samples: int, weight: float) -> StoredGains:
-    """Gains of the problem with the penalty weight·|u - w|²: the forces are further outputs, w is wanted beside r."""
+    """Gains of the problem with the additional cost weight |u - w|²: the forces are further tracked outputs, and w is
+    their reference."""
     p, m = problem.outputs, problem.inputs
     C = np.insert(problem.C, [p] * m, np.zeros((m, problem.order)), axis=0)
     D = np.insert(problem.D, [p] * m, np.eye(m), axis=0)
@@ -168,7 +180,7 @@ def _compute_penalised_gains(problem: TrackingProblem, samples: int, weight: flo
 
 
 def _simulate_outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
-    """(N, q): all outputs, with the penalised ones, to forces (N, m) from rest."""
+    """(N, q): response of all outputs, the p tracked outputs first, to forces (N, m) from rest."""
     outputs, played = np.empty((len(forces), problem.C.shape[0])), np.empty_like(forces)
     every = replace(problem, outputs=problem.C.shape[0]).step
     no_gain = np.zeros((len(forces), problem.inputs, problem.order))
@@ -177,9 +189,11 @@ def _simulate_outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArra
 
 
 def _state_loss(task: _CappedTask, free: FloatArray, forces: FloatArray, gap: float, rounds: int) -> CappedForces:
+    """Result with the loss of `forces` against the unconstrained forces `free`, (N, m) each."""
     p, size = task.problem.outputs, float(np.linalg.norm(task.wanted)) or 1.0
 
     def error(played: FloatArray) -> float:
+        """Relative tracking error of forces (N, m)."""
         return float(np.linalg.norm(_simulate_outputs(task.problem, played)[:, :p] - task.wanted)) / size
 
     loss = TrackingLoss(

@@ -1,13 +1,14 @@
 """A recorded transient that starts at a contact: forces are causal, and the resulting loss of accuracy is stated.
 
-The forces for a transient a(t) along a normal n are linear in n: F(t) = sum_i n_i F_i(t), with the LQR solution F_i for
-the transient along axis i stored beforehand. So is the error E(t) = sum_i n_i E_i(t) of the predicted acceleration, and
-its relative square in the model's band is the quadratic form
+The forces for a transient a(t) along a unit normal n are linear in n: F(t) = sum_i n_i F_i(t), where F_i is the LQR
+solution, stored beforehand, for the transient along axis i. The error of the predicted acceleration is also linear,
+E(t) = sum_i n_i E_i(t), and its relative square in the model's band is the quadratic form
 
     |E|² / |a|² = n' S n,        S_ij = <E_i, E_j> / |a|²
 
-whose largest eigenvalue is the worst normal's. A force that may begin before the contact can prepare the device (the
-optimal tracker is not causal); at an unforeseen contact it cannot. `early_deviation` says how much that costs.
+whose largest eigenvalue belongs to the worst normal. The optimal tracker is not causal: forces before the contact
+reduce the error, but at an unforeseen contact there are none. Comparison of `deviation` with `early_deviation` shows
+the cost of causality.
 """
 
 from dataclasses import dataclass
@@ -29,33 +30,33 @@ class CausalStart:
     basis: RotationBasis
     """Forces of the whole transient at once, for a normal (p,)."""
     live: TurningTransient
-    """The same tick by tick, for a normal that changes while it is played."""
+    """The same transient tick by tick, for a normal that changes while it is played."""
     deviation: FloatArray
-    """(p, p): S above, so that n' S n is the squared relative error for the unit normal n."""
+    """(p, p): S of the module docstring; n' S n is the squared relative error for the unit normal n."""
     early_deviation: FloatArray
-    """Likewise for forces that may begin before the contact."""
+    """(p, p): S for forces that may begin before the contact."""
 
     def error(self, normal: FloatArray) -> float:
         """Relative error of the predicted acceleration in the model's band. normal: (p,), of any length above 0. Raises
-        TrackingError for any other."""
+        TrackingError for another shape, zero and values that are not finite."""
         return _relative_error(self.deviation, normal)
 
     def early_error(self, normal: FloatArray) -> float:
-        """The error if the forces were allowed to begin before the contact. normal: as for `error`."""
+        """Relative error if forces were allowed to begin before the contact. normal and errors: as for `error`."""
         return _relative_error(self.early_deviation, normal)
 
     @property
     def worst_error(self) -> float:
-        """Largest error over all normals."""
+        """Largest relative error over all normals: square root of the largest eigenvalue of `deviation`."""
         return float(np.sqrt(max(0.0, float(np.linalg.eigvalsh(self.deviation)[-1]))))
 
 
 def causal_start(problem: TrackingProblem, recording: FloatArray, padding: Padding | None = None) -> CausalStart:
-    """Prepare a recording (N,), the acceleration (m/s²) along the normal from the contact on, at the problem's rate.
-    padding: the time after it, to come to rest, is played too; that before it serves the comparison only. None = 0.3 s
-    each.
+    """Prepare a recording (N,), the acceleration (m/s²) along the normal from the contact on, at the problem's sample
+    rate. padding: its time after the recording is played, in which the device comes to rest; its time before it serves
+    the comparison only. None = 0.3 s each.
 
-    Raises TrackingError where the recording has nothing in the model's band.
+    Raises TrackingError where the recording has no content in the model's band, or another shape.
     """
     room = padding or Padding()
     causal = Padding(CAUSAL.before_s, room.after_s)
@@ -68,13 +69,15 @@ def causal_start(problem: TrackingProblem, recording: FloatArray, padding: Paddi
 
 
 def _early_deviation(problem: TrackingProblem, played: FloatArray, room: Padding) -> FloatArray:
+    """(p, p): S with zeros before the transient, in which forces may begin. played: (N,)."""
     before, _ = room.samples(problem.sample_rate_hz)
     padded = np.pad(played, (before, 0))
     return _deviation(problem, normal_basis(stored_gains(problem, len(padded)), padded), padded)
 
 
 def _deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatArray) -> FloatArray:
-    """(p, p): S of the module's theory. recording: (N,), with its padding."""
+    """(p, p): S of the module docstring. recording: (N,), with its padding. Raises TrackingError where it has no
+    content in the band."""
     p, rate_hz, band_hz = problem.outputs, problem.sample_rate_hz, problem.band_hz
     level = float(np.linalg.norm(band_spectrum(recording[:, np.newaxis], rate_hz, band_hz)))
     if not level > 0:
@@ -89,6 +92,7 @@ def _deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatA
 
 
 def _relative_error(deviation: FloatArray, normal: FloatArray) -> float:
+    """sqrt(n' S n) for the normal scaled to unit length; rounding below zero counts as zero."""
     n = np.asarray(normal, dtype=np.float64)
     length = float(np.linalg.norm(n))
     if n.shape != deviation.shape[:1] or not (np.isfinite(length) and length > 0):

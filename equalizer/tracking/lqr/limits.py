@@ -1,4 +1,8 @@
-"""Force limits: forces above the cap are refused with the scale that would fit, never clipped."""
+"""Force limits: forces above a cap are refused, with the scale that would fit, and never clipped.
+
+Clipping would distort the wanted acceleration without notice. The cap (N) limits the Euclidean norm of the force vector
+of each row, so that it holds in every direction. `project_to_cap` is a step of the constrained solver (`constrained`).
+"""
 
 from dataclasses import dataclass
 
@@ -8,7 +12,7 @@ from equalizer.signals.signal import FloatArray
 
 
 class ForceLimitError(ValueError):
-    """Forces exceed the cap. `peaks`: by how much."""
+    """Forces exceed the cap. `peaks`: by how much, and where."""
 
     def __init__(self, message: str, peaks: "Peaks") -> None:
         super().__init__(message)
@@ -17,14 +21,14 @@ class ForceLimitError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Peaks:
-    """Peaks of the norm of the force vector, not of single axes: the cap holds in every direction."""
+    """Largest norm of the force vector over all rows, and the cap. Forces in N."""
 
     cap_n: float
     peak_n: float
     at_sample: int
-    """Row of the first largest force."""
+    """First row with the largest norm."""
     share_over: float
-    """Share of all rows above the cap, 0 to 1."""
+    """Share of the rows above the cap, 0 to 1."""
 
     @property
     def fits(self) -> bool:
@@ -38,8 +42,8 @@ class Peaks:
 
 
 def force_peaks(forces: FloatArray, cap_n: float) -> Peaks:
-    """Peaks of forces (N, m). Raises ValueError for a cap that is no positive number and for forces that are not
-    finite."""
+    """Peaks of forces (N, m), in N. Raises ValueError for a cap that is not a positive number and for forces that are
+    not finite."""
     require_cap(cap_n)
     lengths = np.linalg.norm(forces, axis=1)
     if not np.isfinite(lengths).all():
@@ -50,8 +54,8 @@ def force_peaks(forces: FloatArray, cap_n: float) -> Peaks:
 
 
 def require_under_cap(forces: FloatArray, cap_n: float, sample_rate_hz: float) -> Peaks:
-    """Require forces under the cap, and return their peaks. Raises ForceLimitError where a row of forces, (N, m), is
-    longer than the cap."""
+    """Check that forces (N, m), in N, are under the cap, and return their peaks. Raises ForceLimitError where the norm
+    of a row exceeds the cap, and what `force_peaks` raises."""
     peaks = force_peaks(forces, cap_n)
     if not peaks.fits:
         # Rounded down, so that the printed factor still fits.
@@ -73,7 +77,7 @@ def require_cap(cap_n: float) -> float:
 
 
 def project_to_cap(forces: FloatArray, cap_n: float) -> FloatArray:
-    """Projection of forces (N, m) on the cap: each row that is longer is shortened to it."""
+    """Euclidean projection of forces (N, m) on the cap: each row with a larger norm is scaled down to the cap."""
     lengths = np.linalg.norm(forces, axis=1, keepdims=True)
     # Slightly below the cap, so that rounding leaves no row above it.
     shorter = cap_n * (1 - 8 * np.finfo(np.float64).eps) / np.maximum(lengths, cap_n)

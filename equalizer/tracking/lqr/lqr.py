@@ -1,6 +1,6 @@
 """Finite-horizon linear-quadratic tracking: feedforward forces from gains that are computed once.
 
-Theory of operation. The forces u minimise, for the model x' = A x + B u, y = C x + D u (x' of the next sample),
+Theory of operation. The forces u minimise, for the model x_{k+1} = A x_k + B u_k, y_k = C x_k + D u_k,
 
     J = sum over k < N of (y_k - r_k)' Q (y_k - r_k) + u_k' R u_k, plus (x_N - x_f)' P_N (x_N - x_f)
 
@@ -11,11 +11,11 @@ By dynamic programming the cost from sample k on is x' P_k x - 2 x' v_k + a cons
     u_k = g_k - K_k x_k                         g_k = H_k^-1 (D'Q r_k + B' v_{k+1})
 
 P, H and K do not depend on the trajectory r (`riccati`): `stored_gains` computes them once for a length N. For each
-trajectory, one backward pass gives v and g (`costate_feedforward`), one forward pass simulates the model and gives the
+trajectory, a backward pass gives v and g (`costate_feedforward`), and a forward pass simulates the model and gives the
 forces (`track`). Both passes are linear in r, which `rotation` uses.
 
-No measured signal is fed back. The gains act on the state of the simulated model: leaving out K x, as "feedback set to
-zero" could be read, gives an error of about the size of the trajectory.
+No measured signal is fed back, but K_k x_k must not be omitted: it acts on the state of the simulated model, and
+without it the error is about as large as the trajectory.
 
 References: Bryson and Ho, Applied Optimal Control (1975), chapter 5; Anderson and Moore, Optimal Control: Linear
 Quadratic Methods (1990), chapter 4. The tests compute the same forces by one dense least-squares problem
@@ -35,12 +35,12 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProbl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredGains:
-    """Gains for every trajectory of N samples and every initial state. Made by `stored_gains`."""
+    """Gains for all trajectories of N samples and all initial states of a problem. Made by `stored_gains`."""
 
     problem: TrackingProblem
     gains: Gains
     terminal_weight: FloatArray
-    """P_N, (n, n): weight of the final state; zeros = the end is free."""
+    """P_N, (n, n): weight of the final state; zeros = free final state."""
 
     def __len__(self) -> int:
         return len(self.gains)
@@ -51,17 +51,17 @@ class TrackResult:
     """Optimal forces for a trajectory, and the model's response to them; result of `track`."""
 
     forces: FloatArray
-    """(N, m), one row per row of the trajectory."""
+    """(N, m), N: one row per row of the trajectory."""
     predicted: FloatArray
-    """(N, p): the model's response."""
+    """(N, p), m/s²: the model's response."""
     final_state: FloatArray
-    """(n,): state after the last row, to continue from."""
+    """(n,): state of the model after the last row."""
 
 
 def stored_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatArray | None = None) -> StoredGains:
-    """Gains by the Riccati recursion, `samples` steps; by the compiled kernel where rounding permits. terminal_weight:
-    P_N, (n, n), of the distance from the `final_state` given to `track`. Raises TrackingError where a force has no
-    effect on the cost."""
+    """Gains of `samples` steps by the Riccati recursion, in the compiled kernel unless rounding errors forbid it.
+    terminal_weight: P_N, (n, n), weight of x_N - x_f; None = free final state. Raises TrackingError for no samples, an
+    invalid terminal weight, and a force without effect on the cost."""
     if samples < 1:
         raise TrackingError(f"a horizon has {samples} samples; it needs one or more")
     n, m = problem.order, problem.inputs
@@ -75,8 +75,9 @@ def stored_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatA
 def track(
     gains: StoredGains, wanted: FloatArray, x0: FloatArray | None = None, final_state: FloatArray | None = None
 ) -> TrackResult:
-    """Track wanted (N, p), N the length of the gains. x0: the model's state before the first row; None = at rest.
-    final_state: x_f, the target of the final state if the gains have a terminal weight; None = rest."""
+    """Track wanted (N, p), m/s², with N the length of the gains. x0: the model's state before the first row; None = at
+    rest. final_state: x_f, target of the final state if the gains have a terminal weight; None = rest. Raises
+    TrackingError for other shapes and values that are not finite."""
     problem, g = gains.problem, costate_feedforward(gains, wanted, final_state)
     x = problem.state(x0).copy()
     forces, predicted = np.empty_like(g), np.empty((len(g), problem.outputs))
@@ -85,7 +86,8 @@ def track(
 
 
 def costate_feedforward(gains: StoredGains, wanted: FloatArray, final_state: FloatArray | None = None) -> FloatArray:
-    """(N, m): g of u = g - K x, the feedforward from the trajectory ahead. Linear in `wanted` and `final_state`."""
+    """(N, m), N: g of u = g - K x, the feedforward from the remaining trajectory. Linear in `wanted` and `final_state`.
+    Raises TrackingError as `track`."""
     problem = gains.problem
     r = require_trajectory(problem, wanted)
     if len(r) != len(gains):
@@ -97,8 +99,8 @@ def costate_feedforward(gains: StoredGains, wanted: FloatArray, final_state: Flo
 
 
 def periodic_state(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
-    """(n,): the state at the first row of forces (T, m) in their periodic steady state. A fade-in that ends in it
-    continues into the loop without a transient. Raises TrackingError on an unstable model."""
+    """(n,): state at the first row of forces (T, m) that repeat with period T, in the steady state. A fade-in that ends
+    in this state continues into the periodic forces without a transient. Raises TrackingError for an unstable model."""
     _require_stable(problem, "repeated forces lead to no periodic state")
     x = np.zeros(problem.order)
     for force in np.asarray(forces, dtype=np.float64):
@@ -108,14 +110,16 @@ def periodic_state(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
 
 
 def free_decay_weight(problem: TrackingProblem) -> FloatArray:
-    """(n, n): the observability Gramian as terminal weight, which counts the free decay after the end: a final state
-    that is off by d, with forces that go on as intended (none after a transient, the loop after a fade-in), costs
-    d' P_N d in output deviations. Raises TrackingError on an unstable model."""
+    """(n, n): terminal weight P_N that includes the free decay after the end, the observability Gramian of A and
+    Q½ C. A final state that differs by d from the intended state causes, with the intended forces from then on (zero
+    after a transient, periodic after a fade-in), output errors with the cost d' P_N d. Raises TrackingError for an
+    unstable model."""
     _require_stable(problem, "what rings after the end never dies away")
     return np.asarray(solve_discrete_lyapunov(problem.A.T, problem.C.T @ problem.Q @ problem.C))
 
 
 def _require_stable(problem: TrackingProblem, consequence: str) -> None:
+    """Check that all eigenvalues of A are within the unit circle. Raises TrackingError with the consequence."""
     radius = float(np.abs(np.linalg.eigvals(problem.A)).max(initial=0.0))
     if radius >= 1:
         raise TrackingError(f"the model is not stable (spectral radius {radius:.6g}), so that {consequence}")

@@ -1,4 +1,9 @@
-"""The two passes of a tracker with stored gains, compiled: costate backward, model forward; and one tick of it."""
+"""Compiled passes of the tracker with stored gains; the equations and symbols are those of `lqr`.
+
+`feedforward`: backward pass, costate v and feedforward g. `simulate`: forward pass, model and forces. `tick`: a single
+step of the forward pass, for a direction that may change at each step; `run`: many ticks. n: order, m: forces, p:
+outputs.
+"""
 
 import numpy as np
 from numba import njit, types
@@ -10,11 +15,13 @@ _IN = types.Array(types.float64, 1, "C", readonly=True)
 _MATRIX = types.Array(types.float64, 2, "C", readonly=True)
 _STACK = types.Array(types.float64, 3, "C", readonly=True)
 _OUT = types.float64[:, ::1]
+# _VECTOR and _OUT are written; _IN, _MATRIX and _STACK are read-only inputs, all contiguous.
 
 
 @njit(types.void(_VECTOR, _MATRIX, _VECTOR), cache=True, nogil=True, fastmath={"reassoc", "contract"})
 def _add_product(z: FloatArray, matrix: FloatArray, s: FloatArray) -> None:
-    """s += z @ matrix. Four rows at a time: s is then loaded and stored a quarter as often."""
+    """s += z @ matrix, for as many elements of z as matrix has rows. Four rows at a time, because s is then loaded and
+    stored a quarter as often."""
     rows, columns = matrix.shape
     whole = rows - rows % 4
     for j in range(0, whole, 4):
@@ -30,8 +37,8 @@ def _add_product(z: FloatArray, matrix: FloatArray, s: FloatArray) -> None:
 def feedforward(
     joined: FloatArray, pulled: FloatArray, K: FloatArray, H_inverse: FloatArray, v: FloatArray, g: FloatArray
 ) -> None:
-    """Fill g (N, m), the forces' feedforward from the trajectory ahead. v: (n,), the costate at the end, which
-    becomes that of the start. joined: [A B]; pulled: wanted @ (Q [C D]), (N, n + m)."""
+    """Fill g (N, m), the feedforward of the forces. v: (n,), costate after the last row; overwritten by the costate at
+    the first row. joined: [A B], (n, n + m); pulled: r' Q [C D] of each row, (N, n + m)."""
     n, m = joined.shape[0], g.shape[1]
     s = np.empty(n + m)
     for k in range(g.shape[0] - 1, -1, -1):
@@ -54,7 +61,7 @@ def feedforward(
 def simulate(
     step: FloatArray, K: FloatArray, g: FloatArray, x: FloatArray, forces: FloatArray, predicted: FloatArray
 ) -> None:
-    """Fills forces (N, m), u = g - K x, and predicted (N, p). x: (n,), the state at the start, which becomes that of
+    """Fill forces (N, m), u = g - K x, and predicted (N, p). x: (n,), state at the start; overwritten by the state at
     the end. step: [A B; C D]', (n + m, n + p)."""
     m, n = K.shape[1], K.shape[2]
     z, s = np.empty(n + m), np.empty(step.shape[1])
@@ -83,10 +90,10 @@ def simulate(
     fastmath={"reassoc", "contract"},
 )
 def tick(step: FloatArray, K: FloatArray, g: FloatArray, direction: FloatArray, k: int, live: FloatArray) -> None:
-    """A tick of a transient that may turn: u = sum over c of direction_c g_kc - K_k x_k; no force after the last row.
+    """Step k of a transient: u = sum over c of direction_c g_kc - K_k x_k; no force after the last row.
 
-    g: (N, m, c); direction: (c,); live: (2 n + m + p,): the state, which becomes the next one; then the force of this
-    tick; then n numbers of work space; then what the model answers at this tick.
+    g: (N, m, c); direction: (c,); live: (2 n + m + p,), in this order: n numbers, the state, overwritten by the next
+    state; m, the force of this tick; n, work space; p, the model's response at this tick. step: as for `simulate`.
     """
     m, n = K.shape[1], K.shape[2]
     for i in range(m):
@@ -108,7 +115,7 @@ def tick(step: FloatArray, K: FloatArray, g: FloatArray, direction: FloatArray, 
 def run(
     step: FloatArray, K: FloatArray, g: FloatArray, directions: FloatArray, live: FloatArray, out: FloatArray
 ) -> None:
-    """`tick` for all rows of K, g and directions (T, c) in turn. out: (T, m + p), force and response."""
+    """`tick` with each of the directions (T, c) in turn, from row 0 of K and g. out: (T, m + p), force and response."""
     m, n = K.shape[1], K.shape[2]
     for row in range(directions.shape[0]):
         tick(step, K, g, directions[row], row, live)

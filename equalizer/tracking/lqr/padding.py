@@ -1,9 +1,9 @@
-"""Zero padding before and after a finite trajectory, and the error of playing only its own rows.
+"""Zero padding before and after a finite trajectory, and the error if only the trajectory's own rows are played.
 
 The inverse of a device is non-causal: its forces start before the trajectory and end after it. Zeros on both sides make
 room for them. Where only the trajectory's own rows are played, from rest, the forces before the first row are lost, and
-the others were computed for a motion that does not exist: then no padding before is best (`CAUSAL`), which gives the
-optimal forces among those that start with the first row.
+the other forces were computed for an initial motion that does not exist. No padding before the trajectory (`CAUSAL`) is
+then best: it gives the optimal forces among those that start with the first row.
 """
 
 from dataclasses import dataclass
@@ -30,12 +30,13 @@ class Padding:
                 raise TrackingError(f"{name} is {value}; it must be a number that is not negative")
 
     def samples(self, rate_hz: float) -> tuple[int, int]:
-        """Numbers of rows before and after at a sample rate, rounded to whole rows."""
+        """Numbers of rows before and after at a sample rate (Hz), rounded."""
         return round(self.before_s * rate_hz), round(self.after_s * rate_hz)
 
 
 CAUSAL = Padding(before_s=0.0)
-"""No padding before the first row: for a start that is not known beforehand, and where the rows alone are played."""
+"""No padding before the first row: for a start that is not known beforehand, and where only the trajectory's rows are
+played."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,25 +44,25 @@ class PaddedTrack:
     """Tracking of a padded trajectory, and its error with and without the padding played; result of `track_padded`."""
 
     whole: TrackResult
-    """The trajectory with padding, to be played where there is time for it."""
+    """Forces and response with padding."""
     rows: slice
     """The trajectory's own rows in `whole`."""
     whole_error: float
-    """Relative error in the model's band over the trajectory's rows, if the whole is played."""
+    """Relative rms error in the model's band over the trajectory's rows, if all rows are played."""
     cut_error: float
     """The same error if only the trajectory's rows are played, from rest."""
 
     @property
     def forces(self) -> FloatArray:
-        """(N, m): one to one with the rows of the trajectory."""
+        """(N, m), N: forces of the trajectory's own rows."""
         return self.whole.forces[self.rows]
 
 
 def track_padded(
     problem: TrackingProblem, wanted: FloatArray, padding: Padding | None = None, gains: StoredGains | None = None
 ) -> PaddedTrack:
-    """Track wanted (N, p), from rest, with padding; None = CAUSAL. gains: of the length with padding; None =
-    computed."""
+    """Track wanted (N, p), m/s², from rest, with padding; None = `CAUSAL`. gains: for the length with padding; None =
+    computed here. Raises TrackingError for another shape, and where nothing is wanted in the model's band."""
     r = require_trajectory(problem, wanted)
     before, after = (padding or CAUSAL).samples(problem.sample_rate_hz)
     padded = np.pad(r, ((before, after), (0, 0)))
@@ -74,7 +75,7 @@ def track_padded(
 
 
 def simulate_from_rest(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
-    """(N, p): the model's response to forces (N, m) from rest."""
+    """(N, p), m/s²: the model's response to forces (N, m), in N, from rest."""
     x, predicted = np.zeros(problem.order), np.empty((len(forces), problem.outputs))
     for k, force in enumerate(forces):
         s = np.concatenate((x, force)) @ problem.step
@@ -83,7 +84,7 @@ def simulate_from_rest(problem: TrackingProblem, forces: FloatArray) -> FloatArr
 
 
 def band_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> float:
-    """Root-mean-square of played - wanted over that of wanted, of what lies in the band. Both (N, p).
+    """Rms of (played - wanted) over rms of wanted, both (N, p), of their spectra within the band.
 
     Raises TrackingError where nothing is wanted in the band.
     """
@@ -97,8 +98,8 @@ def band_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz: 
 
 
 def band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:
-    """(2 lines, channels): real and imaginary parts of the spectrum in the band, zero-padded to twice the length, so
-    that the end does not wrap around to the start."""
+    """(2 lines, channels): real and imaginary parts of the spectrum (FFT, not scaled) within the band. Zero-padded to
+    at least twice the length, so that the end does not wrap around, and to at least four lines per bandwidth."""
     length = max(2 * len(samples), int(np.ceil(4 * rate_hz / (band_hz[1] - band_hz[0]))))
     lines = np.fft.rfftfreq(length, 1 / rate_hz)
     spectrum = np.fft.rfft(samples, length, axis=0)[(lines >= band_hz[0]) & (lines <= band_hz[1])]

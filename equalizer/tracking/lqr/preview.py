@@ -1,9 +1,9 @@
 """Linear-quadratic preview control: a trajectory that arrives while it is played, and the loss of a limited preview.
 
-The gains are the stationary ones. Samples that are not known yet are taken as zero, the expected value of a zero-mean
-signal. A device that does not answer a constant force with acceleration needs a long preview; a low-frequency weight
-(`TrackingWeights`) shortens it to about 0.2 s, with a larger loss at shorter previews and a small one at full preview:
-`preview_loss` computes both.
+The gains are those of the infinite horizon (`stationary_gains`). Samples that are not known yet count as zero, the
+expected value of a zero-mean signal. A device without acceleration response to a constant force needs a long preview; a
+low-frequency weight (`TrackingWeights`) shortens it to about 0.2 s, at the cost of a larger loss at shorter previews
+and a small loss at full preview: `preview_loss` computes both.
 """
 
 from dataclasses import dataclass
@@ -17,41 +17,43 @@ from equalizer.tracking.lqr.riccati import stationary_gains
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only, require_trajectory
 
 LINE_HZ = 0.1
-"""Spacing of the lines over which a loss is taken."""
+"""Spacing of the spectral lines over which a loss is averaged."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreviewTracker:
-    """u_k = sum over j of ahead_j r_{k+j} - K x_k. Made by `preview_tracker`."""
+    """Controller u_k = sum over j < M of ahead_j r_{k+j} - K x_k. Made by `preview_tracker`."""
 
     problem: TrackingProblem
     K: FloatArray
-    """(m, n)"""
+    """(m, n): stationary gains on the state of the simulated model."""
     ahead: FloatArray
-    """(M, m, p): weights of the present sample and of those after it"""
+    """(M, m, p): weights of the present sample and of the M - 1 samples after it."""
 
     def __len__(self) -> int:
         return int(self.ahead.shape[0])
 
     def step(self, x: FloatArray, known: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The force (m,) now and the state after it. known: (M, p), the present sample first."""
+        """Force (m,), N, of this sample, and the next state. x: (n,), the state; known: (M, p), the present sample
+        first."""
         force = np.einsum("jmp,jp->m", self.ahead, known) - self.K @ x
         return force, self.problem.A @ x + self.problem.B @ force
 
 
 @dataclass(frozen=True, slots=True)
 class PreviewLoss:
-    """Relative error of the response over the model's band, by its own prediction, for a stationary trajectory with
-    equal flat spectra on all axes."""
+    """Relative rms error of the response over the model's band, as the model predicts it, for a stationary trajectory
+    with equal flat spectra on all axes."""
 
     error: float
+    """Error with the limited preview."""
     full_error: float
-    """Loss if the whole trajectory were known."""
+    """Error with unlimited preview."""
 
 
 def preview_tracker(problem: TrackingProblem, preview_samples: int) -> PreviewTracker:
-    """Tracker with M = preview_samples known samples, the present one counted. Raises TrackingError where there are no
-    stationary gains."""
+    """Tracker with M = preview_samples known samples, including the present sample. Raises TrackingError for less than
+    1 sample, and where there are no stationary gains."""
     if preview_samples < 1:
         raise TrackingError(f"the preview is {preview_samples} samples; the present one at least must be known")
     gains = stationary_gains(problem)
@@ -66,7 +68,8 @@ def preview_tracker(problem: TrackingProblem, preview_samples: int) -> PreviewTr
 
 
 def stream(tracker: PreviewTracker, wanted: FloatArray, x0: FloatArray | None = None) -> TrackResult:
-    """Track a trajectory (N, p) as a stream, followed by zeros. Equals `step` row by row."""
+    """Track a trajectory (N, p), m/s², as a stream, followed by zeros; equal to `step` row by row, but compiled. x0:
+    (n,), initial state; None = at rest."""
     problem, M = tracker.problem, len(tracker)
     r = require_trajectory(problem, wanted)
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(r, ((0, M - 1), (0, 0))), M, axis=0)
@@ -79,7 +82,8 @@ def stream(tracker: PreviewTracker, wanted: FloatArray, x0: FloatArray | None = 
 
 
 def preview_loss(problem: TrackingProblem, preview_samples: int) -> PreviewLoss:
-    """Loss of a limited preview, exact per line of the model's band, without a simulation."""
+    """Loss of a limited preview, from exact frequency responses over the model's band, without a simulation. Raises
+    what `preview_tracker` raises."""
     tracker = preview_tracker(problem, preview_samples)
     low, high = problem.band_hz
     lines_hz = np.linspace(low, high, max(2, round((high - low) / LINE_HZ) + 1))
@@ -90,13 +94,13 @@ def preview_loss(problem: TrackingProblem, preview_samples: int) -> PreviewLoss:
 
 
 def _close_loop(problem: TrackingProblem, K: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A - B K, and (C - D K)' Q of the tracked outputs, (n, p)."""
+    """Closed loop A - B K, (n, n), and (C - D K)' Q for references of the tracked outputs, (n, p)."""
     n = problem.order
     return problem.A - problem.B @ K, (problem.linear_cost[:, :n] - problem.linear_cost[:, n:] @ K).T
 
 
 def _compute_closed_response(problem: TrackingProblem, K: FloatArray, z: ComplexArray) -> ComplexArray:
-    """(lines, p, m): response to forces that are added to -K x."""
+    """(lines, p, m): response to forces that are added to -K x. z: (lines,), points of the unit circle."""
     n, p = problem.order, problem.outputs
     closed = problem.A - problem.B @ K
     state = np.linalg.solve(z[:, np.newaxis, np.newaxis] * np.eye(n) - closed, problem.B.astype(complex)[np.newaxis])
@@ -104,7 +108,7 @@ def _compute_closed_response(problem: TrackingProblem, K: FloatArray, z: Complex
 
 
 def _full_preview(problem: TrackingProblem, z: ComplexArray) -> ComplexArray:
-    """(lines, m, p): feedforward with unlimited preview, the sum over all samples ahead in closed form."""
+    """(lines, m, p): feedforward with unlimited preview; the sum over all future samples is a geometric series."""
     gains = stationary_gains(problem)
     closed, linear = _close_loop(problem, gains.K[0])
     turn = z[:, np.newaxis, np.newaxis]
@@ -114,5 +118,6 @@ def _full_preview(problem: TrackingProblem, z: ComplexArray) -> ComplexArray:
 
 
 def _relative_error(delivered: ComplexArray) -> float:
+    """Rms over lines and axes of delivered - I. delivered: (lines, p, p), from wanted to delivered acceleration."""
     p = delivered.shape[-1]
     return float(np.sqrt(np.mean(np.sum(np.abs(delivered - np.eye(p)) ** 2, axis=(1, 2))) / p))

@@ -1,14 +1,16 @@
-"""Riccati recursion of the linear-quadratic tracker, with a factor S of P = S'S. `riccati_kernel` is the compiled one.
+"""Riccati recursion of the linear-quadratic tracker, square-root form: with a factor S of P = S'S (equations in `lqr`).
 
-It does not depend on the trajectory: gains of a model, weights and length serve every trajectory of that length. Bryson
-and Ho, Applied Optimal Control, chapter 5, with feedthrough; as an array algorithm (Kailath, Sayed and Hassibi, Linear
-Estimation, chapter 12): one QR decomposition a step,
+The gains depend on model, weights and length, not on the trajectory. Bryson and Ho, Applied Optimal Control, chapter 5,
+with feedthrough; as an array algorithm (Kailath, Sayed and Hassibi, Linear Estimation, chapter 12) with one QR
+decomposition per step from S of sample k + 1 to S- of sample k, with U orthogonal, T upper triangular, and W here T'⁻¹
+times the W of `lqr`:
 
     [ R½    0   ]       [ T   W  ]
     [ Q½ D  Q½ C]  =  U [ 0   S- ]      H = T'T,   K = T⁻¹ W,   P- = S-' S-
     [ S B   S A ]
 
-so that P has no negative eigenvalue, even where the forces can cancel the whole cost.
+P therefore has no negative eigenvalue, even where the forces can cancel the whole cost. `riccati_kernel` updates P
+itself, compiled: faster, but less accurate.
 """
 
 from dataclasses import dataclass
@@ -29,23 +31,25 @@ NOT_STATIONARY = (
     "feedthrough the force weight must be above zero"
 )
 NEGLIGIBLE = 1e-14
-"""Rank tolerance, relative to the norm of a force's effects: the rest after projection on other forces is rounding."""
+"""Rank tolerance, relative to the norm of the effects of a force: below it, what these add to the effects of the forces
+before it is rounding error."""
 ROUNDED = 1e-9
 """Tolerance for negative eigenvalues, relative to a weight's largest entry (rounding of a solved Riccati equation)."""
 STATIONARY = 1e-6
-"""Convergence of the stationary P: largest change in a further step, relative to its largest entry."""
+"""Largest change of a stationary P in a further step of the recursion, relative to its largest entry."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gains:
-    """u_k = H_k⁻¹ t_k - K_k x_k, with t_k computed from the rest of the trajectory. Read-only arrays."""
+    """Gains of u_k = H_k⁻¹ t_k - K_k x_k, where t_k = D'Q r_k + B' v_{k+1} depends on the remaining trajectory. The
+    arrays are read-only."""
 
     K: FloatArray
     """(N, m, n)"""
     H_inverse: FloatArray
     """(N, m, m)"""
     P: FloatArray
-    """(n, n): x' P x is the optimal cost from the initial state x with zero reference."""
+    """(n, n): P_0; x' P_0 x is the optimal cost from the initial state x with zero reference."""
 
     def __post_init__(self) -> None:
         for name in ("K", "H_inverse", "P"):
@@ -56,9 +60,9 @@ class Gains:
 
 
 def backward_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatArray | None = None) -> Gains:
-    """Gains for `samples` steps. terminal_weight: P_N, (n, n), of (x_N - x_f); None = the end is free.
+    """Gains for `samples` steps. terminal_weight: P_N, (n, n), weight of x_N - x_f; None = free final state.
 
-    Raises TrackingError where a force has no effect on the cost.
+    Raises TrackingError where a force has no effect of its own on the cost, and for an invalid terminal weight.
     """
     n, m = problem.order, problem.inputs
     S = _factor(require_terminal_weight(problem, terminal_weight))
@@ -69,8 +73,8 @@ def backward_gains(problem: TrackingProblem, samples: int, terminal_weight: Floa
         stacked = np.vstack((stage, S @ joined))
         triangle = np.asarray(np.linalg.qr(stacked, mode="r"))
         T, S = triangle[:m, :m], triangle[m:, m:]
-        # Norm of a column after projection on the others, relative to its norm: zero up to rounding means no effect of
-        # its own.
+        # |T_jj| over the norm of column j of the stacked matrix: the share of the column that is orthogonal to the
+        # columns before it. Zero up to rounding: the force has no effect of its own.
         if not np.all(np.abs(np.diag(T)) > NEGLIGIBLE * np.linalg.norm(stacked[:, :m], axis=0)):
             raise TrackingError(NO_CURVATURE.format(step=samples - k))
         K[k] = solve_triangular(T, triangle[:m, m:])
@@ -80,7 +84,8 @@ def backward_gains(problem: TrackingProblem, samples: int, terminal_weight: Floa
 
 
 def stationary_gains(problem: TrackingProblem) -> Gains:
-    """Gains far from the end, as one step (N = 1). Raises TrackingError where there are none."""
+    """Gains of the infinite horizon as a single step (N = 1), by the discrete algebraic Riccati equation. Raises
+    TrackingError where it has no stabilising solution."""
     A, B, C, D, Q, R = problem.A, problem.B, problem.C, problem.D, problem.Q, problem.R
     try:
         P = solve_discrete_are(A, B, C.T @ Q @ C, R + D.T @ Q @ D, s=C.T @ Q @ D)
@@ -94,7 +99,8 @@ def stationary_gains(problem: TrackingProblem) -> Gains:
 
 
 def require_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArray | None) -> FloatArray:
-    """P_N, (n, n), symmetric, no negative eigenvalue; zeros where None. Raises TrackingError."""
+    """P_N, (n, n), made exactly symmetric; zeros where None. Raises TrackingError for another shape, values that are
+    not finite, asymmetry and a negative eigenvalue."""
     n = problem.order
     if terminal_weight is None:
         return np.zeros((n, n))
@@ -113,9 +119,9 @@ def require_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArra
 
 
 def _factor(weight: FloatArray) -> FloatArray:
-    """F with F'F = a symmetric weight; eigenvalues below zero, which are rounding, count as zero. Scaled to a unit
-    diagonal first: states of a model have units of their own, and the rounding errors of a large weight must not hide a
-    small one."""
+    """F with F'F = weight, a symmetric matrix, by its eigenvalues; those below zero are rounding errors and count as
+    zero. The weight is scaled to a unit diagonal first: the states of a model differ in unit and size, and rounding
+    errors of a large weight must not hide a small weight."""
     diagonal = np.sqrt(np.maximum(np.diag(weight), 0.0))
     scale = np.where(diagonal > 0, diagonal, 1.0)
     values, vectors = np.linalg.eigh(weight / np.outer(scale, scale))

@@ -1,9 +1,14 @@
-"""The Riccati recursion with P itself, compiled: fast, and abandoned where rounding errors would matter.
+"""Riccati recursion of the linear-quadratic tracker with P itself, compiled; abandoned where rounding errors matter.
 
-P = M[:n, :n] - W'W is a difference of equal numbers where the forces can cancel nearly all of the cost (no force weight
-and feedthrough): rounding may leave a negative eigenvalue, and each further step multiplies that by the square of every
-unstable zero of the model. `riccati.backward_gains`, which updates a factor of P, is used then. All called functions
-are in this file, because numba invalidates its cache by file.
+The equations are those of `lqr`, whose W_k is F here, with the Cholesky factor L of H:
+
+    M = [A B]' P_{k+1} [A B] + stage cost = [M_xx F'; F H],    H = L L',    W = L⁻¹ F
+    P_k = M_xx - W'W,    K_k = L'⁻¹ W
+
+Where the forces can cancel nearly all of the cost (feedthrough without force weight), P_k is a difference of nearly
+equal numbers: rounding may leave a negative eigenvalue, which each further step multiplies by the square of the model's
+unstable zeros. `riccati.backward_gains`, which updates a factor of P, is used then. All called functions are in this
+file, because numba invalidates its cache by file.
 """
 
 import numpy as np
@@ -15,13 +20,13 @@ _MATRIX = types.Array(types.float64, 2, "C", readonly=True)
 _OUT = types.float64[:, ::1]
 _STACK = types.float64[:, :, ::1]
 HALF_OF_THE_DIGITS = float(np.sqrt(np.finfo(np.float64).eps))
+"""Ratio of a difference to its minuend below which more than half of the digits are lost by cancellation."""
 
 
 @njit(types.boolean(_OUT, types.int64), cache=True, nogil=True)
 def _eliminate(M: FloatArray, n: int) -> bool:
-    """Turns the last rows of M, [F H], into [W L] with L L' = H and L W = F. Reads H's lower triangle only.
-
-    False = H is not positive.
+    """Cholesky factorisation and forward substitution, in place: the last rows of M, [F H], become [W L] with L L' = H
+    and L W = F. Of H, only the lower triangle is read. Returns False where H is not positive definite beyond rounding.
     """
     for i in range(n, M.shape[0]):
         whole = M[i, i]
@@ -30,6 +35,7 @@ def _eliminate(M: FloatArray, n: int) -> bool:
                 M[i, j] -= M[i, c] * M[j, c]
             M[i, j] /= M[j, j]
             M[i, i] -= M[i, j] * M[i, j]
+        # A pivot this small, relative to its entry of H, consists of rounding errors.
         if not M[i, i] > 1e-15 * whole:
             return False
         M[i, i] = M[i, i] ** 0.5
@@ -43,7 +49,7 @@ def _eliminate(M: FloatArray, n: int) -> bool:
 
 @njit(types.void(_OUT, types.int64, _OUT, _OUT), cache=True, nogil=True)
 def _solve(M: FloatArray, n: int, K: FloatArray, H_inverse: FloatArray) -> None:
-    """K = L'⁻¹ W and H⁻¹ = L'⁻¹ L⁻¹ from the result of `_eliminate`."""
+    """Fill K = L'⁻¹ W, (m, n), and H⁻¹ = L'⁻¹ L⁻¹, (m, m), from the result of `_eliminate`."""
     m = M.shape[0] - n
     for i in range(m):
         for c in range(m):
@@ -66,15 +72,15 @@ def _solve(M: FloatArray, n: int, K: FloatArray, H_inverse: FloatArray) -> None:
 
 @njit(types.void(_MATRIX, _MATRIX, _OUT, _OUT), cache=True, nogil=True)
 def _cost_to_go(joined: FloatArray, stage_cost: FloatArray, P: FloatArray, M: FloatArray) -> None:
-    """M = [A B]' P [A B] + the cost of this stage, (n + m, n + m)."""
+    """Fill M = [A B]' P [A B] + stage_cost, (n + m, n + m)."""
     np.dot(joined.T, np.dot(P, joined), M)
     M += stage_cost
 
 
 @njit(types.boolean(_OUT, types.int64, _OUT), cache=True, nogil=True)
 def _subtract(M: FloatArray, n: int, P: FloatArray) -> bool:
-    """P = M[:n, :n] - W' W, exactly symmetric. False = a diagonal entry lost more than half of its digits by
-    cancellation."""
+    """Fill P = M[:n, :n] - W' W, exactly symmetric. Returns False where a diagonal entry lost more than half of its
+    digits by cancellation."""
     kept = True
     for i in range(n):
         whole = M[i, i]
@@ -90,10 +96,10 @@ def _subtract(M: FloatArray, n: int, P: FloatArray) -> bool:
 
 @njit(types.boolean(_MATRIX, _MATRIX, _OUT, _STACK, _STACK), cache=True, nogil=True)
 def backward(joined: FloatArray, stage_cost: FloatArray, P: FloatArray, K: FloatArray, H_inverse: FloatArray) -> bool:
-    """Fills K (N, m, n) and H_inverse (N, m, m) backward from P (n, n), which becomes that of the start.
+    """Fill K (N, m, n) and H_inverse (N, m, m) backward from the terminal weight P (n, n), which is overwritten by P_0.
 
-    joined: [A B], (n, n + m); stage_cost: (n + m, n + m). Returns False where a force has no effect on the cost at some
-    step, or rounding makes its effect uncertain.
+    joined: [A B], (n, n + m); stage_cost: (n + m, n + m). Returns False, with incomplete results, where a force has no
+    effect on the cost at some step, or rounding errors matter.
     """
     n, samples = P.shape[0], K.shape[0]
     M = np.empty_like(stage_cost)

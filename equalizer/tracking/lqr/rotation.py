@@ -1,8 +1,9 @@
 """Forces for every rotation of a trajectory by linear combination of a few stored solutions.
 
-The forces are linear in the trajectory, and R r = sum over i, j of R_ij (e_i r_j). So the nine solutions for what axis
-j wants, wanted along axis i, give each rotation as their combination; a recording along one direction needs only three.
-All start from rest: an initial motion would add its free response, which does not rotate.
+The forces are linear in the trajectory r, and R r = sum over i, j of R_ij (e_i r_j), with the unit vectors e_i. The
+solutions for the trajectories e_i r_j, component j of r played along axis i, are stored: nine on three axes. Their sum
+with the weights R_ij is the solution for the rotation R. A recording along a single direction needs only three. All
+start from rest, because the free response of an initial motion does not rotate.
 """
 
 from dataclasses import dataclass
@@ -16,25 +17,29 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError, read_only, re
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RotationBasis:
-    """Made by `rotation_basis` or `normal_basis`. A direction is a rotation, (p, p), or a normal, (p,): the shape with
-    which it was made. Any such matrix or vector is taken; one of another length also changes the level."""
+    """Stored solutions, made by `rotation_basis` (a direction is a rotation, (p, p)) or `normal_basis` (a normal,
+    (p,)). Directions are not checked to be orthogonal or of unit length; other matrices and vectors also change the
+    level."""
 
     stored_forces: FloatArray
-    """(directions, N * m)"""
+    """(directions, N * m), N: forces of each solution, flattened."""
     stored_answers: FloatArray
-    """(directions, N * p)"""
+    """(directions, N * p), m/s²: the model's response to them, flattened."""
     inputs: int
+    """m, the number of forces."""
     direction_shape: tuple[int, ...]
+    """(p, p) or (p,)."""
 
     def forces(self, direction: FloatArray) -> FloatArray:
-        """(N, m). Raises TrackingError on another shape of the direction."""
+        """(N, m), N: forces for a direction. Raises TrackingError for another shape of the direction."""
         return self._combine(self.stored_forces, direction, self.inputs)
 
     def predict_response(self, direction: FloatArray) -> FloatArray:
-        """(N, p): the model's response to these forces."""
+        """(N, p), m/s²: the model's response to these forces. Raises TrackingError for another shape."""
         return self._combine(self.stored_answers, direction, self.direction_shape[0])
 
     def _combine(self, stored: FloatArray, direction: FloatArray, columns: int) -> FloatArray:
+        """(N, columns): stored solutions, weighted by the elements of the direction and added."""
         turned = np.asarray(direction, dtype=np.float64)
         if turned.shape != self.direction_shape:
             raise TrackingError(f"a direction has shape {turned.shape}; this basis takes {self.direction_shape}")
@@ -43,27 +48,26 @@ class RotationBasis:
 
 
 def rotation_basis(gains: StoredGains, trajectory: FloatArray) -> RotationBasis:
-    """Solutions from which those of every rotation of a trajectory are combined. trajectory: (N, p), before it is
-    rotated. p * p solutions."""
+    """Basis of p * p solutions for every rotation of a trajectory. trajectory: (N, p), m/s², before rotation."""
     p = gains.problem.outputs
     return _solve_basis(gains, every_rotation(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
 def normal_basis(gains: StoredGains, recording: FloatArray) -> RotationBasis:
-    """Solutions from which those of every normal are combined. recording: (N,), to be played along a normal. p
-    solutions."""
+    """Basis of p solutions for every normal. recording: (N,), m/s², to be played along a normal."""
     p = gains.problem.outputs
     return _solve_basis(gains, every_normal(recording, p), (p,))
 
 
 def every_rotation(trajectory: FloatArray) -> FloatArray:
-    """(p * p, N, p): row i p + j contains component j of the trajectory, along axis i."""
+    """(p * p, N, p): entry i p + j is component j of the trajectory, along axis i."""
     p = trajectory.shape[1]
     return np.array([np.outer(samples, axis) for axis in np.eye(p) for samples in trajectory.T])
 
 
 def every_normal(recording: FloatArray, outputs: int) -> FloatArray:
-    """(p, N, p): row i contains the recording along axis i. Raises TrackingError on a recording that is not (N,)."""
+    """(p, N, p): entry i is the recording along axis i; outputs: p. Raises TrackingError for a recording that is not
+    (N,)."""
     samples = np.asarray(recording, dtype=np.float64)
     if samples.ndim != 1 or not samples.size:
         raise TrackingError(f"a recording along one direction has shape {samples.shape}; it must be (N,), N >= 1")
@@ -71,6 +75,7 @@ def every_normal(recording: FloatArray, outputs: int) -> FloatArray:
 
 
 def _solve_basis(gains: StoredGains, wanted: FloatArray, direction_shape: tuple[int, ...]) -> RotationBasis:
+    """Basis from the solutions for trajectories (directions, N, p)."""
     solutions = [track(gains, each) for each in wanted]
     forces = np.array([solution.forces.ravel() for solution in solutions])
     answers = np.array([solution.predicted.ravel() for solution in solutions])

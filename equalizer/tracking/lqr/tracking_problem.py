@@ -2,11 +2,11 @@
 
     sum over k of (y_k - r_k)' Q (y_k - r_k) + u_k' R u_k,    x_{k+1} = A x_k + B u_k,  y_k = C x_k + D u_k
 
-A device that does not answer a constant force with acceleration has zeros near z = 1: the exact inverse of its model
-drifts at low frequencies, where nothing was identified. The force weight limits that at all frequencies, the
-low-frequency weight at low ones only: it penalises w of w_{k+1} = a w_k + (1 - a) u_k, a first-order low pass of each
-force, as a further output with zero reference. (Weights by augmenting the plant: Anderson and Moore, Optimal Control:
-Linear Quadratic Methods, 1990, chapter 9.)
+A device without acceleration response to a constant force has zeros near z = 1: the forces of its model's exact inverse
+drift at low frequencies, where nothing was identified. The force weight R limits this drift at all frequencies; the
+low-frequency weight limits it only there: it penalises w, a first-order low pass of each force,
+w_{k+1} = a w_k + (1 - a) u_k, as a further output with zero reference (frequency-dependent weights by augmenting the
+plant: Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990, chapter 9).
 """
 
 from dataclasses import dataclass
@@ -25,14 +25,15 @@ class TrackingError(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackingWeights:
-    """Weights of the cost. Raises TrackingError for invalid ones."""
+    """Weights of the cost. Raises TrackingError for weights that are negative, not finite, or of an invalid shape."""
 
     weight: float = 1e-3
-    """R = weight * I, of |u|². To be compared with |G|²: the level falls short by about weight / |G|²."""
+    """R = weight I, of |u|², (m/s² per N)². The delivered level is too low by about weight / |G|², relative, with the
+    response G."""
     output_weight: FloatArray | None = None
     """Q, (p, p), symmetric, no negative eigenvalue; None = identity."""
     low_frequency_weight: float = 0.0
-    """Weight of |low-passed u|². It shortens the preview that the inverse needs."""
+    """Weight of |w|², (m/s² per N)²; 0 = none. It shortens the preview that the inverse needs."""
     low_frequency_hz: float = 3.0
     """Corner frequency of that low pass."""
 
@@ -49,7 +50,8 @@ class TrackingWeights:
 
 @dataclass(frozen=True, eq=False)
 class TrackingProblem:
-    """Matrices of the model with its penalised outputs. Made by `make_tracking_problem`; arrays are read-only."""
+    """Matrices of the model with its penalised outputs, and of the cost. Made by `make_tracking_problem`; the arrays
+    are read-only. n: order, m: forces, p: tracked outputs, q: all outputs."""
 
     A: FloatArray
     """(n, n)"""
@@ -64,9 +66,10 @@ class TrackingProblem:
     R: FloatArray
     """(m, m)"""
     outputs: int
-    """p"""
+    """p, the number of tracked outputs."""
     sample_rate_hz: float
     band_hz: tuple[float, float]
+    """Band in which the model is valid."""
 
     def __post_init__(self) -> None:
         for name in ("A", "B", "C", "D", "Q", "R"):
@@ -74,7 +77,7 @@ class TrackingProblem:
 
     @property
     def order(self) -> int:
-        """n, the order including the states of the penalties; the model's own states come first."""
+        """n, including the states of the low passes; the model's own states are the first."""
         return int(self.A.shape[0])
 
     @property
@@ -84,12 +87,12 @@ class TrackingProblem:
 
     @cached_property
     def joined(self) -> FloatArray:
-        """(n, n + m): [A B]"""
+        """(n, n + m): [A B]."""
         return read_only(np.hstack((self.A, self.B)))
 
     @cached_property
     def step(self) -> FloatArray:
-        """(n + m, n + p): [A B; C D]', so that [x, u] @ step = [x next, y]"""
+        """(n + m, n + p): [A B; C D]', so that [x_k, u_k] @ step = [x_{k+1}, y_k]."""
         p = self.outputs
         return read_only(np.block([[self.A, self.B], [self.C[:p], self.D[:p]]]).T)
 
@@ -104,13 +107,13 @@ class TrackingProblem:
 
     @cached_property
     def linear_cost(self) -> FloatArray:
-        """(p, n + m): Q [C D], the linear term of the cost per reference sample."""
+        """(p, n + m): Q [C D] of the tracked outputs, from a reference sample to the linear term of the cost in [x,
+        u]."""
         return read_only((self.Q @ np.hstack((self.C, self.D)))[: self.outputs])
 
     def state(self, x0: FloatArray | None) -> FloatArray:
-        """(n,): a given state with that of the penalties; at rest where None. Of the model's own state alone, (order of
-        the model,), the penalties start at rest. Raises TrackingError on another length, and on values that are not
-        finite."""
+        """(n,): the state x0, or rest where None. x0: (n,), or the model's own state alone, to which low passes at rest
+        are appended. Raises TrackingError for another length and for values that are not finite."""
         if x0 is None:
             return np.zeros(self.order)
         x = np.ascontiguousarray(x0, dtype=np.float64)
@@ -125,9 +128,9 @@ class TrackingProblem:
 
 
 def make_tracking_problem(model: IdentifiedModel, weights: TrackingWeights) -> TrackingProblem:
-    """Problem of a model and its weights, augmented by the low-passed forces as outputs where these are penalised.
+    """Problem of a model and its weights, with the low-passed forces as further outputs where these are penalised.
 
-    Raises TrackingError for an output weight of another size.
+    Raises TrackingError for an output weight that is not (p, p).
     """
     p, m = model.D.shape
     Q = np.eye(p) if weights.output_weight is None else weights.output_weight
@@ -135,7 +138,7 @@ def make_tracking_problem(model: IdentifiedModel, weights: TrackingWeights) -> T
         raise TrackingError(f"output_weight has shape {Q.shape}; {p} outputs need ({p}, {p})")
     A, B, C, D = model.A, model.B, model.C, model.D
     if weights.low_frequency_weight > 0:
-        # One pole per force, w+ = a w + (1 - a) u, and its newest value as the output.
+        # A first-order low pass per force; its output is w_{k+1}, which includes the force of this sample.
         a = float(np.exp(-2 * np.pi * weights.low_frequency_hz / model.sample_rate_hz))
         unit = np.eye(m)
         A, B = block_diag(A, a * unit), np.vstack((B, (1 - a) * unit))
@@ -146,7 +149,8 @@ def make_tracking_problem(model: IdentifiedModel, weights: TrackingWeights) -> T
 
 
 def require_trajectory(problem: TrackingProblem, wanted: FloatArray) -> FloatArray:
-    """(N, p), contiguous. Raises TrackingError on another shape and on values that are not finite."""
+    """The trajectory (N, p) as a contiguous array. Raises TrackingError for another shape, no rows, and values that are
+    not finite."""
     r = np.ascontiguousarray(wanted, dtype=np.float64)
     if r.ndim != 2 or r.shape[1] != problem.outputs or not len(r):
         raise TrackingError(f"the trajectory has shape {r.shape}; this problem takes (N, {problem.outputs}), N >= 1")
@@ -156,13 +160,15 @@ def require_trajectory(problem: TrackingProblem, wanted: FloatArray) -> FloatArr
 
 
 def read_only(values: FloatArray) -> FloatArray:
-    """A contiguous copy that cannot be written."""
+    """A contiguous, read-only copy."""
     copy = np.array(values, dtype=np.float64, order="C")
     copy.flags.writeable = False
     return copy
 
 
 def _require_output_weight(Q: FloatArray) -> FloatArray:
+    """Read-only copy of Q. Raises TrackingError unless it is square, finite, symmetric and without negative
+    eigenvalue."""
     Q = read_only(Q)
     if Q.ndim != 2 or Q.shape[0] != Q.shape[1] or not np.isfinite(Q).all() or not np.allclose(Q, Q.T, rtol=1e-12):
         raise TrackingError("output_weight must be a square symmetric matrix of finite numbers")

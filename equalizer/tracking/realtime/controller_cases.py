@@ -1,4 +1,8 @@
-"""Reference cases to verify a translation of a controller: ticks computed in Python, below the cap."""
+"""Reference cases to verify a translation of a controller into another language: inputs and forces of T ticks.
+
+The forces are computed by this package, for both parts of the controller (`realtime_controller`): the transient, with
+directions that change at each tick, and the stream, with noise as wanted acceleration. All forces are below the cap.
+"""
 
 from dataclasses import dataclass
 
@@ -10,40 +14,40 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError
 from equalizer.tracking.realtime.realtime_controller import RealtimeController
 
 OF_CAP = 0.9
-"""Largest force of a case over the cap, because the cap is not compared."""
+"""Largest force of a case relative to the cap: below 1, because the action of the cap is not compared."""
 
 AFTER = 50
-"""Ticks of a case after the last row of the transient, and at least so many with a force of the stream."""
+"""Least number of ticks after the last row of the transient, and after the first M ticks of a stream with a preview of
+M samples."""
 
 NO_FORCE = 1e-12
-"""Tolerance of a comparison, relative to the cap. A way whose largest force is below it counts as zero."""
+"""Tolerance of a comparison, relative to the cap. Cases with a smaller largest force cannot be compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControllerCases:
-    """T ticks of transient and stream, from rest."""
+    """Inputs and forces of T ticks of transient and stream, each from rest. Accelerations in m/s², forces in N."""
 
     rotations: FloatArray
-    """(T, p, p): directions that change over time and are not only rotations: the level changes too."""
+    """(T, p, p): directions of the transient, a random walk of matrices that also change the level."""
     transient_forces: FloatArray
-    """(T, m)"""
+    """(T, m): forces of the transient in these directions."""
     wanted: FloatArray
-    """(T, p): noise"""
+    """(T, p): wanted acceleration of the stream, white noise."""
     low: FloatArray
-    """(T, p): of what is wanted, not played"""
+    """(T, p): low band of `wanted`, which is not played."""
     high: FloatArray
-    """(T, p)"""
+    """(T, p): high band of `wanted`, which is not played."""
     stream_forces: FloatArray
-    """(T, m)"""
+    """(T, m): forces of the stream for the middle band."""
 
     def __len__(self) -> int:
         return len(self.wanted)
 
 
 def controller_cases(controller: RealtimeController, seed: int = 1) -> ControllerCases:
-    """Compute reference inputs and forces: as many ticks as the transient has rows, or the stream's preview takes, and
-    some after its end. Raises TrackingError where one of the two ways gives no force at all: nothing could be
-    compared."""
+    """Compute reference inputs and forces for as many ticks as the transient has rows or the preview has samples, and
+    `AFTER` more. Raises TrackingError where transient or stream give no force, so that nothing could be compared."""
     draw, p = np.random.default_rng(seed), controller.problem.outputs
     ticks = max(len(controller.transient), len(controller.tracker)) + AFTER
     rotations = np.cumsum(draw.standard_normal((ticks, p, p)), axis=0)
@@ -56,6 +60,8 @@ def controller_cases(controller: RealtimeController, seed: int = 1) -> Controlle
 
 
 def _cap_factor(forces: FloatArray, cap_n: float, way: str) -> float:
+    """Factor that scales the largest norm of forces (T, m) to `OF_CAP` of the cap. way: transient or stream, for the
+    error. Raises TrackingError for forces of zero."""
     longest = float(np.linalg.norm(forces, axis=1).max())
     if not longest >= NO_FORCE * cap_n:
         raise TrackingError(

@@ -1,8 +1,9 @@
-"""Real-time form of a model's tracker, as arrays for a loop in another language: two ways to get a force each tick.
+"""Real-time form of the linear-quadratic tracker of a model: arrays for a control loop in another language.
 
-`transient`: a table of accelerations that is known beforehand, turned into any direction while it is played (stored
-gains and rotation basis). `stream`: accelerations that arrive while they are played, split causally into bands, the
-model's own band tracked with limited preview. Neither feeds a measured signal back.
+There are two controllers, each with one force vector per tick. Transient: a table of accelerations that is known
+beforehand, rotated into any direction while it is played (`changing_direction`). Stream: accelerations that arrive
+while they are played, split into bands by causal filters; the model's band is tracked with limited preview (`preview`).
+Neither feeds back a measured signal.
 """
 
 from dataclasses import dataclass
@@ -25,19 +26,21 @@ from equalizer.tracking.lqr.tracking_problem import (
 )
 
 TAP_S, TAP_DECAY_S = 0.2, 0.04
-"""Length and decay time of the default transient, a tap as contacts with a stiff surface cause: five time constants."""
+"""Length and decay time constant of the default transient, a decaying oscillation as after contact with a stiff
+surface; the length is five time constants."""
 
 
 @dataclass(frozen=True, slots=True)
 class RealtimeSettings:
-    """Settings of the two controllers. Raises TrackingError for values that no loop can run."""
+    """Settings of both controllers. Raises TrackingError for a negative preview, and for a cap that is not above
+    zero."""
 
     weight: float = 1e-3
     """Weight of |force|² against |error|², (m/s² per N)²."""
     preview_s: float = 0.2
-    """How long ahead a stream is known. It is played later by this time, less a tick."""
+    """Duration for which a stream is known in advance: it is played with a delay of the preview, less one sample."""
     cap_n: float = 3.0
-    """Limit of the force vector's length, N."""
+    """Limit of the norm of the force vector, N."""
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.preview_s) and self.preview_s >= 0):
@@ -48,7 +51,7 @@ class RealtimeSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RealtimeController:
-    """Both controllers of a model, as plain arrays: `transient`, and `tracker` with `split` for streams."""
+    """Both controllers of a model: `transient`, and `tracker` with `split` for streams."""
 
     tracker: PreviewTracker
     split: CausalSplit
@@ -63,10 +66,10 @@ class RealtimeController:
         return self.tracker.problem
 
     def simulate_stream(self, wanted: FloatArray) -> tuple[Bands, TrackResult]:
-        """Simulate a stream of wanted (N, p) from rest: its bands, and the forces for the middle one.
+        """Simulate a stream of wanted (N, p), m/s², from rest: its bands, and the forces for the middle band.
 
-        Row k belongs to the tick at which row k of `wanted` arrives; the row that is played then arrived earlier by
-        the preview less a sample. The cap is not applied here.
+        Row k of the forces belongs to the tick at which row k of `wanted` arrives; the acceleration played at this
+        tick is that of an earlier row, by the preview less one sample. The cap is not applied here.
         """
         bands = self.split.split(wanted)
         late = len(self.tracker) - 1
@@ -77,10 +80,11 @@ class RealtimeController:
 def realtime_controller(
     model: IdentifiedModel, transient: FloatArray | None = None, settings: RealtimeSettings | None = None
 ) -> RealtimeController:
-    """Make both controllers. transient: (N, p), m/s², before it is rotated; None = a tap along the last output. Samples
-    in which the device comes to rest are appended.
+    """Make both controllers. transient: (N, p), m/s², before rotation; None = `tap`. Zeros are appended to it, in which
+    the device comes to rest.
 
-    Raises TrackingError for a model without states or without stationary gains, and for settings that no loop can run.
+    Raises TrackingError for a model without states or without stationary gains, a negative weight, and a transient with
+    another number of columns than the model has outputs.
     """
     settings = settings or RealtimeSettings()
     if not model.order:
@@ -100,7 +104,8 @@ def realtime_controller(
 
 
 def tap(model: IdentifiedModel) -> FloatArray:
-    """(N, p): a decaying oscillation in the middle of the model's band, 1 m/s², along the last output."""
+    """(N, p), m/s²: the default transient, exp(-t / TAP_DECAY_S) sin(2 pi f t) along the last output, with f in the
+    middle of the model's band."""
     low_hz, high_hz = model.band_hz
     time_s = np.arange(round(TAP_S * model.sample_rate_hz)) / model.sample_rate_hz
     wanted = np.zeros((len(time_s), model.C.shape[0]))

@@ -1,7 +1,8 @@
-"""Interpolation by blending the forces of several models. Needs no matching of modes: the safe default.
+"""Interpolation between places by the weighted sum of the forces of several models (blending). It needs no matching of
+modes and is the default.
 
-Always better than blending responses and inverting the blend: where a resonance moves, the mean of two responses has
-two small resonances, and its inverse two notches.
+Forces are blended, not responses: where the frequency of a resonance changes with the place, the mean of two responses
+has two smaller resonances, and its inverse two notches.
 """
 
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
@@ -10,8 +11,8 @@ from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 
 def blend_at(workspace: WorkspaceModels, place_m: Place) -> ModelsAtPlace:
-    """All models with the weights of linear interpolation at a place, none negative. A single model without a place is
-    used everywhere, with a remark."""
+    """All models with the weights of linear interpolation at a place (m), none negative, sum 1. A single model without
+    a place is used everywhere, with a remark; a place outside the hull of the models also gets a remark."""
     if len(workspace) == 1 and workspace.models[0].place_m is None:
         return ModelsAtPlace(
             place_m, workspace.models, (1.0,), ("the only model does not say where it was identified",)

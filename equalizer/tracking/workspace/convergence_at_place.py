@@ -1,12 +1,13 @@
 """Convergence test of iterative learning at a place, from the models' uncertainty and their differences.
 
-The device at the place is unknown: it may be any draw of any model's uncertainty, or, between places, any model that is
-used. Learning inverts the weighted sum of the models' inverses. With a virtual spring of force K a at an acceleration
-a, forces u that are added to the spring's give, by a = G (u + K a), the closed loop
+The device at the place is unknown: it may be any draw from any model's uncertainty or, between places, any of the
+models used. Learning corrects forces by the weighted sum of the models' inverses. With the response G from total force
+to acceleration a, and a virtual spring whose force is K a, forces u added to the spring's force give a = G (u + K a),
+hence the closed loop
 
-    a = (I - G K)^-1 G u,
+    a = (I - G K)^-1 G u.
 
-with G from total force to acceleration. `equalizer.tracking.learning.convergence` has the condition.
+The condition of convergence is that of `equalizer.tracking.learning.convergence`.
 """
 
 import numpy as np
@@ -19,13 +20,13 @@ from equalizer.tracking.workspace.feedforward_at_place import select_used_models
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
 LINES = 120
-"""Number of lines, on a logarithmic scale over the band, at which convergence is tested."""
+"""Number of logarithmically spaced lines over the band at which convergence is tested."""
 
 
 def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta: float = 1.0) -> Convergence | None:
-    """The worst case over all devices that the place may have. weight: R = weight I of the inverses. spring: acts on
-    the device and is not in the models. beta: gain of learning. None for a single model without uncertainty, which
-    would only be compared with itself."""
+    """Worst-case convergence over all possible devices at the place. weight: R = weight I of the inverses, (m/s² per
+    N)²; spring: acts on the device, but is not in the models; beta: gain of learning. None for a single model without
+    uncertainty, which would only be compared with itself."""
     used = [model for _, model in select_used_models(at)]
     band_hz = used[0].band_hz
     lines_hz = np.asarray(np.geomspace(*band_hz, LINES), dtype=np.float64)
@@ -41,7 +42,7 @@ def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta
 
 
 def _close_spring_loop(device: ComplexArray, frequency_hz: FloatArray, spring: VirtualSpring) -> ComplexArray:
-    """(lines, p, p): (I - G K)^-1 G, from forces added to the spring's to acceleration. device: G, (lines, p, p)."""
+    """(lines, p, p), m/s² per N: closed loop (I - G K)^-1 G. device: G, (lines, p, p); frequency_hz: (lines,)."""
     spring_force = spring.force_per_acceleration(frequency_hz)[:, None, None]
     return_difference = np.eye(device.shape[1]) - device * spring_force
     return np.asarray(np.linalg.solve(return_difference, device), dtype=np.complex128)

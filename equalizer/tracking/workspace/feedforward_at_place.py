@@ -1,4 +1,7 @@
-"""Feedforward forces at a place, by a single model or by several whose forces are added."""
+"""Feedforward forces at a place of the workspace, by a single model or by the weighted sum of several models' forces.
+
+The models and weights come from an interpolation between places (`interpolation_choice`).
+"""
 
 from dataclasses import replace
 
@@ -14,12 +17,14 @@ from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
 
 def feedforward_at(at: ModelsAtPlace, wanted: Signal, settings: FeedforwardSettings) -> Feedforward:
-    """Feedforward at a place; error and loss are the worst part's, by its own model. Raises what `feedforward`
-    raises."""
+    """Feedforward at a place: the weighted sum of the forces of all models with a weight. Error and loss are the
+    largest of any model's forces, predicted by that model; `predicted` and the other fields are those of the model with
+    the largest weight. wanted: (N, p), m/s². Raises what `feedforward` raises."""
     used = select_used_models(at)
     if len(used) == 1:
         return feedforward(used[0][1], wanted, settings)
-    # A sum may fit where a part does not; parts that fit, with weights that add up to one, have a sum that fits.
+    # The sum may be under the cap where the forces of a model are not. Weights are not negative and add up to 1, so the
+    # sum is under the cap where those of all models are.
     each = settings if settings.constrain else replace(settings, cap_n=NO_CAP_N)
     parts = [(weight, feedforward(model, wanted, each)) for weight, model in used]
     samples = np.asarray(sum(weight * part.forces.samples for weight, part in parts), dtype=np.float64)
@@ -35,17 +40,18 @@ def feedforward_at(at: ModelsAtPlace, wanted: Signal, settings: FeedforwardSetti
 
 
 def select_used_models(at: ModelsAtPlace) -> tuple[tuple[float, IdentifiedModel], ...]:
-    """Models with a weight above zero, with their weights, restricted to the band that all of them cover."""
+    """Weights above zero and their models, with the band restricted to the band that all these models cover."""
     used = [(weight, model) for weight, model in zip(at.weights, at.models, strict=True) if weight > 0]
     band_hz = max(model.band_hz[0] for _, model in used), min(model.band_hz[1] for _, model in used)
     return tuple((weight, replace(model, band_hz=band_hz)) for weight, model in used)
 
 
 def inverse_at(at: ModelsAtPlace, weight: float) -> InverseOfLength:
-    """Weighted sum of the inverse operators of all models at a place. weight: R = weight I, of |u|²."""
+    """Weighted sum of the inverse operators of all models at a place. weight: R = weight I, of |u|², (m/s² per N)²."""
     parts = [(share, inverse_operator(model, weight)) for share, model in select_used_models(at)]
 
     def of_length(rows: int) -> Invert:
+        """Inverse operator for records of `rows` rows."""
         inverses = [(share, inverse(rows)) for share, inverse in parts]
         return lambda wanted: np.asarray(sum(share * invert(wanted) for share, invert in inverses), dtype=np.float64)
 

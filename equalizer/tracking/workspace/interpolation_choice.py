@@ -1,4 +1,8 @@
-"""Choice of the interpolation by cross-validation on places that were identified and are left out."""
+"""Choice between blended and modal interpolation by cross-validation at held-out places.
+
+At each held-out place, the response that was identified there is equalized by the interpolation from the other places.
+The method with the smaller largest error is chosen; blended forces where nothing can be checked.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,32 +24,33 @@ from equalizer.tracking.workspace.workspace_models import Place, WorkspaceError,
 
 Interpolation = Literal["blended forces", "modal"]
 LINES = 300
-"""Lines on which interpolations are compared."""
+"""Number of logarithmically spaced lines over the band on which interpolations are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeldOutPlace:
-    """The device's response, as well as it is known, at a place without a model."""
+    """Reference response of the device at a place that is held out from the interpolation."""
 
     place_m: Place
     frequency_hz: FloatArray
     """(lines,), within the models' band."""
     response: ComplexArray
-    """(lines, p, m)"""
+    """(lines, p, m), m/s² per N."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlaceCheck:
-    """Errors of both interpolations at a held-out place, against the response that is known there."""
+    """Errors of both interpolations at a held-out place, by the reference response there."""
 
     place_m: Place
     blended: Quality
     modal: Quality | None
-    """None where resonances could not be matched without this place."""
+    """None where resonances could not be matched between the other places."""
     blended_error: float
-    """Root mean square over the lines of the largest singular value of delivered minus wanted; 0.01 = 1 %. Not the
-    worst line: where a resonance is missed at all, that is equally bad for everything."""
+    """Rms over the lines of the largest singular value of T - I, with T from wanted to delivered acceleration; 0.01 =
+    1 %. Not the worst line, because at a resonance that all methods miss they are equally bad."""
     modal_error: float | None
+    """The same for modal interpolation; None as `modal`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,13 +66,13 @@ class InterpolationChoice:
     """Interpolation by the modes of all models; None where it is not used."""
 
     def at(self, place_m: Place) -> ModelsAtPlace:
-        """Models and weights for a place by the chosen interpolation. A place outside the models' hull gets those of
-        the nearest place inside, with a remark."""
+        """Models and weights for a place (m) by the chosen interpolation. A place outside the convex hull of the models
+        gets those of the nearest place inside, with a remark."""
         return self.modal.at(place_m) if self.modal else blend_at(self.workspace, place_m)
 
 
 def held_out_model(model: IdentifiedModel, band_hz: tuple[float, float]) -> HeldOutPlace:
-    """A model of a place, taken as the truth there. Raises ValueError without a place."""
+    """A model as the reference at its own place, over a band (Hz). Raises ValueError for a model without a place."""
     if model.place_m is None:
         raise ValueError("the model that is held out does not say where it was identified; identify it with its place")
     frequency_hz = np.geomspace(*band_hz, LINES)
@@ -77,10 +82,10 @@ def held_out_model(model: IdentifiedModel, band_hz: tuple[float, float]) -> Held
 def choose_interpolation(
     workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace] = (), weight: float = WEIGHT
 ) -> InterpolationChoice:
-    """Choose between modal and blended interpolation: by the models of `held_out` places, else by holding out in turn
-    each model that lies between the others, which judges a coarser grid than the one that is used. Blended forces where
-    nothing can be checked, or modes do not match. Raises WorkspaceError for a held-out place where one of the models
-    was identified: it would judge nothing."""
+    """Choose between modal and blended interpolation: by the responses at `held_out` places; without any, by leaving
+    out in turn each model that lies between the others, which tests a coarser grid than the grid in use. Blended forces
+    where nothing can be checked or modes do not match. weight: of |force|², (m/s² per N)². Raises WorkspaceError for a
+    held-out place at which one of the models was identified, because it would test nothing."""
     _check_apart(workspace, held_out)
     try:
         modal = modal_interpolation(workspace) if len(workspace) > 1 else None
@@ -99,6 +104,7 @@ def choose_interpolation(
 def _choose_by_checks(
     workspace: WorkspaceModels, modal: ModalInterpolation, checks: tuple[PlaceCheck, ...]
 ) -> InterpolationChoice:
+    """Modal interpolation where its largest error over all checks is smaller than that of blended forces."""
     if not checks:
         reason = "forces are blended, because no model lies between the others to check anything better by"
         return InterpolationChoice("blended forces", reason, checks, workspace, None)
@@ -116,6 +122,7 @@ def _choose_by_checks(
 
 
 def _check_apart(workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace]) -> None:
+    """Raise WorkspaceError for a held-out place within `OUTSIDE_M` of a model's place."""
     for place in held_out:
         apart = np.linalg.norm(workspace.places_m - np.array(place.place_m), axis=1)
         if apart.min() < OUTSIDE_M:
@@ -125,6 +132,8 @@ def _check_apart(workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace]) -
 
 
 def _leave_one_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]]:
+    """For each model inside the convex hull of the others: the others, their modal interpolation (None where modes do
+    not match), and the model as reference. Empty for fewer than three models."""
     found: list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]] = []
     for index, model in enumerate(workspace.models):
         if len(workspace) < 3:
@@ -143,6 +152,7 @@ def _leave_one_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, Mo
 def _check_place(
     workspace: WorkspaceModels, modal: ModalInterpolation | None, place: HeldOutPlace, weight: float
 ) -> PlaceCheck:
+    """Quality and error of both interpolations at a held-out place."""
     blended = _compute_equalized_response(blend_at(workspace, place.place_m), place, weight)
     if modal is None:
         return PlaceCheck(place.place_m, measure_quality(blended), None, _rms_error(blended), None)
@@ -153,9 +163,11 @@ def _check_place(
 
 
 def _compute_equalized_response(at: ModelsAtPlace, place: HeldOutPlace, weight: float) -> ComplexArray:
+    """T, (lines, p, p): reference response times interpolated inverse, from wanted to delivered acceleration."""
     return np.asarray(place.response @ at.inverse(place.frequency_hz, weight))
 
 
 def _rms_error(delivered: ComplexArray) -> float:
+    """Rms over the lines of the largest singular value of T - I. delivered: T, (lines, p, p)."""
     largest = np.linalg.norm(delivered - np.eye(delivered.shape[1]), ord=2, axis=(1, 2))
     return float(np.sqrt((largest**2).mean()))

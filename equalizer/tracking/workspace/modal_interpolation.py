@@ -1,7 +1,9 @@
-"""Modal interpolation: a model for a place between models, whose resonances move instead of being mixed.
+"""Modal interpolation: a model for a place between identified models, with interpolated resonances.
 
-Resonances of the band are matched, and their frequency, damping and residues interpolated; what is left of each
-model's response is smooth and is interpolated linearly. The sum becomes a model again, on a fixed set of real poles.
+A weighted sum of responses would contain the resonances of every model. Here the resonances in the band are matched
+between models (`mode_matching`), and their natural frequencies, damping ratios and residues are interpolated. The
+remainder of each response without its resonances is smooth and is interpolated linearly. The sum is realised as a
+state-space model, with fixed real poles for the remainder.
 """
 
 from collections.abc import Sequence
@@ -20,30 +22,31 @@ from equalizer.tracking.workspace.place_weights import place_weights
 from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 REAL_POLES_PER_OCTAVE = 2.0
-"""Density of the real poles that describe the smooth remainder."""
+"""Density of the fixed real poles that describe the smooth remainder."""
 POLES_FROM, POLES_TO = 0.3, 4.5
-"""Lowest and highest of them, relative to the band's ends."""
+"""Lowest and highest of these poles, relative to the lower and the upper end of the band."""
 RANK_SHARE = 0.1
-"""Singular values of a residue below this share of the largest are what interpolation adds to it."""
+"""Singular values below this share of the largest are not counted in the rank of a residue matrix. The interpolated
+residue is truncated to the largest rank of the models' residues, because a sum of matrices has a higher rank."""
 POOR_FIT = 0.02
-"""Relative error of the remainder's model above which a remark is made."""
+"""Largest relative error of the fit of the remainder without a remark to the user."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalInterpolation:
-    """Matched resonances of all models, and the smooth remainders of their responses; `at` gives a model for a
-    place."""
+    """Matched resonances of all models and the smooth remainders of their responses. Made by `modal_interpolation`."""
 
     workspace: WorkspaceModels
     tracks: tuple[tuple[BandMode, ...], ...]
-    """Each resonance through all models, in their order."""
+    """For each resonance, its mode in every model, in the order of the models."""
     lines: BandLines
+    """Lines of the band, the same for all models; its response is that of the first model."""
     remainders: ComplexArray
-    """(models, lines, p, m)"""
+    """(models, lines, p, m), m/s² per N: responses without the matched resonances."""
 
     def at(self, place_m: Place) -> ModelsAtPlace:
-        """A single model for a place, which resonances and remainder at their interpolated values give, valid in the
-        models' common band. Remarks: a place outside the models' hull, a poor fit of the remainder."""
+        """A single model for a place (m), from interpolated resonances and remainder, valid in the models' common band.
+        Remarks: a place outside the convex hull of the models, a poor fit of the remainder."""
         weights = place_weights(self.workspace.places_m, place_m)
         modes = [_interpolate_mode(track, weights.smooth) for track in self.tracks]
         remainder = np.einsum("k,klpm->lpm", weights.linear, self.remainders)
@@ -57,8 +60,8 @@ class ModalInterpolation:
 
 
 def modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
-    """Match the resonances of neighbouring models for an interpolation. Raises ModesDoNotMatchError where it is
-    doubtful which resonances of neighbouring models are the same."""
+    """Find and match the resonances of all models. Raises ModesDoNotMatchError where the matching of resonances of
+    neighbouring models is ambiguous."""
     band_hz = workspace.band_hz
     modes = [band_modes(model, band_hz) for model in workspace.models]
     tracks = _track_modes(workspace, modes)
@@ -71,7 +74,8 @@ def modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
 
 
 def _track_modes(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]) -> tuple[tuple[BandMode, ...], ...]:
-    """Follow each resonance from neighbour to neighbour along the minimum spanning tree of the places."""
+    """Modes of each resonance in all models, followed from neighbour to neighbour along the minimum spanning tree of
+    the places. Resonances that are not in every model are left out."""
     places = workspace.places_m
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
     net = minimum_spanning_tree(apart)
@@ -91,9 +95,12 @@ def _track_modes(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]
 
 
 def _interpolate_mode(track: Sequence[BandMode], weights: FloatArray) -> BandMode:
+    """Mode at a place: frequency and damping by weighted geometric means, the residue over frequency by a weighted
+    mean. track: one mode per model; weights: (models,), sum 1."""
     natural = float(np.exp(weights @ np.log([mode.natural_hz for mode in track])))
     damping = float(np.exp(weights @ np.log([mode.damping_ratio for mode in track])))
-    # A residue of an acceleration grows with the frequency: that part moves with the frequency, not with the place.
+    # The residue of an acceleration response is proportional to the natural frequency. It is divided by it before the
+    # interpolation over places, and multiplied by the interpolated frequency afterwards.
     residue = natural * np.einsum("k,kpm->pm", weights, np.array([mode.residue / mode.natural_hz for mode in track]))
     rank = max(_rank(mode.residue) for mode in track)
     u, s, v = np.linalg.svd(residue)
@@ -102,6 +109,7 @@ def _interpolate_mode(track: Sequence[BandMode], weights: FloatArray) -> BandMod
 
 
 def _rank(residue: ComplexArray) -> int:
+    """Numerical rank of a residue (p, m), by `RANK_SHARE`."""
     sizes = np.linalg.svd(residue, compute_uv=False)
     return int((sizes > RANK_SHARE * sizes[0]).sum())
 
@@ -109,8 +117,8 @@ def _rank(residue: ComplexArray) -> int:
 def _assemble_model(
     prepared: ModalInterpolation, modes: Sequence[BandMode], remainder: ComplexArray, size: FloatArray
 ) -> tuple[IdentifiedModel, float]:
-    """State-space model of the resonances and of the remainder, which is fitted on fixed real poles; and the
-    remainder's worst relative error."""
+    """State-space model of resonances and remainder, (lines, p, m), which is fitted by least squares with fixed real
+    poles; and the largest error of that fit relative to size, (lines,), the norm of the total response."""
     first, lines = prepared.workspace.models[0], prepared.lines
     poles = _smooth_poles(prepared.workspace.band_hz, first.sample_rate_hz)
     basis = np.hstack([(1 - poles) / (lines.z[:, None] - poles), np.ones((len(lines.z), 1))]) / size[:, None]
@@ -140,13 +148,15 @@ def _assemble_model(
 
 
 def _smooth_poles(band_hz: tuple[float, float], rate_hz: float) -> FloatArray:
+    """(poles,): discrete real poles, logarithmically spaced from below the band to above it, at most 0.4 of the sample
+    rate."""
     low, high = POLES_FROM * band_hz[0], min(POLES_TO * band_hz[1], 0.4 * rate_hz)
     count = max(4, round(REAL_POLES_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
     return np.asarray(np.exp(-2 * np.pi * np.geomspace(low, high, count) / rate_hz))
 
 
 def _realise_mode(mode: BandMode) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Real state-space matrices A, B, C of R / (z - p) and its conjugate; two states for each rank of R."""
+    """Real state-space matrices A, B, C of R / (z - pole) plus its conjugate; two states per rank of the residue R."""
     u, s, v = np.linalg.svd(mode.residue)
     rank = int((s > 1e-9 * s[0]).sum())
     p = mode.pole

@@ -1,4 +1,7 @@
-"""Models that compute forces at a place: a single one, or several whose forces are added."""
+"""Models with weights for a place of the workspace: the forces there are the weighted sum of the models' forces.
+
+Result of an interpolation between places: a single model by `modal_interpolation`, several by `blended_inverse`.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,25 +17,28 @@ from equalizer.tracking.workspace.workspace_models import Place
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelsAtPlace:
-    """Models for a place with their weights; the forces there are the weighted sum of those of each model."""
+    """Models for a place, with their weights."""
 
     place_m: Place
+    """The place, m."""
     models: tuple[IdentifiedModel, ...]
     weights: tuple[float, ...]
-    """One per model, none negative, sum 1: forces are added with them, never models or responses."""
+    """One per model, none negative, sum 1: weights of the forces, never of models or responses."""
     remarks: tuple[str, ...] = ()
-    """What the user should know, in sentences."""
+    """Sentences for the user, such as that the place is outside the identified places."""
 
     def inverse(
         self, frequency_hz: FloatArray, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
     ) -> ComplexArray:
-        """Steady-state forces per wanted output, (lines, m, p)."""
+        """(lines, m, p), N per m/s²: regularised inverse (`periodic_inverse.inverse_response`), for frequencies
+        (lines,). weight: of |force|², (m/s² per N)²; spring: its force is subtracted."""
         parts = [w * inverse_response(model, frequency_hz, weight, spring) for w, model in self._select_used_models()]
         return np.asarray(sum(parts), dtype=np.complex128)
 
     def forces(self, track: Callable[[IdentifiedModel], FloatArray]) -> FloatArray:
-        """Forces of a trajectory: the weighted sum of what `track` returns for each model."""
+        """Forces (N, m), N, of a trajectory: the weighted sum of the forces that `track` returns for each model."""
         return np.asarray(sum(w * track(model) for w, model in self._select_used_models()), dtype=np.float64)
 
     def _select_used_models(self) -> list[tuple[float, IdentifiedModel]]:
+        """Weights above zero and their models."""
         return [(w, model) for w, model in zip(self.weights, self.models, strict=True) if w > 0]

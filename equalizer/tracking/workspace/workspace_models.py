@@ -1,4 +1,7 @@
-"""Models of a device, each identified at another place of its workspace."""
+"""Models of a single device, each identified at another place of its workspace, checked to be compatible.
+
+The response of a device changes with the pose of its mechanism; between the places, models are interpolated.
+"""
 
 from dataclasses import dataclass
 
@@ -8,22 +11,22 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray
 
 Place = tuple[float, float, float]
-"""x, y, z in metres."""
+"""Coordinates x, y, z of the handle, m."""
 
 SAME_PLACE_M = 1e-4
-"""Distance below which two places are the same."""
+"""Distance (m) below which two places count as the same."""
 
 
 class WorkspaceError(ValueError):
-    """These models cannot be used together, or not at places."""
+    """Models cannot be used together, or a place for them is missing or invalid."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorkspaceModels:
-    """Models of one device at several places of its workspace. Raises WorkspaceError where models differ in rate,
-    channels or units, share no band, or lack a place.
+    """Models of one device at several places of its workspace. A single model needs no place: it is used everywhere.
 
-    A single model needs no place: it is used everywhere.
+    Raises WorkspaceError for no models, an unstable model, models that differ in sample rate, channels or units, have
+    no common band or the same place, and for a missing place.
     """
 
     models: tuple[IdentifiedModel, ...]
@@ -45,20 +48,21 @@ class WorkspaceModels:
 
     @property
     def places_m(self) -> FloatArray:
-        """(models, 3); a single model without a place is put at the origin."""
+        """(models, 3), m; the origin for a single model without a place."""
         return np.array([model.place_m or (0.0, 0.0, 0.0) for model in self.models], dtype=np.float64)
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """What all models cover."""
+        """Lower and upper end of the band that all models cover."""
         return max(model.band_hz[0] for model in self.models), min(model.band_hz[1] for model in self.models)
 
     def without(self, index: int) -> "WorkspaceModels":
-        """All models but that of this index, from 0. Raises WorkspaceError where none is left."""
+        """All models except that of an index, from 0. Raises WorkspaceError for a single model."""
         return WorkspaceModels(self.models[:index] + self.models[index + 1 :])
 
 
 def _check_alike(first: IdentifiedModel, model: IdentifiedModel, number: int) -> None:
+    """Check a model against the first. number: of the model, from 1, for the message. Raises WorkspaceError."""
     for what, each, other in (
         ("sample rate", first.sample_rate_hz, model.sample_rate_hz),
         ("input channels", first.input_channels, model.input_channels),
@@ -73,6 +77,7 @@ def _check_alike(first: IdentifiedModel, model: IdentifiedModel, number: int) ->
 
 
 def _check_places(models: tuple[IdentifiedModel, ...]) -> None:
+    """Check that all models have different places. Raises WorkspaceError."""
     missing = [str(number) for number, model in enumerate(models, start=1) if model.place_m is None]
     if missing:
         raise WorkspaceError(

@@ -1,6 +1,7 @@
-"""Accelerometer on a board or data-acquisition device with its own clock, aligned to the loop's ticks.
+"""Accelerometer on a board or data-acquisition device with its own clock, resampled to the control loop's ticks.
 
-A board (`serial_reader` by `parser`) or a data-acquisition device (`sources`) gives `samples`; a thread (`sensor`)
-keeps them (`history`); for the ticks of a recording the clock is fitted (`clock_fit`) and they are put where they
-belong (`placement`). Begin at `sensor.py`.
+A board (`serial_reader`, `parser`) or a data-acquisition device (`sources`) gives `samples`; a thread (`sensor`) keeps
+them (`history`, `newest_sample`). After a recording the sensor's clock is fitted to the computer's (`clock_fit`) and
+the samples are resampled to the ticks (`placement`). `six_positions` and `calibration` calibrate the sensor under
+gravity; `sensor_findings` are the checks of `hapteq doctor`. Begin at `sensor.py`.
 """

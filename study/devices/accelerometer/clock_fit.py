@@ -1,7 +1,8 @@
-"""Fit of the microcontroller's clock to the host's: a sample arrives some time after it was taken, never before.
+"""Linear fit of the sensor's clock to the computer's, from the times of arrival of its samples.
 
-So the line from device time to host time lies below all arrivals, and of all such lines that one is taken which lies
-closest to them on average: an edge of the lower convex hull, no constant needed.
+A sample arrives after it was taken, never before. The line from device time to host time therefore lies below all
+arrivals. Of all such lines the fit takes the one with the smallest mean distance to the arrivals, which is the edge of
+their lower convex hull at the mean device time; no constant has to be chosen.
 Source: S. B. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay measurements,
 INFOCOM 1999.
 """
@@ -15,18 +16,21 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class ClockFit:
-    """host_s = at_host_s + rate (device_s - at_device_s). The least delay of an arrival cannot be seen: it is in it."""
+    """host_s = at_host_s + rate (device_s - at_device_s). The smallest delay of an arrival cannot be separated from the
+    offset of the clocks: `at_host_s` includes it."""
 
     at_device_s: float
+    """Device time of a point on the line."""
     at_host_s: float
+    """Host time of the same point."""
     rate: float
-    """Host seconds in a second of the device."""
+    """Host seconds per second of the device's clock."""
     longest_delay_s: float
-    """Largest delay of an arrival beyond the smallest one."""
+    """Largest delay of an arrival above the fitted line, that is in excess of the smallest delay."""
 
     @property
     def drift_ppm(self) -> float:
-        """> 0: the device's clock is slow."""
+        """Drift of the device's clock, in parts per million; > 0: it is slow."""
         return 1e6 * (self.rate - 1.0)
 
     def host_s(self, device_s: FloatArray) -> FloatArray:
@@ -36,14 +40,14 @@ class ClockFit:
 
 def fit_clock(device_s: FloatArray, arrived_s: FloatArray) -> ClockFit:
     """Fit the device's clock to the host's: a line through the earliest arrivals. device_s (n,), rising: when samples
-    were taken, by the device; arrived_s (n,): when they came, by the host.
+    were taken, by the device's clock; arrived_s (n,): when they arrived, by the host's.
 
-    Raises ValueError for fewer than two samples, or device times that do not rise.
+    Raises ValueError for fewer than two samples, device times that do not rise, or arrivals that are not finite.
     """
     device, arrived = np.asarray(device_s, dtype=float), np.asarray(arrived_s, dtype=float)
     if len(device) < 2 or not (np.diff(device) > 0).all() or not np.isfinite(arrived).all():
         raise ValueError("a clock needs two samples or more, with device times that rise")
-    # Later than the first by nearly the same on both clocks: the difference keeps its digits.
+    # Both intervals since the first sample are nearly equal; their difference is fitted, for numerical precision.
     behind = (arrived - arrived[0]) - (device - device[0])
     hull = _lower_hull(device - device[0], behind)
     middle = float(np.mean(device - device[0]))
@@ -56,7 +60,7 @@ def fit_clock(device_s: FloatArray, arrived_s: FloatArray) -> ClockFit:
 
 
 def _lower_hull(x: FloatArray, y: FloatArray) -> list[int]:
-    """Indices of its corners, from left to right; x rises."""
+    """Indices of the corners of the lower convex hull, from left to right; x rises (monotone chain)."""
     hull: list[int] = []
     for k in range(len(x)):
         while len(hull) > 1 and _not_left(x, y, hull[-2], hull[-1], k):
@@ -66,4 +70,5 @@ def _lower_hull(x: FloatArray, y: FloatArray) -> list[int]:
 
 
 def _not_left(x: FloatArray, y: FloatArray, a: int, b: int, c: int) -> bool:
+    """Whether point b lies on or above the chord from a to c, and so is no corner of the lower hull."""
     return bool((x[b] - x[a]) * (y[c] - y[a]) <= (y[b] - y[a]) * (x[c] - x[a]))

@@ -1,5 +1,8 @@
-"""Ring of the last minutes of samples, with their time of arrival and the packets lost. One thread adds, others
-read."""
+"""Buffer of the last minutes of samples, with their times of arrival and the counts of lost packets.
+
+One thread adds, others read. After a recording, the samples and arrivals of an interval are taken from here to fit the
+clock (`clock_fit`) and to resample to the ticks (`placement`).
+"""
 
 import threading
 from dataclasses import dataclass
@@ -10,23 +13,24 @@ from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.samples import Counts, Samples
 
 KEPT_S = 300.0
-"""Time for which samples are kept, by their arrival: the longest recording, and the minutes before it to which the
-clock is fitted."""
+"""Time (s) for which samples are kept after their arrival: room for a long recording and for the minutes before it to
+which the clock is fitted."""
 
 
 class Table:
-    """Rows that only ever come to its end, shape (n, columns), in steps that take no time each."""
+    """Growing array of rows, shape (n, columns): rows are appended at the end, in amortised constant time per row, and
+    dropped at the beginning."""
 
     def __init__(self, columns: int) -> None:
         self._rows, self._from, self._end = np.zeros((1024, columns)), 0, 0
 
     @property
     def rows(self) -> FloatArray:
-        """A view, until the next change."""
+        """The present rows: a view, valid until the next change."""
         return self._rows[self._from : self._end]
 
     def append(self, rows: FloatArray) -> None:
-        """rows: (k, columns). The array is made anew, twice as long, only when it is full."""
+        """Append rows (k, columns). Only when the array is full is it replaced by one of twice the needed length."""
         if self._end + len(rows) > len(self._rows):
             kept = self.rows
             roomier = np.zeros((max(1024, 2 * (len(kept) + len(rows))), self._rows.shape[1]))
@@ -36,26 +40,27 @@ class Table:
         self._end += len(rows)
 
     def drop(self, rows: int) -> None:
-        """The oldest."""
+        """Drop this many of the oldest rows."""
         self._from += rows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArrivedSamples:
-    """Samples that arrived within an interval, and their arrivals."""
+    """Samples that arrived within an interval (n samples), and their arrivals (m; an arrival brings several
+    samples)."""
 
     device_s: FloatArray
-    """(n,), by the board's clock."""
+    """(n,), time of each sample by the sensor's clock (s)."""
     restarts: FloatArray
-    """(n,), as in `Samples`."""
+    """(n,), number of restarts of the sensor before each sample, as in `Samples`."""
     raw: FloatArray
-    """(n, 3)."""
+    """(n, 3), raw values of the three channels, as in `Samples`."""
     last_device_s: FloatArray
-    """(m,), of the newest sample of each arrival."""
+    """(m,), time of the newest sample of each arrival, by the sensor's clock (s)."""
     last_restarts: FloatArray
-    """(m,)."""
+    """(m,), number of restarts of the sensor before that sample."""
     arrived_s: FloatArray
-    """(m,), by the host's clock."""
+    """(m,), time of each arrival by the host's clock (s)."""
 
 
 class History:
@@ -63,13 +68,15 @@ class History:
 
     def __init__(self) -> None:
         self._samples, self._arrivals = Table(5), Table(7)
-        """Device time in s, restarts, raw; arrival, samples until then, newest device time, and `Counts`."""
+        """Columns of a sample: device time (s), restarts, three raw values. Columns of an arrival: host time (s),
+        number of all samples up to it, newest device time (s), and the four numbers of `Counts`."""
         self._taken = 0
-        """Samples that were dropped."""
+        """Number of samples that were dropped."""
         self._lock = threading.Lock()
 
     def add(self, samples: Samples, arrived_s: float, counts: Counts) -> None:
-        """Append samples that arrived together at arrived_s. counts: of the source at that time."""
+        """Append samples (at least one) that arrived together at arrived_s. counts: those of the source at that
+        time."""
         device_s = 1e-6 * samples.time_us
         rows = np.column_stack((device_s, samples.restarts, samples.raw))
         with self._lock:
@@ -80,7 +87,7 @@ class History:
             self._forget(arrived_s - KEPT_S)
 
     def counted(self, since_s: float) -> Counts:
-        """Counts from the last arrival before that time to the newest."""
+        """Counts since `since_s`: differences from the last arrival before that time to the newest arrival."""
         with self._lock:
             arrivals = self._arrivals.rows
             if not len(arrivals):
@@ -90,7 +97,7 @@ class History:
         return Counts(*(int(count) for count in counted))
 
     def stretch(self, from_s: float, until_s: float) -> ArrivedSamples:
-        """Arrivals from from_s up to until_s, with all of their samples."""
+        """Arrivals from from_s until before until_s, by the host's clock (s), with all of their samples."""
         with self._lock:
             arrivals = self._arrivals.rows
             first, end = np.searchsorted(arrivals[:, 0], (from_s, until_s))
@@ -102,7 +109,8 @@ class History:
         )
 
     def _forget(self, before_s: float) -> None:
-        """Now and then, a tenth at a time, but for the last arrival before: it says where the next one begins."""
+        """Drop what arrived before before_s, once it exceeds a tenth of all arrivals. The last arrival before that time
+        is kept, without its samples: it gives the index of the next arrival's first sample."""
         arrivals = self._arrivals.rows
         old = int(np.searchsorted(arrivals[:, 0], before_s)) - 1
         if old > 0.1 * len(arrivals):

@@ -1,8 +1,11 @@
-"""Resamples the board's samples to the ticks of the loop, by the fitted clock.
+"""Resamples the accelerometer's samples to the ticks of the control loop, by the fitted clock.
 
-Each clock between two restarts of the board is fitted by itself (`clock_fit`). Then a low-pass without delay (a
-windowed sinc about each tick, over the samples as they lie in time) keeps what a rate of ticks can show and takes away
-what it would alias.
+Between two restarts of the sensor's board its clock is fitted separately (`clock_fit`). Then a zero-phase anti-aliasing
+low-pass, a Kaiser-windowed sinc centred on each tick t, is evaluated over the samples at their own times t_i:
+
+    value(t) = sum_i w_i x_i / sum_i w_i,    w_i = sinc(2 f_c (t_i - t)) kaiser(t_i - t) dt_i
+
+f_c is `CORNER` times the lower of both rates; dt_i is the spacing of the samples around t_i.
 """
 
 from dataclasses import dataclass
@@ -14,27 +17,28 @@ from study.devices.accelerometer.clock_fit import ClockFit, fit_clock
 from study.devices.accelerometer.history import ArrivedSamples
 
 CORNER = 0.42
-"""Frequency of the low-pass's -6 dB, relative to the lower of both rates."""
+"""Corner frequency of the low-pass (-6 dB), relative to the lower of both rates."""
 
 HALF_PERIODS = 16
-"""Half the length of the low-pass, in periods of the lower rate."""
+"""Half the length of the low-pass's impulse response, in periods of the lower rate."""
 
 KAISER_BETA = 8.0
 """Shape of the low-pass's Kaiser window. With `CORNER` and the filter's length: flat up to 0.33 of the lower rate, 80
 dB down from half of it on."""
 
 LONGEST_GAP = 2.5
-"""Periods of the lower rate: samples further apart leave the ticks about them without a value."""
+"""Longest gap between two samples, in periods of the lower rate: ticks near a longer gap have no value."""
 
 LEAST_FIT_S = 1.0
-"""Shorter stretches of a clock are too short to be fitted: an arrival that is 0.1 ms late would be 100 ppm."""
+"""Shortest stretch of arrivals (s) to which a clock is fitted: over this time a delay of 0.1 ms is already an error of
+100 ppm in its rate."""
 
 POINTS_PER_S = 50.0
-"""Most arrivals per second that the clock is fitted to: the least delayed ones, because a delay says nothing about the
-clock."""
+"""Largest number of arrivals per second to which the clock is fitted. The least delayed ones are selected, because a
+delay contains no information about the clock."""
 
 AT_ONCE = 4096
-"""Ticks."""
+"""Approximate number of ticks that are resampled in a single array operation, which limits the memory needed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +52,9 @@ class PlacedSamples:
 
 
 def place(stretch: ArrivedSamples, values: FloatArray, tick_s: FloatArray, rate_hz: float) -> PlacedSamples:
-    """Resample samples to the ticks of the loop. values: (n, channels) of the samples; tick_s: (k,), rising, when the
-    ticks were due, rate_hz apart."""
+    """Fit the clock and resample to the ticks. values: (n, channels), of the n samples of `stretch`; tick_s: (k,),
+    times at which the ticks were due (s), rising by 1 / rate_hz. Samples of a clock that cannot be fitted are left
+    out."""
     host_s = np.full(len(stretch.device_s), np.nan)
     best: ClockFit | None = None
     most = 0
@@ -68,7 +73,8 @@ def place(stretch: ArrivedSamples, values: FloatArray, tick_s: FloatArray, rate_
 
 
 def resample(sample_s: FloatArray, values: FloatArray, tick_s: FloatArray, rate_hz: float) -> FloatArray:
-    """(k, channels). sample_s: (n,), rising; values: (n, channels); tick_s: (k,), rate_hz apart."""
+    """Values at the ticks, (k, channels); NaN near gaps and with fewer than two samples. sample_s: (n,), times of the
+    samples (s), rising; values: (n, channels); tick_s: (k,), times of the ticks (s), 1 / rate_hz apart."""
     placed = np.full((len(tick_s), values.shape[1]), np.nan)
     if len(sample_s) < 2:
         return placed
@@ -76,8 +82,9 @@ def resample(sample_s: FloatArray, values: FloatArray, tick_s: FloatArray, rate_
     lower_hz = min(rate_hz, 1.0 / period_s)
     half_s = HALF_PERIODS / lower_hz
     whole = _is_without_gap(sample_s, tick_s, half_s, LONGEST_GAP / lower_hz)
-    # Samples lie closer where the board was late: each counts for the time that it stands for.
+    # The spacing of the samples varies: each is weighted by the time interval that it represents.
     stands_for_s = np.gradient(sample_s)
+    # Right half of the Kaiser window, interpolated at each distance from the tick.
     window = np.kaiser(4097, KAISER_BETA)[2048:]
     reach = np.arange(-1, 2 + int(np.ceil(2.2 * half_s / period_s)))
     for chunk in np.array_split(np.flatnonzero(whole), max(1, len(tick_s) // AT_ONCE)):
@@ -93,7 +100,7 @@ def resample(sample_s: FloatArray, values: FloatArray, tick_s: FloatArray, rate_
 
 
 def _is_without_gap(sample_s: FloatArray, tick_s: FloatArray, half_s: float, longest_s: float) -> np.ndarray:
-    """(k,), whether the samples about each tick are without a gap."""
+    """(k,), whether the samples within half_s of each tick cover it without a gap longer than longest_s."""
     inside = (tick_s - half_s >= sample_s[0] - longest_s) & (tick_s + half_s <= sample_s[-1] + longest_s)
     gaps = np.flatnonzero(np.diff(sample_s) > longest_s)
     begins, ends = sample_s[gaps] - half_s, sample_s[gaps + 1] + half_s
@@ -102,7 +109,7 @@ def _is_without_gap(sample_s: FloatArray, tick_s: FloatArray, half_s: float, lon
 
 
 def _promptest(device_s: FloatArray, arrived_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Select the least delayed arrival of each fiftieth of a second."""
+    """Select the least delayed arrival in each interval of 1 / POINTS_PER_S: its device time and its host time (s)."""
     bins = ((device_s - device_s[0]) * POINTS_PER_S).astype(np.int64)
     order = np.lexsort((arrived_s - device_s, bins))
     chosen = np.sort(order[np.unique(bins[order], return_index=True)[1]])

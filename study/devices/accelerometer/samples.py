@@ -1,6 +1,7 @@
-"""Samples of a board before any processing: sequence numbers, times by the board's clock, counts of lost packets.
+"""Samples of an accelerometer before any processing: sequence numbers, times by its own clock, counts of lost packets.
 
-A source is a serial line or a data-acquisition device; nothing behind it knows which.
+`Source` is the interface of a serial line (`serial_reader`) and of a data-acquisition device (`sources`); all further
+processing is the same for both.
 """
 
 from dataclasses import dataclass
@@ -12,17 +13,17 @@ import numpy.typing as npt
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """n samples of a board with three channels."""
+    """n samples of a sensor with three channels."""
 
     sequence: npt.NDArray[np.int64]
-    """(n,), counted on where the counter of the board begins anew."""
+    """(n,), number of each sample; continued without a jump where the board's counter wraps or restarts."""
     time_us: npt.NDArray[np.int64]
-    """(n,), when they were taken by the board's clock, counted on likewise."""
+    """(n,), time of each sample by the board's clock (us), continued likewise."""
     raw: npt.NDArray[np.uint16] | npt.NDArray[np.float64]
-    """(n, 3)."""
+    """(n, 3): counts of 16 bits from a board, volts from a data-acquisition device."""
     restarts: npt.NDArray[np.int64]
-    """(n,), how often the board had begun anew by then: the times of samples with another number do not belong
-    together."""
+    """(n,), number of restarts of the board before each sample. Times are comparable only between samples with the same
+    number."""
 
     def __len__(self) -> int:
         return len(self.sequence)
@@ -30,19 +31,20 @@ class Samples:
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """Since the beginning."""
+    """Counts since the source was opened."""
 
     packets: int = 0
+    """Complete packets received."""
     lost: int = 0
-    """Packets lost, counted by the gaps in the sequence numbers: torn or garbled arrivals are among them."""
+    """Packets lost, counted by the gaps in the sequence numbers; incomplete and corrupt packets are included."""
     spoiled_bytes: int = 0
-    """That belonged to no whole packet."""
+    """Bytes that belonged to no complete packet."""
     restarts: int = 0
-    """How often the board began anew."""
+    """Number of restarts of the board."""
 
 
 class Source(Protocol):
-    """Read by one thread."""
+    """A source of samples; `read` is called by a single thread."""
 
     @property
     def counts(self) -> Counts:
@@ -50,10 +52,10 @@ class Source(Protocol):
         ...
 
     def read(self) -> tuple[Samples, float]:
-        """Samples since the last call, and the time of their arrival by `time.monotonic`. Waits some milliseconds at
-        the most; none where nothing came. Raises anything for a broken line."""
+        """Samples since the last call, and the time of their arrival by `time.monotonic` (s). Waits for a few
+        milliseconds at most; zero samples where none arrived. May raise any exception when the connection fails."""
         ...
 
     def close(self) -> None:
-        """May raise; called once."""
+        """Release the source. Called once; may raise."""
         ...

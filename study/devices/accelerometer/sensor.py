@@ -1,5 +1,9 @@
-"""Accelerometer as a rig uses it: a thread reads the board; the newest sample is available at any time, and after a
-recording the samples at its ticks."""
+"""Accelerometer with its own clock, as a device driver uses it.
+
+A thread reads the source and fills two buffers: the newest sample, which the control loop reads at every tick without
+waiting (`newest_sample`), and the samples of the last minutes (`history`), from which the accelerations at the ticks of
+a recording are computed afterwards (`clock_fit`, `placement`).
+"""
 
 import contextlib
 import threading
@@ -19,19 +23,20 @@ from study.errors import DeviceError
 from study.session.facts.sensor_facts import SensorFacts
 
 ZEROING_S = 0.5
-"""Time at rest when it is opened (s), whose mean is subtracted: gravity, and the bias's drift since calibration."""
+"""Duration (s) of the measurement at rest when the sensor is opened. Its mean is subtracted from all readings: gravity,
+and the drift of the bias since the calibration."""
 
 FITTED_S = 120.0
-"""Before a recording, and the recording: to their arrivals the clock is fitted. Long enough for 1 ppm, and short enough
-for a quartz that warms up."""
+"""The clock is fitted to the arrivals during a recording and this time (s) before it: long enough for 1 ppm, and short
+enough that a quartz that warms up keeps its rate."""
 
 LATENESS_S = 0.05
-"""Longest wait after the last tick for its samples."""
+"""Wait (s) after the last tick for samples that are still on their way, in addition to half of the low-pass."""
 
 
 class Accelerometer:
     """An accelerometer with its own clock: the newest sample at any time, and resampled ones after a recording.
-    raw_range: the lowest and the highest raw value that are within the sensor's range."""
+    raw_range: lowest and highest raw value; a sample at or beyond either counts as clipped."""
 
     def __init__(self, source: Source, calibration: Calibration, raw_range: tuple[float, float]) -> None:
         self._source, self._calibration, self._range = source, calibration, raw_range
@@ -44,11 +49,11 @@ class Accelerometer:
 
     @property
     def counts(self) -> Counts:
-        """Packets and lost packets since the board was opened."""
+        """Packets and lost packets since the source was opened."""
         return self._source.counts
 
     def zero(self, seconds: float = ZEROING_S) -> None:
-        """Take the mean reading of the next seconds, at rest, as zero. Raises `DeviceError` where nothing is read."""
+        """Measure for `seconds` at rest, and take the mean as zero. Raises `DeviceError` where no sample arrives."""
         since_s = time.monotonic()
         time.sleep(seconds)
         raw = self._history.stretch(since_s, time.monotonic()).raw
@@ -59,16 +64,17 @@ class Accelerometer:
 
     @property
     def samples(self) -> FloatArray:
-        """The array from which compiled code reads what `latest` returns."""
+        """Array (`NewestSample.rows`) from which compiled code reads what `latest` returns."""
         return self._newest.rows
 
     def latest(self) -> tuple[FloatArray, bool]:
-        """Acceleration now, (3,), m/s², zeroed at rest, NaN without a fresh sample (`FRESH_S`); and whether a channel
-        is at its limit. From any thread."""
+        """Newest acceleration, (3,), m/s², zeroed at rest, NaN without a sample younger than
+        `newest_sample.FRESH_S`; and whether a channel is at its limit. May be called from any thread."""
         return self._newest.fresh(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration:
-        """Read the sensor apart from the position: the port of `study.devices.rig.OwnClockSensor`."""
+        """Accelerations at the ticks of a recording, as `study.devices.rig.OwnClockSensor` defines it. Waits until the
+        samples after the last tick have arrived."""
         if len(tick_s):
             time.sleep(max(0.0, tick_s[-1] + HALF_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
         placed = self._resample_to_ticks(tick_s, rate_hz) if len(tick_s) else PlacedSamples(np.zeros((0, 3)), None)
@@ -76,8 +82,8 @@ class Accelerometer:
         return SensedAcceleration(placed.values, _health(counts, placed.values, placed.fit))
 
     def rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
-        """Facts about the last seconds at rest, the standard deviation of each axis (3,) in m/s², and samples per
-        second."""
+        """Facts about the last `seconds`, during which the sensor was at rest; standard deviation of each axis (3,),
+        m/s², NaN without samples; samples per second."""
         now_s = time.monotonic()
         stretch = self._history.stretch(now_s - seconds, now_s)
         noise = self._calibration.acceleration(stretch.raw).std(axis=0) if len(stretch.raw) else np.full(3, np.nan)
@@ -92,12 +98,14 @@ class Accelerometer:
             self._source.close()
 
     def _resample_to_ticks(self, tick_s: FloatArray, rate_hz: float) -> PlacedSamples:
+        """Accelerations at the ticks (m/s², zeroed at rest), and the fit of the clock. tick_s: at least one."""
         stretch = self._history.stretch(tick_s[0] - FITTED_S, time.monotonic())
         values = self._calibration.acceleration(stretch.raw) - self._rest_mps2
         return place(stretch, values, tick_s, rate_hz)
 
     def _read(self) -> None:
-        """A line that breaks leaves no fresh sample: that is how it is noticed."""
+        """Loop of the reading thread. An error of the source ends it; readers notice that by the age of the newest
+        sample."""
         with contextlib.suppress(Exception):
             while not self._closed.is_set():
                 samples, arrived_s = self._source.read()
@@ -109,7 +117,8 @@ class Accelerometer:
 
 
 def silent(seconds: float, spoiled_bytes: int) -> DeviceError:
-    """No whole packet came for so long, but so many other bytes."""
+    """Error for a sensor that sent no complete packet within `seconds`. spoiled_bytes: number of other bytes
+    received."""
     return DeviceError(
         "The accelerometer is silent",
         f"Within {seconds:g} s no whole packet came ({spoiled_bytes} bytes that are none).",
@@ -120,6 +129,7 @@ def silent(seconds: float, spoiled_bytes: int) -> DeviceError:
 
 
 def _health(counts: Counts, placed: FloatArray, fit: ClockFit | None) -> SensorFacts:
+    """Facts for the log. placed: accelerations at the ticks, (k, 3), NaN where unknown; fit: of the clock, if any."""
     return SensorFacts(
         packets=counts.packets,
         lost=counts.lost,

@@ -1,4 +1,8 @@
-"""Six-position calibration at a table: lay the sensor down, wait, turn it; at the end, the text for the lab's file."""
+"""Procedure of the six-position calibration: records the sensor at rest with each axis up and down.
+
+The calibration itself (least squares under gravity) is `calibration`; the result is the [accelerometer] table for the
+laboratory's settings file.
+"""
 
 import time
 from collections.abc import Callable
@@ -13,26 +17,27 @@ from study.devices.accelerometer.sources import is_volts, open_source
 from study.errors import DeviceError
 
 BeforeEach = Callable[[str, tuple[float, float, float] | None], None]
-"""before_each(position, heard): returns when the sensor lies there. heard: the mean raw values in the position before,
-None for the first."""
+"""before_each(position, heard): returns when the sensor lies in that position. heard: mean raw values of the three
+channels in the previous position, None for the first."""
 
 REST_S = 2.0
-"""Duration in each position: at 2 kHz the mean of 4000 samples, within 1 mg of noise."""
+"""Duration of the recording in each position (s): at 2 kHz 4000 samples, whose mean has a noise below 1 mg."""
 
 SETTLE_S = 0.3
-"""Time after a position changes in which samples may still belong to the old one."""
+"""Time (s) after a change of position in which samples may still belong to the old one; they are discarded."""
 
 MANY, DRAIN_S = 200, 2.0
-"""Samples that come at once are old ones, which are let go by for so long at the most."""
+"""More than MANY samples in a single read are old ones from a buffer. They are discarded too, for at most DRAIN_S (s)
+after `SETTLE_S`."""
 
 RANGE_G = 3.0
-"""Guaranteed range of the ADXL335; beyond it, a channel counts as clipped."""
+"""Guaranteed range of the ADXL335, in g; beyond it, a channel counts as clipped."""
 
 
 def calibrate_on_table(path: str, baud: int, before_each: BeforeEach, rest_s: float | None = None) -> str:
-    """The table of the lab's file, TOML. rest_s: `REST_S`.
+    """Record all positions and return the [accelerometer] table, as TOML. rest_s: None = `REST_S`.
 
-    Raises `DeviceError` where nothing comes, or the positions do not fit a sensor.
+    Raises `DeviceError` where no samples arrive, or the positions do not fit a linear sensor.
     """
     source = open_source(path, baud)
     try:
@@ -45,7 +50,8 @@ def calibrate_on_table(path: str, baud: int, before_each: BeforeEach, rest_s: fl
 
 
 def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
-    """The [accelerometer] table for the lab's settings file. path: port of the board; baud: its rate."""
+    """The [accelerometer] table for the laboratory's settings file. path: port of the sensor; baud: rate of a serial
+    line. raw_range is the range of raw values for `RANGE_G` along any direction."""
     reach = np.abs(calibration.sensitivity).sum(axis=1) * RANGE_G * GRAVITY_MPS2
     lowest, highest = float((calibration.bias - reach).min()), float((calibration.bias + reach).max())
     within = f"[{max(0, round(lowest))}, {min(65_535, round(highest))}]"
@@ -67,7 +73,7 @@ def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
 
 
 def _record_positions(source: Source, before_each: BeforeEach, rest_s: float) -> tuple[FloatArray, ...]:
-    """Raw samples, (n, 3) each."""
+    """Raw samples, (n, 3) for each of `POSITIONS`."""
     found: list[FloatArray] = []
     for position in POSITIONS:
         x, y, z = found[-1].mean(axis=0).tolist() if found else (0.0, 0.0, 0.0)
@@ -77,10 +83,11 @@ def _record_positions(source: Source, before_each: BeforeEach, rest_s: float) ->
 
 
 def _record_position(source: Source, rest_s: float) -> FloatArray:
-    """Raw samples (n, 3)."""
+    """Raw samples (n, 3) of one position. Raises `DeviceError` where fewer than two samples arrive."""
     settled_s = time.monotonic() + SETTLE_S
     now_s, came = time.monotonic(), 0
-    # Of before: the line holds some, and the board waits with more where that is full.
+    # Discard samples of the previous position: some are in the line's buffer, and where that is full, the board
+    # itself holds more.
     while now_s < settled_s or (came > MANY and now_s < settled_s + DRAIN_S):
         samples_of_before, now_s = source.read()
         came = len(samples_of_before)
@@ -95,5 +102,5 @@ def _record_position(source: Source, rest_s: float) -> FloatArray:
 
 
 def _numbers(row: FloatArray) -> str:
-    """Volts have few digits before the point, counts of 16 bits many."""
+    """A row as TOML: four decimals from 100 on (counts of 16 bits), else seven (volts)."""
     return f"[{', '.join(f'{value:.4f}' if abs(value) >= 100 else f'{value:.7f}' for value in row)}]"

@@ -1,8 +1,8 @@
-"""Sources of samples by the name of the port: a board on a serial line, or a data-acquisition device.
+"""Sources of accelerometer samples by the name of the port: a board on a serial line, or a data-acquisition device.
 
-`ni:Dev1` reads ai0 to ai2 of a device of National Instruments, `labjack:ANY` AIN0 to AIN2 of a LabJack T-series device
-(or of the one with that serial number), in volts. Their clock is the number of a sample over its rate.
-**Tested with fakes of their packages only**, never with a driver or a device.
+`ni:Dev1` reads ai0 to ai2 of a National Instruments device, `labjack:ANY` AIN0 to AIN2 of a LabJack T-series device (a
+serial number in place of ANY selects a device), in volts. The time of a sample is its number divided by the sample
+rate. **Tested with fakes of the vendors' packages only**, never with a driver or a device.
 """
 
 import time
@@ -18,15 +18,16 @@ from study.devices.accelerometer.serial_reader import open_serial
 from study.errors import DeviceError
 
 NI, LABJACK = "ni:", "labjack:"
-"""Before the name of a device, in the place of a serial port."""
+"""Prefixes of a port that names a data-acquisition device instead of a serial line."""
 
 SCAN_HZ = 4000.0
-"""Requested rate of scans: twice the least rate of 2 kHz, within what either vendor's devices reach."""
+"""Requested sample rate of each channel (Hz): twice the lowest useful rate of 2 kHz, within the range of both vendors'
+devices."""
 PAUSE_S = 0.01
-"""Between two reads: so much comes at once."""
+"""Interval between two reads (s), whose scans arrive together."""
 
 DUMMY_V = -9999.0
-"""Value in place of a scan that a LabJack lost."""
+"""Value (V) that stands for a scan that a LabJack lost."""
 
 
 def open_source(port: str, baud: int) -> Source:
@@ -42,15 +43,15 @@ def open_source(port: str, baud: int) -> Source:
 
 
 def is_volts(port: str) -> bool:
-    """Whether its raw values are volts; else they have 16 bits."""
+    """Whether the raw values of this port are volts; else they are counts of 16 bits."""
     return port.startswith((NI, LABJACK))
 
 
 class ScanCounter:
-    """Numbers scans that come without numbers, and counts those that were lost."""
+    """Numbers and times the scans of a device that supplies neither, and counts the lost ones."""
 
     def __init__(self, rate_hz: float) -> None:
-        """rate_hz: the rate that the device reports, by which scans are timed."""
+        """rate_hz: sample rate that the device reports, by which scans are timed."""
         self._rate_hz, self._next = rate_hz, 0
         self.counts = Counts()
 
@@ -94,6 +95,7 @@ class NiSource:
         return self._scans.samples(np.array(channels, dtype=np.float64).reshape(3, -1).T), arrived_s
 
     def close(self) -> None:
+        """End the task of the device."""
         self._task.close()
 
 
@@ -117,11 +119,12 @@ class LabJackSource:
 
     def read(self) -> tuple[Samples, float]:
         """The next scans, and the host's monotonic time in seconds at which they had arrived."""
-        volts = self._ljm.eStreamRead(self._handle)[0]  # waits for the next scans
+        volts = self._ljm.eStreamRead(self._handle)[0]  # returns when the next scans are complete
         arrived_s = time.monotonic()
         return self._scans.samples(np.array(volts, dtype=np.float64).reshape(-1, 3)), arrived_s
 
     def close(self) -> None:
+        """End the stream and close the device. Raises what labjack-ljm raises."""
         try:
             self._ljm.eStreamStop(self._handle)
         finally:
@@ -129,6 +132,8 @@ class LabJackSource:
 
 
 def _open_source(opener: Callable[[], Source], port: str, package: str, extra: str, driver: str) -> Source:
+    """Open a data-acquisition device. Raises `DeviceError`, with a remedy, where package, driver or device is
+    missing."""
     try:
         return opener()
     except ImportError as error:

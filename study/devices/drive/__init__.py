@@ -1,8 +1,8 @@
-"""The loop that plays forces once a millisecond, and its records. A tick: wait, sense, govern, write, publish
-telemetry.
+"""The control loop, at 1 kHz: each tick waits, senses, decides the force (`governor`), writes it, publishes telemetry.
 
-Of a real device `realtime_drive` is the thread on the wall clock, in the scheduling class of `real_time_class`; where
-the driver has compiled halves, `compiled_drive` runs its ticks (`compiled_ticks` hands it the arrays), else
-`stepped_runner` from Python. Of a simulated one `virtual_drive` is the clock, and `runner` steps device and governor in
-blocks of ticks. `recorded_run` and `last_reading` are what comes out. Begin at `runner.py`, then `compiled_drive.py`.
+Real device: `realtime_drive` is the thread on the wall clock, in the scheduling class of `real_time_class`;
+`stepped_runner` runs its ticks, in compiled code (`compiled_ticks`, `compiled_drive`) where the driver has compiled
+halves, else from Python. Simulated device: `virtual_drive` runs the ticks that fall due in virtual time, and `runner`
+steps device and governor in compiled blocks of ticks. Results: `recorded_run` (recording), `last_reading` (present
+state). Begin at `runner.py`, then `compiled_drive.py`.
 """

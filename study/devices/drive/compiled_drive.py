@@ -1,9 +1,9 @@
-"""Ticks of a real device without the interpreter: wait, sense, govern, write, and fill the telemetry ring.
+"""Control ticks of a real device in compiled code: wait, sense, govern, write, and fill the telemetry ring.
 
-The same as `stepped_runner` and `realtime_drive` do from Python, in the same order and to the last bit. `run_due` runs
-ticks one after another, for time that a test passes and for systems whose clock is not read here; `attend` waits for
-each in real time until anything is asked that needs the interpreter. Nothing is allocated, and no interpreter lock is
-wanted, so that no other thread of the program can delay a tick.
+The ticks do the same as those of `stepped_runner` and `realtime_drive` in Python, in the same order and to the last
+bit. `run_due` runs ticks one after another without waiting, for tests and for systems whose clock compiled code does
+not read; `attend` waits for each tick in real time, until the loop's thread is needed for other work. The code
+allocates nothing and holds no interpreter lock, so that no other Python thread can delay a tick.
 """
 
 from pathlib import Path
@@ -19,44 +19,45 @@ from study.devices.native import now_s, sleep_until
 from study.devices.rig import READING_SIZE
 
 (
-    # Flags. GONE: the rig is given up. DECIDING: from the decision of a force until it was written; WRITING: while it
-    # is. STAMPS: each reading is stamped by the clock. WANTED: something needs the loop's thread.
+    # Flags. GONE: the rig is no longer used. DECIDING: from before a force is decided until it was written; WRITING:
+    # during the write. STAMPS: each reading gets a time stamp. WANTED: the loop's thread is needed for other work.
     GONE, DECIDING, WRITING, STAMPS, WANTED,
-    # Of real time: when the stimulus began and when the loop turned last, s; ticks run; when the last one was due, s.
+    # Real time: begin of the stimulus and of the last turn of the loop (s); number of the last tick, run or missed; due
+    # time of the present tick (s); rate (Hz); gap between two turns that counts as a failure of the loop (s).
     STARTED_S, LAST_S, RUN, DUE_S, RATE_HZ, LONGEST_GAP_S,
-    # Readings so far of this call, as they stand in `seen`.
+    # Readings of this call so far, of which `seen` holds the newest; size of the array.
     SEEN, LOOP_STATE_SIZE,
 ) = range(13)  # fmt: skip
 """Cells of `loop_state`. STARTED_S to LONGEST_GAP_S belong to `realtime_drive`."""
 
 GOES_ON, OVER, GAP = 0, -1, -2
-"""What a call answers, or the rig's own code above zero. OVER: that tick was the last, or the rig is gone. GAP: none
-was run, since the one before was too long ago."""
+"""Return codes; a code above zero is the driver's own error. GOES_ON: more ticks may follow. OVER: that tick was the
+last, or the rig is gone. GAP: no tick was run, because the previous one was longer ago than LONGEST_GAP_S."""
 
 SPIN_S = 0.00015
-"""Sleep until so long before a real tick, then wait awake: a sleep ends late by more than that on its own."""
+"""Time (s) before a tick at which the sleep ends and polling of the clock begins, because a sleep ends late."""
 
 HAIR = 1e-6
-"""Tolerance in ticks: a sum of rounded times just short of a tick counts as that tick."""
+"""Tolerance (ticks): a time that rounding puts just before a tick counts as that tick."""
 
 SEEN_ROWS = 8
-"""The newest readings; one that is copied meanwhile stays whole for so many ticks less one."""
+"""Number of readings in the ring `seen`. A reading that another thread is copying is overwritten only SEEN_ROWS - 1
+ticks later."""
 
 CALLS = types.int64[::1]
 """Addresses of C functions: `study.devices.native.system_calls`, followed by the driver's own."""
 SENSE_SIGNATURE = types.int64(CALLS, VECTOR, ROWS, VECTOR)
-"""Signatures of the compiled halves of a rig, in the order of arguments of `study.devices.rig.CompiledIo`: `sense` and
-`write`."""
+"""Signature of the compiled half `sense` of a rig, as in `study.devices.rig.CompiledIo`; that of `write` follows."""
 WRITE_SIGNATURE = types.int64(CALLS, VECTOR, VECTOR)
 SENSE, WRITE = types.FunctionType(SENSE_SIGNATURE), types.FunctionType(WRITE_SIGNATURE)
 TICK, PUBLISH, MISS = map(types.FunctionType, (TICK_SIGNATURE, PUBLISH_SIGNATURE, MISS_SIGNATURE))
 _RIG = types.Tuple((CALLS, VECTOR, ROWS))  # type: ignore[no-untyped-call]
-"""Grouped arguments of `_tick`: the rig's calls, cells and samples; the governor's arrays (`CompiledTicks`); flags,
-last reading and the newest readings."""
+"""Types of the grouped arguments of `_tick`. _RIG: the rig's calls, cells and samples; _GOVERNOR: the governor's arrays
+(`CompiledTicks`); _COURSE: flags, last reading, and the ring of newest readings."""
 _GOVERNOR = types.Tuple((VECTOR, VECTOR, ROWS, ROWS, VECTOR, ROWS, VECTOR))  # type: ignore[no-untyped-call]
 _COURSE = types.Tuple((VECTOR, VECTOR, ROWS))  # type: ignore[no-untyped-call]
 _RUN_DUE = types.int64(SENSE, WRITE, TICK, PUBLISH, _RIG, _GOVERNOR, _COURSE, types.int64)
-"""Signatures of the two entry points."""
+"""Signature of the entry point `run_due`; that of `attend` follows."""
 _ATTEND = types.int64(SENSE, WRITE, TICK, PUBLISH, MISS, _RIG, _GOVERNOR, _COURSE)
 
 
@@ -64,12 +65,14 @@ _ATTEND = types.int64(SENSE, WRITE, TICK, PUBLISH, MISS, _RIG, _GOVERNOR, _COURS
 def _tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
     sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:
-    """A tick: sense, note its time, decide the force (`govern.tick`), write it, publish it to telemetry.
+    """A tick: sense, store the time of the reading, decide the force (`govern.tick`), write it, publish it to
+    telemetry.
 
-    Returns `GOES_ON`, `OVER` where the force is off for good, or the driver's code of an error. The flags `DECIDING`
+    Returns `GOES_ON`, `OVER` where the force is off and stays off, or the driver's error code. The flags `DECIDING`
     and `WRITING` show the watching thread where a tick hangs.
     """
     calls, cells, samples = rig
+    # `_nothing`, the reading of a missed tick, is used in `_attend_tick` only.
     state, settings, loop, buffer, force, ring, _nothing = governor
     flags, reading, seen = loop_state
     code = sense(calls, cells, samples, reading)
@@ -99,12 +102,13 @@ def _tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
 
 @part
 def _due_s(flags: FloatArray, tick: float) -> float:
+    """Time (s) at which a tick is due, counted from the start, so that delays do not accumulate."""
     return float(flags[STARTED_S] + tick / flags[RATE_HZ])
 
 
 @part
 def _wait_for_tick(calls: Any, flags: FloatArray) -> float:
-    """When it is now, s."""
+    """Sleep, then poll the clock, until the next tick is due. Returns the time (s)."""
     flags[DUE_S] = _due_s(flags, flags[RUN] + 1.0)
     sleep_until(calls, flags[DUE_S] - SPIN_S)
     now = now_s(calls)
@@ -115,6 +119,7 @@ def _wait_for_tick(calls: Any, flags: FloatArray) -> float:
 
 @part
 def _is_called_away(governor: Any, loop_state: Any) -> bool:
+    """Whether `attend` has to return: the thread is needed, the rig is gone, or no force acts any more."""
     flags = loop_state[0]
     return bool(flags[WANTED] != 0.0 or flags[GONE] != 0.0 or governor[0][PHASE] == STILL)
 
@@ -123,6 +128,7 @@ def _is_called_away(governor: Any, loop_state: Any) -> bool:
 def _attend_tick(  # noqa: PLR0913 - as above
     sense: Any, write: Any, govern: Any, publish: Any, miss: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:
+    """Wait for the next tick, count ticks that were missed meanwhile, run the tick, and record how late it ended."""
     calls, flags, state, code = rig[0], loop_state[0], governor[0], GOES_ON
     now = _wait_for_tick(calls, flags)
     if flags[GONE] != 0.0 or state[PHASE] == STILL:
@@ -145,12 +151,14 @@ def _attend_tick(  # noqa: PLR0913 - as above
 
 
 def _entry_points(sources: int) -> tuple[Any, Any]:
+    """Compile `run_due` and `attend`. sources: fingerprint, captured so that a change invalidates the cache."""
+
     @njit(_RUN_DUE, cache=True, nogil=True, error_model="numpy")
     def run_due(  # noqa: PLR0913 - compiled code takes function pointers one by one
         sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any, ticks: int
     ) -> int:
-        """Run at most `ticks` ticks that are due, fewer if all is over before. Returns `GOES_ON`, `OVER`,
-        or the rig's own code."""
+        """Run at most `ticks` ticks without waiting, fewer if the force is off for good before or a tick fails.
+        Returns `GOES_ON`, `OVER`, or the driver's error code."""
         _ = sources
         code = GOES_ON
         for _k in range(ticks):
@@ -163,10 +171,10 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
     def attend(  # noqa: PLR0913 - as above
         sense: Any, write: Any, govern: Any, publish: Any, miss: Any, rig: Any, governor: Any, loop_state: Any
     ) -> int:
-        """Ticks as they become due, until all is over, one fails, or the thread is wanted. Only where
-        `study.devices.native.SLEEP` is there.
+        """Run ticks as they become due, until the force is off for good, a tick fails, or the thread is needed for
+        other work. To be called only where the address at `study.devices.native.SLEEP` is not 0.
 
-        After a code above zero the lateness of that tick is not counted yet.
+        After an error code (above zero) the caller has to count the lateness of that tick.
         """
         _ = sources
         code = GOES_ON

@@ -1,4 +1,7 @@
-"""Arguments of `compiled_drive`: the rig's compiled halves, the governor's arrays, and the array of last readings."""
+"""Calls the compiled loop (`compiled_drive`) with its arguments, and reads its newest reading from other threads.
+
+The arguments are the compiled halves of the rig, the arrays of the governor, and the ring of newest readings.
+"""
 
 import numpy as np
 
@@ -12,19 +15,20 @@ from study.devices.rig import READING_SIZE, CompiledIo, Rig
 
 
 def halves_of(rig: Rig) -> CompiledIo | None:
-    """Compiled halves of a tick of this rig; None where the rig has none."""
+    """The compiled `sense` and `write` of this rig; None where it has none."""
     halves = getattr(rig, "halves", None)
     return halves if isinstance(halves, CompiledIo) else None
 
 
 TICK_PARTS = Part(govern.tick, TICK), Part(govern.publish, PUBLISH)
-"""The parts of a tick that are the same for every rig: looked up once."""
+"""Function pointers of the parts of a tick that are the same for every rig; their addresses are looked up once."""
 MISSED = Part(govern.miss, MISS)
+"""Function pointer of the part that records missed ticks."""
 
 
 class CompiledTicks:
-    """Runs the ticks of a rig by the compiled loop of `compiled_drive`, and gives its newest reading. The loop is
-    compiled when the object is made."""
+    """Runs the ticks of a rig by the compiled loop of `compiled_drive`, and gives its newest reading. loop_state: cells
+    of `compiled_drive`, shared with the drive. The constructor compiles the loop."""
 
     def __init__(self, halves: CompiledIo, governor: Governor, loop_state: FloatArray) -> None:
         self._halves = halves
@@ -36,7 +40,7 @@ class CompiledTicks:
         self._flags = loop_state
         self._running = False
         self.error = halves.error
-        self.run(0)  # compiled now, not when a stimulus is due
+        self.run(0)  # compile now, not when a stimulus is due
 
     @property
     def attends(self) -> bool:
@@ -44,8 +48,8 @@ class CompiledTicks:
         return bool(self._halves.calls[SLEEP] != 0)
 
     def run(self, ticks: int) -> int:
-        """Run at most `ticks` ticks, one after another without waiting. Returns `GOES_ON`, `OVER`, or the rig's error
-        code, > 0."""
+        """Run at most `ticks` ticks, one after another without waiting. Returns `GOES_ON`, `OVER`, or the driver's
+        error code, > 0."""
         self._flags[SEEN], self._running = 0.0, True
         try:
             return int(run_due(*self._parts, self._rig, self._arrays(), self._loop_state, ticks))
@@ -53,8 +57,8 @@ class CompiledTicks:
             self._running = False
 
     def attend(self) -> int:
-        """Run ticks as they become due, until all is over, one fails, or the loop's thread is wanted. Returns as `run`,
-        or `GAP`. Only where `attends`."""
+        """Run ticks as they become due, until the force is off for good, a tick fails, or the loop's thread is needed.
+        Returns as `run`, or `GAP`. To be called only where `attends`."""
         self._flags[SEEN], self._running = 0.0, True
         try:
             return int(attend(*self._parts, MISSED, self._rig, self._arrays(), self._loop_state))
@@ -62,11 +66,12 @@ class CompiledTicks:
             self._running = False
 
     def seen(self) -> FloatArray | None:
-        """The newest reading of a call that is under way. None where there is none."""
+        """Newest reading, shape (READING_SIZE,), of a call of `run` or `attend` in progress; else None."""
         return self.last_seen() if self._running else None
 
     def last_seen(self) -> FloatArray | None:
-        """Last reading of the last call, or of the one under way."""
+        """Last reading, shape (READING_SIZE,), of the present or else the last call; None before its first tick. May be
+        called from any thread: a row that was overwritten while it was copied is copied again."""
         while count := int(self._flags[SEEN]):
             reading: FloatArray = self._seen[(count - 1) % SEEN_ROWS].copy()
             if self._flags[SEEN] - count < SEEN_ROWS - 1:
@@ -74,6 +79,7 @@ class CompiledTicks:
         return None
 
     def _arrays(self) -> tuple[FloatArray, ...]:
+        """The governor's arrays, in the order of `compiled_drive._GOVERNOR`; some are replaced for each stimulus."""
         governor = self._governor
         return (
             governor.state,

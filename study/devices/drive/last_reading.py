@@ -1,4 +1,4 @@
-"""Last reading of a rig, and its form for the rest of the program."""
+"""Last reading of a rig, and its conversion to the `Look` of the device port, which displays use."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,8 @@ from study.devices.rig import ACCELERATION, POSITION, SENSOR_CLIPPED
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LastReading:
-    """One reading. Replaced as a whole and never changed, so that any thread may read it."""
+    """A reading with the buttons pressed at that time. It is replaced as a whole and never changed, so that any thread
+    may read it without a lock."""
 
     reading: FloatArray
     """Shape (READING_SIZE,), as `study.devices.rig` lays it out."""
@@ -18,7 +19,8 @@ class LastReading:
 
 
 def look_of(last: LastReading | None, missed_ticks: int) -> Look:
-    """The look that screens may show; without a reading where nothing was read."""
+    """Convert a reading to a `Look`: position in m, acceleration in m/s². Both are None without a reading, or where
+    their numbers are not finite. missed_ticks: of the present stimulus."""
     if last is None:
         return Look(None, None, sensor_clipped=False, buttons=frozenset(), missed_ticks=missed_ticks)
     return Look(
@@ -31,5 +33,6 @@ def look_of(last: LastReading | None, missed_ticks: int) -> Look:
 
 
 def _numbers(components: FloatArray) -> tuple[float, float, float] | None:
+    """Three components as a tuple; None unless all are finite."""
     x, y, z = (float(component) for component in components)
     return (x, y, z) if math.isfinite(x + y + z) else None

@@ -1,9 +1,9 @@
 """Real-time scheduling of the loop's thread, and locking of its memory (no swapping), where the system allows them.
 
-Where the system refuses, the finding says so with the remedy, and the loop runs without them. The priority is below
-that of interrupt threads (50 on Linux), because the device's own USB transfers must come first. A loop that hangs
-cannot starve the computer under Linux's default, which reserves 5 % of every second for ordinary threads
-(`sched_rt_runtime_us`); where that is switched off, the finding says so.
+Where the system refuses them, `real_time_finding` reports that with the remedy, and the loop runs without them. The
+priority is below that of interrupt threads (50 on Linux), because the device's own USB transfers must come first. A
+loop that hangs cannot starve the computer under Linux's default, which reserves 5 % of every second for ordinary
+threads (`sched_rt_runtime_us`); where that is switched off, the finding reports it.
 
 Reference: Linux manual pages sched(7), mlockall(2).
 """
@@ -24,18 +24,19 @@ from study.session.views.views import DeviceFinding
 PRIORITY = 40
 """Priority of the loop's thread under SCHED_FIFO of Linux, 1 to 99: below interrupt threads (50)."""
 SWITCH_S = 0.0005
-"""Longest time for which another Python thread keeps the interpreter once the loop wants it; Python's default is 5
-ms."""
+"""Switch interval of the interpreter (s): time for which another Python thread keeps the interpreter lock after the
+loop has requested it. Python's default is 5 ms."""
 
 PRESENT_WHEN_TOUCHED = 1 | 4
-"""MCL_CURRENT | MCL_ONFAULT: lock what is mapped now, page by page as it is used; reserved memory is not filled."""
+"""MCL_CURRENT | MCL_ONFAULT: lock the pages mapped now, each when it is first used, so that reserved memory is not
+filled."""
 
 FUTURE_TOO = 2
-"""MCL_FUTURE: lock what is mapped later as well. Only where locked memory has no limit: allocations beyond a limit
+"""MCL_FUTURE: lock pages mapped later as well. Used only where locked memory has no limit: allocations beyond a limit
 would fail and end the program."""
 
 RT_RUNTIME = Path("/proc/sys/kernel/sched_rt_runtime_us")
-"""Share of each second that Linux gives to real-time threads, in µs; -1: all of it."""
+"""File with the time in µs per period (by default 1 s) that Linux grants to real-time threads; -1: all of it."""
 
 STARVING_ADVICE = (
     "This computer lets such a loop take a whole core for itself (kernel.sched_rt_runtime_us is -1): while it hangs, "
@@ -56,7 +57,9 @@ class GrantedRights:
     """Rights that the operating system granted to the loop."""
 
     scheduled: bool
+    """Whether the thread has the real-time class."""
     locked: bool
+    """Whether the program's memory is locked."""
     advice: str
     """How to get what was not granted; empty where all was."""
 
@@ -72,8 +75,9 @@ class _Users:
         self._switch_s = 0.0
 
     def enter(self) -> GrantedRights:
+        """Add a user, in whose thread the class is requested."""
         with self._lock:
-            granted, undo = _request_class()  # by each user: the class is a thread's, and memory was mapped since
+            granted, undo = _request_class()  # for each user: the class belongs to a thread, memory grows
             if self._count == 0:
                 self._switch_s = sys.getswitchinterval()
                 sys.setswitchinterval(min(SWITCH_S, self._switch_s))
@@ -82,6 +86,7 @@ class _Users:
             return granted
 
     def leave(self) -> None:
+        """Remove a user; the last one restores all settings."""
         with self._lock:
             self._count -= 1
             if self._count == 0:
@@ -91,7 +96,7 @@ class _Users:
 
 
 _USERS = _Users()
-"""Of this program: its threads share the settings."""
+"""The only counter of this program, because its threads share the settings."""
 
 
 @contextlib.contextmanager
@@ -106,7 +111,7 @@ def real_time_class() -> Iterator[GrantedRights]:
 
 
 def real_time_finding() -> DeviceFinding:
-    """Finding on what the system grants to this account, tried in a separate thread."""
+    """Finding on the rights that the system grants to this account, determined by a request in a separate thread."""
     found: list[GrantedRights] = []
 
     def ask() -> None:
@@ -130,9 +135,10 @@ def real_time_finding() -> DeviceFinding:
 
 
 def _may_starve_others() -> bool:
+    """Whether real-time threads may take all of the processor time, so that a loop that hangs blocks other programs."""
     try:
         return RT_RUNTIME.read_text("ascii").strip() == "-1"
-    except (OSError, ValueError):  # another system, or a kernel that shows none
+    except (OSError, ValueError):  # another system, or a kernel without this file
         return False
 
 
@@ -148,12 +154,13 @@ def _request_class() -> tuple[GrantedRights, Callable[[], None]]:
 
 
 def _of_linux(library: Any) -> tuple[GrantedRights, Callable[[], None]]:
+    """Request SCHED_FIFO for the calling thread, then the memory lock."""
     try:
-        # A program that is started from here must not inherit it.
+        # RESET_ON_FORK: a program that is started from here does not inherit the class.
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
         os.sched_setscheduler(threading.get_native_id(), policy, os.sched_param(PRIORITY))
         scheduled = True
-    except (OSError, AttributeError):  # AttributeError: a Python built without it
+    except (OSError, AttributeError):  # AttributeError: a Python without these functions
         scheduled = False
     try:
         locked = library.mlockall(PRESENT_WHEN_TOUCHED | (FUTURE_TOO if _memory_without_limit() else 0)) == 0
@@ -164,13 +171,15 @@ def _of_linux(library: Any) -> tuple[GrantedRights, Callable[[], None]]:
 
 
 def _memory_without_limit() -> bool:
+    """Whether the account may lock memory without a limit."""
     import resource  # not on Windows
 
     return resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
 
 
 def _of_windows(windows: Any) -> tuple[GrantedRights, Callable[[], None]]:
-    """Sleeps of 1 ms instead of 16, and the thread's priority. Its memory is locked by no call that a program has."""
+    """Request a timer resolution of 1 ms instead of 16 ms, and the priority `TIME_CRITICAL` for the calling thread. The
+    memory of a whole program is not locked on Windows."""
     fine_sleep = windows.winmm.timeBeginPeriod(1) == 0
     kernel = windows.kernel32
     kernel.GetCurrentThread.restype = ctypes.c_void_p

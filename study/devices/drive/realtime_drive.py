@@ -1,21 +1,20 @@
-"""Ticks in real time: a thread runs them as they become due.
+"""Control ticks in real time: a thread runs them as they become due.
 
 Theory of operation. Tick k is due at t_0 + k T (T = 1 ms). In each tick the loop senses (position, acceleration),
 governs (caps, slew limit, fades, workspace, faults) and writes one force, in this order: no force leaves that was not
 computed from this tick's reading. The due time is counted from the start, not from the last tick, so that delays do not
 add up. The loop sleeps until `SPIN_S` before the due time, then polls the clock, because a sleep alone ends late.
 
-A stimulus is a function of time. Ticks that come late are caught up where the world waits (a simulated rig); where
-it does not, they are counted as missed and the waveform goes on where the time is, never stretched.
+A stimulus is a function of time. Late ticks of a simulated rig, whose time waits, are run afterwards; those of a real
+device are counted as missed, and the waveform continues at the present time: it is never stretched.
 
-The thread watches its callers (the governor's watchdog), and every caller watches the thread (`check`).
+The thread monitors its callers (the governor's watchdog), and every caller monitors the thread (`check`).
 
-A rig with compiled halves is attended by compiled code for as long as nothing else is asked of the thread, so that no
-other thread's hold on the interpreter makes a tick late; `pump` does the same from Python, a tick at a time.
+The ticks of a rig with compiled halves run in compiled code while the thread has no other work, so that the interpreter
+lock of another thread delays no tick; `pump` does the same from Python, for a tick at a time.
 
-Readings while nothing moves are asked of the same thread: a rig is driven by one thread even then, a stimulus that
-begins meanwhile cannot collide with the reading, and a driver that hangs keeps a caller waiting for at most
-`PATIENCE_S`.
+Readings while nothing moves are taken by the same thread, so that only a single thread drives a rig and a stimulus that
+begins meanwhile cannot collide with the reading. A driver that hangs delays a caller by at most `PATIENCE_S`.
 """
 
 import contextlib
@@ -47,27 +46,31 @@ from study.devices.drive.virtual_drive import ticks_by
 from study.devices.governor.governor import Governor
 
 PATIENCE_S = 0.1
-"""A reading takes well below a millisecond; a busy computer is late by some 10 ms."""
+"""Longest wait of a caller for a reading (s). A reading takes well below 1 ms; a busy computer is late by some 10
+ms."""
 
 
 class _Request:
+    """A request for a reading: deadline (s, by the drive's clock), and whether the reading was taken."""
+
     def __init__(self, until_s: float) -> None:
         self.until_s = until_s
         self.taken = threading.Event()
 
 
 class Glances:
-    """One request at a time: who asks while another waits gets the same reading."""
+    """Requests for a reading while nothing moves, a single one at a time: callers that ask meanwhile get the same
+    reading."""
 
     def __init__(self, clock: Clock, wake: Callable[[], None]) -> None:
-        """`wake` lets the loop's thread look whether something is `wanted`."""
+        """wake: makes the loop's thread check `wanted`."""
         self._clock = clock
         self._wake = wake
         self._asking = threading.Lock()
         self._request: _Request | None = None
 
     def ask(self) -> bool:
-        """Wait for a reading. False where none came in time; a request that is late already is not waited for."""
+        """Wait for a reading. Returns False where none was taken in time, at once after the request's deadline."""
         with self._asking:
             request = self._request
             if request is None or request.taken.is_set():
@@ -87,26 +90,28 @@ class Glances:
 
 
 LEISURELY_S = 0.003
-"""Between two pumps of a simulated rig: no hand feels it, so it need not wake for each tick."""
+"""Interval between two pumps of a simulated rig (s). It needs no wake-up per tick, because no person feels it."""
 
 LATE_S = 0.1
-"""A real rig's loop that did not turn for so long counts as hanging. A busy computer is late by some 10 ms."""
+"""Time without a turn (s) after which a real rig's loop counts as hanging. A busy computer is late by some 10 ms."""
 
 GRACE_S = 0.02
-"""When the whole process stood still, its loop looks late too: it gets so long to prove itself alive."""
+"""Time (s) that a seemingly late loop gets to continue, because after a suspension of the process it looks late too."""
 
 STOP_S = 0.005
-"""Longest wait of an emergency stop for the loop to write the zero."""
+"""Longest wait of an emergency stop for the loop to write the zero force (s)."""
 
 JOIN_S = 0.5
-"""A driver that hangs must not hang the program as well."""
+"""Longest wait for the loop's thread (s), so that a driver that hangs does not block the program."""
 
 ASK_EVERY_S = 0.01
-"""Who begins a stimulus asks the thread again for its lock: between two ticks it is free for most of a millisecond."""
+"""Interval (s) at which the begin of a stimulus repeats its request for the lock, which compiled ticks otherwise
+keep."""
 
 
 class RealtimeDrive:
-    """first: whether the loop goes before other programs, where the system allows: for a device that moves."""
+    """Drive of a device in real time. longest_gap_s: interruption of the loop after which it does not resume. first:
+    run the loop in the real-time class where the system allows it, for a real device."""
 
     def __init__(
         self,
@@ -135,18 +140,18 @@ class RealtimeDrive:
         self._thread.start()
 
     def start(self, begin: Callable[[], None]) -> bool:
-        """`begin` readies the governor, undisturbed by the thread; from now on its ticks fall due.
+        """Call `begin`, which prepares the governor, while no tick runs; from then on ticks fall due.
 
-        False, and nothing begins, where something moves already or nothing may move any more.
+        Returns False, without a begin, where a stimulus is in progress, or the drive has failed or is closing.
         """
         if not (self._thread.is_alive() and self._take_lock()):
-            if not self._closing:  # else its thread may have ended already, as it should
+            if not self._closing:  # a closing drive's thread may have ended, which is no failure
                 self._runner.give_up(TimeoutError("its loop hangs"))
             return False
         try:
             if self._runner.moving or self._closing or self._runner.failure is not None:
                 return False
-            self._loop_state[LAST_S] = math.inf  # a long preparation is no late tick
+            self._loop_state[LAST_S] = math.inf  # the time that `begin` takes is no late tick
             begin()
             self._loop_state[STARTED_S] = self._loop_state[LAST_S] = now_s = self._clock.now_s()
             self._governor.note_begin(now_s)
@@ -157,6 +162,7 @@ class RealtimeDrive:
             self._lock.release()
 
     def _take_lock(self) -> bool:
+        """Take the lock from the loop's thread, within `JOIN_S`. Returns whether it was taken."""
         for _ in range(round(JOIN_S / ASK_EVERY_S)):
             self._loop_state[WANTED] = 1.0
             if self._lock.acquire(timeout=ASK_EVERY_S):
@@ -165,20 +171,20 @@ class RealtimeDrive:
         return False
 
     def check(self) -> None:
-        """Give up a loop that gives no sign of life while something is played. Cheap."""
+        """Give up a loop that does not turn while a stimulus is played. Fast enough for every call of a device."""
         if self._runner.moving and self._late():
             self._clock.sleep(GRACE_S)
             if self._late():
                 self._runner.give_up(TimeoutError("its loop gave no sign of life"))
 
     def refresh(self) -> bool:
-        """Before a look: whether what the runner saw last is of now. Waits for the loop while all is still."""
+        """Update the last reading. Returns whether it is current. Waits for the loop's thread while nothing moves."""
         if self._runner.moving:
             return True
         return self._thread.is_alive() and not self._closing and self._glances.ask()
 
     def stop(self) -> None:
-        """After a stop was asked for: wait until the loop has taken it, or stop without the loop."""
+        """After a stop was requested: wait until the loop has executed it, else stop without the loop."""
         until_s = self._clock.now_s() + STOP_S
         while self._runner.moving and self._clock.now_s() < until_s:
             self._clock.sleep(STOP_S / 10)
@@ -186,17 +192,19 @@ class RealtimeDrive:
             self._runner.cut()
 
     def close(self) -> None:
-        """End the loop's thread. Waits for it at most `JOIN_S`: one that hangs in a driver is left behind."""
+        """End the loop's thread. Waits for at most `JOIN_S`; a thread that hangs in a driver is abandoned."""
         self._closing = True
         self._wake()
         self._thread.join(JOIN_S)
 
     def _wake(self) -> None:
+        """Make the loop's thread leave compiled code and its wait, and look for work."""
         self._loop_state[WANTED] = 1.0
         self._awake.set()
 
     def pump(self, now_s: float) -> None:
-        """Run what is due. After a gap that was not watched (a stopped process, a suspended machine) let go at once."""
+        """Run the ticks that are due. After a gap without control (suspended process or computer) drop the force at
+        once."""
         with self._lock:
             if not self._governor.moving:
                 self._awake.clear()
@@ -221,17 +229,19 @@ class RealtimeDrive:
             loop_state[RUN] = due
             if not self._runner.catches_up:
                 self._count_lateness(due, first_s)
-            if self._glances.wanted:  # asked for a moment before this stimulus began
+            if self._glances.wanted:  # requested directly before this stimulus began
                 self._glances.mark_taken()
 
     def _due_s(self, tick: int) -> float:
         return float(self._loop_state[STARTED_S] + tick / self._loop_state[RATE_HZ])
 
     def _count_lateness(self, tick: int, first_s: float) -> None:
+        """Record whether a tick ended after the next was due, and the time since first_s, the due time of its turn."""
         done_s = self._clock.now_s()
         self._governor.count_lateness(done_s > self._due_s(tick + 1), done_s - first_s)
 
     def _late(self) -> bool:
+        """Whether the loop's thread has ended or, for a real rig, has not turned for `LATE_S`."""
         if not self._thread.is_alive():
             return True
         return not self._runner.catches_up and bool(self._clock.now_s() - self._loop_state[LAST_S] > LATE_S)
@@ -241,6 +251,7 @@ class RealtimeDrive:
             self._attend_until_closed()
 
     def _attend_until_closed(self) -> None:
+        """Loop of the thread: run ticks while a stimulus is in progress, otherwise wait for work."""
         while not self._closing:
             try:
                 self._awake.wait()
@@ -257,8 +268,8 @@ class RealtimeDrive:
             self._runner.run(1)
 
     def _attend_compiled(self) -> bool:
-        """Whether ticks were run. Else the thread is wanted, or Python has to run them: one is run by `pump`, before
-        which the lock is free."""
+        """Run ticks in compiled code. Returns False where the rig has none or the thread is needed: `pump` then runs a
+        tick from Python, before which other threads can take the lock."""
         wanted, self._loop_state[WANTED] = self._loop_state[WANTED] != 0.0, 0.0
         if self._attending is None or wanted:
             return False
@@ -266,11 +277,12 @@ class RealtimeDrive:
             code = self._attending.attend()
             if code == GAP:
                 self._runner.drop(Fault.STALLED)
-            elif code > 0:  # its zero is written by now
+            elif code > 0:  # the zero force was written in `attend`
                 self._count_lateness(int(self._loop_state[RUN]), float(self._loop_state[DUE_S]))
         return True
 
     def _wait_for_tick(self) -> None:
+        """Wait until the next tick is due; for a simulated rig for `LEISURELY_S`."""
         if self._runner.catches_up:
             self._clock.sleep(LEISURELY_S)
             return

@@ -1,5 +1,7 @@
-"""Converts the rows of the compiled loop to a recording and its health; samples of an accelerometer with its own clock
-are added here."""
+"""Converts the rows that the control loop recorded to a `Recording` with the counters of the safety layer.
+
+The accelerations of an accelerometer with its own clock are inserted here, resampled to the ticks of the rows.
+"""
 
 from dataclasses import replace
 
@@ -13,10 +15,13 @@ from study.devices.governor.governor import Governor
 from study.devices.rig import OwnClockSensor
 
 COMMAND, EXCITATION, POSITION, ACCELERATION, TRUTH = (slice(start, start + 3) for start in range(0, ROW_SIZE, 3))
+"""Columns of a row, three components each: command and excitation (N), position (m), acceleration and true acceleration
+(m/s²). The command is the written force; the excitation is the stimulus alone, without spring and damper."""
 
 
 def record_held_stimulus(governor: Governor, info: DeviceInfo, apart: OwnClockSensor | None = None) -> Played:
-    """Record of a held stimulus: the last of its steady part, whole loops unless the loop is longer than the ring."""
+    """Recording of a held stimulus: the end of its steady part, in whole loops unless a loop is longer than the ring.
+    None where not even that much was recorded. apart: an accelerometer with its own clock, if any."""
     rows, loop = governor.rows(), governor.steady
     whole = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
     kept = len(rows) // whole * whole
@@ -29,7 +34,8 @@ def record_held_stimulus(governor: Governor, info: DeviceInfo, apart: OwnClockSe
 
 
 def record_commands(governor: Governor, info: DeviceInfo, apart: OwnClockSensor | None = None) -> Played:
-    """Record of commands played once through; the caller knows which segments they are."""
+    """Recording of commands that were played once; None after a fault or where they ended early. It has no segments:
+    the caller knows them."""
     rows = governor.rows()
     if governor.fault is not Fault.NONE or len(rows) < len(governor.loop):
         return Played(recording=None, health=_with_acceleration(rows[:0], governor, info, apart)[1])
@@ -39,7 +45,8 @@ def record_commands(governor: Governor, info: DeviceInfo, apart: OwnClockSensor 
 def _with_acceleration(
     rows: FloatArray, governor: Governor, info: DeviceInfo, apart: OwnClockSensor | None
 ) -> tuple[FloatArray, Health]:
-    """rows: the last ones. With the acceleration that belongs to each, of missed ticks too."""
+    """Insert the acceleration at the tick of each row, missed ticks included, and its counters. rows: the newest rows
+    of the governor."""
     due_s = governor.row_due_s()
     due_s = due_s[len(due_s) - len(rows) :]
     sensed = apart.sensed(governor.began_s, due_s, info.sample_rate_hz) if apart is not None else None
@@ -51,6 +58,7 @@ def _with_acceleration(
 
 
 def _make_played(rows: FloatArray, health: Health, info: DeviceInfo, segments: tuple[Segment, ...]) -> Played:
+    """Recording of rows (n, ROW_SIZE); the true acceleration only of a simulated device."""
     rate_hz = info.sample_rate_hz
     acceleration = ("acceleration", "m/s^2", ("ax", "ay", "az"))
     force = ("force", "N", ("fx", "fy", "fz"))

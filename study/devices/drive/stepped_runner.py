@@ -1,9 +1,10 @@
-"""Ticks of a real device, and what is done when its driver hangs or fails.
+"""Control ticks of a real device, and the reaction to a driver that hangs or fails.
 
-Rigs with compiled halves are driven in compiled code (`compiled_drive`), others tick by tick from Python: one law.
+Ticks of rigs with compiled halves run in compiled code (`compiled_drive`), others from Python; both compute the same.
 
-A call into a driver cannot be broken off. So the side that gives up first marks the rig as `gone` and has a thread of
-its own write zero; and the loop, whenever its call returns, writes zero once more: a late write leaves no force.
+A call into a driver cannot be interrupted. A caller that gives up therefore marks the rig as gone (GONE) and lets a
+separate thread write zero force. When the call of the loop returns later, the loop writes zero once more, so that a
+late write leaves no force on the device.
 """
 
 import contextlib
@@ -24,7 +25,8 @@ from study.devices.rig import READING_SIZE, Rig
 
 
 class Standby:
-    """Started beforehand: no thread can be started any more while the interpreter ends."""
+    """A thread that runs an action on request. It is started in advance, because no thread can be started while the
+    interpreter shuts down."""
 
     def __init__(self, action: Callable[[], bool | None], name: str) -> None:
         self._action = action
@@ -32,8 +34,8 @@ class Standby:
         threading.Thread(target=self._run_thread, name=name, daemon=True).start()
 
     def run(self, patience_s: float) -> bool:
-        """Whether it was done within patience_s, with neither an error nor False. It goes on even if the caller is
-        interrupted."""
+        """Run the action. Returns whether it ended within patience_s (s) with neither an error nor False. The action
+        continues even if the caller is interrupted."""
         answer: SimpleQueue[bool] = SimpleQueue()
         self._asked.put(answer)
         try:
@@ -54,15 +56,16 @@ class Standby:
 
 
 ZERO_PATIENCE_S = 0.1
-"""Longest wait for a zero force to be written (s): a hundred times what a driver takes."""
+"""Longest wait for a zero force to be written (s): a hundred times the duration of a normal write."""
 
 CLOSE_PATIENCE_S = 1.0
 """Longest wait for the driver to close its device (s)."""
 
 
 class SteppedRunner:
-    """now_s: the clock by which readings are stamped, where time passes by itself. Without it, each is a tick apart.
-    monotonic: whether that is the system's own, which compiled code reads too."""
+    """Runner of a real device (`drive.runner.Runner`). now_s: clock for the time stamps of readings, in real time;
+    without it, readings are a tick apart. monotonic: whether that is the system's monotonic clock, which compiled code
+    can read."""
 
     def __init__(
         self,
@@ -89,7 +92,7 @@ class SteppedRunner:
 
     @property
     def moving(self) -> bool:
-        """Whether a force acts or is about to: also between its decision and its being written."""
+        """Whether a force acts or is about to act: also between its decision and the end of its write."""
         return self._governor.moving or bool(self.loop_state[DECIDING])
 
     @property
@@ -101,17 +104,18 @@ class SteppedRunner:
 
     @property
     def attends(self) -> bool:
-        """Whether `attend` is there: it waits for ticks by itself."""
+        """Whether `attend` may be called."""
         return self._compiled is not None and self._compiled.attends
 
     def prepare(self) -> None:
-        """Nothing to prepare: the device moves by itself."""
+        """Nothing to do for a real device."""
 
     @property
     def _is_gone(self) -> bool:
         return bool(self.loop_state[GONE])
 
     def glance(self) -> None:
+        """Read the sensors once while nothing moves. Never raises for a driver that fails."""
         if self._is_gone:
             return
         try:
@@ -120,7 +124,8 @@ class SteppedRunner:
             self._seen = None
 
     def run(self, ticks: int) -> None:
-        """Run ticks, in compiled code where the rig has functions for it, else one by one from Python."""
+        """Run at most this many ticks, in compiled code where the rig has compiled halves, else from Python. Never
+        raises for a failing rig."""
         if self._is_gone:
             self._governor.abandon(Fault.LOST)
             return
@@ -133,8 +138,8 @@ class SteppedRunner:
                     break
 
     def attend(self) -> int:
-        """Ticks in real time, in `loop_state`, until something is WANTED: see `compiled_drive.attend`, and only where
-        `attends`. Never raises for a failing rig."""
+        """Run ticks in real time by `compiled_drive.attend`, and return its code. To be called only where `attends`.
+        Never raises for a failing rig."""
         assert self._compiled is not None
         code = OVER
         if self._is_gone:
@@ -147,7 +152,8 @@ class SteppedRunner:
 
     @contextlib.contextmanager
     def _handle_failures(self) -> Iterator[None]:
-        """Around ticks: what is done where they fail."""
+        """Context for ticks: if they fail or are interrupted, switch the force off; if the rig is gone, write zero
+        again."""
         try:
             yield
         except Exception as error:  # noqa: BLE001 - any error of a driver: the force goes off, the next call says why
@@ -160,6 +166,7 @@ class SteppedRunner:
                 self._once_more()
 
     def _conclude(self, code: int) -> None:
+        """Keep the last reading of compiled ticks; raise the rig's error for a code above zero."""
         assert self._compiled is not None
         if (reading := self._compiled.last_seen()) is not None:
             self._seen = LastReading(reading, self._rig.buttons())
@@ -167,21 +174,24 @@ class SteppedRunner:
             raise self._compiled.error(code)
 
     def give_up(self, failure: BaseException) -> None:
+        """Force off permanently, because of this failure; the first one is kept."""
         self.failure = self.failure or failure
         self.loop_state[GONE] = 1.0
         self._silence(Fault.LOST)
 
     def drop(self, fault: Fault) -> None:
+        """Force off at once with this fault; the rig stays usable if it takes the zero force."""
         self._silence(fault)
 
     def cut(self) -> None:
-        """A thread of its own writes zero, past a call of the driver that hangs."""
+        """Emergency stop: a separate thread writes zero force even if a call of the driver hangs; the rig is then
+        gone."""
         self.loop_state[GONE] = 1.0
         self._silence(Fault.STOPPED)
 
     def disconnect(self) -> None:
-        """Zero force, then the driver's `close`, each by a thread of its own and with a timeout (`ZERO_PATIENCE_S`,
-        `CLOSE_PATIENCE_S`)."""
+        """Write zero force, then call the driver's `close`, each in a separate thread and with a timeout
+        (`ZERO_PATIENCE_S`, `CLOSE_PATIENCE_S`)."""
         if self._ended:
             return
         self.loop_state[GONE] = 1.0
@@ -195,6 +205,8 @@ class SteppedRunner:
         self._disconnect.end()
 
     def _tick(self) -> bool:
+        """A tick from Python, in the order of `compiled_drive._tick`. Returns whether the force is off and stays
+        off."""
         governor = self._governor
         reading = self._read()
         if self._is_gone:
@@ -215,18 +227,21 @@ class SteppedRunner:
         return bool(over)
 
     def _read(self) -> FloatArray:
+        """A reading of the rig. Raises ValueError for a wrong shape, and what the driver raises."""
         reading = np.array(self._rig.sense(), dtype=np.float64)
         if reading.shape != (READING_SIZE,):
             raise ValueError(f"a reading has the shape {reading.shape}; it must be ({READING_SIZE},)")
         return reading
 
     def _silence(self, fault: Fault) -> None:
-        """Zero force first, then the governor is still: it must not be said that all is over before it is."""
+        """Write zero force, then stop the governor with this fault: the end is reported only when no force acts.
+
+        Where zero force could not be written in time, the rig is gone and the fault is FORCE_LEFT."""
         written = False
         try:
             written = (
                 self._zero.run(ZERO_PATIENCE_S) and not self.loop_state[WRITING]
-            )  # what still hangs may come after the zero
+            )  # a write that still hangs may take effect after the zero
         finally:
             self.force_off = written
             if not written:
@@ -236,7 +251,8 @@ class SteppedRunner:
             self.loop_state[DECIDING] = 0.0
 
     def _once_more(self) -> None:
-        """The caller gave up while this thread was in the driver: what it wrote is taken back."""
+        """Write zero force again, and close the rig if that was requested: the caller gave up while this thread was in
+        the driver, which may have written a force since."""
         self.force_off = False
         try:
             self._rig.write(np.zeros(3))

@@ -1,4 +1,7 @@
-"""Ticks in virtual time: whenever the program sleeps, the ticks that became due are run."""
+"""Control ticks in virtual time: when the program sleeps, the ticks that fall due in that time are run at once.
+
+Used for simulated devices, so that a session runs as fast as the computer allows.
+"""
 
 from collections.abc import Callable
 
@@ -8,7 +11,7 @@ from study.devices.governor.governor import Governor
 
 
 class VirtualDrive:
-    """Drive of a device in virtual time: ticks run in the caller's thread whenever the clock goes on."""
+    """Drive of a device in virtual time: ticks run in the caller's thread whenever the clock advances."""
 
     def __init__(self, runner: Runner, governor: Governor, clock: VirtualClock, rate_hz: float) -> None:
         self._runner = runner
@@ -21,7 +24,8 @@ class VirtualDrive:
         clock.listen(self._pump)
 
     def start(self, begin: Callable[[], None]) -> bool:
-        """`begin` readies the governor; from now on its ticks fall due. False where something moves already."""
+        """Call `begin`, which prepares the governor; from then on ticks fall due. Returns False, without a begin, where
+        a stimulus is in progress or the drive is closed."""
         if self._runner.moving or self._closed:
             return False
         begin()
@@ -31,24 +35,25 @@ class VirtualDrive:
         return True
 
     def check(self) -> None:
-        """Nothing can hang: ticks run in the caller's own thread."""
+        """Nothing to check: ticks run in the caller's thread."""
 
     def refresh(self) -> bool:
-        """Update the last reading before it is looked at. Returns whether it is current."""
+        """Update the last reading while nothing moves. Returns whether it is current."""
         if not (self._runner.moving or self._closed):
             self._runner.glance()
         return not self._closed
 
     def stop(self) -> None:
-        """The next tick takes it; none is under way."""
+        """Nothing to wait for: no tick is in progress, and the next one executes the stop."""
 
     def close(self) -> None:
-        """Run no more ticks when the clock moves on."""
+        """Run no more ticks when the clock advances."""
         if not self._closed:
             self._closed = True
             self._clock.forget(self._pump)
 
     def _pump(self, now_s: float) -> None:
+        """Run the ticks that have become due by now_s (s)."""
         if self._governor.moving:
             due = ticks_by(now_s - self._started_s, self._rate_hz)
             self._runner.run(due - self._run)
@@ -56,5 +61,6 @@ class VirtualDrive:
 
 
 def ticks_by(elapsed_s: float, rate_hz: float) -> int:
-    """Ticks that are due; a sum of rounded times just short of a tick counts as that tick."""
+    """Number of ticks that are due after elapsed_s. A time that rounding puts just before a tick counts as that
+    tick."""
     return int(elapsed_s * rate_hz + 1e-6)

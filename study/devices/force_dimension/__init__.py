@@ -1,10 +1,10 @@
-"""Driver for devices of Force Dimension through the vendor's own shared library, which is located and never shipped.
+"""Driver for devices of Force Dimension through the vendor's shared library, which is located and never shipped.
 
-`locate`, `library` (its functions) -> `connect` (open, calibrate, arm the watchdog; `usb`, `models`, `lab`) -> `handle`
-(an open device) -> `rig` (the driver, with the compiled halves of `tick_io` and their `loop_cells`), built by `rigs`.
-Before a hand may hold it: `watchdog_check` at every opening, `force_limit_check` and `acceptance` once, `findings` for
-`hapteq doctor`. `linkage` reads the calibration. Begin at `rigs.py`, then `rig.py`.
+In the order of opening: `locate` and `library` (its functions), `connect` (open, arm the watchdog; `usb`, `models`,
+`lab`), `handle` (an open device), `rig` (the driver, with the compiled halves in `tick_io` and their `loop_cells`);
+`rigs` builds the driver. Before a hand may hold the device: `watchdog_check` at every opening, `force_limit_check` and
+`acceptance`; `findings` for `hapteq doctor`. `linkage` reads the kinematics. Begin at `rigs.py`, then `rig.py`.
 
-Facts about its functions: the public header of SDK 3.17.5. Proved on a stub of it (`tests/study/devices/
-force_dimension/dhd_stub.c`), not yet on a device: `docs/hardware.md` says what that leaves open.
+Source of the functions' signatures: the public header of SDK 3.17.5. Tested on a stub of the library (`tests/study/
+devices/force_dimension/dhd_stub.c`), not yet on a device: `docs/hardware.md` lists what remains to be tested.
 """

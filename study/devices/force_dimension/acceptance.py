@@ -1,6 +1,7 @@
-"""Acceptance of a device: checked with no hand on it, signed by an operator, and void when something changes.
+"""Acceptance record of a device: tested with no hand on the handle, with an operator's name, void after any change.
 
-Without one, a device opens for no hand: neither for a person's nor for one that is simulated in a session.
+Without a valid record, a real device cannot be opened with a hand on the handle. The tests are `force_limit_check`; the
+record is acceptance.json.
 """
 
 import json
@@ -13,9 +14,10 @@ from study.devices.force_dimension.lab import lab_file
 from study.errors import DeviceError
 
 FORMAT, VERSION = "hapteq-acceptance", 1
+"""Values by which the file and its version are recognised."""
 
 VALID_FOR = timedelta(days=180)
-"""Half a year: twice a year is how often laboratories check what people are connected to."""
+"""Validity of an acceptance: half a year, so that the device is tested twice a year."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,21 +26,24 @@ class Acceptance:
 
     device: str
     details: str
-    """Serial number, firmware and SDK. Another of any of them voids it."""
+    """Serial number, firmware and SDK. A change of any of them voids the acceptance."""
     operator: str
     accepted_on: str
     """ISO 8601 date."""
     force_n: float
-    """Force that was held when the loop was stopped on purpose."""
+    """Force (N) that was held when the loop was stopped on purpose, and the cap of the test of the force limit."""
     gone_after_s: float
-    """Until the device said that it was off."""
+    """Time (s) from the last command until the device reported its force as off."""
     asked_n: float = 0.0
-    """Force asked of each layer, with a cap of `force_n`; 0 where that was not tested, as before November 2026."""
+    """Force (N) commanded of each layer, above the cap of `force_n`; 0 where this was not tested, as before November
+    2026."""
     most_given_n: float = 0.0
-    """Then, as the device said."""
+    """Largest force (N) that the device reported meanwhile."""
     baseline: str = ""
-    """Name of the recording beside this file with which the daily check compares; empty where none was made."""
+    """File name of the recording, in the same folder, with which the daily check compares; empty where none was
+    made."""
     baseline_sha256: str = ""
+    """SHA-256 of that file."""
 
 
 def acceptance_file() -> Path:
@@ -47,7 +52,8 @@ def acceptance_file() -> Path:
 
 
 def write_acceptance(acceptance: Acceptance) -> Path:
-    """Write acceptance.json, in the place of an older acceptance; its folder is made if missing. Returns the path."""
+    """Write acceptance.json, replacing an older acceptance; its folder is made if missing. Returns the path. Raises
+    OSError where the file cannot be written."""
     path = acceptance_file()
     path.parent.mkdir(parents=True, exist_ok=True)
     written = path.with_suffix(".new")
@@ -57,8 +63,8 @@ def write_acceptance(acceptance: Acceptance) -> Path:
 
 
 def check_accepted(info: DeviceInfo, today: date) -> tuple[str, str]:
-    """Name and SHA-256 of the accepted baseline, empty where none was made. Raises `DeviceError` where this device, as
-    it is now, was not accepted, or too long ago."""
+    """Name and SHA-256 of the accepted baseline, empty where none was made. Raises `DeviceError` where this device, in
+    its present configuration, was not accepted, or the acceptance has expired."""
     path = acceptance_file()
     try:
         document = json.loads(path.read_text("utf-8"))
@@ -77,6 +83,7 @@ def check_accepted(info: DeviceInfo, today: date) -> tuple[str, str]:
 
 
 def _lock_error(info: DeviceInfo, happened: str) -> DeviceError:
+    """Error for a device that must not be opened with a hand on the handle."""
     option = info.name.replace(".", "")
     return DeviceError(
         f"The {info.name} is locked for hands",

@@ -1,5 +1,8 @@
-"""Connects to a device by name: opened, calibrated, watchdog armed, forces on; otherwise an error that says what is
-missing. If a step fails, the device is stopped and closed again."""
+"""Connects to a device by model: opens it, checks power and calibration, arms the watchdog, enables forces.
+
+Each failure is a `DeviceError` that says what is missing and what to do. If opening fails, the device is closed again;
+after `open_model`, closing is the caller's task.
+"""
 
 import os
 
@@ -11,18 +14,18 @@ from study.devices.force_dimension.usb import ADVICE, find_usb_devices
 from study.errors import DeviceError
 
 WATCHDOG_S = 0.03
-"""Close to the 31.9 ms that the firmware can count: a loop in Python is late by 10 ms on a busy computer, and a force
-that stays for 30 ms moves a bare handle by a few millimetres."""
+"""Timeout of the device's watchdog (s), close to the longest that the firmware can count (31.9 ms). A loop in Python is
+late by 10 ms on a busy computer; a force that remains for 30 ms moves a handle without a hand by a few millimetres."""
 
 MOST_DEVICES = 16
-"""Devices that are looked at on one computer. A library that counts more than that has lost count, and the error of a
-device that is not among them says so."""
+"""Largest number of devices that are tried on a computer. A library that counts more is not trusted; the error for a
+device that was not found then says so."""
 
 CALIBRATE = (
     "Push the handle gently into its calibration position, as the device's manual shows (or run the vendor's "
     "calibration program), then try again."
 )
-"""Advice for a device that does not know its place."""
+"""Advice for a device without calibration."""
 
 
 def load_library() -> Library:
@@ -35,7 +38,8 @@ def load_library() -> Library:
 
 
 def open_model(library: Library, model: DeviceModel) -> Handle:
-    """The first device of this kind that is free, as it is: neither armed nor taking forces. Raises `DeviceError`."""
+    """Open the first free device of this model; its watchdog is not armed and its forces are not enabled yet. Raises
+    `DeviceError` where there is none."""
     others: list[tuple[str, str | None]] = []
     failures: list[LibraryError] = []
     count = max(0, int(library.function("dhdGetDeviceCount")()))
@@ -64,9 +68,10 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
 
 
 def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_kg: float | None) -> float:
-    """Takes forces up to cap_n from now on, zero for now. For how long it holds one by itself, s; 0: for ever.
+    """Enable forces up to cap_n (N), starting with zero. Returns the watchdog's timeout (s): how long the device holds
+    a force without commands; 0: without limit. effector_mass_kg: for the gravity compensation, None = the model's.
 
-    Raises `DeviceError` for a device without power or calibration. The caller lets the handle go then.
+    Raises `DeviceError` for a device without power or calibration. The caller has to disconnect it then.
     """
     try:
         _check_fit(handle, model)
@@ -88,7 +93,7 @@ def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_k
 
 
 def device_error(name: str, error: LibraryError) -> DeviceError:
-    """Error for a failed call of the vendor's library. name: of the device."""
+    """Error for a failed call of the vendor's library. name: name of the device."""
     return DeviceError(
         f"The {name} does not work", f"The library says: {error}.", "Check its power and its cable, then try again."
     )
@@ -107,6 +112,7 @@ def make_missing_library_error(computer: Computer) -> DeviceError:
 
 
 def _check_fit(handle: Handle, model: DeviceModel) -> None:
+    """Require power and calibration. Raises `DeviceError` or `LibraryError`."""
     status = handle.status()
     if not status.powered:
         raise DeviceError(
@@ -121,7 +127,9 @@ def _check_fit(handle: Handle, model: DeviceModel) -> None:
 def _none_of_them(
     model: DeviceModel, others: list[tuple[str, str | None]], failures: list[LibraryError]
 ) -> DeviceError:
-    """others: the vendor's name of each device that was found, and the one that `--device` takes, if there is one."""
+    """Error where no device of the model could be opened, with the most probable cause. others: the vendor's name of
+    each other device found, and the name that `--device` takes, if there is one; failures: of devices that did not
+    open."""
     title = f"There is no {model.name}"
     if any(failure.code == DEVICE_IN_USE for failure in failures):
         return DeviceError(title, "A device is there, and another program has it.", "Close the other program.")
@@ -137,6 +145,7 @@ def _none_of_them(
 
 
 def _others_instead(model: DeviceModel, others: list[tuple[str, str | None]]) -> DeviceError:
+    """Error where only devices of other models were found; it names them."""
     known = [f"`--device {name}`" for _, name in others if name is not None]
     found = ", ".join(name or f"{reported!r}, which hapteq does not drive" for reported, name in others)
     plug_in = f"plug the {model.name} in and switch its power on."

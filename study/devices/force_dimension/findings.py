@@ -1,4 +1,8 @@
-"""Findings about a device before a study day: library, connection, power, calibration, watchdog. Commands no force."""
+"""Findings of `hapteq doctor` about a Force Dimension device before a study day. Commands only zero forces.
+
+In this order: library, USB, real-time rights, accelerometer, connection, power, calibration, watchdog, masses, gravity
+compensation. Each finding that is not fine says what to do.
+"""
 
 import contextlib
 import time
@@ -17,25 +21,29 @@ from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
 
 CAP_N = 1.0
-"""While it is looked at no force is sent; if one were, the library would cut it here."""
+"""Force cap set in the library during the examination (N). Only zero forces are sent; the cap protects against an error
+of this program."""
 
 AT_REST_S = 0.3
 """Time (s) for which the handle is left to itself, gravity compensated, before its speed is read."""
 EVERY_S = 0.002
 """Interval (s) of the zero forces sent meanwhile, shorter than the device's watchdog."""
 COMPARED_S = 0.02
-"""After that time, over so long the velocity is computed from the positions (s): as the library does it."""
+"""Time (s), after `AT_REST_S`, over which the velocity is computed from two positions. The library averages over 20 ms
+too (`Handle.velocity_mps`)."""
 DRIFTING_MPS = 0.02
-"""After `AT_REST_S` with gravity compensated and no hand: 7 % of g in excess of friction. Below, friction holds it."""
+"""Speed (m/s) after `AT_REST_S` above which the gravity compensation is off: an acceleration of 0.07 m/s² (0.7 % of g)
+in excess of friction. A smaller error is held by friction."""
 
 POWER = "Switch its power supply on."
+"""Advice for a device without power."""
 SENSOR = "Accelerometer"
 """Title of the findings on the accelerometer."""
 
 
 def examine(name: str) -> tuple[DeviceFinding, ...]:
-    """Up to the first thing that hinders all others; what needs no library is told in any case. Raises nothing; the
-    device is left braked."""
+    """Findings up to the first failure that prevents the further checks; checks that need no library are made in any
+    case. name: a key of `MODELS`. Raises no `DeviceError`; the device is left braked."""
     try:
         lab = read_lab()
     except DeviceError as error:
@@ -54,6 +62,7 @@ def examine(name: str) -> tuple[DeviceFinding, ...]:
 
 
 def _of_device(library: Library, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
+    """Open the device, examine it, and disconnect it. Errors become findings."""
     findings: list[DeviceFinding] = []
     try:
         handle = open_model(library, model)
@@ -74,7 +83,8 @@ def _of_device(library: Library, model: DeviceModel, lab: LabSettings) -> list[D
 
 
 def calibrate(name: str, patience_s: float) -> None:
-    """Wait until a person has put the handle where it rests. Raises `DeviceError`."""
+    """Calibrate the device: wait, for patience_s (s) at most, until a person has put the handle to its rest position.
+    Raises `DeviceError`."""
     handle = open_model(load_library(), MODELS[name])
     try:
         handle.calibrate(patience_s)
@@ -87,7 +97,7 @@ def calibrate(name: str, patience_s: float) -> None:
 
 
 def _usb() -> list[DeviceFinding]:
-    """Linux only, and only where a device is plugged in."""
+    """Findings on the USB permissions of the devices that are plugged in; empty on systems other than Linux."""
     return [
         DeviceFinding("USB", device.product, fine=True)
         if device.may_open
@@ -97,8 +107,8 @@ def _usb() -> list[DeviceFinding]:
 
 
 def _find_if_unplugged() -> list[DeviceFinding]:
-    """Finding on a device that is not plugged in, where the library that would say so is missing; empty where this
-    system cannot say it (no Linux)."""
+    """Finding that no device is plugged in, for a computer without the vendor's library. Called where no device was
+    found by USB; empty on systems other than Linux, where that is not known."""
     if find_usb_devices() is None:
         return []
     value, advice = "no device of the vendor is plugged in", "Plug its USB cable in and switch its power on."
@@ -106,7 +116,8 @@ def _find_if_unplugged() -> list[DeviceFinding]:
 
 
 def _sensor(lab: LabSettings) -> list[DeviceFinding]:
-    """Opened, listened to, and closed again for the loop's process, which opens it anew."""
+    """Findings on the accelerometer. It is opened, read and closed again, because the loop's process opens it
+    itself."""
     if lab.accelerometer is None:
         advice = (
             "Without one no acceleration is measured. To add one: calibrate it with `hapteq doctor --calibrate-sensor "
@@ -122,7 +133,8 @@ def _sensor(lab: LabSettings) -> list[DeviceFinding]:
 
 
 def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
-    """Raises `DeviceError`, `LibraryError`."""
+    """Findings on an opened device: power, calibration, watchdog, masses, gravity compensation. Raises `DeviceError`,
+    `LibraryError`."""
     status = handle.status()
     power = DeviceFinding("Power", "on" if status.powered else "off", status.powered, "" if status.powered else POWER)
     calibrated = status.calibrated
@@ -138,6 +150,7 @@ def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[Dev
 
 
 def _masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
+    """The masses in use (kg): for the gravity compensation, and for the stiffness of the centring spring."""
     carried_kg = lab.effector_mass_kg or model.effector_mass_kg
     carried = f"{carried_kg:g} kg" if carried_kg else "what the library takes"
     moved = f"{lab.effective_mass_kg:g} kg" if lab.effective_mass_kg else f"{model.effective_mass_kg:g} kg, assumed"
@@ -145,8 +158,8 @@ def _masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
 
 
 def _gravity(handle: Handle) -> list[DeviceFinding]:
-    """Drift of the handle by its positions, and whether the library's velocity is that; nothing where the positions
-    cannot be read, as another line of the check says. Raises `LibraryError`."""
+    """Findings on the vertical drift of the handle by its positions, and on a velocity of the library that differs from
+    it; empty where positions cannot be read, which another finding reports. Raises `LibraryError`."""
     _rest(handle, AT_REST_S)
     try:
         began_s, from_m = time.monotonic(), handle.position_m()[2]
@@ -166,7 +179,8 @@ def _gravity(handle: Handle) -> list[DeviceFinding]:
 
 
 def _rest(handle: Handle, seconds: float) -> None:
-    """Zero forces, in which alone the library compensates gravity. Raises `LibraryError`."""
+    """Send zero forces for this time (s): the library compensates gravity only while forces are sent. Raises
+    `LibraryError`."""
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
         handle.set_force(0.0, 0.0, 0.0)
@@ -174,6 +188,7 @@ def _rest(handle: Handle, seconds: float) -> None:
 
 
 def _drift(up_mps: float) -> DeviceFinding:
+    """Finding on the gravity compensation by the vertical speed of the free handle (m/s, > 0: it rises)."""
     if abs(up_mps) <= DRIFTING_MPS:
         return DeviceFinding("Gravity", "compensated: the handle stays where it is", fine=True)
     sinks = up_mps < 0
@@ -183,8 +198,10 @@ def _drift(up_mps: float) -> DeviceFinding:
 
 
 def _option(model: DeviceModel) -> str:
+    """The name that `--device` takes for a model."""
     return next(name for name, known in MODELS.items() if known is model)
 
 
 def _make_failed_finding(name: str, error: DeviceError) -> DeviceFinding:
+    """An error as a finding, with its remedy as advice."""
     return DeviceFinding(name, f"{error.title}. {error.happened}", fine=False, advice=error.do_now)

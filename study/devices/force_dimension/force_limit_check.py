@@ -1,7 +1,9 @@
-"""Acceptance test of the force limit, with no hand on the handle.
+"""Acceptance test of the force limit of a real device, with no hand on the handle.
 
-1. More than the cap is commanded, at each tick and of the vendor's library. The device must report no more than it.
-2. A small force is held, and the loop stops on purpose. The device's watchdog must switch the force off in time.
+1. More than the cap is commanded, first of the safety layer's ticks, then directly of the vendor's library. The device
+   must report no force above the cap (`check_cap_holds`).
+2. A small force is held, and the loop stops on purpose. The device's watchdog must switch the force off in time
+   (`check_force_vanishes`).
 """
 
 import time
@@ -16,25 +18,27 @@ from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 FORCE_N = 0.5
-"""Force held, and cap, of the test: above the friction of such devices, a sixth of the strongest stimulus (3 N)."""
+"""Force held in part 2, and cap in part 1 (N): above the friction of such devices, a sixth of the strongest stimulus
+(3 N)."""
 HELD_S, FADE_S, EVERY_S = 0.12, 0.05, 0.002
-"""Duration of the push, of its fades, and interval of polling. Short: without spring and friction the handle moves by
-some 15 mm until the device brakes."""
+"""Duration of the constant force, of its fades, and interval of polling (s). Short, because without spring and friction
+the handle moves by some 15 mm until the device brakes."""
 LEAST_SHARE = 0.8
 """Share of `FORCE_N` that must have been commanded for the test to be valid: the damper subtracts some."""
 PAUSE_S = 0.2
-"""Pause in the commands; a zero force is sent at its end."""
+"""Pause in the commands in part 2 (s); a zero force is sent at its end."""
 
 COMMANDED_TO_CAP = 2.0
-"""Commanded force over the cap (`FORCE_N`) in part 1: what a failing cap lets through is still small."""
+"""Ratio of the commanded force to the cap (`FORCE_N`) in part 1. Even a failing cap lets only a small force through."""
 SHAKEN_HZ, SHAKEN_S = 12.5, 0.24
-"""Frequency and duration of that command. Three periods: a free handle moves by less than 1 mm and ends at rest."""
+"""Frequency (Hz) and duration (s) of that command: three periods. A free handle moves by less than 1 mm and ends at
+rest."""
 ALLOWED_TO_CAP = 1.05
-"""Reported force over the cap that is accepted: motor currents are quantized."""
+"""Largest accepted ratio of the reported force to the cap: motor currents are quantized."""
 
 
 class CappedDevice(Protocol):
-    """The safety layer, as far as part 1 needs it."""
+    """Part of the safety layer's interface that part 1 needs."""
 
     @property
     def info(self) -> DeviceInfo: ...
@@ -77,7 +81,7 @@ class CommandPausing(Protocol):
         ...
 
     def force_on(self) -> bool:
-        """Whether the device says that it gives forces."""
+        """Whether the device reports that its forces are on."""
         ...
 
 
@@ -86,7 +90,7 @@ REQUIRED_METHODS = ("given_n", "given_past_this_n", "withhold", "force_on")
 
 
 def require_testable(rig: object) -> None:
-    """Raises `DeviceError` for a driver without the methods that this test needs, as a laboratory's own may be."""
+    """Raise `DeviceError` for a driver without the methods that this test needs, such as a laboratory's own driver."""
     missing = [name for name in REQUIRED_METHODS if not hasattr(rig, name)]
     if missing:
         raise DeviceError(
@@ -98,10 +102,10 @@ def require_testable(rig: object) -> None:
 
 
 def check_cap_holds(device: CappedDevice, rig: ForceReporting) -> float:
-    """Part 1: the largest force that the device reported (N) while each layer in turn was commanded more than the cap.
+    """Part 1: command more than the cap of each layer in turn. Returns the largest force that the device reported (N).
 
-    device: opened without a spring and with caps of FORCE_N. Raises `DeviceError` where more was given, or where too
-    little was given for the test to be valid.
+    device: opened without a spring and with caps of FORCE_N. Raises `DeviceError` where the cap was exceeded,
+    or where the force was too small for the test to be valid.
     """
     shaking = _oscillation(device.info.sample_rate_hz)
     try:
@@ -142,10 +146,10 @@ def _check_given(which: str, given_n: float) -> None:
 
 
 def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
-    """Part 2: time without commands after which the device was found without force (s). device: opened without a
-    spring; its loop counts as failed afterwards, so that it must be closed.
+    """Part 2: stop the commands while a force is held. Returns the time (s) after which the device reported no force.
 
-    Raises `DeviceError` where the force stayed, or where there was none to begin with.
+    device: opened without a spring; its loop counts as failed afterwards, so that it must be closed. Raises
+    `DeviceError` where the force remained, or where there was none before.
     """
     device.hold(_push(device.info.sample_rate_hz))
     _keep_alive_for(device, HELD_S)
@@ -167,19 +171,20 @@ def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
 
 
 def _push(rate_hz: float) -> HeldStimulus:
-    """A constant force along x, towards the operator."""
+    """A constant force of `FORCE_N` along x, towards the operator. rate_hz: of the device."""
     samples = np.tile([[FORCE_N, 0.0, 0.0]], (round(0.05 * rate_hz), 1))
     return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")
 
 
 def _oscillation(rate_hz: float) -> HeldStimulus:
-    """A sinusoidal force along x, stronger than the cap."""
+    """A sinusoidal force along x, with `COMMANDED_TO_CAP` times the cap as amplitude. rate_hz: of the device."""
     phase = 2 * np.pi * np.arange(round(rate_hz / SHAKEN_HZ)) * SHAKEN_HZ / rate_hz
     samples = COMMANDED_TO_CAP * FORCE_N * np.sin(phase)[:, None] * [1.0, 0.0, 0.0]
     return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")
 
 
 def _keep_alive_for(device: Device, seconds: float) -> None:
+    """Give signs of life for this time (s)."""
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
         time.sleep(0.02)

@@ -1,4 +1,8 @@
-"""A lab's settings of its device, such as its accelerometer: a small TOML file, in which every key is optional."""
+"""The laboratory's settings of its device (masses, accelerometer, onset pulse): a TOML file with only optional keys.
+
+Read at every opening of a real device; `hapteq doctor` writes the result of a sensor calibration into it. The keys are
+described in docs/hardware.md.
+"""
 
 import os
 import re
@@ -17,6 +21,7 @@ from study.devices.onset_line import PulseSettings
 from study.errors import DeviceError
 
 Triple = tuple[float, float, float]
+"""Three numbers, for three channels or three axes."""
 
 HEADER = re.compile(r"\s*\[\[?[\w.\"-]+\]\]?\s*(#.*)?")
 """Header of a table in TOML; a row of numbers in brackets does not match."""
@@ -27,20 +32,22 @@ FILE_VARIABLE = "HAPTEQ_DEVICE_FILE"
 
 @dataclass(frozen=True, config=STRICT)
 class SensorSettings:
-    """An accelerometer, with what its calibration found."""
+    """The [accelerometer] table: connection and calibration of an accelerometer."""
 
     port: str
-    """As the system calls it: /dev/ttyACM0, COM3; or a data-acquisition device, as `sources` says."""
+    """Port by its name in the operating system (/dev/ttyACM0, COM3), or a data-acquisition device as in
+    `accelerometer.sources`."""
     bias: Triple
-    """Raw value of each channel at no acceleration."""
+    """Raw value of each channel at zero acceleration."""
     sensitivity: tuple[Triple, Triple, Triple]
-    """Raw per m/s²; a row is a channel, a column an axis of the device."""
+    """Change of the raw value per m/s²; row = channel, column = axis of the device."""
     raw_range: tuple[float, float]
-    """Lowest and highest raw value that are no clipping."""
+    """Lowest and highest raw value; a sample at or beyond either counts as clipped."""
     baud: int = Field(default=2_000_000, gt=0)
+    """Rate of the serial line, bit/s; not used by a data-acquisition device."""
 
     def open_sensor(self) -> Accelerometer:
-        """Zeroed, so at rest. Raises `DeviceError`."""
+        """Open the sensor and take its present reading as zero; the handle must be at rest. Raises `DeviceError`."""
         calibration = Calibration(np.array(self.bias), np.array(self.sensitivity), np.zeros(3), 0.0)
         sensor = Accelerometer(open_source(self.port, self.baud), calibration, self.raw_range)
         try:
@@ -60,8 +67,9 @@ class LabSettings:
     effective_mass_kg: float | None = Field(default=None, ge=0.01, le=5)
     """Mass that the centring spring moves, at the handle. None: the assumption in the table of models."""
     accelerometer: SensorSettings | None = None
+    """None: no acceleration is measured."""
     pulse: PulseSettings | None = None
-    """A line that gets a pulse at the onset of each trial's force."""
+    """Output line that gets a pulse at the onset of each trial's force. None: no pulse."""
 
 
 def lab_file() -> Path:
@@ -72,8 +80,8 @@ def lab_file() -> Path:
 
 
 def read_lab() -> LabSettings:
-    """Read the laboratory's settings. Raises `DeviceError` for a file that cannot be read. Without one, nothing is
-    known."""
+    """Read the laboratory's settings; all are None where the file does not exist. Raises `DeviceError` for a file that
+    cannot be read or is not valid."""
     path = lab_file()
     try:
         text = path.read_text("utf-8")
@@ -91,8 +99,8 @@ def read_lab() -> LabSettings:
 
 
 def keep_sensor(table: str) -> Path:
-    """Put an [accelerometer] table into the lab's file, in the place of an older one. What the file said before stays
-    beside it. Raises `DeviceError`; then nothing was changed."""
+    """Write an [accelerometer] table (TOML) into the settings file, replacing an older one, and return the path. The
+    previous file is kept as `NAME.before`. Raises `DeviceError` where the file cannot be read or written."""
     read_lab()
     path = lab_file()
     try:
@@ -115,6 +123,7 @@ def keep_sensor(table: str) -> Path:
 
 
 def _with_sensor(text: str, table: str) -> str:
+    """The text of the file with its [accelerometer] table removed and the new one appended."""
     lines, kept, skipping = text.splitlines(), [], False
     for line in lines:
         if HEADER.fullmatch(line):

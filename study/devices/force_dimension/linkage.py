@@ -1,7 +1,8 @@
-"""Linkage of an open device at any position, as the vendor's library computes it: nothing moves.
+"""Kinematics and dynamics of an open device at any position, as computed by the vendor's library. Nothing moves.
 
-A position becomes encoder counts, joint angles, Jacobian, inertia and gravity torques, each by a function of the
-library. The device gets no force and stays braked; where its handle is does not matter, beyond one comparison.
+For a position of the handle the library gives encoder counts, joint angles q, Jacobian J = dx/dq, inertia matrix and
+gravity torques tau; the force that holds the weight is pinv(J^T) tau. The device gets no force and stays braked. The
+actual position of the handle is used only in `check_frame`.
 """
 
 import contextlib
@@ -23,6 +24,7 @@ from study.devices.force_dimension.rigs import info_of
 from study.errors import DeviceError
 
 Told = TypeVar("Told")
+"""Type of a result of the library."""
 
 JOINTS = 8
 """DHD_MAX_DOF: joints of base, wrist and gripper."""
@@ -30,9 +32,10 @@ DELTA = 0b111
 """Mask of the base's three joints."""
 
 NEAR_M = 2e-4
-"""A position that comes back from its encoder counts further off is out of reach. Counts are 10 um or so apart."""
+"""A position is out of reach where the position computed from its encoder counts differs by more than this (m). The
+encoders resolve about 10 um."""
 SAME_M = 1e-3
-"""The handle's position against that of its own encoder counts."""
+"""Largest accepted difference (m) between the handle's reported position and that of its reported joint angles."""
 
 
 class VendorLinkage:
@@ -44,16 +47,18 @@ class VendorLinkage:
         self._library, self._number = handle.library, handle.number
 
     def at(self, position_m: FloatArray) -> LinkageReading | None:
-        """The linkage at a position of the handle; None out of reach. Raises `DeviceError`."""
+        """Joint angles, Jacobian, inertia and holding force at a position (3,), m; None out of reach. Raises
+        `DeviceError`."""
         return self._ask_library(self._read_at, position_m)
 
     def angles_at(self, position_m: FloatArray) -> FloatArray | None:
-        """Joint angles (3,) at a position of the handle, rad; None out of reach. Raises `DeviceError`."""
+        """Joint angles (3,), rad, at a position (3,), m; None out of reach. Raises `DeviceError`."""
         return self._ask_library(lambda place: self._angles(self._counts(place)), position_m)
 
     def check_frame(self) -> None:
-        """Check the axes of the library's functions for the linkage. Raises `DeviceError` where the library's delta
-        functions and its positions do not mean the same axes."""
+        """Check that the linkage functions use the axes of the reported positions. Raises `DeviceError` where the
+        handle's position and its joint angles do not agree, and `LibraryError` where the joint angles cannot be
+        read."""
         try:
             here = np.array(self._handle.position_m())
         except LibraryError as error:
@@ -71,13 +76,14 @@ class VendorLinkage:
         )
 
     def _moves_by(self, reading: LinkageReading, angles: FloatArray) -> float:
-        """How far the handle is from the reading's position, by its joint angles, m. A Jacobian that is no number is
-        refused later, by that name."""
+        """Distance (m) of the handle from the reading's position, linearized: |J (angles - q)|. A Jacobian that is not
+        finite counts as zero here; it is refused later, with an error that names it."""
         jacobian = np.nan_to_num(reading.jacobian)
         return float(np.linalg.norm(jacobian @ (angles - reading.joint_angle_rad)))
 
     def _ask_library(self, ask: Callable[[FloatArray], Told | None], position_m: FloatArray) -> Told | None:
-        """Ask the library for the linkage at a position; None out of reach. Raises `DeviceError`."""
+        """Call `ask` for a position; None where the library reports it as out of reach. Raises `DeviceError` for other
+        failures."""
         try:
             return ask(position_m)
         except LibraryError as error:
@@ -86,15 +92,18 @@ class VendorLinkage:
             raise device_error(self._model.name, error) from error
 
     def _counts(self, position_m: FloatArray) -> list[c_int]:
+        """Encoder counts of the base's three joints at a position (m)."""
         counts = [c_int() for _ in range(3)]
         x, y, z = (float(each) for each in position_m)
         self._library.call("dhdDeltaPositionToEncoder", x, y, z, *map(byref, counts), self._number)
         return counts
 
     def _angles(self, counts: list[c_int]) -> FloatArray:
+        """Joint angles (3,), rad, of encoder counts."""
         return self._three("dhdDeltaEncodersToJointAngles", *counts)
 
     def _read_at(self, position_m: FloatArray) -> LinkageReading | None:
+        """Reading at a position (3,), m; None where that of its encoder counts differs by more than `NEAR_M`."""
         counts = self._counts(position_m)
         back = self._three("dhdDeltaEncoderToPosition", *counts)
         if not float(np.linalg.norm(back - position_m)) <= NEAR_M:
@@ -102,7 +111,7 @@ class VendorLinkage:
         angles = self._angles(counts)
         jacobian, inertia = (c_double * 9)(), (c_double * 36)()
         self._library.call("dhdDeltaJointAnglesToJacobian", *(float(each) for each in angles), jacobian, self._number)
-        # A wrist stays where it is: its joints follow the base's three.
+        # The joints of a wrist, which follow the base's three, keep their present angles.
         joints, torques = (c_double * JOINTS)(), (c_double * JOINTS)()
         self._library.call("dhdGetJointAngles", joints, self._number)
         joints[:3] = [float(each) for each in angles]
@@ -113,6 +122,7 @@ class VendorLinkage:
         return LinkageReading(np.array(position_m), angles, j, np.array(inertia).reshape(6, 6)[:3, :3], held)
 
     def _three(self, name: str, *counts: c_int) -> FloatArray:
+        """The three numbers that a function of the library returns for three encoder counts."""
         values = [c_double() for _ in range(3)]
         self._library.call(name, *counts, *map(byref, values), self._number)
         return np.array([value.value for value in values])
@@ -120,7 +130,8 @@ class VendorLinkage:
 
 @contextlib.contextmanager
 def vendor_linkage(name: str) -> Iterator[VendorLinkage]:
-    """An open device, braked. Raises `DeviceError`."""
+    """Context: the linkage of an open, braked device of this name (`MODELS`), disconnected at the end. Raises
+    `DeviceError`."""
     model, library = MODELS[name], load_library()
     handle = open_model(library, model)
     try:

@@ -1,4 +1,7 @@
-"""Names of the vendor's devices that can be opened. Light to import: the command line needs the names."""
+"""Models of the vendor's devices that can be opened, with their constants.
+
+The module imports nothing heavy, because the command line needs the names at every start.
+"""
 
 from dataclasses import dataclass
 
@@ -10,12 +13,13 @@ class DeviceModel:
     name: str
     """Name as written by the vendor."""
     system_types: tuple[int, ...]
-    """Return value of dhdGetSystemType (SDK 3.17.5)."""
+    """Values of dhdGetSystemType for this model (SDK 3.17.5)."""
     max_force_n: float
-    """Continuous maximum along any direction at the centre, as CHAI3D's table of devices has it."""
+    """Largest continuous force along any direction at the centre (N). Source: the table of devices in CHAI3D."""
     effective_mass_kg: float
-    """At the handle; the centring spring is made from it. The vendor publishes none: these are assumptions, from the
-    simulated omega.3 and from the heavier wrists. An error changes the spring's natural frequency by its root."""
+    """Effective mass at the handle, from which the stiffness of the centring spring is computed. The vendor publishes
+    none: the values are assumptions, from the simulated omega.3 and the heavier wrists of the other models. The
+    spring's natural frequency changes with the square root of the ratio of assumed to true mass."""
     effector_mass_kg: float | None
     """Mass for the gravity compensation. None: the library's default."""
 
@@ -31,5 +35,5 @@ MODELS = {
 
 
 def name_of_type(system_type: int) -> str | None:
-    """The name that `--device` takes for a device that was found."""
+    """Key of `MODELS` for a value of dhdGetSystemType; None for another device of the vendor."""
     return next((name for name, model in MODELS.items() if system_type in model.system_types), None)

@@ -1,8 +1,8 @@
-"""Input and output of a tick, compiled: the reading of the sensors, and the writing of the force.
+"""Compiled input and output of a control tick: reads the sensors, and writes the force to the device.
 
-The only implementation for every caller: the loop calls it without the interpreter, the rig's own methods call it from
-Python. A return value of 0 is success; any other is one of the codes below, `FAILED` keeps the first, and no force
-follows it.
+The only implementation for all callers: the compiled loop calls it without the interpreter, the methods of `rig` call
+it from Python. A return value of 0 is success; any other is an error code of `loop_cells`. The cell FAILED keeps the
+first error, after which no force other than zero is sent.
 """
 
 import math
@@ -56,24 +56,23 @@ from study.devices.native import Addresses, acquire, call_int, now_s, release
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
 
 LOOKS_OF, LOOKS_AT = 42.0, (0.0, 8.0, 18.0, 29.0)
-"""Of so many ticks those at which status, buttons and the reported force are read (95 Hz at 1 kHz: a person cannot
-press faster). Uneven, so that no stimulus is looked at in the same two phases of its period again and again."""
+"""Of every `LOOKS_OF` ticks those at which status, buttons and reported force are read (95 Hz at 1 kHz, faster than a
+person presses). Unevenly spaced, so that a periodic stimulus is not always sampled at the same phases."""
 
 STALE_FOR, STALE_SHARE = 50, 0.5
-"""Readings that only repeat an earlier one: so many in a row, or as many beyond this share of all readings, end the
-force. At 1 kHz half of what counts as a lost loop."""
+"""Limits on readings that only repeat an earlier one: this many in a row, or as many in excess of this share of all
+readings (`count_beyond_share`), switch the force off. At 1 kHz half of the time after which a loop counts as lost."""
 
 SCALED_FOR, SCALED_SHARE = 5, 0.02
-"""The same of forces that are answered with a notice, because the device cannot give them in full: what a participant
-feels is then not what is written down.
-A force whose peaks alone are scaled is so only for some milliseconds in a row, again and again."""
+"""The same limits for forces that the device reduced, which its answer reports: the participant then does not feel the
+recorded force. The share detects a force of which only the peaks are reduced, for some milliseconds in each period."""
 
 ROUNDING = 1 + 1e-9
-"""Factor on the cap that rounding may need."""
+"""Factor on the cap that allows for rounding."""
 REST_SIGNATURE = types.int64(CALLS, VECTOR, types.float64, VECTOR)
 """Signature of the compiled function that repeats the zero force between stimuli."""
 LOCK_S = 0.002
-"""Longest wait for the lock (s). A write lasts a tenth of it: a longer wait is for a call that hangs."""
+"""Longest wait for the lock (s), ten times the duration of a write: a longer wait means that a call hangs."""
 
 
 @part
@@ -96,6 +95,7 @@ def _sense_acceleration(samples: FloatArray, now: float, reading: FloatArray) ->
 
 @part
 def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: FloatArray) -> int:
+    """Read the position (m), at some ticks the status, and the newest acceleration (m/s²) into `reading`."""
     if cells[FAILED] != 0.0:
         return FAILED_BEFORE
     for i in range(READING_SIZE):
@@ -121,19 +121,21 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
 
 @part
 def _is_silent(calls: Addresses, cells: FloatArray) -> bool:
-    """Whether no force was sent for longer than the device holds a force by itself."""
+    """Whether no force was sent for longer than the timeout of the device's watchdog."""
     return bool(now_s(calls) - cells[SENT_S] > cells[DROPS_AFTER_S] > 0.0)
 
 
 @part
 def _set_force(calls: Addresses, cells: FloatArray, x: float, y: float, z: float) -> int:
+    """Call dhdSetForce (N). Returns its answer."""
     return int(call_int(calls[FORCE], (x, y, z, np.int32(cells[NUMBER]))))
 
 
 @part
 def _wake_device(calls: Addresses, cells: FloatArray) -> int:
-    """Check the device after a pause longer than its watchdog. While a force acts, the pause ends the stimulus; without
-    one it does not: the computer was asleep, or nothing was played."""
+    """Enable forces after a pause longer than the watchdog's timeout. Returns an error code where the forces are off
+    for another cause, or a force acted; a pause after a zero (nothing was played, or the computer slept) is no
+    error."""
     code = check_on(calls, cells)
     if code >= 0:
         return code
@@ -144,7 +146,7 @@ def _wake_device(calls: Addresses, cells: FloatArray) -> int:
         return record_library_failure(cells, BRAKES)
     if cells[CLOSED] == 0.0 and not is_success(call_int(calls[ENABLE], (np.int32(1), number))):
         return record_library_failure(cells, ENABLE)
-    if cells[CLOSED] != 0.0:  # the call hung while the device was closed: it is taken back
+    if cells[CLOSED] != 0.0:  # the call hung while the device was closed: undo it
         _brake(calls, cells)
         return record_failure(cells, IS_CLOSED)
     return 0 if is_success(_set_force(calls, cells, 0.0, 0.0, 0.0)) else record_library_failure(cells, FORCE)
@@ -152,7 +154,7 @@ def _wake_device(calls: Addresses, cells: FloatArray) -> int:
 
 @part
 def _brake(calls: Addresses, cells: FloatArray) -> None:
-    """Forces off and brakes on. Whether the device takes that is not asked."""
+    """Switch forces off and brakes on; the answers of the library are ignored."""
     number = np.int32(cells[NUMBER])
     call_int(calls[ENABLE], (np.int32(0), number))
     call_int(calls[BRAKES], (np.int32(1), number))
@@ -166,7 +168,7 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
         if code != 0:
             return code
     x, y, z = force[0], force[1], force[2]
-    began_s = now_s(calls)  # the device counts from when it got the force, which may be long before the call ends
+    began_s = now_s(calls)  # the watchdog counts from the arrival of the force, which may be long before the call ends
     answer = _set_force(calls, cells, x, y, z)
     if not is_success(answer):
         return record_library_failure(cells, FORCE)
@@ -185,10 +187,10 @@ def _send_zero(calls: Addresses, cells: FloatArray) -> int:
     began_s = now_s(calls)
     if not is_success(_set_force(calls, cells, 0.0, 0.0, 0.0)):
         code = record_library_failure(cells, FORCE)
-        _brake(calls, cells)  # the device may give the force before still
+        _brake(calls, cells)  # the device may still give the previous force
         return code
     if cells[SENT_ZERO] == 0.0 and _is_silent(calls, cells):
-        # A force was cut off: its call may hang still, and must find a device that takes none.
+        # The watchdog cut off a force whose call may still hang: the device must take no forces when it continues.
         code = check_on(calls, cells)
         if code != 0 and code != RELEASED:
             return code
@@ -201,7 +203,8 @@ def _send_zero(calls: Addresses, cells: FloatArray) -> int:
 
 @part
 def _write_zero(calls: Addresses, cells: FloatArray) -> int:
-    """Past everything: neither a lock nor an earlier failure may hold up a zero. It wakes no sleeping device."""
+    """Send a zero force in any case: neither a lock that is not free nor an earlier failure prevents it. It does not
+    enable the forces of a braked device."""
     if cells[LET_GO] != 0.0:
         return 0
     got = acquire(calls, LOCK_S)
@@ -213,6 +216,7 @@ def _write_zero(calls: Addresses, cells: FloatArray) -> int:
 
 @part
 def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+    """Write a force (3,), N: a zero in any case, another only within the cap, without a failure, and under the lock."""
     if now_s(calls) < cells[WITHHELD_UNTIL_S]:
         return 0
     norm = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
@@ -234,8 +238,8 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 
 @part
 def _rest(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
-    """Repeat a zero where nothing is played, and brake where the device does not take it. The lock is never kept while
-    the interpreter is waited for: the loop's next force waits no longer than `LOCK_S` for it."""
+    """Repeat the zero force while nothing is played, and brake where the device does not take it. The lock is held
+    without the interpreter, so that the loop's next force waits for it no longer than `LOCK_S`."""
     if not acquire(calls, LOCK_S):
         return 0
     code = 0
@@ -251,6 +255,8 @@ def _rest(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray
 
 
 def _entry_points(sources: int) -> tuple[Any, Any, Any]:
+    """Compile the entry points. sources: fingerprint, captured so that a change invalidates the cache."""
+
     @njit(SENSE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def sense_once(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: FloatArray) -> int:
         _ = sources
@@ -279,5 +285,5 @@ sense_once, write_once, rest_once = _entry_points(
         ),
     )
 )
-"""The first two as `study.devices.rig.CompiledIo` wants them; `rest_once(calls, cells, every_s, zero)`: repeats the
-zero where the last force was one, so long ago."""
+"""`sense_once` and `write_once` as defined in `study.devices.rig.CompiledIo`; `rest_once(calls, cells, every_s, zero)`
+repeats the zero force where the last force was a zero, every_s (s) or longer ago."""

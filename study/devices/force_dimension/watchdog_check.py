@@ -1,8 +1,8 @@
-"""Test of the device's watchdog at every opening: it is armed, the loop stops on purpose, and the device must switch
-its force off in time.
+"""Test of the device's watchdog at every opening: commands pause on purpose, and the device must switch its force off
+in time.
 
-The command is zero throughout, so nothing pulls whether or not it works; what counts is that the device says that it
-takes no forces any more, that its brakes hold, and that its watchdog is why.
+The commanded force is zero throughout, so that the test is safe even if the watchdog fails. It passes if the device
+reports its forces as off, its brakes as on, and the watchdog as the cause.
 """
 
 from collections.abc import Callable
@@ -13,20 +13,22 @@ from study.errors import DeviceError
 ARMED_FOR_S = 0.05
 """Time for which zero forces are sent before the pause."""
 EVERY_S = 0.002
-"""Interval of polling."""
+"""Interval of the zero forces, then of polling the status (s)."""
 MARGIN_S = 0.02
-"""Time granted beyond the watchdog's own, for the USB and the device's own bookkeeping."""
+"""Time granted in addition to the watchdog's timeout (s), for the USB transfer and the device's own processing."""
 
 ATTEMPTS = 5
-"""A busy computer may come too late for the watchdog before it is meant to."""
+"""Number of attempts to keep the forces on before the pause: on a busy computer a late command may trip the watchdog
+too early."""
 
 
 def check_watchdog(
     handle: Handle, drops_after_s: float, now_s: Callable[[], float], sleep: Callable[[float], None]
 ) -> float:
-    """Time (s) without commands after which the device was found without force; the device takes forces again after.
+    """Pause the commands. Returns the time (s) after which the device reported its force as off; then enables it again.
 
-    Raises `DeviceError` where it holds on, and `LibraryError`.
+    drops_after_s: timeout of the watchdog (s), 0 without one; now_s and sleep: clock.
+    Raises `DeviceError` where the force stays on or goes off for another cause, and `LibraryError`.
     """
     if drops_after_s <= 0:
         raise _watchdog_error("It has no watchdog, or none that can be set.")
@@ -46,7 +48,7 @@ def check_watchdog(
 
 
 def _send_zeros(handle: Handle, now_s: Callable[[], float], sleep: Callable[[float], None]) -> bool:
-    """Zero forces for a while. Whether the device takes them to the end."""
+    """Send zero forces for `ARMED_FOR_S`. Returns whether the device's forces are still on at the end."""
     handle.enable_force()
     until_s = now_s() + ARMED_FOR_S
     while now_s() < until_s:
@@ -57,6 +59,7 @@ def _send_zeros(handle: Handle, now_s: Callable[[], float], sleep: Callable[[flo
 
 
 def _check_reason(status: Status) -> None:
+    """Require the watchdog as the cause, and the brakes on. Raises `DeviceError`."""
     if status.off_cause != WATCHDOG_CAUSE:
         raise _watchdog_error(f"It let go for another reason: {status.why_off}.")
     if not status.braking:

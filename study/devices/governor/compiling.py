@@ -1,8 +1,9 @@
-"""How the safety layer is compiled, and how its machine code on disk is kept in step with its sources.
+"""Compilation of the safety layer with numba, and invalidation of its cached machine code.
 
-numba holds kept code for good as long as the file of that very function is the same, and does not watch the files of
-what it calls. It also compares what a function encloses: an entry point that encloses the fingerprint of a folder is
-compiled anew whenever any file of the folder changes, and what it calls has no kept code of its own.
+numba reuses cached code of a function while the file of that function is unchanged; it ignores changes in the files of
+the functions that it calls. It also compares the values that a closure captures. Entry points therefore capture the
+fingerprint of a folder, so that they are compiled again after a change of any file in it; the functions that they call
+are not cached themselves.
 """
 
 import hashlib
@@ -11,13 +12,13 @@ from pathlib import Path
 from numba import njit
 
 part = njit(forceinline=True, nogil=True, error_model="numpy")
-"""A function within the tick, never kept on its own. Division by zero gives inf or NaN, which `confine` knows, and
-never an exception halfway through a tick. Inlined, a tick takes half the time that calls take."""
+"""Decorator of a function within the tick, which is not cached itself. Division by zero gives inf or NaN, which
+`confine` handles, instead of an exception within a tick. Inlining halves the duration of a tick."""
 
 
 def fingerprint(folder: Path, *beyond: Path) -> int:
-    """Checksum (32 bits) of all Python sources in the folder, and of files outside it whose constants are compiled
-    in."""
+    """Checksum (the first 32 bits of SHA-256) of all Python sources in the folder, and of further files whose code or
+    constants are compiled into an entry point."""
     digest = hashlib.sha256()
     for source in (*sorted(folder.glob("*.py")), *beyond):
         digest.update(source.read_bytes())

@@ -1,4 +1,7 @@
-"""Forces kept within a cap, inside the tick."""
+"""Limits the norm of a force to a cap within a tick, with its direction unchanged: F <- F min(1, cap / |F|).
+
+A force that is not finite becomes zero. The functions are compiled into the safety layer's tick (`govern`).
+"""
 
 import math
 
@@ -6,35 +9,36 @@ from equalizer.signals.signal import FloatArray
 from study.devices.governor.compiling import part
 
 OVERFLOWING = 1e100
-"""Norm (N) above which squares of components may overflow; such a force becomes zero."""
+"""Component or norm (N) from which squares of components may overflow; such a force becomes zero."""
 
 WITHIN, BEYOND = 1 - 1e-12, 1 + 1e-9
-"""Forces are confined to the first share of a limit: rounding cannot then carry them over it. They count as limited
-from the second share on: a stimulus that is just at its cap is not clipped."""
+"""Factors on a limit. Forces are limited to WITHIN times the limit, so that rounding cannot exceed it. A force counts
+as limited only beyond BEYOND times the limit, so that a stimulus exactly at its cap does not count."""
 
 
 @part
 def norm_of(x: float, y: float, z: float) -> float:
-    """Euclidean norm of a vector."""
+    """Euclidean norm of the vector (x, y, z)."""
     return math.sqrt(x * x + y * y + z * z)
 
 
 @part
 def is_bounded(vector: FloatArray, bound: float) -> bool:
-    """False for NaN and infinity too."""
+    """Whether all three components are smaller than the bound in magnitude; False for NaN and infinity."""
     return bool(abs(vector[0]) < bound and abs(vector[1]) < bound and abs(vector[2]) < bound)
 
 
 @part
 def clear(force: FloatArray) -> None:
-    """Set a force to zero."""
+    """Set a force (3,) to zero."""
     for i in range(3):
         force[i] = 0.0
 
 
 @part
 def kept_share(norm: float, cap: float) -> float:
-    """Factor that limits a force of this norm to the cap: 1 up to the cap, 0 where either is not a number."""
+    """Factor that limits a force of this norm (N) to the cap (N): 1 up to the cap, then cap / norm. 0 where either is
+    not a number, the cap is not positive, or the norm is not below `OVERFLOWING`."""
     if not (cap > 0.0 and norm < OVERFLOWING):
         return 0.0
     return 1.0 if norm <= cap * WITHIN else cap * WITHIN / norm
@@ -42,7 +46,8 @@ def kept_share(norm: float, cap: float) -> float:
 
 @part
 def confine(force: FloatArray, cap: float) -> bool:
-    """Shorten to the cap, direction kept; zero if it is no force at all. Whether it was above the cap."""
+    """Limit a force (3,), N, to the cap (N) in place; zero where a component is not finite or the cap is not positive.
+    Returns whether the force exceeded the cap by more than rounding; False where it was not finite."""
     if not (is_bounded(force, OVERFLOWING) and cap > 0.0):
         clear(force)
         return False

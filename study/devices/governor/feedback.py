@@ -2,8 +2,8 @@
 
     F = -K (x - centre) - B v,        v: low-pass filtered velocity
 
-Spring, damper and their sum are each limited to FEEDBACK_CAP, apart from the caps of the stimulus: a wrong reading that
-no plausibility check can detect then exerts at most this force.
+K (STIFFNESS) in N/m, B (DAMPING) in N s/m. Spring, damper and their sum are each limited to FEEDBACK_CAP, separately
+from the cap of the stimulus: a wrong reading that no plausibility check detects then exerts at most this force.
 """
 
 import math
@@ -32,8 +32,8 @@ from study.devices.governor.confine import BEYOND, kept_share, norm_of
 
 @part
 def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray) -> None:
-    """Low-pass filter of the velocity. It uses the time that actually passed since the last tick, so that its corner
-    frequency stays the same when ticks are late."""
+    """First-order low-pass filter of the velocity (m/s): v += share (dx/dt - v) per tick. It uses the time that
+    actually passed since the last tick, so that its corner frequency stays the same when ticks are late."""
     elapsed = state[ELAPSED]
     share = settings[VELOCITY_SHARE]
     if elapsed != 1.0:
@@ -46,7 +46,7 @@ def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray
 
 @part
 def _ease(state: FloatArray, settings: FloatArray) -> None:
-    """Reduce the force slowly while the position reads exactly the same.
+    """Reduce the feedback force slowly while the position reading does not change (UNCHANGED, by `plausibility`).
 
     A handle that dry friction holds at rest looks like a frozen encoder. With the force reduced, a real handle moves
     and shows that the encoder works; an encoder whose reading still does not change is reported as stale. The reduction

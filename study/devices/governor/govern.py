@@ -1,14 +1,14 @@
 """The safety layer's control tick: the only code in the program that decides a force.
 
-In this order, function `tick`:
+Steps of `tick`, in this order:
 
-1. requests (stop, release) and timeouts change the phase: still, playing, releasing, letting go;
+1. requests (stop, release) and timeouts change the phase (STILL, PLAYING, RELEASING, LETTING_GO: see `cells`);
 2. the position reading is checked (`plausibility`); an implausible one is a fault, which starts the safety fade;
 3. the stimulus is capped, faded and added to spring and damper (`feedback`); the sum is capped, its slew rate limited;
 4. the result is capped once more, independent of all steps before: no force above the cap, and none that is not a
    number, is ever written.
 
-The machine code on disk is kept in step with all these files: see `compiling`.
+Machine code that is cached on disk is invalidated when any of these files changes: see `compiling`.
 """
 
 import math
@@ -39,21 +39,22 @@ from study.devices.governor.cells import (
 # isort: on
 
 IMPLAUSIBLE_N = 1e6
-"""Component of a stimulus (N) from which it is treated like NaN."""
+"""A stimulus with a component of this magnitude (N) or more is treated like NaN."""
 
 LEAST_ELAPSED = 1e-3
-"""Ticks between two readings: a time stamp that stood still, went back or is no number counts as so many."""
+"""Smallest interval between two readings (ticks), used where a time stamp did not advance or is not a number."""
 
 VECTOR, ROWS = types.float64[::1], types.float64[:, ::1]
+"""numba types of contiguous arrays with one and two dimensions."""
 TICK_SIGNATURE = types.boolean(VECTOR, VECTOR, ROWS, ROWS, VECTOR, VECTOR)
-"""Signatures of the entry points `tick`, `publish` and `miss`, whose docstrings name the arguments."""
+"""Signature of the entry point `tick`, whose docstring names the arguments; those of `publish` and `miss` follow."""
 PUBLISH_SIGNATURE = types.void(VECTOR, VECTOR, ROWS, VECTOR)
 MISS_SIGNATURE = types.void(VECTOR, ROWS, VECTOR, types.int64)
 
 
 @part
 def _start_safety_fade(state: FloatArray, fault: int) -> None:
-    """Begin the fade of the last force to zero, which needs neither sensor nor program; keeps the first fault."""
+    """Begin the fade of the last force to zero, which needs neither sensor nor program. The first fault is kept."""
     state[PHASE] = LETTING_GO
     state[LET_GO_AT] = state[TICK]
     for i in range(3):
@@ -94,12 +95,12 @@ def _update_phase(state: FloatArray, settings: FloatArray) -> None:
         if state[FORCE] == 0.0 and state[FORCE + 1] == 0.0 and state[FORCE + 2] == 0.0:
             state[PHASE] = STILL
         else:
-            _start_safety_fade(state, NO_FAULT)  # the slew limit held it up
+            _start_safety_fade(state, NO_FAULT)  # the slew limit delayed the fade-out: a force remains
 
 
 @part
 def _fade_share(ticks: float, length: float, raised_cosine: float) -> float:
-    """Share of a fade: from 0 at 0 ticks to 1 at `length`."""
+    """Gain of a fade-in, from 0 at 0 ticks to 1 at `length`: linear, or (1 - cos(pi ticks / length)) / 2."""
     if ticks >= length:
         return 1.0
     if ticks <= 0:
@@ -111,7 +112,8 @@ def _fade_share(ticks: float, length: float, raised_cosine: float) -> float:
 
 @part
 def _gains(state: FloatArray) -> tuple[float, float]:
-    """Force of stimulus and spring at this tick. A release during a fade-in starts from the amplitude reached."""
+    """Gains (0 to 1) of stimulus and of spring and damper at this tick. A release during a fade-in starts from the gain
+    reached."""
     tick, cosine = state[TICK], state[RAISED_COSINE]
     if state[PHASE] == PLAYING:
         state[STIMULUS_GAIN] = _fade_share(tick, state[FADE_IN], cosine)
@@ -123,7 +125,7 @@ def _gains(state: FloatArray) -> tuple[float, float]:
 
 @part
 def _update_elapsed(state: FloatArray, settings: FloatArray) -> None:
-    """Ticks since the last reading, by the loop's clock where it stamps its readings."""
+    """Time since the last reading, in ticks; by the time stamps of the readings where there are any."""
     elapsed = state[TICK] - state[READ_AT]
     if state[STAMP_S] > 0.0 and state[READ_AT_S] > 0.0:
         elapsed = (state[STAMP_S] - state[READ_AT_S]) / settings[TICK_S]
@@ -133,8 +135,8 @@ def _update_elapsed(state: FloatArray, settings: FloatArray) -> None:
 
 @part
 def _limit_slew(state: FloatArray, settings: FloatArray, force: FloatArray) -> bool:
-    """Shorten the step from the last force to the slew limit. Both ends lie within the cap, and a ball is convex: so
-    does the shortened step. Returns whether it was beyond the limit by more than rounding."""
+    """Shorten the step from the last force to the slew limit. Both forces lie within the cap, and a ball is convex, so
+    that the new force lies within it too. Returns whether the step exceeded the limit by more than rounding."""
     x, y, z = force[0] - state[FORCE], force[1] - state[FORCE + 1], force[2] - state[FORCE + 2]
     step = norm_of(x, y, z)
     if step > settings[SLEW_STEP] * WITHIN:
@@ -149,7 +151,8 @@ def _limit_slew(state: FloatArray, settings: FloatArray, force: FloatArray) -> b
 def _compute_force(
     state: FloatArray, settings: FloatArray, loop: FloatArray, reading: FloatArray, force: FloatArray
 ) -> None:
-    """The force of stimulus, spring and damper within all limits; a fault where stimulus or reading is implausible."""
+    """Force (N) of stimulus, spring and damper within all limits. An implausible stimulus or reading is a fault: it
+    starts the safety fade instead."""
     tick = int(state[TICK])
     clear(force)
     if 0 <= tick < state[LENGTH]:
@@ -176,7 +179,7 @@ def _compute_force(
 
 @part
 def _apply_safety_fade(state: FloatArray, settings: FloatArray, force: FloatArray) -> None:
-    """Linear fade of the force at its begin, within `LET_GO_TICKS`."""
+    """Safety fade: the last force before the fade, reduced linearly to zero within LET_GO_TICKS ticks."""
     left = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0) / settings[LET_GO_TICKS]
     for i in range(3):
         force[i] = max(left, 0.0) * state[LET_GO_FROM + i]
@@ -186,7 +189,7 @@ def _apply_safety_fade(state: FloatArray, settings: FloatArray, force: FloatArra
 
 @part
 def _record(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
-    """One row into a ring: the last rows stay."""
+    """Write command, excitation and reading of a tick into the recording ring, where the oldest row was."""
     if state[PHASE] == PLAYING and state[RECORD_FROM] <= state[TICK] < state[LENGTH]:
         row = int(state[RECORDED]) % buffer.shape[0]
         for i in range(3):
@@ -198,9 +201,12 @@ def _record(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
 
 
 def _compile_publish(sources: int) -> Any:
+    """Compile `publish`. sources: fingerprint, captured so that a change invalidates the cache."""
+
     @njit(PUBLISH_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def publish(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
-        """After a tick and its force: one row into the telemetry ring, if it has room for any."""
+        """Write the row of a tick into the telemetry ring, after its force was written; nothing for a ring without
+        rows."""
         _ = sources
         if ring.shape[0] > 1:
             write_row(state, settings, ring, reading)
@@ -211,7 +217,7 @@ def _compile_publish(sources: int) -> Any:
 def _entry_points(sources: int) -> tuple[Any, Any]:
     @njit(MISS_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def miss(state: FloatArray, buffer: FloatArray, nothing: FloatArray, ticks: int) -> None:
-        """Record ticks that passed unattended: their rows hold the last force, and `nothing` as their reading."""
+        """Record missed ticks: their rows contain the last force, and `nothing` (NaN) as the reading."""
         _ = sources
         for _k in range(ticks):
             _record(state, buffer, nothing)
@@ -226,8 +232,8 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
     ) -> bool:  # fmt: skip
         """Decide the force of one tick. Returns whether the force is off and stays off.
 
-        state (STATE_SIZE,), settings (SETTINGS_SIZE,), loop (n, 3) in N, buffer (rows, ROW_SIZE): changed in place with
-        state; reading (READING_SIZE,): as the rig sensed it; force (3,), N: the answer.
+        state (STATE_SIZE,) and buffer (rows, ROW_SIZE) are changed in place; settings (SETTINGS_SIZE,); loop (n, 3), N:
+        the stimulus; reading (READING_SIZE,): from the rig's `sense`; force (3,), N: the result, written in place.
         """
         _ = sources
         _update_phase(state, settings)
@@ -251,6 +257,6 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
 
 
 _SOURCES = fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
-"""Changes with each file whose code is compiled into the entry points."""
+"""Fingerprint of all files whose code is compiled into the entry points."""
 tick, miss = _entry_points(_SOURCES)
 publish = _compile_publish(_SOURCES)

@@ -1,4 +1,8 @@
-"""The governed tick's arrays and what may be asked of them: nothing else touches the cells of `govern`."""
+"""Python interface of the safety layer's tick: owns its arrays, starts stimuli, sends requests, reads the counters.
+
+The cells of the arrays are defined in `cells`; `govern.tick` computes with them. Drive and runners
+read or write only a few of them directly, such as the time stamp; all other access goes through this class.
+"""
 
 import math
 
@@ -13,27 +17,30 @@ from study.devices.rig import READING_SIZE
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 VELOCITY_CORNER_HZ = 50.0
-"""Corner frequency of the low pass in the spring's damping: far above the spring, far below the encoders' quantization
-noise."""
+"""Corner frequency of the velocity low-pass of the damper: far above the natural frequency of the spring, far below the
+encoders' quantization noise."""
 
 ACCELERATION_S = 0.02
-"""Time over which the readings' acceleration is averaged."""
+"""Time constant (s) of the low-pass for the acceleration of the position readings, a plausibility check."""
 
 SETTLE_S = 0.5
-"""Before a recording's first sample: half for the spring to come in, half for the handle to come to rest."""
+"""Time (s) before the first command of a recording: half for the fade-in of the spring, half for the handle to come to
+rest."""
 
 FAULTS = tuple(Fault)
-"""Faults by their code in `cells`."""
+"""Faults in the order of their codes in `cells`."""
 
 
 class Governor:
     """Settings, state, stimulus and recording ring of one device.
 
-    The asking methods may be called from any thread at any time. `begin_*` and `rows` only while nothing moves.
+    Requests (`ask_*`, `sign_of_life`) and queries may be made from any thread at any time, `begin_*` and `rows` only
+    while nothing moves.
     """
 
     def __init__(self, info: DeviceInfo, settings: DeviceSettings, ring: FloatArray | None = None) -> None:
-        """ring: of `study.devices.telemetry`, where each tick writes a row; None: nowhere."""
+        """ring: rows of the telemetry ring (`study.devices.telemetry`), where each tick writes a row; None: no
+        telemetry."""
         self._rate_hz = info.sample_rate_hz
         self._longest_s = settings.limits.longest_hold_s
         self._keep_s = settings.keep_s
@@ -44,16 +51,16 @@ class Governor:
         self.ring: FloatArray = np.zeros((1, cells.RING_WIDTH)) if ring is None else ring
         self.force = np.zeros(3)
         self.nothing: FloatArray = np.full(READING_SIZE, np.nan)
-        """The reading of a tick that was missed."""
+        """Reading of a missed tick: all NaN."""
 
     @property
     def moving(self) -> bool:
-        """Whether a stimulus or a fade of it is under way."""
+        """Whether a stimulus or one of its fades is in progress."""
         return bool(self.state[cells.PHASE] != cells.STILL)
 
     @property
     def playing(self) -> bool:
-        """Neither over nor being released."""
+        """Whether a stimulus is in progress and not yet being released."""
         return bool(self.state[cells.PHASE] == cells.PLAYING)
 
     @property
@@ -68,16 +75,17 @@ class Governor:
 
     @property
     def missed(self) -> int:
-        """Ticks that passed unattended since `begin_hold` or `begin_play`."""
+        """Ticks missed since `begin_hold` or `begin_play`."""
         return int(self.state[cells.MISSED])
 
     def begin_hold(self, stimulus: HeldStimulus) -> None:
-        """Set up a stimulus that is repeated until it is released; the next tick is its first."""
+        """Set up a stimulus that is repeated until its release; the next tick is its first. The limits are checked
+        before, in `admission`."""
         fade_in, fade_out = self._ticks(stimulus.fade_in_s), self._ticks(stimulus.fade_out_s)
         self._begin(stimulus.played_once_then_loop, self._kept_of_loop(len(stimulus.loop)))
         state, lead = self.state, len(stimulus.onset) if stimulus.onset is not None else 0
         state[cells.LEAD] = lead
-        # An onset has its own way of rising.
+        # An onset replaces the fade-in.
         state[cells.FADE_IN], state[cells.FADE_OUT] = 0 if lead else fade_in, fade_out
         state[cells.RAISED_COSINE] = stimulus.fade_shape == "raised_cosine"
         state[cells.SPRING_RAMP] = max(fade_in, self.settings[cells.LET_GO_TICKS])
@@ -101,23 +109,23 @@ class Governor:
         state[cells.PHASE] = cells.PLAYING
 
     def note_begin(self, now_s: float) -> None:
-        """The first tick is due one tick from now."""
+        """Store the time of the begin (s, by the loop's clock); the first tick is due one tick later."""
         self.state[cells.BEGAN_S] = now_s
 
     def sign_of_life(self) -> None:
-        """Start the watchdog's time anew."""
+        """Restart the watchdog's timeout, at the next tick."""
         self.state[cells.SIGN_OF_LIFE] = 1.0
 
     def ask_release(self) -> None:
-        """Fade out as the stimulus says."""
+        """Request the fade-out that the stimulus specifies."""
         self.state[cells.RELEASE_ASKED] = 1.0
 
     def ask_let_go(self) -> None:
-        """Fade out within `release_s`, from any stimulus."""
+        """Request the safety fade within `release_s`, for any stimulus."""
         self.state[cells.LET_GO_ASKED] = 1.0
 
     def ask_stop(self) -> None:
-        """No force from the next tick on, and never again."""
+        """Request the emergency stop: no force from the next tick on. It cannot be undone."""
         self.state[cells.STOP_ASKED] = 1.0
 
     @property
@@ -126,18 +134,20 @@ class Governor:
         return bool(self.state[cells.STOP_ASKED] != 0.0)
 
     def abandon(self, fault: Fault) -> None:
-        """No force from now on: the loop itself is in trouble. The first fault stays, unless a worse one comes."""
+        """End the stimulus at once, without the loop. The first fault is kept, except that FORCE_LEFT replaces any. The
+        caller must ensure that the device gets zero force."""
         if fault is Fault.FORCE_LEFT or self.fault is Fault.NONE:
             self.state[cells.FAULT] = FAULTS.index(fault)
         self.state[cells.PHASE] = cells.STILL
         self.state[cells.FORCE : cells.FORCE + 3] = 0.0
 
     def miss(self, ticks: int) -> None:
-        """Record ticks that passed unattended: the device held its last force, and its sensors were not read."""
+        """Record missed ticks: the device held its last force, and its sensors were not read."""
         govern.miss(self.state, self.buffer, self.nothing, ticks)
 
     def count_lateness(self, late: bool, after_s: float) -> None:
-        """Record whether the tick that was just run ended late, and how long after it was due."""
+        """Record whether the latest tick ended after the next was due, and the time from its due time to its end
+        (s)."""
         self.state[cells.LATE] += late
         self.state[cells.LATEST_S] = max(self.state[cells.LATEST_S], after_s)
 
@@ -165,7 +175,7 @@ class Governor:
         return self.buffer[np.arange(recorded - kept, recorded) % size]
 
     def row_due_s(self) -> FloatArray:
-        """When the ticks of `rows` were due, (n,), by the clock of `note_begin`."""
+        """Times at which the ticks of `rows` were due, (n,), s, by the clock of `note_begin`."""
         state, kept = self.state, len(self.rows())
         last = state[cells.RECORD_FROM] + state[cells.RECORDED] - 1.0
         ticks = last - np.arange(kept)[::-1]
@@ -174,36 +184,40 @@ class Governor:
 
     @property
     def began_s(self) -> float:
-        """When the stimulus began, by the loop's clock (s); see `note_begin`."""
+        """Time of the begin of the stimulus (s), by the clock of `note_begin`."""
         return float(self.state[cells.BEGAN_S])
 
     @property
     def steady(self) -> FloatArray:
-        """(n, 3): what is repeated, without what leads into it."""
+        """The repeated part of the stimulus, (n, 3), N, without its onset."""
         return self.loop[int(self.state[cells.LEAD]) :]
 
     def _begin(self, played: FloatArray, rows: int) -> None:
+        """Reset the state for a stimulus (n, 3), N, and a recording ring of this many rows."""
         self.loop = np.array(played, order="C")
         self.buffer = np.full((max(rows, 1), cells.ROW_SIZE), np.nan)
-        # Never clear the stop, not even for a moment: another thread may be asking for it just now.
+        # Never clear the stop request, not even briefly: another thread may be setting it at this moment.
         self.state[cells.STOP_ASKED + 1 :] = 0.0
         self.state[cells.LAST_POSITION : cells.LAST_POSITION + 3] = np.nan
         self.state[cells.LAST_STEP] = np.nan
 
     def _kept_of_loop(self, length: int) -> int:
+        """Rows recorded of a loop: as many whole loops as fit in `keep_s`, or `keep_s` of a longer loop."""
         keep = self._ticks(self._keep_s)
         return keep // length * length if length <= keep else keep
 
     def _ticks(self, seconds: float) -> int:
+        """The nearest number of ticks."""
         return round(seconds * self._rate_hz)
 
 
 NEVER_TICKS = 1e15
-"""Ticks that no opening lasts: for a limit that does not hold."""
+"""Number of ticks that is never reached, for a limit that does not apply."""
 
 
 def pack_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
-    """The cells of `study.devices.governor.govern` that hold from opening to closing."""
+    """The array `settings` of `govern.tick`, fixed from opening to closing: SI units, times in ticks (`cells`).
+    Stiffness K = m (2 pi f)²; low-pass coefficients 1 - exp(-2 pi f_c / rate)."""
     limits, rate_hz = settings.limits, info.sample_rate_hz
     packed = np.zeros(cells.SETTINGS_SIZE)
     packed[cells.TICK_S] = 1.0 / rate_hz
@@ -224,6 +238,7 @@ def pack_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
 
 
 def _pack_plausibility(packed: FloatArray, bounds: PlausibilitySettings, rate_hz: float) -> None:
+    """Bounds of plausible position readings (`protocols.definition.plausibility`), converted to ticks."""
     packed[cells.WORKSPACE] = bounds.workspace_m
     packed[cells.LONGEST_JUMP] = bounds.longest_jump_m
     packed[cells.FASTEST_STEP] = bounds.fastest_m_per_s / rate_hz
@@ -233,5 +248,5 @@ def _pack_plausibility(packed: FloatArray, bounds: PlausibilitySettings, rate_hz
     packed[cells.RESOLUTION] = bounds.resolution_m
     packed[cells.FRICTION] = bounds.friction_n
     packed[cells.STALE_TICKS] = math.ceil(bounds.stale_s * rate_hz)
-    # So long until the spring gives way to a position that stands still, and so long until it has.
+    # Half of still_s until the feedback force begins to be reduced at an unchanged reading, half for the reduction.
     packed[cells.EASE_TICKS] = max(1, math.floor(bounds.still_s * rate_hz / 2))

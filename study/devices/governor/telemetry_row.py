@@ -1,7 +1,7 @@
-"""The row of a tick in the telemetry ring, written where the oldest one was.
+"""Writes the row of a tick into the telemetry ring, in place of the oldest row.
 
-There is one writer, the loop, which never waits: readers keep their own place and only ever read. A row that is being
-written is recognised by its index and its checksum, on any processor: no order of the stores is relied on.
+The loop is the only writer and never waits; readers (`study.devices.telemetry`) only read. A row that is being written
+is recognised by its index and its checksum, on any processor: the method does not depend on the order of the stores.
 """
 
 import math
@@ -44,10 +44,11 @@ from study.devices.governor.compiling import part
 
 @part
 def write_row(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
-    """Write the row of a tick into the ring; called after `tick`, which has counted the tick already. ring (1 + rows,
-    RING_WIDTH): a header, then the rows."""
+    """Write the row of a tick into the ring; called after `tick`, which has advanced TICK already. ring (1 + rows,
+    RING_WIDTH): a header, then the rows. Time in s, position in m, acceleration in m/s², forces in N."""
     count = ring[0, RING_COUNT]
     row = ring[1 + int(count) % (ring.shape[0] - 1)]
+    # The excitation and the velocity are computed in these two phases only.
     aims = state[PHASE] in (PLAYING, RELEASING)
     row[RING_INDEX] = count
     row[RING_TIME_S] = state[STAMP_S]

@@ -1,5 +1,6 @@
 """Separate process for a real device's loop; only this process opens the device.
 
-`start` begins the process, `serve` is what runs in it: the safety layer as ever, with a thread for each of the `LINES`.
-`line` is this side of a pipe, `remote_device` the device port over all of them. Begin at `remote_device.py`.
+Its purpose: no other work of the program delays a tick, and the force fades when the program ends for any reason.
+`remote_device` is the device port; it sends each call through a pipe (`line`) to the process. `start` starts the
+process; `serve` is its main program: the safety layer with a thread for each pipe. Begin at `remote_device.py`.
 """

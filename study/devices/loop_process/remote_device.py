@@ -1,7 +1,7 @@
-"""Device port over a device in the loop's process. Every call has a timeout.
+"""Device port over a device whose control loop runs in a separate process. Every call has a timeout.
 
-A process that ended, or that does not answer, is a lost device: it is killed where it still runs, so that no force
-comes back, and the device's own watchdog has dropped what it held.
+A process that has ended or does not answer is a lost device. It is killed if it still runs, so that it commands no
+further force; the device's own watchdog switches off the force that it held.
 """
 
 import atexit
@@ -21,26 +21,26 @@ from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 OPENING_S = 180.0
-"""Timeout for importing, for compiling where necessary, and for opening the device."""
+"""Timeout (s) for starting the process, compiling where necessary, and opening the device."""
 
 ANSWER_S = 3.0
-"""Longest wait for an answer, above what a busy computer is late by and above the safety layer's own waits: its loop is
-given up after 0.1 s, a zero force is written within 0.1 s, and a device that does not become still is lost 1 s after
-its fades."""
+"""Timeout for an answer (s), longer than the delays of a busy computer and than the safety layer's own timeouts: 0.1 s
+for a loop that hangs, 0.1 s for writing a zero force, 1 s after the fades for a device that does not become still."""
 
 STOP_S = 0.5
-"""An emergency stop waits no longer, without a grace: the process is killed."""
+"""Timeout of an emergency stop (s), after which the process is killed at once."""
 
 SENT_S_PER_RECORDED_S = 0.05
-"""A recorded second is some 100 kB, which a pipe takes in 2 ms; a busy computer is slower."""
+"""Additional timeout (s) per recorded second, which is some 100 kB: a pipe takes it in 2 ms, on a busy computer more
+slowly."""
 
 NEVER_HELD = Health(Fault.NONE, 0, 0, 0, 0, 0, 0, 0.0)
 """Health before the first stimulus: no fault, nothing counted."""
 
 
 def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevice":
-    """Open a device in a process of its own. Raises what opening the device in the process raised, or `DeviceError`
-    where that ended or hangs."""
+    """Open a device in a separate process. name, settings, seed: as in `opening.open_device`. Raises what opening
+    raised in the process, or `DeviceError` where the process ended or hangs."""
     process: LoopProcess | None = None
     ring = Ring()
     try:
@@ -65,7 +65,7 @@ def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevi
 
 
 class RemoteDevice:
-    """A device whose loop runs in a process of its own, with the interface of `Device`; opened by `open_remotely`."""
+    """A device whose loop runs in a separate process, with the interface of `Device`; opened by `open_remotely`."""
 
     def __init__(
         self, process: LoopProcess, info: DeviceInfo, settings: DeviceSettings, ring: Ring | None = None
@@ -80,13 +80,13 @@ class RemoteDevice:
         self._releasing: Call | None = None
         self._health = NEVER_HELD
         self._force_left = self._stopped = False
-        """Said there at least once: the end of the process changes nothing about it."""
+        """Whether the process reported FORCE_LEFT or an executed stop; both remain true after its end."""
         self._closing = self._closed = self._ended = False
-        """Asked to close; nothing is asked any more; nor does the process run."""
+        """Closing has begun; no further calls are sent; the process has ended."""
         self._losing = threading.Lock()
         self._lost = ""
-        """Reason for the loss."""
-        # Twice: an interruption that waits as the first begins ends it before its first line.
+        """Reason why the device was lost; empty while it is not."""
+        # Registered twice: a pending KeyboardInterrupt may end the first call before its first line.
         atexit.register(self._close_at_exit)
         atexit.register(self._close_at_exit)
 
@@ -109,7 +109,7 @@ class RemoteDevice:
             raise
 
     def keep_alive(self) -> None:
-        """Raises nothing for a lost process: `fault` says it."""
+        """Sign of life. Does not raise for a lost process, which `fault` reports."""
         with contextlib.suppress(DeviceError):
             self._call_remote(self._process.signs, "keep_alive")
 
@@ -139,14 +139,14 @@ class RemoteDevice:
             self._held = None
             return Played(recording=None, health=self._health_of_the_lost())
         fade_out_s = self._held.fade_out_s if self._held is not None else 0.0
-        # A caller that was interrupted while it waited asks for the same release once more.
+        # A caller that was interrupted while it waited gets the answer of the same release.
         self._releasing = self._releasing or self._process.work.begin("release")
         try:
             played: Played = self._releasing.answer(fade_out_s + self._patience_s(self._keep_s))
         except LoopGoneError as gone:
             self._lose(gone)
             played = Played(recording=None, health=self._health_of_the_lost())
-        except Exception:  # was raised there. After an interruption the answer is asked for again.
+        except Exception:  # raised in the process. After an interruption the answer is awaited again.
             self._releasing = self._held = None
             raise
         self._note_health(played.health)
@@ -176,11 +176,11 @@ class RemoteDevice:
         return Look(None, None, sensor_clipped=False, buttons=frozenset(), missed_ticks=0)
 
     def simulate_hand(self, on_handle: bool) -> None:
-        """Real devices have none."""
+        """No effect: real devices have no simulated hand."""
 
     def stop(self) -> None:
-        """The process is killed where it does not answer within `STOP_S`: the device's own watchdog then drops the
-        force."""
+        """Emergency stop. The process is killed where it does not answer within `STOP_S`; the device's own watchdog
+        then switches the force off."""
         if self._lost or self._ended:
             return
         try:
@@ -188,12 +188,13 @@ class RemoteDevice:
                 self._process.stop.begin("stop").answer(STOP_S, grace_s=0.0)
                 self._stopped = True
         except LoopGoneError as gone:
-            # Not in `_lose`, which waits where another call waits for the end of a process that may let go by itself.
+            # Kill here: `_lose` may wait for another call that waits for the process to fade its force and end.
             self._process.kill()
             self._lose(gone)
 
     def close(self) -> None:
-        """Waits at most for the fade and twice `CLOSE_S`; a process that does not end is killed."""
+        """Close device and process. Waits at most for the fade and twice `CLOSE_S`; a process that does not end is
+        killed."""
         if self._ended:
             return
         self._closing = True
@@ -203,29 +204,31 @@ class RemoteDevice:
                     self._note_health(
                         self._call_remote(self._process.close, "close", patience_s=self._fade_s + CLOSE_S)
                     )
-        finally:  # it lets go by itself then
+        finally:  # closed pipes make the process fade the force and end
             self._closed = True
             self._process.hang_up()
         self._process.end(CLOSE_S)
         if self._ring is not None:
             self._ring.remove()
-        # Last, so that a close that was interrupted is made good for when the program ends.
+        # Last, so that an interrupted close is repeated when the program ends.
         self._ended = True
         atexit.unregister(self._close_at_exit)
 
     def _close_at_exit(self) -> None:
+        """Close when the program ends, even if Ctrl-C interrupts it."""
         while not self._ended:
             try:
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
                 self.close()
-            except KeyboardInterrupt:  # came before it was ignored
+            except KeyboardInterrupt:  # arrived before SIGINT was ignored
                 continue
 
     def _patience_s(self, recorded_s: float) -> float:
         return self._fade_s + ANSWER_S + SENT_S_PER_RECORDED_S * recorded_s
 
     def _call_remote(self, line: Line, name: str, *arguments: Any, patience_s: float | None = None) -> Any:
-        """Raises `DeviceError` for a device that is lost or closed, and what was raised there."""
+        """Call a method in the process. Raises `DeviceError` for a device that is lost or closed, and what the method
+        raised."""
         self._must_be_there()
         try:
             return line.begin(name, *arguments).answer(ANSWER_S if patience_s is None else patience_s)
@@ -234,19 +237,21 @@ class RemoteDevice:
             raise self._absence() from gone
 
     def _break_off(self, call: Call, patience_s: float) -> None:
+        """Cancel `play` with a fade, and wait for its end."""
         try:
             call.break_off(patience_s)
         except LoopGoneError as gone:
             self._lose(gone)
-        except BaseException:  # impatient: then without a fade
+        except BaseException:  # interrupted again: stop without a fade
             self.stop()
             raise
 
     def _lose(self, gone: LoopGoneError) -> None:
+        """Mark the device as lost, at the first failure, and end the process."""
         with self._losing:
             if not self._lost and not self._closed:
                 self._process.hang_up()
-                # One that hung up may be letting go just now.
+                # A process that closed its pipes may still be fading the force: wait for its end.
                 self._lost = f"{gone}, {self._process.end(0.0 if gone.hangs else self._fade_s + CLOSE_S)}"
 
     def _note_health(self, health: Health) -> Health:
@@ -256,7 +261,7 @@ class RemoteDevice:
 
     def _must_be_idle(self) -> None:
         self._must_be_there()
-        if self._releasing is not None:  # its answer is not that of the next stimulus
+        if self._releasing is not None:  # its pending answer must not be taken for that of the next call
             raise DeviceError("The device cannot do this now", "It is still playing.", "Call release first.")
 
     def _must_be_there(self) -> None:
@@ -264,6 +269,7 @@ class RemoteDevice:
             raise self._absence()
 
     def _absence(self) -> DeviceError:
+        """Error for a call on a closed or lost device."""
         if self._closing:
             return DeviceError("The device cannot do this now", "The device is closed.", "Open it again.")
         return DeviceError(
@@ -274,6 +280,7 @@ class RemoteDevice:
         )
 
     def _fault_of_the_lost(self) -> Fault:
+        """Fault without the process; see `fault`."""
         if self._force_left:
             return Fault.FORCE_LEFT
         if self._closed and not self._lost:

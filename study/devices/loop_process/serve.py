@@ -1,8 +1,8 @@
-"""Main program of the loop's process: a device behind its safety layer, and a thread for each pipe of its caller.
+"""Main program of the loop's process: a device behind its safety layer, with a thread for each pipe from the caller.
 
-A sign of life is always the caller's: `keep_alive` runs when it is called from there, and `play` goes on only as long
-as the caller answers its progress. When the caller's end of a pipe closes, for any reason, the force fades, the brakes
-hold, and the process ends.
+Signs of life always come from the caller: `keep_alive` runs only on its call, and `play` continues only while the
+caller answers its progress. When the caller's end of a pipe closes, for any reason, the force fades, the device is
+closed, and the process ends.
 """
 
 import contextlib
@@ -24,21 +24,23 @@ from study.devices.loop_process.line import CLOSE_S, ERROR, LINES, PROGRESS, VAL
 from study.devices.opening import open_device, raise_thread_priority
 
 POLL_EVERY_S = 0.2
-"""Whether the caller's process is there still: a fork of it may hold its end of a pipe open."""
+"""Interval (s) at which the existence of the caller's process is checked, because a fork of the caller may keep its end
+of a pipe open."""
 
 LAST_ANSWER_S = 1.0
 """Longest wait for the thread that sends the last answer (s)."""
 
 OPENING_GRACE_S = 1.0
-"""While the device is opened, no force of a stimulus is on that a fade would end: the process ends soon."""
+"""Time (s) that the process may still run after its caller has ended while the device is being opened: no stimulus has
+to be faded out then."""
 
 OVERDUE_S = CLOSE_S + 3.0
-"""Time granted beyond the fade: only a process that hangs, in the driver or in an exit handler, takes so long to
-end."""
+"""Time (s) in addition to the fade after which a process that does not end is terminated: it hangs, in the driver or in
+an exit handler."""
 
 
 class BrokenOffError(Exception):
-    """The caller wants no more of what is played."""
+    """The caller has cancelled the commands that are being played."""
 
 
 class DeviceServer:
@@ -51,14 +53,14 @@ class DeviceServer:
         at_rest: Callable[[], object] = lambda: None,
         raise_thread_priority: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
     ) -> None:
-        """ends: of `LINES`. at_rest: called after each stimulus. raise_thread_priority: entered by the threads that
-        a stop and a sign of life wait for."""
+        """ends: ends of the pipes, in the order of `LINES`. at_rest: called after each stimulus. raise_thread_priority:
+        context in which the threads for stops and signs of life run."""
         self._device = device
         self._at_rest = at_rest
         self._raise_priority = raise_thread_priority
         self._closed = threading.Event()
         self.ended = threading.Event()
-        """The caller is gone, or wants the device closed."""
+        """Set when the caller is gone or has asked to close the device."""
         work, signs, look, stop, close = ends
         tables: tuple[tuple[End, dict[str, Callable[..., Any]]], ...] = (
             (
@@ -91,6 +93,7 @@ class DeviceServer:
         self._threads[-1].join(LAST_ANSWER_S)
 
     def _serve(self, end: End, table: dict[str, Callable[..., Any]]) -> None:
+        """Thread of a pipe: receive calls and send answers, until the caller is gone. table: functions by name."""
         urgent = "stop" in table or "keep_alive" in table
         try:
             with self._raise_priority() if urgent else contextlib.nullcontext():
@@ -105,6 +108,8 @@ class DeviceServer:
             self.ended.set()
 
     def _play_commands(self, end: End, commands: Signal) -> Played:
+        """Play commands; after each progress, continue only with the caller's consent."""
+
         def go_on(share: float) -> None:
             end.send((PROGRESS, share))
             if not end.recv():
@@ -113,37 +118,41 @@ class DeviceServer:
         return self._device.play(commands, go_on)
 
     def _await_closed(self) -> Any:
+        """Ask the main thread to close the device, and wait for that. Returns the final counters."""
         self.ended.set()
         self._closed.wait()
         return self._device.health()
 
 
 def run(parent: int, *handles: int) -> None:
-    """The main function of the process. parent: the caller's process; handles: of the ends of `LINES`."""
+    """The main function of the process. parent: process id of the caller; handles: of the ends of the pipes, in the
+    order of `LINES`."""
     told_to_end: list[int] = []
     _leave_signals_to_the_caller(told_to_end)
     lifetime = Lifetime(parent, told_to_end)
     threading.Thread(target=lifetime.watch, name="lifetime", daemon=True).start()
     ends = tuple(End(handle) for handle in handles)
-    with contextlib.suppress(EOFError, OSError):  # the caller is gone: what is open is closed all the same
+    with contextlib.suppress(EOFError, OSError):  # the caller is gone: the device is closed all the same
         _open_and_serve(lifetime, ends)
 
 
 class Lifetime:
-    """Longest time that the process may still run."""
+    """Ensures that the process ends soon after its caller has ended or it was told to end. told_to_end: numbers of the
+    signals received."""
 
     def __init__(self, parent: int, told_to_end: list[int]) -> None:
         self._parent = parent
         self._told_to_end = told_to_end
         self.patience_s = OPENING_GRACE_S
-        """From when the end is due."""
+        """Time (s) granted to the main thread from then on."""
 
     def is_over(self) -> bool:
         """Whether the process was told to end, or the one that started it is gone."""
         return bool(self._told_to_end) or os.getppid() != self._parent
 
     def watch(self) -> None:
-        """Ends the process where its main thread does not: the device's own watchdog then drops the force."""
+        """Terminate the process where its main thread does not end it in time; the device's own watchdog then switches
+        the force off."""
         while not self.is_over():
             time.sleep(POLL_EVERY_S)
         due_s = time.monotonic()
@@ -153,6 +162,8 @@ class Lifetime:
 
 
 def _open_and_serve(lifetime: Lifetime, ends: tuple[End, ...]) -> None:
+    """Open the device that the first message names, serve it until the end is due, and close it with a fade. An error
+    while opening is sent to the caller."""
     name, settings, seed, telemetry = ends[0].recv()[1]
     try:
         device = open_device(name, settings, RealClock(), seed, own_process=False, telemetry=telemetry)
@@ -161,7 +172,8 @@ def _open_and_serve(lifetime: Lifetime, ends: tuple[End, ...]) -> None:
         return
     lifetime.patience_s = settings.limits.release_s + settings.limits.watchdog_s + OVERDUE_S
     with contextlib.closing(device):
-        # Nothing may stop the loop to look for garbage: what is there stays, what comes is looked at between stimuli.
+        # The garbage collector must not interrupt the loop: existing objects are exempted, new ones are collected
+        # between stimuli.
         gc.collect()
         gc.freeze()
         gc.disable()
@@ -174,8 +186,8 @@ def _open_and_serve(lifetime: Lifetime, ends: tuple[End, ...]) -> None:
 
 
 def _leave_signals_to_the_caller(told_to_end: list[int]) -> None:
-    """A terminal's Ctrl-C or end is the caller's business, which lets go with a fade. A SIGTERM for this process ends
-    it, with the same fade."""
+    """Ignore Ctrl-C and the end of the terminal, which the caller handles with a fade. SIGTERM is noted in
+    `told_to_end` and ends the process with the same fade."""
 
     def note(number: int, frame: FrameType | None) -> None:
         told_to_end.append(number)
@@ -187,15 +199,17 @@ def _leave_signals_to_the_caller(told_to_end: list[int]) -> None:
 
 
 def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[int, Any]:
+    """Call a function. Returns its value or its exception as a message (kind, value)."""
     try:
         return VALUE, function(*arguments)
-    except (EOFError, ConnectionError):  # the caller went while it was asked whether to go on
+    except (EOFError, ConnectionError):  # the caller ended during its answer to a progress
         raise
     except BaseException as error:  # noqa: BLE001 - the caller raises it
         return ERROR, _sendable(error)
 
 
 def _sendable(error: BaseException) -> Exception:
+    """The exception itself if it can be pickled and restored, else a RuntimeError with its type and text."""
     if isinstance(error, Exception):
         with contextlib.suppress(Exception):
             copy = pickle.loads(pickle.dumps(error))

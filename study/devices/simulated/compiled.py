@@ -1,7 +1,7 @@
-"""The compiled entry points. Their machine code is kept on disk, so that only a first run waits for the compiler.
+"""Compiled entry points of the simulated device. Their machine code is kept on disk: only a first run compiles.
 
-Most of the mechanism stands in other files of this folder: each entry point encloses the fingerprint of them all, as
-`study.devices.governor.compiling` explains.
+numba checks only the file of an entry point for changes, but most of the mechanism is in other files of this folder.
+Each entry point therefore encloses the fingerprint of all of them (`study.devices.governor.compiling`).
 """
 
 from pathlib import Path
@@ -20,9 +20,12 @@ from study.devices.simulated.sensors import read_sensors
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 _NOISE = types.uint64[::1]
+"""numba's types of the arguments: vectors and matrices of floats, and the state of the random numbers."""
 
 
 def _entry_points(sources: int) -> tuple[Any, Any, Any]:
+    """`sense`, `advance` and `pose`. sources: fingerprint, enclosed so that a change of any source compiles anew."""
+
     @njit(types.void(_VECTOR, _VECTOR, _NOISE, _VECTOR), cache=True, nogil=True)
     def sense(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[uint64], reading: FloatArray) -> None:
         _ = sources
@@ -42,4 +45,4 @@ def _entry_points(sources: int) -> tuple[Any, Any, Any]:
 
 
 sense, advance, pose = _entry_points(fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py"))
-"""`sense` and `advance` as `study.devices.rig.CompiledRig` wants them; `pose` is `inverse_kinematics`."""
+"""`sense` and `advance` with the arguments that `study.devices.rig.CompiledRig` states; `pose`: inverse kinematics."""

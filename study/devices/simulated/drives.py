@@ -1,8 +1,14 @@
-"""The three drives: amplifier, motor with friction, and the cable that pulls the arm.
+"""The three drives: amplifier, motor with friction, and the cable that pulls the arm. For each drive:
+
+    amplifier   a first-order low pass from the commanded torque to the motor's torque u
+    motor       I dw/dt = u - cable - f_C z / z_max - d w               w: speed of the motor, rad/s
+    friction    dz/dt = w - |w| z / z_max                               z: deflection of a bristle, rad
+    cable       cable = k s + c ds/dt,  ds/dt = w - J v                 s: stretch, rad; J v: speed of the arm, rad/s
 
 Friction is Dahl's (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976): a bristle
-that bends as an elastic spring first and slips at the Coulomb level. It is passive, holds without creep, and has no
-corner at zero speed where a simulation at a fixed step would chatter.
+that deflects elastically at first and slips at the Coulomb level f_C. It is passive, holds a constant load without
+creep, and is continuous at zero speed, where a discontinuous law would chatter at a fixed step. Integration:
+semi-implicit Euler with the step `STEP_S`.
 """
 
 from equalizer.signals.signal import FloatArray
@@ -26,8 +32,8 @@ from study.devices.simulated.layout import (
 
 @inlined
 def bent_bristle(bristle: float, travel: float, longest: float) -> float:
-    """The bristle's bend after a `travel`, both rad: dz = dx - |dx| z / longest, solved backwards, so |z| <= longest
-    for any step."""
+    """Deflection of the bristle after a `travel` of the motor, both rad: an implicit Euler step of
+    dz = dx - |dx| z / longest, so that |z| <= longest for a travel of any size."""
     return (bristle + travel) / (1.0 + abs(travel) / longest)
 
 
@@ -40,7 +46,8 @@ def step_drives(
     stretch: FloatArray,
     cables: FloatArray,
 ) -> None:
-    """One step of the motors. Fills cables (3,), the torques on the arms; stretch (3,) of the cables in rad."""
+    """One step of amplifiers and motors, in `state`. command: (3,), N m. jacobian: (3, 3), joint speed per handle
+    velocity, rad/m. stretch: (3,) of the cables, rad. Fills cables (3,), the torques on the arms, N m."""
     for drive in range(3):
         arm_speed = 0.0
         for axis in range(3):
@@ -60,7 +67,7 @@ def step_drives(
 
 @inlined
 def step_cables(state: FloatArray, jacobian: FloatArray, stretch: FloatArray) -> None:
-    """Moves stretch (3,) on, once motors and handle have their new speeds: with older ones the cables would damp."""
+    """One step of stretch (3,), rad. Called when motors and handle have their new speeds (semi-implicit Euler)."""
     for drive in range(3):
         slip = state[MOTOR_SPEED + drive]
         for axis in range(3):

@@ -1,7 +1,13 @@
-"""One millisecond of the mechanism. Equations and their reasons: docs/simulated_omega3.md.
+"""Equations of motion of the simulated device, for a tick of 1 ms. Equations and their reasons:
+docs/simulated_omega3.md.
 
-The linkage (Jacobian, mass matrix) is taken once per tick at the handle's predicted midpoint; what swings fast
-(cables, handle, base, friction) takes finer steps, speeds before positions, which keeps energy from growing.
+    M (dv/dt, d2r/dt2) = (J^T t + f + f_stop - I_a J^T (dJ/dt) v,  N^T f - K r - C dr/dt)
+
+v: velocity of the handle against the base; r: rocking of the base in the directions N; M: mass matrix (`inertia`); J:
+joint speed per handle velocity; t: torques of the cables (`drives`); f: force of hand and handle modes (`handle`).
+
+J and M are computed once per tick, at the predicted midpoint of the handle's path. The fast parts (cables, handle,
+base, friction) take `SUBSTEPS` steps of semi-implicit Euler, speeds before positions, so that energy stays bounded.
 """
 
 import math
@@ -38,7 +44,8 @@ from study.devices.simulated.linkage import inverse_kinematics
 
 @inlined
 def add_stops(state: FloatArray, parameters: FloatArray, pull: FloatArray) -> None:
-    """Adds to pull[:3] the force of a spherical cushion. It damps on the way out only, and never sucks."""
+    """Add to pull[:3] the force (N) of the end stop, a spring and a damper beyond a sphere about the origin. It damps
+    outward motion only, so that its force never points outwards."""
     x, y, z = state[RELATIVE], state[RELATIVE + 1], state[RELATIVE + 2]
     radius = math.sqrt(x * x + y * y + z * z)
     depth = radius - parameters[STOP_RADIUS]
@@ -55,20 +62,20 @@ class Held(NamedTuple):
     """Quantities that stay constant during one tick, except `stretch`."""
 
     command: FloatArray
-    """(3,) motor torques, N m."""
+    """(3,), commanded motor torques, N m."""
     jacobian: FloatArray
-    """(3, 3) at the midpoint, rad/m."""
+    """(3, 3), joint speed per handle velocity at the midpoint, rad/m."""
     inverse_mass: FloatArray
-    """(5, 5), 1/kg."""
+    """(5, 5), inverse of `mass_matrix` at the midpoint, 1/kg."""
     stretch: FloatArray
-    """(3,) of the cables, rad: this one changes."""
+    """(3,), of the cables, rad; changes at each step."""
     centrifugal: FloatArray
-    """(3,) force that keeps the arms on their curved way, N."""
+    """(3,), velocity products (centrifugal and Coriolis force) of the arms at the handle, -I_a J^T (dJ/dt) v, N."""
 
 
 @inlined
 def integrate_tick(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> None:
-    """Holds force_n (3,), the force that the controller means to have at the handle, for one tick."""
+    """Advance `state` by a tick under a constant command. force_n: (3,), N, the intended force at the handle."""
     held = _hold(state, parameters, force_n)
     cables, pulls, force, change = np.empty(3), np.empty(MODES), np.empty(3), np.empty(SIZE)
     for _ in range(SUBSTEPS):
@@ -89,6 +96,8 @@ def integrate_tick(state: FloatArray, parameters: FloatArray, force_n: FloatArra
 
 @inlined
 def _hold(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> Held:
+    """Quantities of a tick. The torques are J^-T force_n with J at the present position, as of a controller; dJ/dt is
+    the difference between the midpoint and the present position over half a tick."""
     angles, midpoint, begin = np.empty(3), np.empty(3), np.empty((3, 3))
     held = Held(np.empty(3), np.empty((3, 3)), np.empty((SIZE, SIZE)), np.empty(3), np.empty(3))
     for axis in range(3):
@@ -113,7 +122,8 @@ def _hold(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> Hel
 def _accelerations(
     state: FloatArray, parameters: FloatArray, held: Held, cables: FloatArray, force: FloatArray, change: FloatArray
 ) -> None:
-    """Fills change (5,): accelerations of the handle against the base, and of the rocking."""
+    """Fill change (5,), m/s²: acceleration of the handle against the base, then of the two rocking modes. cables: (3,),
+    N m. force: (3,), N, on the handle."""
     pull = np.empty(SIZE)
     for axis in range(3):
         pull[axis] = force[axis] + held.centrifugal[axis]
@@ -136,7 +146,7 @@ def _accelerations(
 
 @inlined
 def _absolute(parameters: FloatArray, change: FloatArray) -> None:
-    """Turns the handle's acceleration against the base into the one against the room."""
+    """Add the base's acceleration to change[:3], which then is the handle's acceleration in the room."""
     for mode in range(MOUNTS):
         for axis in range(3):
             change[axis] += parameters[MOUNT_DIRECTION + 3 * mode + axis] * change[3 + mode]

@@ -1,4 +1,12 @@
-"""The handle: the hand on it, its bending modes, and the acceleration at the sensor's place on it."""
+"""Handle of the simulated device: hand, bending modes, and acceleration at the place of the accelerometer.
+
+    hand     f = -K (x - x_rest) - C dx/dt                 x: position of the platform in the room
+    mode j   m_j (d2b_j/dt2 + h_j . a) = -p_j,  p_j = k_j b_j + c_j db_j/dt       exerts +p_j h_j on the platform
+    sensor   a + sum_j g_j h_j d2b_j/dt2, then a first-order low pass
+
+a: acceleration of the platform; b_j: displacement of mode j against the platform along the unit vector h_j; g_j: gain
+at the sensor. The mass of the hand is part of the platform's (`packing`).
+"""
 
 from equalizer.signals.signal import FloatArray
 from study.devices.simulated.inlined import inlined
@@ -29,8 +37,8 @@ from study.devices.simulated.layout import (
 
 @inlined
 def handle_force(state: FloatArray, parameters: FloatArray, pulls: FloatArray, force: FloatArray) -> None:
-    """Fills force (3,), N, on the platform from what is not tied to the base: hand and handle modes; and
-    pulls (MODES,), N, the part of each mode."""
+    """Fill force (3,), N, of hand and handle modes on the platform, and pulls (MODES,), N, the force of each mode along
+    its direction."""
     for axis in range(3):
         away = state[RELATIVE + axis] - parameters[HAND_REST + axis]
         speed = state[VELOCITY + axis]
@@ -50,8 +58,8 @@ def handle_force(state: FloatArray, parameters: FloatArray, pulls: FloatArray, f
 
 @inlined
 def step_bending(state: FloatArray, parameters: FloatArray, pulls: FloatArray, platform: FloatArray) -> None:
-    """One step of the handle modes, carried by the platform's acceleration (3, m/s²); leaves in `state` what the
-    sensor's place feels."""
+    """One step of the handle modes, and the acceleration at the sensor, in `state`. pulls: from `handle_force`.
+    platform: acceleration of the platform in the room, (3,), m/s²."""
     for axis in range(3):
         state[TRUE + axis] = platform[axis]
     for mode in range(MODES):
@@ -66,6 +74,6 @@ def step_bending(state: FloatArray, parameters: FloatArray, pulls: FloatArray, p
 
 @inlined
 def step_sensor(state: FloatArray, parameters: FloatArray) -> None:
-    """First-order low pass of the accelerometer: one step of each axis."""
+    """One step of the accelerometer's first-order low pass on each axis."""
     for axis in range(3):
         state[FILTERED + axis] += parameters[SENSOR_POLE] * (state[TRUE + axis] - state[FILTERED + axis])

@@ -1,18 +1,23 @@
-"""Inertia of what the cables pull: platform, handle and arms on a base that rocks."""
+"""Mass matrix of the simulated device on the arm side of the cables, and two small linear solvers.
+
+Platform, handle and arms move on a base that rocks. The motors are on the other side of the cables (`drives`). The
+solvers are written out, because every function of a tick is compiled without calls into a library.
+"""
 
 from equalizer.signals.signal import FloatArray
 from study.devices.simulated.inlined import inlined
 from study.devices.simulated.layout import ARM_INERTIA, MOUNT_DIRECTION, MOUNT_MASS, MOUNTS, PLATFORM_MASS
 
 SIZE = 3 + MOUNTS
-"""Rows of the mass matrix: three of the handle, and the mount's modes."""
+"""Rows of the mass matrix: three of the handle, then the modes of the mount."""
 
 
 @inlined
 def mass_matrix(parameters: FloatArray, jacobian: FloatArray, mass: FloatArray) -> None:
-    """Fills mass (5, 5) of (handle against base, rocking): from
-    2 T = |v + N r|² S + I |J v|² + r² M  with v the handle's velocity against the base, r the rocking speeds,
-    N their directions, S what moves with the handle, I the arms and M the base's modal masses."""
+    """Fill mass (5, 5), kg, of the velocities (v, r), from the kinetic energy T:
+    2 T = (v + N r)^T S (v + N r) + I |J v|² + r^T M r.
+    v: handle against the base; r: rocking speeds, N their directions; S: mass that moves with the handle; I: inertia of
+    an arm; J: jacobian (3, 3), rad/m; M: modal masses of the base."""
     directions = parameters[MOUNT_DIRECTION : MOUNT_DIRECTION + 3 * MOUNTS].reshape((MOUNTS, 3))
     carried = parameters[PLATFORM_MASS : PLATFORM_MASS + 9].reshape((3, 3))
     for row in range(3):
@@ -38,7 +43,7 @@ def mass_matrix(parameters: FloatArray, jacobian: FloatArray, mass: FloatArray) 
 
 @inlined
 def invert_in_place(matrix: FloatArray) -> None:
-    """Gauss and Jordan without pivots: for a positive definite matrix of five rows."""
+    """Invert a positive definite matrix (SIZE, SIZE) by Gauss-Jordan elimination, which then needs no pivoting."""
     for pivot in range(SIZE):
         scale = 1.0 / matrix[pivot, pivot]
         matrix[pivot, pivot] = 1.0
@@ -54,7 +59,7 @@ def invert_in_place(matrix: FloatArray) -> None:
 
 @inlined
 def solve_transposed(jacobian: FloatArray, force: FloatArray, torque: FloatArray) -> None:
-    """Fills torque (3,) with jacobian^T torque = force, by cofactors."""
+    """Fill torque (3,), N m, with the solution of jacobian^T torque = force (Cramer's rule). force: (3,), N."""
     j = jacobian
     c0 = j[1, 1] * j[2, 2] - j[1, 2] * j[2, 1]
     c1 = j[1, 2] * j[2, 0] - j[1, 0] * j[2, 2]

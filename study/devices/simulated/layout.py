@@ -1,15 +1,16 @@
 """Layout of the two flat arrays that the compiled functions share: state and parameters, in SI units.
 
-Each constant is the index of a quantity's first number; the next constant shows how many there are. The equations:
-docs/simulated_omega3.md.
+Each constant is the index of the first number of a quantity; the quantity ends where the next constant begins. A
+quantity of the handle or the sensor has the order x, y, z, a quantity of a drive the order of the legs. `packing` fills
+the arrays; the equations are in docs/simulated_omega3.md.
 """
 
 MODES = 6
-"""Handle modes; a shape, so known when compiled."""
+"""Number of handle modes; a constant, because the compiled code needs the sizes of its arrays."""
 MOUNTS = 2
-"""Modes of the mount: its base rocks in two directions."""
+"""Number of modes of the mount: the base rocks in two directions."""
 SUBSTEPS = 10
-"""Steps of integration in a tick."""
+"""Integration steps in a tick."""
 TICK_S = 1e-3
 """Duration of a tick of the loop (s)."""
 STEP_S = TICK_S / SUBSTEPS
@@ -17,87 +18,100 @@ STEP_S = TICK_S / SUBSTEPS
 
 # State, SI units.
 RELATIVE = 0
-"""Handle's position and then velocity, against the base."""
+"""Position of the handle against the base, m."""
 VELOCITY = RELATIVE + 3
-"""Handle's velocity against the base."""
+"""Velocity of the handle against the base, m/s."""
 MOTOR = VELOCITY + 3
-"""Motor angles, behind the capstans, and then speeds."""
+"""Motor angles divided by the ratio of the capstans, rad."""
 MOTOR_SPEED = MOTOR + 3
+"""Speeds of the same angles, rad/s."""
 ROCKING = MOTOR_SPEED + 3
-"""The mount's modal displacements at the handle, and speeds."""
+"""Modal displacements of the mount at the handle, m."""
 ROCKING_SPEED = ROCKING + MOUNTS
+"""Speeds of the mount's modes, m/s."""
 BENDING = ROCKING_SPEED + MOUNTS
-"""The handle modes' displacements against the platform, and speeds."""
+"""Displacements of the handle modes against the platform, m."""
 BENDING_SPEED = BENDING + MODES
+"""Speeds of the handle modes, m/s."""
 TORQUE = BENDING_SPEED + MODES
-"""Motor torques behind the amplifiers' bandwidth."""
+"""Motor torques after the low pass of the amplifiers, N m."""
 BRISTLE = TORQUE + 3
-"""Deflections of the friction's bristles, one per motor."""
+"""Deflection of the friction's bristle at each motor, rad."""
 FILTERED = BRISTLE + 3
-"""Acceleration behind the accelerometer's bandwidth."""
+"""Acceleration after the low pass of the accelerometer, m/s²."""
 TRUE = FILTERED + 3
-"""Acceleration of the accelerometer's place."""
+"""True acceleration at the place of the accelerometer, m/s²."""
 STATE_SIZE = TRUE + 3
-"""Numbers in the state."""
+"""Length of the state."""
 
 # Parameters, SI units.
 UPPER_ARM = 0
-"""Length, as the next three."""
+"""Length of an upper arm, m."""
 FOREARM = 1
+"""Length of a forearm, m."""
 RADIUS = 2
+"""Radius of the base less that of the platform, m."""
 PLATFORM_DEPTH = 3
-"""Distance of the origin in front of the base's plane."""
+"""Distance of the origin in front of the base's plane, m."""
 AZIMUTH = 4
-"""Cosine and sine of each leg's azimuth."""
+"""Cosine and sine of the azimuth of each leg."""
 PLATFORM_MASS = AZIMUTH + 6
-"""(3, 3): what moves with the platform and is no handle mode; with the hand's mass."""
+"""(3, 3), kg: platform and handle without the masses of the handle modes; with the mass of a hand."""
 ARM_INERTIA = PLATFORM_MASS + 9
-"""Of one arm about its pivot, kg m², with the part of the forearm that is lumped at the elbow."""
+"""Inertia of an arm about its pivot, kg m², with the part of the forearm that is lumped at the elbow."""
 DRIVE_INERTIA = ARM_INERTIA + 1
-"""Of one motor with capstan and drum, about the arm's pivot, kg m²."""
+"""Inertia of a motor with capstan and drum, about the arm's pivot, kg m²."""
 AMPLIFIER = DRIVE_INERTIA + 1
-"""Part of the way that the torque goes in one step."""
+"""Coefficient of the amplifier's first-order low pass: share of the difference that vanishes in a step."""
 FRICTION = AMPLIFIER + 1
-"""Coulomb friction of a motor, N m."""
+"""Coulomb friction of a motor, about the arm's pivot, N m."""
 PRESLIDING = FRICTION + 1
-"""Angle over which the friction of a motor builds up after a reversal, rad."""
+"""Largest deflection z_max of the bristle, over which friction builds up after a reversal, rad."""
 DRIVE_DAMPING = PRESLIDING + 1
-"""Viscous damping of one motor, N m s/rad."""
+"""Viscous damping of a motor, N m s/rad."""
 CABLE = DRIVE_DAMPING + 1
-"""Stiffness of each cable."""
+"""Stiffness of each cable, N m/rad."""
 CABLE_DAMPING = CABLE + 3
 """Damping of each cable, N m s/rad."""
 COUNT = CABLE_DAMPING + 3
-"""One encoder count, rad."""
+"""Resolution of the encoders, rad per count."""
 MOUNT_MASS = COUNT + 1
-"""Modal masses of the mount, then stiffnesses and dampings."""
+"""Modal masses of the mount, kg."""
 MOUNT_STIFFNESS = MOUNT_MASS + MOUNTS
+"""Modal stiffnesses of the mount, N/m."""
 MOUNT_DAMPING = MOUNT_STIFFNESS + MOUNTS
+"""Modal dampings of the mount, N s/m."""
 MOUNT_DIRECTION = MOUNT_DAMPING + MOUNTS
-"""(MOUNTS, 3), unit vectors."""
+"""(MOUNTS, 3), unit vectors of the motion at the handle."""
 MODE_MASS = MOUNT_DIRECTION + 3 * MOUNTS
-"""Modal masses of the handle modes, then stiffnesses and dampings."""
+"""Masses of the handle modes, kg."""
 MODE_STIFFNESS = MODE_MASS + MODES
+"""Stiffnesses of the handle modes, N/m."""
 MODE_DAMPING = MODE_STIFFNESS + MODES
+"""Dampings of the handle modes, N s/m."""
 MODE_GAIN = MODE_DAMPING + MODES
-"""Share of each mode in the motion at the sensor."""
+"""Share of the displacement of each mode at the accelerometer."""
 MODE_DIRECTION = MODE_GAIN + MODES
 """(MODES, 3), unit vectors."""
 HAND_DAMPING = MODE_DIRECTION + 3 * MODES
-"""Of the hand along x, y, z, then its stiffness and its place of rest; zero damping and stiffness without a hand."""
+"""Damping of the hand along x, y, z, N s/m; zero without a hand."""
 HAND_STIFFNESS = HAND_DAMPING + 3
+"""Stiffness of the hand along x, y, z, N/m; zero without a hand."""
 HAND_REST = HAND_STIFFNESS + 3
+"""Position at which the spring of the hand is relaxed, m."""
 STOP_RADIUS = HAND_REST + 3
-"""Radius of the sphere beyond which the stop pushes back, then its stiffness and damping."""
+"""Radius of the sphere beyond which the end stop pushes back, m."""
 STOP_STIFFNESS = STOP_RADIUS + 1
+"""Stiffness of the end stop, N/m."""
 STOP_DAMPING = STOP_STIFFNESS + 1
+"""Damping of the end stop, N s/m."""
 SENSOR_POLE = STOP_DAMPING + 1
-"""Part of the way that the filtered acceleration goes in one step."""
+"""Coefficient of the accelerometer's first-order low pass: share of the difference that vanishes in a step."""
 SENSOR_MATRIX = SENSOR_POLE + 1
-"""(3, 3): from device axes to the sensor's channels."""
+"""(3, 3): from device axes to the channels of the accelerometer (mounting and cross-axis sensitivity)."""
 SENSOR_NOISE = SENSOR_MATRIX + 9
-"""Standard deviation of each channel, m/s²."""
+"""Standard deviation of the noise of each channel, m/s²."""
 SENSOR_RANGE = SENSOR_NOISE + 3
 """Acceleration at which a channel clips, m/s²."""
 PARAMETERS_SIZE = SENSOR_RANGE + 1
-"""Numbers in the parameters."""
+"""Length of the parameters."""

@@ -1,4 +1,7 @@
-"""The simulated omega.3 as a rig. What it is and is not: docs/simulated_omega3.md."""
+"""Builds the simulated omega.3 as a rig, with packed parameters, state at rest and compiled functions.
+
+Its numbers are not those of the real device: see docs/simulated_omega3.md and `parameters`.
+"""
 
 import math
 from dataclasses import replace
@@ -13,7 +16,7 @@ from study.devices.simulated.packing import effective_mass_kg, pack_parameters, 
 from study.devices.simulated.parameters import Omega3Parameters, Vector
 
 NAME = "simulated omega.3"
-"""As it stands in `DeviceInfo` and in recordings."""
+"""Name of the device in `DeviceInfo` and in recordings."""
 MAX_FORCE_N = 12.0
 """Largest force of an omega.3 by its data sheet (N)."""
 
@@ -25,12 +28,11 @@ def build_omega3(
     friction: bool = True,
     parameters: Omega3Parameters | None = None,
 ) -> CompiledRig:
-    """A device at rest at place_m, gravity compensated. `seed`: of the accelerometer's noise, any integer >= 0.
+    """A device at rest at place_m, gravity compensated. seed: of the accelerometer's noise, any integer >= 0. hand:
+    whether a simulated hand holds the handle. friction: False sets the Coulomb friction of the drives to zero, to show
+    the effect of friction by comparison. parameters: those fitted to a calibration; None: the set of `parameters`.
 
-    Without `friction` it is no stand-in for a device, but a means of telling what friction costs. parameters: not the
-    one set of the simulated omega.3, but those fitted to a calibration.
-
-    Raises ValueError for a place within the stops.
+    Raises ValueError where place_m is not closer to the origin than the end stop.
     """
     named = NAME if parameters is None else f"{NAME} as calibrated"
     set_words = "parameter set 1" if parameters is None else "linkage and masses of a calibration"
@@ -43,7 +45,7 @@ def build_omega3(
     free, held = pack_parameters(parameters, False, place_m), packed.copy()
 
     def simulate_hand(on_handle: bool) -> None:
-        """Change what the hand adds, and nothing that a test has planted elsewhere."""
+        """Set only the parameters that the hand changes; others, which a test may have altered, stay."""
         changed = free != held
         packed[changed] = (held if on_handle and hand else free)[changed]
 
@@ -61,7 +63,7 @@ def build_omega3(
 
 
 def omega3_info(name: str, effective_mass_kg: float, details: str) -> DeviceInfo:
-    """`DeviceInfo` of a simulated omega.3, with its fixed rate and maximum force."""
+    """`DeviceInfo` of a simulated omega.3: 1 kHz and `MAX_FORCE_N`, with the given mass (kg)."""
     return DeviceInfo(
         name=name,
         simulated=True,

@@ -1,8 +1,9 @@
-"""What the simulated device knows of its own linkage, as a real one tells it, and the way back: parameters with which
-the simulated device has the linkage and the inertia of a calibration.
+"""Linkage of the simulated device by position, as a real device reports it, and the inverse problem: the parameters of
+the simulated device that fit the linkage and the inertia of a calibration.
 
-The way back has the simulated device's own equations. A device that is built otherwise (hinge offsets, arms that
-weigh other than its neighbours') is met as well as these can; what is left is told.
+Four lengths and a common turn of the azimuths are fitted to the Jacobians (nonlinear least squares), then two masses to
+the inertia matrices (linear least squares). A device of another design (hinge offsets, arms of unequal weight) is only
+approximated; `FittedLinkage` states the misfit.
 """
 
 from dataclasses import dataclass, replace
@@ -21,14 +22,14 @@ from study.devices.simulated.packing import effective_mass_kg, isotropic_depth_m
 from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Masses, Omega3Parameters
 
 MOST_MISFIT = 0.1
-"""Largest relative misfit of Jacobian or inertia: above it the simulated device would not be that of the
-calibration."""
+"""Largest accepted relative misfit of Jacobian or inertia; above it, the simulated device would not represent the
+calibrated device."""
 LIGHTEST_KG = 0.07
-"""Least mass that moves with the handle: the parts that swing on it weigh 54 g."""
+"""Smallest mass that moves with the handle (kg): the handle modes, which are part of it, have 54 g."""
 
 
 class SimulatedLinkage:
-    """Linkage of the simulated omega.3, without a hand."""
+    """Linkage of the simulated omega.3 without a hand: a `study.devices.opening.LinkageSource`."""
 
     def __init__(self, parameters: Omega3Parameters, info: DeviceInfo) -> None:
         self.info = info
@@ -36,7 +37,7 @@ class SimulatedLinkage:
         self._masses, self._reach_m = parameters.masses, parameters.stops.radius_m
 
     def at(self, position_m: FloatArray) -> LinkageReading | None:
-        """The linkage at a position of the handle; None in the stops."""
+        """The linkage at a position of the handle (3,), m; None at or beyond the end stop."""
         if not float(np.linalg.norm(position_m)) < self._reach_m:
             return None
         angles, rates = _pose(self._packed, position_m)
@@ -48,22 +49,22 @@ class SimulatedLinkage:
         return LinkageReading(np.array(position_m), angles, jacobian, inertia, held)
 
     def angles_at(self, position_m: FloatArray) -> FloatArray | None:
-        """Joint angles (3,) at a position of the handle, rad; None in the stops."""
+        """Joint angles (3,), rad, at a position of the handle (3,), m; None at or beyond the end stop."""
         return _pose(self._packed, position_m)[0] if float(np.linalg.norm(position_m)) < self._reach_m else None
 
     def check_frame(self) -> None:
-        """Nothing to check: a simulated linkage has a single frame."""
+        """Nothing to check: positions and readings of the simulated device have the same axes."""
 
 
 @dataclass(frozen=True, slots=True)
 class FittedLinkage:
-    """Parameters of the simulated device fitted to a calibration, and what the fit leaves over."""
+    """Parameters of the simulated device fitted to a calibration, and the misfit."""
 
     parameters: Omega3Parameters
     jacobian_misfit: float
-    """Largest difference from the calibration's joint rates, relative to their largest."""
+    """Largest difference from the calibration's inverse Jacobian (rad/m), relative to its largest element."""
     inertia_misfit: float
-    """Likewise of the inertia."""
+    """Largest difference from the calibration's inertia (kg), relative to its largest element."""
 
 
 def make_simulated_linkage() -> SimulatedLinkage:
@@ -74,7 +75,8 @@ def make_simulated_linkage() -> SimulatedLinkage:
 
 
 def fit_linkage(calibration: LinkageCalibration) -> FittedLinkage:
-    """Raises ValueError where no linkage of this kind has the calibration's Jacobian and inertia."""
+    """Fit the simulated device to a calibration. Raises ValueError where Jacobian or inertia differ by more than
+    `MOST_MISFIT`, or a fitted mass is too small."""
     rates = np.linalg.inv(calibration.jacobian)
     rates = rates * np.sign(rates[:, :, :1])
     centre = int(np.argmin(np.linalg.norm(calibration.position_m, axis=1)))
@@ -96,11 +98,15 @@ def _pose(packed: FloatArray, position_m: FloatArray) -> tuple[FloatArray, Float
 
 
 def _all_rates(parameters: Omega3Parameters, positions: FloatArray) -> FloatArray:
+    """(n, 3, 3), rad/m: joint speeds per handle velocity at the positions (n, 3), m."""
     packed = pack_parameters(parameters, False, (0.0, 0.0, 0.0))
     return np.stack([_pose(packed, position)[1] for position in positions])
 
 
 def _fit_lengths(positions: FloatArray, rates: FloatArray, azimuths: FloatArray) -> tuple[Linkage, float]:
+    """Least-squares linkage and its misfit. rates: (n, 3, 3), rad/m. azimuths: (3,), rad. The unknowns are the
+    logarithms of four lengths over their start values, which are scaled to the size of the device, and a turn of all
+    azimuths."""
     nominal = Linkage()
     ratio = float(np.abs(_all_rates(Omega3Parameters(), positions)).max() / np.abs(rates).max())
     first = ratio * np.array([nominal.upper_arm_m, nominal.forearm_m, nominal.radius_m, isotropic_depth_m(nominal)])
@@ -120,8 +126,8 @@ def _fit_lengths(positions: FloatArray, rates: FloatArray, azimuths: FloatArray)
 
 
 def _fit_masses(parameters: Omega3Parameters, calibration: LinkageCalibration) -> tuple[Masses, float]:
-    """Masses by least squares on the calibration's inertia matrices: that which moves with the handle and that which
-    turns with each arm; the inertia is linear in both."""
+    """Masses by linear least squares on the calibration's inertia matrices, m I + i J^T J: m moves with the handle, and
+    i (kg m²) turns with each arm. Returns the relative misfit too. Raises ValueError for masses that are too small."""
     nominal, arm_m = parameters.masses, parameters.linkage.upper_arm_m
     rates = _all_rates(parameters, calibration.position_m)
     turning = np.einsum("nki,nkj->nij", rates, rates)
@@ -134,7 +140,7 @@ def _fit_masses(parameters: Omega3Parameters, calibration: LinkageCalibration) -
             f"one weighs at least {1000 * LIGHTEST_KG:.0f} g"
         )
     misfit = float(np.abs(columns @ np.array([carried_kg, inertia_kg_m2]) - wanted).max() / np.abs(wanted).max())
-    # Between arms and motors, on either side of the cables, it is shared as in the simulated device.
+    # The inertia does not show how i is divided between arms and motors: the ratio is that of the nominal device.
     forearms = 2 / 3 * nominal.forearm_kg * arm_m**2
     share = inertia_kg_m2 / (nominal.upper_arm_kg_m2 + forearms + nominal.drive_kg_m2)
     arms_kg_m2 = share * (nominal.upper_arm_kg_m2 + forearms) - forearms

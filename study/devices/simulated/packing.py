@@ -1,4 +1,8 @@
-"""Packs named parameters into the flat array of the compiled functions (`layout`)."""
+"""Packs named parameters into the flat array of the compiled functions (`layout`).
+
+Derived quantities are computed here: modal stiffness m w² and damping 2 zeta m w from frequency and damping ratio, the
+coefficients of first-order low passes, noise from its density, and the depth at which the linkage is isotropic.
+"""
 
 import math
 
@@ -14,7 +18,8 @@ def isotropic_depth_m(linkage: Linkage) -> float:
     """Distance from the base plane to the isotropic point on the axis, where the inertia is the same in all directions.
 
     On the axis each Jacobian row is parallel to its forearm. Three rows at 120 degrees give J^T J a multiple of the
-    identity when the forearm's radial part is sqrt(2) times its axial part.
+    identity when the forearm's radial part is sqrt(2) times its axial part. Raises ValueError where the arms are too
+    short or too long for such a point.
     """
     radial = linkage.forearm_m * math.sqrt(2 / 3)
     cosine = (radial - linkage.radius_m) / linkage.upper_arm_m
@@ -24,7 +29,8 @@ def isotropic_depth_m(linkage: Linkage) -> float:
 
 
 def pack_parameters(parameters: Omega3Parameters, hand: bool, place_m: Vector) -> FloatArray:
-    """Shape (layout.PARAMETERS_SIZE,). The hand, if any, rests at place_m."""
+    """The parameters as an array (layout.PARAMETERS_SIZE,). hand: whether a hand holds the handle, relaxed at place_m.
+    Raises ValueError as `isotropic_depth_m`."""
     packed = np.zeros(layout.PARAMETERS_SIZE)
     _pack_linkage(packed, parameters)
     _pack_drives(packed, parameters)
@@ -38,7 +44,7 @@ def pack_parameters(parameters: Omega3Parameters, hand: bool, place_m: Vector) -
 
 
 def state_at_rest(packed: FloatArray, place_m: Vector) -> FloatArray:
-    """Shape (layout.STATE_SIZE,): everything still and unstressed, the handle at place_m."""
+    """The state (layout.STATE_SIZE,) at rest without stress, the handle at place_m, the motors at its joint angles."""
     state = np.zeros(layout.STATE_SIZE)
     _put(state, layout.RELATIVE, place_m)
     pose(packed, np.array(place_m, dtype=float), state[layout.MOTOR : layout.MOTOR + 3], np.empty((3, 3)))
@@ -46,7 +52,8 @@ def state_at_rest(packed: FloatArray, place_m: Vector) -> FloatArray:
 
 
 def effective_mass_kg(parameters: Omega3Parameters, packed: FloatArray) -> float:
-    """Effective mass at the centre, where it is the same in all directions; without a hand."""
+    """Effective mass at the origin without a hand: carried mass + I trace(J^T J) / 3, with arms and motors in I. At the
+    isotropic point it is the same in all directions."""
     jacobian = np.empty((3, 3))
     pose(packed, np.zeros(3), np.empty(3), jacobian)
     masses = parameters.masses
@@ -66,7 +73,7 @@ def _unit(directions: tuple[Vector, ...]) -> FloatArray:
 
 
 def _pole(frequency_hz: float) -> float:
-    """Share of the way to its input that a first-order low pass goes in one integration step."""
+    """Coefficient of a first-order low pass: share of the difference to its input that vanishes in a step, exactly."""
     return 1.0 - math.exp(-2 * math.pi * frequency_hz * layout.STEP_S)
 
 
@@ -125,6 +132,8 @@ def _pack_handle(packed: FloatArray, parameters: Omega3Parameters, hand: bool) -
 
 
 def _pack_sensor(packed: FloatArray, parameters: Omega3Parameters) -> None:
+    """Mounting as a small rotation (first order in the angles), then cross-axis sensitivity; white noise through a
+    first-order low pass has the noise bandwidth pi/2 times its corner frequency."""
     sensor = parameters.accelerometer
     about_x, about_y, about_z = np.radians(sensor.turns_deg)
     yz, zx, xy = sensor.cross_axis

@@ -1,17 +1,16 @@
-"""The one parameter set of the simulated omega.3. Not tuned per figure; see docs/simulated_omega3.md.
+"""The single parameter set of the simulated omega.3, the same for all figures; see docs/simulated_omega3.md.
 
-No link length, inertia, friction or stiffness of the omega.3 is public. What follows is a device of its size, with
-the reason for each number: a source where there is one, otherwise the feature of the published measurements that the
-number was chosen to give.
+No link length, inertia, friction or stiffness of the omega.3 is public. The numbers below describe a device of its
+size. Each has its reason: a source, or the feature of the published measurements for which the number was chosen.
 """
 
 from dataclasses import dataclass, field
 
 Vector = tuple[float, float, float]
-"""x, y, z; of drives and legs: one number per leg."""
+"""Three numbers for x, y, z, or for the three legs."""
 
 GRAVITY_M_S2 = 9.81
-"""Gravity of the simulated device, and the g in which its accelerometer's range is given (m/s²)."""
+"""Acceleration of gravity, and unit g of the accelerometer's data (m/s²)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,12 +21,13 @@ class Linkage:
     upper_arm_m: float = 1.6 * 0.060
     forearm_m: float = 1.6 * 0.1025
     radius_m: float = 0.055
-    """Base radius less platform radius. The Falcon's would be 0.041 m: without its hinge offsets the legs then fold
-    60 mm behind the isotropic point. With this one they stay well away from folding within the stops."""
+    """Base radius less platform radius. The Falcon's value times 1.6 would be 0.041 m, but without its hinge offsets
+    the legs would then fold (singular) 60 mm behind the isotropic point. At 0.055 m they stay far from it within the
+    stops."""
     azimuths_deg: Vector = (90.0, 210.0, 330.0)
-    """From y towards z. First leg upright, as the omega.3 stands: the x-z plane is a mirror plane."""
+    """From y towards z. The first leg is upright, as on the omega.3, so that the x-z plane is a mirror plane."""
     depth_m: float | None = None
-    """Distance of the origin in front of the base's plane; None: the isotropic point is the origin."""
+    """Distance of the origin in front of the base's plane; None: the origin is the isotropic point (`packing`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,55 +37,57 @@ class Masses:
     handle_kg: float = 0.128
     """Platform and handle: with the forearms' share the 0.148 kg of CHAI3D-based configurations of the omega.3."""
     forearm_kg: float = 0.020
+    """Mass of a forearm."""
     upper_arm_kg_m2: float = 1.5e-4
     """Aluminium arm of 35 g with its hinge, about its pivot. Counterweighted: a moving base does not turn it."""
     drive_kg_m2: float = 8.2e-4
-    """Rotor of 30 g cm² (DC motors of 30 mm: 10 to 35) behind a capstan of ratio 16, and the drum."""
+    """Rotor of 30 g cm² (DC motors of 30 mm: 10 to 35) times the square of the capstan's ratio 16, and the drum."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drives:
-    """One per leg: amplifier, motor, capstan and cable."""
+    """The three equal drives: amplifier, motor, capstan and cable; angles and torques about the arm's pivot."""
 
     amplifier_hz: float = 600.0
-    """One-pole current loop: common bandwidth of such amplifiers."""
+    """Corner frequency of the current loop, a first-order low pass: common for such amplifiers."""
     friction_n_m: float = 1.1e-2
     """Coulomb level (brushes, bearings, cable): 0.20 N at the handle along z, about 2 % of full force."""
     presliding_rad: float = 1.6e-4
-    """Dahl's break-away length: 18 um at the handle, cable and ball-bearing order."""
+    """Largest deflection of Dahl's bristle: 18 um at the handle, the order of cables and ball bearings."""
     damping_n_m_s: float = 8.3e-2
     """Back-EMF and grease: 10 N s/m at the handle, so that friction and damping dominate below 10 Hz."""
     cable_n_m_per_rad: Vector = (158.0, 140.0, 179.0)
-    """17-22 N/mm at the handle, order of the data sheet's 14.5 N/mm closed loop; puts the first structural modes
-    from 80 Hz. Unequal, as tensioned by hand: this is what couples there."""
+    """17-22 N/mm at the handle, order of the data sheet's 14.5 N/mm closed loop; the first structural modes then are
+    at 80 Hz and above. Unequal, as cables tensioned by hand: this couples the axes at these modes."""
     cable_damping_ratio: float = 0.03
+    """Damping ratio of the inertia of a motor on its cable, with the arm at rest."""
     counts_per_turn: float = 64000.0
     """1000 lines, four edges, ratio 16: 8.8 um of motion along one leg's forearm; the data sheet says below 10 um."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """Base on its feet and table: two rocking modes, seen at the handle along oblique directions. Invented; chosen by
-    the coupling published at 15, 25 and 35 Hz."""
+    """Base on its feet and table: two rocking modes, whose motion at the handle has oblique directions. Assumed: chosen
+    to give the coupling published at 15, 25 and 35 Hz."""
 
     frequencies_hz: tuple[float, float] = (20.0, 26.6)
     damping_ratios: tuple[float, float] = (0.06, 0.06)
     masses_kg: tuple[float, float] = (2.7, 1.1)
-    """Modal, at the handle: a base of 5 kg or so that rocks below the handle's height."""
+    """Modal masses at the handle: a base of about 5 kg that rocks below the height of the handle."""
     directions: tuple[Vector, Vector] = ((0.88, 0.42, 0.23), (0.18, 0.15, 0.97))
 
 
 @dataclass(frozen=True, slots=True)
 class HandleModes:
-    """Oscillators on the platform. First the loom, sensor lead and cover that hang on it, lumped, on an oblique soft
-    spring: the coupled resonance near 11 Hz. Then bending and twisting of handle, platform and forearms, more and
-    more coupled. Invented; published are only the 11 Hz and that there are large modes from 80 Hz on."""
+    """Oscillators on the platform. The first is the lumped mass of cable loom, sensor lead and cover on an oblique soft
+    spring: the coupled resonance near 11 Hz. The others are bending and twisting of handle, platform and forearms,
+    along oblique directions. Assumed: published are only the 11 Hz and that there are large modes from 80 Hz on."""
 
     frequencies_hz: tuple[float, ...] = (10.9, 134.0, 188.0, 251.0, 322.0, 391.0)
     damping_ratios: tuple[float, ...] = (0.028, 0.03, 0.025, 0.025, 0.022, 0.022)
     masses_kg: tuple[float, ...] = (0.019, 0.008, 0.008, 0.007, 0.006, 0.006)
     gains: tuple[float, ...] = (0.0, 0.3, 0.35, 0.4, 0.5, 0.6)
-    """Share of a mode's displacement at the accelerometer."""
+    """Share of the displacement of a mode at the accelerometer."""
     directions: tuple[Vector, ...] = (
         (0.85, 0.53, -0.02),
         (0.3, 0.8, 0.5),
@@ -109,7 +111,7 @@ class Hand:
 
 @dataclass(frozen=True, slots=True)
 class Accelerometer:
-    """ADXL335 (Analog Devices, Rev. B), at 3 V, 10 nF per axis."""
+    """ADXL335 (Analog Devices, data sheet Rev. B), at 3 V, with 10 nF per axis (first-order low pass of 500 Hz)."""
 
     noise_g_per_rthz: Vector = (150e-6, 150e-6, 300e-6)
     bandwidth_hz: float = 500.0
@@ -122,7 +124,7 @@ class Accelerometer:
 
 @dataclass(frozen=True, slots=True)
 class Stops:
-    """Soft ends of the workspace: no force within the radius that CHAI3D states as usable."""
+    """End stop, a spring and damper beyond a sphere: no force within the radius that CHAI3D states as usable."""
 
     radius_m: float = 0.075
     stiffness_n_per_m: float = 2500.0

@@ -1,7 +1,8 @@
 """Simulated sensors: encoders of finite resolution, and an ADXL335 with noise, range and mounting errors.
 
-Its normal random numbers come from one 64-bit word of state (SplitMix64: G. L. Steele, D. Lea, C. H. Flood, "Fast
-splittable pseudorandom number generators", OOPSLA 2014), so that a recording depends on its seed alone.
+The noise comes from a generator with a 64-bit state (SplitMix64: G. L. Steele, D. Lea, C. H. Flood, "Fast splittable
+pseudorandom number generators", OOPSLA 2014), turned into normal numbers by Box and Muller's method. Its state is part
+of the rig, so that a recording depends on the seed alone.
 """
 
 import math
@@ -26,7 +27,7 @@ from study.devices.simulated.linkage import forward_kinematics
 from study.devices.simulated.parameters import GRAVITY_M_S2
 
 _STEP = np.uint64(0x9E3779B97F4A7C15)
-"""Increment of the state in SplitMix64, then the factors of its output function: constants of the cited paper."""
+"""Increment of the state in SplitMix64; below, the factors and shifts of its output function (the cited paper)."""
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
 _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
@@ -47,7 +48,7 @@ def uniform(noise: npt.NDArray[np.uint64]) -> Any:
 
 @inlined
 def three_normals(noise: npt.NDArray[np.uint64], out: FloatArray) -> None:
-    """Fills out (3,) with independent standard normal numbers (Box and Muller)."""
+    """Fill out (3,) with independent standard normal numbers (Box and Muller)."""
     radius = math.sqrt(-2.0 * math.log(uniform(noise)))
     turn = 2.0 * math.pi * uniform(noise)
     out[0] = radius * math.cos(turn)
@@ -57,11 +58,13 @@ def three_normals(noise: npt.NDArray[np.uint64], out: FloatArray) -> None:
 
 
 _POSITION, _ACCELERATION, _TRUE = rig.POSITION.start, rig.ACCELERATION.start, rig.TRUE_ACCELERATION.start
+"""Index of the first number of each part of a reading."""
 
 
 @inlined
 def read_sensors(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[np.uint64], reading: FloatArray) -> None:
-    """Fills reading as `study.devices.rig` lays it out. Changes noise only."""
+    """Fill reading (READING_SIZE,), laid out as in `study.devices.rig`. Advances `noise`; `state` stays. The position
+    is the forward kinematics of the motor angles, rounded to whole counts, so it does not show the cables' stretch."""
     angles = np.empty(3)
     count = parameters[COUNT]
     for drive in range(3):
@@ -76,7 +79,8 @@ def read_sensors(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[n
 def _accelerometer(
     state: FloatArray, parameters: FloatArray, noise: npt.NDArray[np.uint64], channels: FloatArray
 ) -> float:
-    """The range bounds specific force with gravity in it; what the channels read at rest is then taken off."""
+    """Fill channels (3,), m/s². The range limits the specific force, which contains gravity; the reading at rest is
+    then subtracted. Returns 1 if a channel was at its limit, else 0."""
     three_normals(noise, channels)
     limit = parameters[SENSOR_RANGE]
     clipped = 0.0

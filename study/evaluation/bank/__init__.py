@@ -1,7 +1,7 @@
 """A bank of a blind test: concealed faults are sealed, diagnosed by separate processes without access to the truth,
 revealed and scored.
 
-`seal_cases` (`proof_folder`, `proof_seals`) -> `ask_engine` (starts `answer_cases` in separate
-processes), `follow_up`, `run_controls` -> `sealed_bank` (checks seals, pairs answers with labels; also for laws) ->
-`proof_summary`, `write_proof`. Begin at `prove.py`.
+`seal_cases` (with `begun_cases`, `proof_folder`, `proof_seals`) -> `ask_engine` (starts `answer_cases` in separate
+processes), `follow_up`, `run_controls` -> `sealed_bank` (checks seals, pairs answers with labels) -> `proof_summary`,
+`write_proof`. `laws`: the same for concealed laws outside the catalogue of effects. Begin at `prove.py`.
 """

@@ -1,8 +1,8 @@
 """Worker process that diagnoses the cases of a bank: `python -m study.evaluation.bank.answer_cases FOLDER`.
 
-It gets only the folder of open cases. It reads one case name per line on standard input, writes answer.json into the
-case's folder, and prints the name when that is done. An audit hook stops it from importing the code that made the cases
-and from opening files outside the folder.
+It gets only the folder of open cases. It reads a case name per line on standard input, writes answer.json into the
+case's folder, and prints the name when that is done. So that the test is blind, an audit hook stops the process from
+importing the code that made the cases, and from opening its files or any other file of the bank, such as the labels.
 """
 
 import hashlib
@@ -26,17 +26,18 @@ from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 
 APART = "study.evaluation.challenge"
-"""Package that makes the cases: it cannot be imported, nor its files opened, while cases are answered."""
+"""Package that makes the cases: while cases are answered, it cannot be imported, and its files cannot be opened."""
 OPENED = ("open", "os.listdir", "os.scandir", "os.chdir", "os.rename", "os.link", "os.symlink", "shutil.copyfile")
-"""Audit events of Python for files and folders that are opened or linked."""
+"""Python's audit events when files or folders are opened, listed, renamed, linked or copied."""
 STARTED = ("subprocess.Popen", "os.exec", "os.posix_spawn", "os.spawn", "os.system", "os.fork", "os.forkpty")
-"""Audit events of Python. HDF5 opens files in C without such events; it only gets paths that this module built."""
+"""Python's audit events when a program is started. HDF5 opens files in C without any audit event, but only gets paths
+that this module has built."""
 
 
 def main(arguments: list[str]) -> None:
     """Read case names from standard input until it ends; answer each and print its name."""
     cases = Path(arguments[0]).resolve()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; the parent ends us
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C reaches all; the parent ends this process
     isolate_process(cases)
     digest = engine_digest()
     for line in sys.stdin:
@@ -46,8 +47,9 @@ def main(arguments: list[str]) -> None:
 
 
 def isolate_process(cases: Path) -> None:
-    """Install an audit hook: from here on this process cannot import the challenge, open or list any path beside
-    `cases`, or start a program."""
+    """Install an audit hook: from now on this process cannot import the challenge or open its files, open or list
+    anything in the parent folder of `cases` but `cases` itself, or start a program. The import then
+    raises ImportError, the rest PermissionError."""
     sys.modules[APART] = cast(ModuleType, None)
     beside, inside = os.path.realpath(cases.parent), os.path.realpath(cases)
     maker = os.path.realpath(Path(study.__path__[0]).joinpath(*APART.split(".")[1:]))
@@ -68,7 +70,7 @@ def isolate_process(cases: Path) -> None:
 
 
 def others_sha256(place: Path) -> dict[str, str]:
-    """SHA-256 of every further recording of a case, by its path relative to the case folder."""
+    """SHA-256 of every recording of a case but the first, by its path relative to the case's folder `place`."""
     paths = [path for path in sorted(place.rglob("*.h5")) if path != place / RECORDING]
     return {str(path.relative_to(place)): sha256_of(path) for path in paths}
 
@@ -112,12 +114,14 @@ def engine_digest() -> str:
 
 
 def _time_budget(processor_s: float | None) -> Callable[[], bool]:
-    """Whether processor time is left. Processor time, so that the load of the machine does not change an answer."""
+    """Function that says whether processor time is left; None: always. Processor time (s), not wall-clock time, so that
+    the load of the machine does not change an answer."""
     begun = time.process_time()
     return lambda: processor_s is None or time.process_time() - begun < processor_s
 
 
 def _diagnose_case(place: Path) -> dict[str, Any]:
+    """Diagnose the recordings in `place` with the settings of the case; the answer as JSON values."""
     from analysis.diagnosis.diagnose import diagnose
     from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
     from analysis.diagnosis.document import diagnosis_to_json

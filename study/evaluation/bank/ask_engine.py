@@ -1,4 +1,8 @@
-"""Run the diagnosis of a bank's open cases in worker processes, one per core, each for many cases."""
+"""Runs the diagnosis of a bank's open cases in worker processes (`answer_cases`), each for many cases.
+
+The processes run on this computer, or on the workers of an executor. A case is tried `TRIES` times, with a new process
+where the last died or exceeded `PATIENCE_S`; then it counts as failed.
+"""
 
 import json
 import subprocess
@@ -23,7 +27,7 @@ PATIENCE_S = 1200.0
 GLANCE_S = 0.5
 """Interval at which the calling thread checks that workers still run (s)."""
 TRIES = 2
-"""Attempts per case: a process that died may have been killed from outside."""
+"""Attempts per case: a process may have died because it was killed from outside."""
 
 
 class Engine:
@@ -46,7 +50,7 @@ class Engine:
             process = self._process
         if answered := _ask_process(process, name):
             return answered
-        # A process that is about to end still looks alive, and would take the next request with it.
+        # A process that is about to end still seems to run, and the next request would be lost with it.
         process.kill()
         process.wait()
         return answered
@@ -78,6 +82,7 @@ class Engine:
 
 
 def _ask_process(process: "subprocess.Popen[str]", name: str) -> bool:
+    """Send a case name and wait for its echo. Kills the process after `PATIENCE_S`, which ends the wait."""
     impatience = threading.Timer(PATIENCE_S, process.kill)
     impatience.daemon = True
     impatience.start()
@@ -106,8 +111,9 @@ def ask_and_count(
     keep: bool,
     asked: Sequence[str] | None = None,
 ) -> None:
-    """Diagnose the cases that have no answer, calling `on_done(answered, total)`. keep: keep recordings after they are
-    answered. asked: those of `names` that can be asked; None = all. Raises StudyError as `ask_engine`."""
+    """Diagnose the cases `names` that have no answer, calling `on_done(answered, total)`. keep: do not delete
+    recordings of answered cases. asked: those of `names` that can be diagnosed; None = all. Raises StudyError as
+    `ask_engine`."""
     done = sum(is_answered(folder.open / name) for name in names)
     on_done(done, len(names))
 
@@ -122,8 +128,8 @@ def ask_and_count(
 
 
 def ask_engine(folder: ProofFolder, names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]) -> None:
-    """Diagnose all cases that have no answer yet; blocks until done. `on_answered(name)` is called in this thread
-    after each. Raises StudyError if all worker processes ended early."""
+    """Diagnose the cases `names` that have no answer yet; blocks until done. `on_answered(name)` is called in this
+    thread after each case. Raises StudyError if all worker processes ended early."""
     left, answered = SimpleQueue[str](), SimpleQueue[str]()
     wanted = [name for name in names if not is_answered(folder.open / name)]
     if isinstance(workers, Executor):
@@ -147,6 +153,7 @@ def ask_engine(folder: ProofFolder, names: Sequence[str], workers: Workers, on_a
 def _send_cases(
     folder: ProofFolder, wanted: Sequence[str], executor: Executor, on_answered: Callable[[str], None]
 ) -> None:
+    """Diagnose the cases on an executor, and write the answers that it returns."""
     cases = ((name, (name, read_files(folder.open / name))) for name in wanted)
     for name, document in run_pieces(executor, answer_sent_case, cases):
         if document is None:
@@ -157,8 +164,8 @@ def _send_cases(
 
 
 def answer_sent_case(name: str, case: Files) -> str | None:
-    """Runs on a worker: the text of answer.json, from a process that is given nothing but the files of the case. None
-    if it died or timed out, as often as is tried."""
+    """Runs on a worker of an executor: the text of answer.json, from a process in a temporary folder with nothing but
+    the files of the case. None if the process died or timed out at every attempt."""
     with TemporaryDirectory() as place:
         folder = ProofFolder(Path(place))
         write_files(folder.open / name, case)
@@ -175,6 +182,7 @@ def answer_sent_case(name: str, case: Files) -> str | None:
 def _engines(
     folder: ProofFolder, workers: int, left: SimpleQueue[str], answered: SimpleQueue[str]
 ) -> Iterator[list[threading.Thread]]:
+    """Context with a thread per worker process. On exit, also by an exception, the processes are killed."""
     engines = [Engine(folder) for _ in range(workers)]
     threads = [
         threading.Thread(target=_run_worker, args=(each, folder, left, answered), daemon=True) for each in engines
@@ -194,6 +202,7 @@ def _engines(
 
 
 def _run_worker(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], answered: SimpleQueue[str]) -> None:
+    """Take names from `left` until it is empty; put them into `answered` once an answer or a failure is written."""
     while True:
         try:
             name = left.get_nowait()
@@ -216,20 +225,21 @@ def _processes_ended_error(folder: ProofFolder, missing: int) -> StudyError:
 
 
 def is_answered(place: Path) -> bool:
-    """Whether the case has an answer. A dead process does not count (it may have been killed): the case is asked
-    again on the next run."""
+    """Whether the case has an answer. The failure of a process that died does not count, because it may have been
+    killed: the next run diagnoses the case again."""
     return (place / ANSWER).exists() and DIED not in read_answer(place)
 
 
 def _write_failure(place: Path) -> None:
+    """Write an answer that says that the process died or timed out."""
     how = f"the process died {TRIES} times, or took longer than {PATIENCE_S:g} s"
     document = {"name": place.name, "failed": how, DIED: True}
     write_text(place / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
 
 
 def forget_recordings(place: Path) -> None:
-    """Delete the recordings of an answered case to save disk space; the label keeps their hash, and the seed can draw
-    them again."""
+    """Delete the recordings of an answered case to save disk space; the label has their hash, and the seed reproduces
+    them."""
     if is_answered(place):
         for path in (place / RECORDING, *place.glob(FURTHER.format("*"))):
             with suppress(OSError):

@@ -1,7 +1,9 @@
-"""Cases of a bank appear under `open` complete and with a label, or not at all, wherever a sealing is killed.
+"""Atomic creation of a bank's cases: a case is in the folder `open` with all files and a label, or not at all, even if
+the process that draws the cases is killed at any point.
 
-A case is written into a folder of its own under `begun`; then its label is written, and last the folder renamed. What a
-killed sealing left under `begun` has a label, and is renamed at the next run, or has none, and is drawn anew.
+The files of a case are written into a folder under `begun`; then the label is written; last, the folder is renamed into
+`open`. After a kill, the next run renames the folders in `begun` that have a label, and removes the others, whose cases
+are drawn again.
 """
 
 import secrets
@@ -15,11 +17,11 @@ from study.store.disk.atomic_write import sync_folder
 from study.store.disk.text_file import read_text
 
 NAME_BYTES = 6
-"""Random bytes of a case's name, which says nothing of its number."""
+"""Random bytes in the name of a case, which does not reveal its number."""
 
 
 def begin_case(folder: ProofFolder) -> Path:
-    """A new folder for the files of a case; its name is the case's."""
+    """Make a folder for the files of a new case; its random name is the name of the case."""
     place = folder.begun / secrets.token_hex(NAME_BYTES)
     place.mkdir(parents=True)
     return place
@@ -34,8 +36,8 @@ def show_case(folder: ProofFolder, place: Path) -> None:
 
 @contextmanager
 def finish_begun_cases(folder: ProofFolder) -> Iterator[None]:
-    """Context of a sealing: on entry, finish or remove the cases of an earlier one that was killed; on exit, remove the
-    folder `begun`."""
+    """Context in which cases are drawn: on entry, finish or remove the cases of an earlier run that was killed; on
+    normal exit, remove the folder `begun`, which must be empty."""
     _finish_begun(folder)
     yield
     with suppress(FileNotFoundError):
@@ -43,6 +45,7 @@ def finish_begun_cases(folder: ProofFolder) -> Iterator[None]:
 
 
 def _finish_begun(folder: ProofFolder) -> None:
+    """Rename begun cases that have a label into `open`, and remove the others."""
     begun = sorted(folder.begun.iterdir()) if folder.begun.exists() else []
     labels = [read_text(path) for path in sorted(folder.sealed.glob("*.json"))] if begun else []
     for place in begun:

@@ -1,7 +1,8 @@
 """Follow-up experiments for cases whose diagnosis returned several effects that the data could not separate.
 
 The sealed device plays the experiments that the diagnosis proposed and, for comparison, as many drawn at random from
-the same menu. Separate processes diagnose both.
+the same menu. Separate processes diagnose both, with the first recording. The number of effects that the diagnosis
+still returns shows whether its proposals are better than chance.
 """
 
 import json
@@ -31,8 +32,9 @@ from study.store.formats.recording_file import write_recording
 NEXT = "next"
 """Folder of the follow-up cases: a bank of its own, whose labels name the case they follow."""
 PROPOSED, DRAWN = "proposed", "drawn"
+"""Keys of the two follow-up cases in a label."""
 NOISE_SEED = 7
-"""Keeps the noise and the random order of follow-ups apart from all other draws of a case."""
+"""Part of the seeds of a follow-up's noise and random order: makes them independent of all other draws of a case."""
 
 
 def follow_up(
@@ -42,9 +44,9 @@ def follow_up(
     options: tuple[Workers, bool],
     on_done: Callable[[int, int], None],
 ) -> tuple[FollowUp, ...]:
-    """Follow up single-effect cases with several returned effects. options: the workers, and whether recordings
-    are kept after they are answered. Resumable: after an interruption the same call continues. Raises
-    StudyError."""
+    """Follow up the cases with a single concealed effect for which the diagnosis returned more effects than it named,
+    and named any. options: the workers, and whether to keep recordings after they are answered. After an
+    interruption the same call continues. Raises StudyError."""
     workers, keep = options
     starts = [
         outcome for outcome in outcomes if outcome.kind == "single" and len(outcome.returned) > len(outcome.named) > 0
@@ -64,7 +66,7 @@ def follow_up(
 
 
 def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcome) -> None:
-    """Write both follow-up cases of `start`; a missing label means that neither is finished."""
+    """Write both follow-up cases of `start` and their label, which is written last, when both are complete."""
     first = read_label(folder.label(start.number))
     place = folder.open / first["name"]
     proposal = read_answer(place).get("proposal")
@@ -73,7 +75,7 @@ def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcom
         model = read_mechanical_model(place / MODEL)
         menu = experiment_menu(model, RATE_HZ, proposal["axis"], proposal["level"])
         best = proposal["best"]
-        wanted_words = [best] if isinstance(best, str) else best or ()  # one text in answers of older versions
+        wanted_words = [best] if isinstance(best, str) else best or ()  # a single text in answers of older versions
         proposed = [each for each in menu if each.words in wanted_words]
         order = np.random.default_rng([plan.seed, start.number, NOISE_SEED]).permutation(len(menu))
         drawn = [menu[number] for number in order[: max(len(proposed), 1)]]
@@ -87,8 +89,8 @@ def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcom
 def _write_case(
     again: ProofFolder, plan: BankPlan, start: tuple[dict[str, Any], Path], experiments: Sequence[Experiment]
 ) -> dict[str, Any]:
-    """Write one follow-up case and return its part of the label. The first recording is drawn again and must equal
-    the one that was answered."""
+    """Write a follow-up case and return its part of the label. `redraw_recording` draws the first recording again and
+    checks it against its label."""
     label, first = start
     place = begin_case(again)
     case = redraw_recording(place, plan, label)
@@ -107,6 +109,8 @@ def _write_case(
 
 
 def _follow_up_outcome(again: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowUp:
+    """The effects returned after the proposed and after the random experiments. Raises StudyError for a broken seal."""
+
     def read_follow_up(which: str) -> tuple[str, tuple[str, ...]]:
         if which not in label:
             return "", ()

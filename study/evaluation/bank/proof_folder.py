@@ -1,4 +1,9 @@
-"""Folder layout of a blind test: open inputs of the diagnosis, sealed truths, results."""
+"""Folder layout of a blind test: open inputs of the diagnosis, sealed labels (the truths), results.
+
+Layout: bank.json (settings of the bank), open/CASE/ (all that the diagnosis gets, and its answer), sealed/NUMBER.json
+(labels), labels.sha256 (seals), engine.log, and begun/ while cases are written. The random name of a case does not
+reveal its number, so that the diagnosis cannot find its label.
+"""
 
 import json
 from dataclasses import dataclass
@@ -11,9 +16,7 @@ from study.store.disk.text_file import read_text, write_text
 
 @dataclass(frozen=True, slots=True)
 class ProofFolder:
-    """bank.json: settings of the bank. open: one folder per case with everything that the diagnosis gets. sealed:
-    the truths, one file each. labels.sha256: their hashes in the format of `sha256sum --check`. begun: cases that are
-    being written."""
+    """Paths in the folder of a bank."""
 
     path: Path
 
@@ -29,12 +32,12 @@ class ProofFolder:
 
     @property
     def sealed(self) -> Path:
-        """Folder of the truths."""
+        """Folder of the labels, a file each."""
         return self.path / "sealed"
 
     @property
     def seals(self) -> Path:
-        """File with the hash of each truth."""
+        """File with the SHA-256 of each label, in the format of `sha256sum --check`."""
         return self.path / "labels.sha256"
 
     @property
@@ -43,7 +46,7 @@ class ProofFolder:
         return self.path / "engine.log"
 
     def label(self, number: int) -> Path:
-        """File of the truth of a case, by its number."""
+        """File of the label of a case, by its number."""
         return self.sealed / f"{number:05d}.json"
 
 
@@ -58,8 +61,8 @@ CLEAN = "clean"
 
 
 def open_proof_folder(path: Path, seed: int, brief: bool, of: str = "") -> ProofFolder:
-    """Create the folder of a bank, or open the existing one to continue. of: what is concealed, if not effects of the
-    catalogue.
+    """Create the folder of a bank, or open an existing folder to continue. brief: whether the recordings are short. of:
+    kind of the bank, if not effects of the catalogue are concealed.
 
     Raises StudyError where the folder holds something else or a bank with other settings.
     """

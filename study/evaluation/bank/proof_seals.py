@@ -1,5 +1,9 @@
-"""Seals of a blind test: the hash of every label is written before anything is answered and compared at every later
-step."""
+"""Seals of a blind test, a commitment by hash: the SHA-256 of every label is written before any case is answered, and
+compared at every later step.
+
+So neither a truth nor a recording can be changed to suit an answer: a label holds the hashes of the files of its case,
+and an answer must have been given to files with the same hashes.
+"""
 
 import hashlib
 from pathlib import Path
@@ -14,7 +18,7 @@ from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 
 HASHED = ("recording_sha256", "model_sha256", "others_sha256")
-"""Keys that appear in the label and in the answer: what was sealed is what was answered."""
+"""Keys of hashes in the label and in the answer; equal values show that the answer belongs to the sealed files."""
 
 
 def seal(folder: ProofFolder) -> str:
@@ -50,7 +54,7 @@ def read_label(path: Path) -> dict[str, Any]:
 
 
 def read_answer(place: Path) -> dict[str, Any]:
-    """The answer.json in `place`, parsed; an unknown error is NaN. Raises StudyError."""
+    """The answer.json in `place`, parsed; it may contain NaN (an unknown error). Raises StudyError."""
     try:
         document = load_json(read_text(place / ANSWER), with_nan=True)
     except ValueError as problem:
@@ -61,8 +65,8 @@ def read_answer(place: Path) -> dict[str, Any]:
 
 
 def answers_sealed_case(label: dict[str, Any], answer: dict[str, Any]) -> bool:
-    """Whether an answer belongs to the sealed files and comes from a process that had not imported the challenge.
-    True for an answer of a process that died: it contains nothing."""
+    """Whether an answer belongs to the sealed files and comes from a process that had not imported the challenge. True
+    for the answer of a process that died, which contains no diagnosis."""
     if DIED in answer:
         return True
     return answer.get("knows_the_challenge") is False and all(
@@ -71,7 +75,8 @@ def answers_sealed_case(label: dict[str, Any], answer: dict[str, Any]) -> bool:
 
 
 def broken_seal_error(names: list[str], path: Path) -> StudyError:
-    """The error for cases whose files are not what was sealed."""
+    """The error for cases whose files differ from the sealed files. names: of the cases or labels; path: of the
+    bank."""
     return StudyError(
         "A seal is broken",
         f"Of {len(names)} cases ({', '.join(names[:5])}) in {path} the label, the recording or the model is not what "
@@ -82,4 +87,5 @@ def broken_seal_error(names: list[str], path: Path) -> StudyError:
 
 
 def _digest(path: Path) -> str:
+    """SHA-256 of a file; empty where there is none."""
     return sha256_of(path) if path.exists() else ""

@@ -11,8 +11,8 @@ from study.evaluation.bank.prove import BlindTest
 
 
 def blind_test_lines(done: BlindTest) -> Iterator[str]:
-    """Lines for the terminal: every miss, the controls, each share with its 95 % interval, calibration, remarks,
-    seal."""
+    """Lines for the terminal: every miss, the controls, each share with its 95 % interval, the expected calibration
+    error of the probabilities, remarks, the seal of the labels."""
     score = done.score
     yield f"{len(score.misses)} misses in {len(done.outcomes)} cases"
     for miss in score.misses:
@@ -34,7 +34,7 @@ def blind_test_lines(done: BlindTest) -> Iterator[str]:
 
 
 def control_lines(done: BlindTest) -> Iterator[str]:
-    """Number of controls that held, and each one that failed with the answers that it got."""
+    """Number of controls that held, and each failed control with the answers to it."""
     if done.controls:
         yield f"{sum(each.held for each in done.controls)} of {len(done.controls)} controls held"
     for control in done.controls:
@@ -64,7 +64,7 @@ def remarks(done: BlindTest) -> Iterator[str]:
 
 def unanswered(done: BlindTest) -> int:
     """Number of cases whose process died or was killed at every attempt: they have no duration, whereas a diagnosis
-    that failed by itself has one."""
+    that failed by itself has a duration."""
     return sum(each.diagnosis is None and math.isnan(each.seconds) for each in done.outcomes)
 
 

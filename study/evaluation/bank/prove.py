@@ -1,4 +1,8 @@
-"""Run a bank of concealed effects: seal, diagnose in separate processes, reveal, score."""
+"""Runs a bank of concealed effects, a blind test of the diagnosis (`hapteq prove`).
+
+Order: draw and seal the cases, diagnose them in separate processes without access to the truth, reveal and pair labels
+with answers, follow up undecided cases, run the controls, score.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,7 +25,7 @@ from study.evaluation.bank.sealed_bank import BankOptions, Progress, answered_fi
 
 
 def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
-    """Pair a revealed label with the answer of the diagnosis."""
+    """The outcome of a case from its revealed label and the answer of the diagnosis."""
     concealed = tuple(
         Concealed(each["effect"], each["place"], each["axis"], {**each["values"], **each["unseen"]})
         for each in label["truth"]
@@ -36,7 +40,7 @@ def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
 
 
 CONTROL_TURNS = 3
-"""Repetitions of the controls, each with its own seed."""
+"""Repetitions of all controls, each with its own seed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +59,14 @@ class BlindTest:
     """Digests of the code that diagnosed follow-ups and controls."""
     controls: tuple[ControlOutcome, ...]
     followed: tuple[FollowUp, ...]
+    """Cases that were followed up by further experiments."""
     left_out: int
-    """Cases of the second physics engine, where it is not installed."""
+    """Number of cases of the second physics engine, where it is not installed; else 0."""
 
 
 def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> BlindTest:
-    """Run or continue the bank in the folder `path`. Resumable. Raises StudyError."""
+    """Run the bank in the folder `path`, or continue it after an interruption. on_progress: called with the step, the
+    number done and the total. Raises StudyError."""
     folder = open_proof_folder(path, plan.seed, plan.brief)
     numbers = [each.number for each in drawable_cases(plan)]
     with resumable("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
@@ -90,7 +96,7 @@ def _other_digests(path: Path) -> tuple[str, ...]:
 def _answer_cases(
     folder: ProofFolder, plan: BankPlan, options: BankOptions, numbers: Mapping[str, int], on_progress: Progress
 ) -> None:
-    """Diagnose all open cases; deleted recordings are drawn again first. numbers: case number by case name."""
+    """Diagnose the open cases without an answer; a deleted recording is drawn again. numbers: case number by name."""
     for name, number in numbers.items():
         if not is_answered(folder.open / name) and not (folder.open / name / RECORDING).exists():
             redraw_recording(folder.open / name, plan, read_label(folder.label(number)))
@@ -98,6 +104,7 @@ def _answer_cases(
 
 
 def _controls(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> tuple[ControlOutcome, ...]:
+    """Outcomes of the controls, `CONTROL_TURNS` times, where the options request them."""
     found: tuple[ControlOutcome, ...] = ()
     for seed in range(plan.seed, plan.seed + CONTROL_TURNS) if options.controls else ():
         there = path / "controls" / str(seed)

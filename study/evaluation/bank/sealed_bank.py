@@ -1,4 +1,8 @@
-"""Steps that all sealed banks share: check the seals, reveal the labels."""
+"""Steps that all sealed banks (effects and laws) share: check the seals, reveal the labels, pair them with answers.
+
+A label is revealed only if its SHA-256 is the sealed hash, and an answer counts only if it was given to the sealed
+files (`proof_seals`).
+"""
 
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
@@ -20,24 +24,25 @@ from study.store.disk.provenance import sha256_of
 Progress = Callable[[str, int, int], None]
 """Called with the current step, the number done, the total."""
 Found = TypeVar("Found")
+"""Type of an outcome."""
 
 
 @dataclass(frozen=True, slots=True)
 class BankOptions:
-    """How a bank is run."""
+    """Options for running a bank."""
 
     workers: int = 2
-    """Processes of this computer that draw and seal, and diagnose where there is no executor."""
+    """Number of processes of this computer that draw and seal cases, and diagnose them if there is no executor."""
     keep: bool = False
     """Keep recordings after they are answered."""
     controls: bool = False
     """Also run the controls."""
     executor: Executor | None = None
-    """Diagnoses on its workers."""
+    """Executor on whose workers the cases are diagnosed; None: on this computer."""
 
     @property
     def answering(self) -> Workers:
-        """Who diagnoses: the executor, or that many processes of this computer."""
+        """Workers of the diagnosis: the executor, or the number of processes of this computer."""
         return self.workers if self.executor is None else self.executor
 
 
@@ -47,8 +52,8 @@ def reveal_bank(
     outcome_of: Callable[[dict[str, Any], dict[str, Any]], Found],
     is_whole: Callable[[dict[str, Any]], bool] = lambda label: True,
 ) -> tuple[Found, ...]:
-    """Outcomes of the answered cases among the first `cases` numbers. outcome_of: makes an outcome from a label and
-    its answer. is_whole: whether further files under the label's seal are unchanged. Raises StudyError where a seal
+    """Outcomes of the answered cases with numbers below `cases`. outcome_of: makes an outcome from a label and its
+    answer. is_whole: whether further files whose hashes the label holds are unchanged. Raises StudyError where a seal
     is broken."""
     seals = read_seals(folder)
     found: list[Found] = []
@@ -85,6 +90,6 @@ def answered_fields(label: Mapping[str, Any], answer: Mapping[str, Any]) -> dict
 
 
 def engines(folder: ProofFolder, names: Iterable[str]) -> tuple[str, ...]:
-    """Digests of the code that gave the answers; more than one if the code changed during the run."""
+    """Digests of the code that gave the answers to the cases `names`; several if the code changed during the run."""
     answers = [read_answer(folder.open / name) for name in names if (folder.open / name / ANSWER).exists()]
     return tuple(sorted({answer["engine"] for answer in answers if "engine" in answer}))

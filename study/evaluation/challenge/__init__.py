@@ -1,7 +1,8 @@
-"""Generator of the concealed cases: a test bench whose model lacks some of its physics, in equations of its own.
+"""Generator of the concealed cases: simulated devices whose given model lacks some of their physics. It shares no
+equations with the diagnosis.
 
-`rig` (size) -> `bench`, `device` (the true physics, with `effects` built in and `extras` that every device has) ->
-`drive_plan` (excitation) -> `sensor` -> `nominal` (the model a laboratory would have) -> `draw_case`, `draw_bank`.
-`controls`, `injection` (faults put into real recordings) and `second_engine` (MuJoCo) stand beside it. Begin at
-`draw_case.py`.
+`rig` (size) -> `bench`, `device` (the true physics, with `effects` built in and `extras` that every device has; the
+`*_kernel` files integrate it) -> `drive_plan` (excitation) -> `sensor` -> `nominal` (the model that a laboratory would
+have) -> `draw_case`, `draw_bank`. Additional: `laws`, `controls`, `injection` (faults in real recordings) and
+`second_engine` (MuJoCo). Begin at `draw_case.py`.
 """

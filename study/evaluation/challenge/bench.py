@@ -1,4 +1,9 @@
-"""The linear bench: three driven axes at a handle on an elastic ground, with three oscillators attached."""
+"""Linear part of a simulated device, the bench: a handle with three axes on springs and dampers to the ground, with
+three oscillators (structural modes) attached.
+
+Equation of motion: M d2q/dt2 + C dq/dt + K q = (f, 0), where q holds the positions of the handle and of the
+oscillators' masses along their directions, and f is the force on the handle.
+"""
 
 from dataclasses import dataclass
 
@@ -7,15 +12,15 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 OFFSET_KG, OFFSET_STIFFNESS = 0.012, 0.03
-"""Largest off-diagonal terms: mass (kg), and stiffness as a fraction of the mean."""
+"""Largest off-diagonal elements: of the mass (kg), and of the stiffness as a fraction of its mean."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Oscillators:
-    """Masses on springs, each moving along a direction fixed to the handle."""
+    """Masses on springs and dampers, each moving along a direction fixed to the handle."""
 
     frequency_hz: FloatArray
-    """(k,), with the handle held"""
+    """(k,), natural frequency with the handle fixed"""
     mass_kg: FloatArray
     """(k,)"""
     damping_ratio: FloatArray
@@ -26,7 +31,7 @@ class Oscillators:
     def and_one(
         self, frequency_hz: float, mass_kg: float, damping_ratio: float, direction: FloatArray
     ) -> "Oscillators":
-        """Copy with one more oscillator."""
+        """Copy with a further oscillator. direction: unit vector (3,)."""
         return Oscillators(
             np.append(self.frequency_hz, frequency_hz),
             np.append(self.mass_kg, mass_kg),
@@ -48,7 +53,7 @@ class Bench:
     oscillators: Oscillators
 
     def matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Mass, damping and stiffness of handle and oscillators, (3 + k, 3 + k) each."""
+        """Mass (kg), damping (N s/m) and stiffness (N/m) of handle and k oscillators, (3 + k, 3 + k) each."""
         parts = self.oscillators
         spring = parts.mass_kg * (2 * np.pi * parts.frequency_hz) ** 2
         damper = 2 * parts.damping_ratio * np.sqrt(spring * parts.mass_kg)
@@ -63,7 +68,8 @@ class Bench:
 
 
 def draw_bench(random: np.random.Generator) -> Bench:
-    """A bench of the family that the labelled cases come from: rigid below 10 Hz, modes near 11, 95 and 175 Hz."""
+    """Draw the bench of a case: rigid below about 10 Hz, with modes near 11, 95 and 175 Hz. All values are uniformly
+    distributed in the ranges below (kg, N s/m, N/m, Hz), the directions of the oscillators on the sphere."""
     mean_kg = random.uniform(0.17, 0.29)
     mass = np.diag(mean_kg * random.uniform(0.92, 1.08, 3)) + _symmetric(random, OFFSET_KG)
     stiffness_mean = random.uniform(90.0, 210.0)
@@ -81,13 +87,14 @@ def draw_bench(random: np.random.Generator) -> Bench:
 
 
 def _symmetric(random: np.random.Generator, reach: float) -> FloatArray:
+    """Symmetric matrix (3, 3) with zero diagonal and uniform elements between -reach and reach."""
     upper = np.triu(random.uniform(-reach, reach, (3, 3)), 1)
     both: FloatArray = upper + upper.T
     return both
 
 
 def _with_oscillators(ground: FloatArray, each: FloatArray, direction: FloatArray) -> FloatArray:
-    """Damping or stiffness matrix (3 + k, 3 + k) of handle and k oscillators, attached along `direction`."""
+    """Damping or stiffness matrix (3 + k, 3 + k). ground: (3, 3); each: (k,), of the oscillators; direction: (k, 3)."""
     size = 3 + len(each)
     joined = np.zeros((size, size))
     joined[:3, :3] = ground + direction.T @ np.diag(each) @ direction

@@ -1,5 +1,8 @@
-"""Definition of a concealable effect: how its parameters are drawn for a strength, and how it is built into a
-device."""
+"""Definition of a concealable effect: how its parameters are drawn for a strength, and how it is built into a device.
+
+The effects themselves are in `effects`. The strength, 0 to 1, places the main parameter of an effect geometrically
+between its weakest and its strongest value.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -12,26 +15,28 @@ from study.evaluation.challenge.bench import Bench
 from study.evaluation.challenge.device import Device
 
 Place = Literal["mechanism", "hand", "actuator", "sensor"]
-"""Where an effect acts on the way from the command to the record."""
+"""Place on the path of the signal, from the command to the recording, at which an effect acts."""
 Values = Mapping[str, float]
 """Drawn parameters of an effect, by name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EffectContext:
-    """What a draw may use, so that a strength means the same on every bench."""
+    """Data from which the parameters of an effect are drawn, so that a strength means the same on every bench."""
 
     random: np.random.Generator
     strength: float
-    """0 = weakest that is drawn, 1 = strongest; the main parameter lies log-uniformly between."""
+    """0 = weakest, 1 = strongest effect that is drawn; between them, the main parameter is interpolated
+    geometrically."""
     bench: Bench
     axis: int
+    """Axis at which the effect is built in, 0 to 2."""
     travel_m: FloatArray
-    """(3,): largest distance of the handle from the centre without the effect."""
+    """(3,): largest distance of the handle from the centre, per axis, without the effect."""
     peak_mps2: FloatArray
-    """(3,): largest reading without the effect."""
+    """(3,): largest magnitude of the reading, per axis, without the effect."""
     axes: tuple[int, ...] = (0, 1, 2)
-    """Driven and read axes."""
+    """Driven and measured axes."""
 
     def log_between(self, weakest: float, strongest: float) -> float:
         """Geometric interpolation between two values by the strength."""
@@ -54,20 +59,21 @@ class EffectContext:
 
 @dataclass(frozen=True, slots=True)
 class ConcealedEffect:
-    """One effect that can be concealed."""
+    """An effect that can be concealed."""
 
     name: str
-    """Name in the vocabulary; a name of its own for a decoy."""
+    """Name in the vocabulary of effects; a decoy (an effect outside the vocabulary) has another name."""
     place: Place
     of_axis: bool
     """Whether the effect acts on one axis; otherwise on all."""
     draw: Callable[[EffectContext], dict[str, float]]
-    """Parameters by name: those of the vocabulary, and what else `build` needs."""
+    """Draws the parameters, by name: those of the vocabulary, and further parameters that `build` needs."""
     build: Callable[[Device, int, Values], Device]
+    """build(device, axis, values): the device with the effect."""
 
 
 def with_cells(table: FloatArray, axis: int, cells: Mapping[int, float]) -> FloatArray:
-    """A copy of the table with these columns of the axis's row set."""
+    """Copy of a table (3, columns) in which the columns `cells` of the row `axis` are set."""
     changed = table.copy()
     for column, value in cells.items():
         changed[axis, column] = value

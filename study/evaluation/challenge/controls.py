@@ -1,4 +1,9 @@
-"""Control inputs: recordings and models altered such that the correct answer changes in a known way, or not at all."""
+"""Control inputs: recordings and models altered such that the correct answer changes in a known way, or not at all.
+
+Negative controls (shuffled, silent, model of another device) must not be explained by an effect. Symmetry controls
+(axes exchanged, signs mirrored, names changed) must give the corresponding answer. The claims are judged in
+`analysis.evaluation.blind_test.controlled`.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,56 +19,64 @@ from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.sensor import NOISE_MPS2
 
 CONCEALED, STRONG = "force_saturation", 0.9
-"""Effect and strength of the control cases: it acts on one axis, and no other effect resembles it."""
+"""Effect and strength of most control cases; the effect acts on a single axis, and no other effect resembles it."""
 PUSHED = "constant_force"
 """Effect of the control whose signs are mirrored."""
 WRONG = "mains_hum"
-"""The only hypothesis that is left to the control with a wrong catalogue."""
+"""The only hypothesis in the control with a wrong catalogue."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlInput:
-    """Input of one diagnosis."""
+    """Input of a diagnosis."""
 
     recording: Recording
     model: MechanicalModel
     without: tuple[str, ...] = ()
+    """Effects that the diagnosis must not consider."""
 
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """claim: how the answers are judged, in `blind_test.controlled`. draw: makes the inputs from a seed and a rig."""
+    """A control: inputs, and the claim that must hold for the answers to them."""
 
     name: str
     claim: str
+    """Name of the claim in `analysis.evaluation.blind_test.controlled.CLAIMS`."""
     draw: Callable[[int, Rig], tuple[ControlInput, ...]]
+    """Makes the inputs from a seed and a rig."""
 
 
 def _draw_strong(seed: int, rig: Rig) -> Case:
+    """A case with the effect `CONCEALED` at strength `STRONG`."""
     return draw_case(seed, (CONCEALED,), "calibrated", STRONG, "a", rig)
 
 
 def _draw_clean(seed: int, rig: Rig) -> Case:
+    """A case in which the model lacks nothing."""
     return draw_case(seed, (), "calibrated", None, "a", rig)
 
 
 def _plain_input(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    """A case in which the model lacks nothing, unchanged."""
     case = _draw_clean(seed, rig)
     return (ControlInput(case.recording, case.model),)
 
 
 def _shuffle_in_time(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    """Response and position in a random order of the samples, the same for both; the command is unchanged."""
     case = _draw_strong(seed, rig)
     order = np.random.default_rng(seed).permutation(len(case.recording))
     return (ControlInput(_map_samples(case.recording, lambda samples: samples[order], command=False), case.model),)
 
 
 def _other_model_input(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
-    """Recording of one device with the model of another, whose tolerances are as tight as its own."""
+    """Recording of a device with the model of another device, whose stated tolerances are as tight."""
     return (ControlInput(_draw_strong(seed, rig).recording, _draw_clean(seed + 1, rig).model),)
 
 
 def _silent_input(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    """A recording of sensor noise alone, with zero command and no position."""
     case, random = _draw_clean(seed, rig), np.random.default_rng(seed)
     shape = case.recording.response.samples.shape
     noise = np.array(NOISE_MPS2)[list(rig.axes)] * random.normal(size=shape)
@@ -104,18 +117,21 @@ def _exchange_axes(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
 
 
 def _mirror_signs(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    """A recording with a constant force, and the same with command, response and position negated."""
     case = draw_case(seed, (PUSHED,), "calibrated", STRONG, "a", rig)
     turned = _map_samples(case.recording, lambda samples: -samples)
     return ControlInput(case.recording, case.model), ControlInput(turned, case.model)
 
 
 def _exclude_irrelevant(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    """The same input without and with the hypotheses of the sensor, none of which is the concealed effect."""
     case = _draw_strong(seed, rig)
     irrelevant = tuple(effect_name.name for effect_name in EFFECT_NAMES if effect_name.place == "sensor")
     return ControlInput(case.recording, case.model, irrelevant), ControlInput(case.recording, case.model)
 
 
 def _rename_channels(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    """The same data under other names of device and channels."""
     case = _draw_strong(seed, rig)
     recording, new = case.recording, tuple(f"q{number}" for number in range(len(rig.axes)))
     other = replace(
@@ -129,6 +145,7 @@ def _rename_channels(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
 
 
 def _allow_one_wrong(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+    """The diagnosis may consider the effect `WRONG` only, which is not the concealed effect."""
     case = _draw_strong(seed, rig)
     return (
         ControlInput(
@@ -140,7 +157,7 @@ def _allow_one_wrong(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
 
 
 def _map_samples(recording: Recording, how: Callable[[FloatArray], FloatArray], command: bool = True) -> Recording:
-    """The recording with `how` applied to response and position, and to the command unless stated otherwise."""
+    """The recording with `how` applied to response and position, and to the command if `command` is True."""
     position = recording.position
     return replace(
         recording,

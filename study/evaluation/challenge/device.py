@@ -1,4 +1,8 @@
-"""The true device: a bench with all physics that its model may lack. `record` measures it."""
+"""The true device of a case: the linear bench with all physics that its model may lack, and its sensor.
+
+Path of the signal: command -> law of the drive, skipped commands -> `actuator_kernel` -> `mechanism_kernel` (motion)
+-> `sensor` (readings). By default a device has none of the effects. `record` measures it.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,18 +23,21 @@ STEPS = 20
 
 
 def _no_forces() -> FloatArray:
+    """Table of forces without any force, its end stops at infinity."""
     forces = np.zeros((3, 11))
     forces[:, handle.ABOVE], forces[:, handle.BELOW] = np.inf, -np.inf
     return forces
 
 
 def _exact_amplifiers() -> FloatArray:
+    """Table of amplifiers whose force equals the command."""
     amplifiers = np.zeros((3, 9))
     amplifiers[:, GAIN] = 1.0
     return amplifiers
 
 
 def _no_play() -> FloatArray:
+    """Play on no axis."""
     return np.array([-1.0, 0.0, 0.0, 0.0, 0.0])
 
 
@@ -41,30 +48,38 @@ class Device:
 
     bench: Bench
     amplifiers: FloatArray = field(default_factory=_exact_amplifiers)
-    """(3, 9)"""
+    """(3, 9), columns in `actuator_kernel`"""
     friction: FloatArray = field(default_factory=lambda: np.zeros((3, 7)))
+    """(3, 7), columns in `friction_kernel`"""
     forces: FloatArray = field(default_factory=_no_forces)
-    """(3, 11)"""
+    """(3, 11), columns in `handle_force_kernel`"""
     inertia_per_m: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """(3,), 1/m: relative change of the whole handle's inertia with the position along each axis"""
     axis_mass_per_m: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """(3,), kg/m: change of the mass for motion along an axis with the position along it"""
     varying: FloatArray = field(default_factory=lambda: np.zeros((3, 5)))
+    """(3, 5), columns in `mechanism_kernel`"""
     play: FloatArray = field(default_factory=_no_play)
+    """(5,), columns in `mechanism_kernel`"""
     creep_stiffness: FloatArray = field(default_factory=lambda: np.zeros((3, 1)))
+    """(3, elements), N/m: springs to the ground, each in series with a damper"""
     creep_time_s: FloatArray = field(default_factory=lambda: np.ones(1))
+    """(elements,), s: relaxation times of these elements"""
     coupling: float = 0.0
+    """N/m^2: coupling of the axes x and y, with the potential coupling * x^2 y / 2"""
     skipped: int = 0
-    """Every n-th command is not written; 0 = none."""
+    """Every n-th command is not written, so that the previous command is held; 0 = none."""
     laws: FloatArray = field(default_factory=lambda: np.zeros((0, COLUMNS)))
     """(laws, 7), columns in `law_kernel`"""
     drive_law: Callable[[FloatArray], FloatArray] | None = None
-    """Maps the commands (samples, 3) before they reach the amplifiers."""
+    """Maps the commands (samples, 3), N, before they reach the amplifiers."""
     sensor: Sensor = field(default_factory=Sensor)
     steps: int = STEPS
     """Integration steps per sample."""
 
     def mechanism(self) -> Mechanism:
-        """Parameters of the simulation's kernel, in SI units. The motor's mass is taken off the axis with play, behind
-        which it moves by itself."""
+        """Parameters for `mechanism_kernel.move`, in SI units. On an axis with play the motor moves separately, so its
+        mass is subtracted from the mass matrix."""
         mass, damping, stiffness = self.bench.matrices()
         axis = int(self.play[AXIS])
         if axis >= 0:
@@ -87,7 +102,7 @@ def motion(device: Device, command: FloatArray) -> tuple[FloatArray, FloatArray]
 def whole_motion(device: Device, command: FloatArray) -> Motion:
     """True motion of the handle, with velocity and the forces of its laws. command: (samples, 3), N.
 
-    Raises ValueError where the motion diverges: the drawn parameters contradict each other.
+    Raises ValueError where the motion is not finite or exceeds 1 m: the parameters make the integration unstable.
     """
     written = command.copy() if device.drive_law is None else device.drive_law(command)
     if device.skipped:
@@ -100,6 +115,7 @@ def whole_motion(device: Device, command: FloatArray) -> Motion:
 
 
 def record(device: Device, command: FloatArray, random: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Measured acceleration and position, (samples, 3) each."""
+    """Measured acceleration (m/s^2) and position (m), (samples, 3) each. command: (samples, 3), N; random: of the
+    sensor's noise. Raises ValueError as `whole_motion`."""
     acceleration, position = motion(device, command)
     return read(device.sensor, acceleration, position, RATE_HZ, random)

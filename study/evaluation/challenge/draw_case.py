@@ -1,4 +1,8 @@
-"""A concealed-physics case from one seed: a recording, a model that lacks some physics, and the truth."""
+"""Draws a case of the blind test from a seed: a recording, a model that lacks some physics, and the truth.
+
+Steps: draw bench and excitation, add nuisance effects (`extras`), draw and build in the concealed effects, simulate and
+measure, make the model that a laboratory would have (`nominal`).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -27,25 +31,25 @@ EFFECTS: dict[str, ConcealedEffect] = {
 }
 """All effects of the vocabulary."""
 DECOYS: dict[str, ConcealedEffect] = {effect.name: effect for effect in decoys.DECOYS}
-"""Effects outside the vocabulary."""
+"""Effects outside the vocabulary, which a diagnosis must not name."""
 
 Concealed = Literal["calibrated", "retuned"]
 """How the given model was made: `calibrated` from the device without the effect, `retuned` on the recording itself."""
 MotionPair = tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
-"""Acceleration and position of a first device, then of a second."""
+"""Acceleration (m/s^2) and position (m), (samples, 3) each, of a first device, then of a second."""
 
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """One effect that the device has and the model lacks."""
+    """An effect that the device has and the model lacks."""
 
     effect: str
     place: str
     axis: str | None
     values: dict[str, float]
-    """Parameters by their names in the vocabulary; a decoy has its own."""
+    """Parameters by their names in the vocabulary; all parameters of a decoy."""
     unseen: dict[str, float]
-    """Parameters without a name in the vocabulary: which variant of the effect was drawn."""
+    """Parameters without a name in the vocabulary, which select the variant of the effect."""
 
 
 Again = Callable[[FloatArray, str, float, int], Recording]
@@ -55,18 +59,19 @@ noise seed."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A recording with a model that lacks something, and the truth."""
+    """A recording with a model that lacks some physics, and the truth."""
 
     recording: Recording
     model: MechanicalModel
     truth: tuple[Truth, ...]
     again: Again
+    """Records the same device again under other commands."""
     adds: float = 0.0
     """Detectability: change of the readings by the concealed effects over the noise, both rms, in the worst channel."""
 
 
 NOISE = np.array([*NOISE_MPS2, *[float(np.hypot(POSITION_NOISE_M, POSITION_STEP_M / 12**0.5))] * 3])
-"""Standard deviation of the noise of acceleration (m/s^2), then position (m)."""
+"""Standard deviation of the noise of acceleration (m/s^2), then of position (m), which includes its quantization."""
 
 
 def draw_case(
@@ -77,8 +82,8 @@ def draw_case(
     name: str = "",
     rig: Rig = WHOLE,
 ) -> Case:
-    """Draw one case. effects: names from the vocabulary or DECOYS; none = nothing is missing. strength: 0 (weakest) to
-    1, one for all or one each; None draws it uniformly. The same arguments give the same case.
+    """Draw a case. effects: names from EFFECTS or DECOYS; none = nothing is missing. strength: 0 (weakest) to 1, a
+    single value for all or a value each; None draws it uniformly. The same arguments give the same case.
 
     Raises ValueError for an unknown name, a strength outside 0..1, or a hand with a re-tuned model, which would absorb
     the hand into the device.
@@ -112,10 +117,11 @@ def draw_case(
 
 
 def visibility(bare: Device, device: Device, moved: MotionPair, rig: Rig) -> float:
-    """Difference of two devices' readings over the noise, both rms, in the worst channel. moved: the motion of each."""
+    """Difference between the readings of two devices over the noise, both rms, in the worst channel of acceleration or
+    position. moved: the motion of each device."""
     readings = []
     for each, (acceleration, position) in zip((bare, device), moved, strict=True):
-        # The same noise and the same losses for both: what is left is the difference of the devices.
+        # The same noise and lost samples for both, so that the difference of the readings is that of the devices.
         seen, _ = read(each.sensor, acceleration, position, RATE_HZ, np.random.default_rng(0))
         readings.append(np.hstack([seen[:, rig.axes], position[:, rig.axes]]))
     noise = NOISE[[*rig.axes, *(3 + axis for axis in rig.axes)]]
@@ -124,6 +130,7 @@ def visibility(bare: Device, device: Device, moved: MotionPair, rig: Rig) -> flo
 
 
 def _find_effect(name: str) -> ConcealedEffect:
+    """The effect or decoy with this name. Raises ValueError for an unknown name."""
     found = EFFECTS.get(name) or DECOYS.get(name)
     if found is None:
         raise ValueError(f"there is no way to conceal '{name}'; known are {', '.join((*EFFECTS, *DECOYS))}")
@@ -131,6 +138,7 @@ def _find_effect(name: str) -> ConcealedEffect:
 
 
 def _strengths(given: float | Sequence[float] | None, count: int, random: np.random.Generator) -> FloatArray:
+    """(count,): the given strengths, or uniform draws. Raises ValueError for a strength outside 0..1."""
     drawn = random.random(count) if given is None else np.broadcast_to(np.asarray(given, dtype=np.float64), (count,))
     if ((drawn < 0.0) | (drawn > 1.0)).any():
         raise ValueError(f"strength is {given}; it must lie between 0 and 1")
@@ -144,8 +152,8 @@ def _conceal(
     random: np.random.Generator,
     rig: Rig,
 ) -> tuple[Device, tuple[Truth, ...]]:
-    """Draw the parameters of the effects and build them into the device. free: acceleration and position without
-    them."""
+    """Draw the parameters of the effects, each for a random axis of the rig, and build them into the device. free:
+    acceleration and position without the effects. wanted: the effects and their strengths."""
     (chosen, strengths), (acceleration, position) = wanted, free
     bench, truth = device.bench, []
     peak = np.minimum(np.abs(acceleration).max(axis=0), RANGE_MPS2)
@@ -160,7 +168,8 @@ def _conceal(
 
 
 def further_plan(command: FloatArray, kind: str, rig: Rig) -> DrivePlan:
-    """Excitation plan of a further recording. command: (samples, axes), N."""
+    """Excitation plan of a further recording, a single segment to fit. command: (samples, axes), N; kind: of
+    excitation."""
     whole = np.zeros((len(command), 3))
     whole[:, rig.axes] = command
     return DrivePlan(whole, (Segment(0, len(whole), kind, float(np.abs(whole).max()), 0, "fit"),))

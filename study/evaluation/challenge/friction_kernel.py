@@ -1,4 +1,11 @@
-"""Dry friction as a relaxed bristle: one integration step on one axis (compiled)."""
+"""Dry friction on one axis as a bristle, in an integration step (compiled).
+
+Dahl's model with a level that depends on position x and velocity v:
+
+    dz/dt = v - |v| K z / L,    F = -K z,    L = level (1 + slope x + bend x^2) (1 + (ratio - 1) exp(-(v/speed)^2))
+
+z: deflection of the bristle (m); K: its stiffness (N/m); the last factor is Stribeck's. No friction where L <= 0.
+"""
 
 from math import exp
 
@@ -7,17 +14,18 @@ from numba import njit
 from equalizer.signals.signal import FloatArray
 
 POSITIVE, NEGATIVE, STATIC_RATIO, SPEED, STIFFNESS, SLOPE, BEND = range(7)
-"""Columns of an axis: level (N) while moving forwards, level (N) while moving backwards, ratio of static to moving
-level, speed at which that excess has fallen to 1/e (m/s), bristle stiffness (N/m), change of the level with position
-(1/m and 1/m^2)."""
+"""Columns of an axis: level (N) for positive velocity, level (N) for negative velocity, ratio of static to moving
+level, speed at which the excess of the static level has fallen to 1/e (m/s), stiffness of the bristle (N/m), change of
+the level with position (1/m and 1/m^2)."""
 
 
 @njit(cache=True, nogil=True)
 def bristle_force(row: FloatArray, x: float, v: float, bend: float, step_s: float) -> tuple[float, float]:
-    """Force on the handle (N) and new deflection of the bristle (m).
+    """Force on the handle (N) and new deflection of the bristle (m). row: the columns above; x (m), v (m/s); bend: old
+    deflection (m).
 
-    The deflection follows the motion and relaxes towards level / stiffness. The relaxation is integrated implicitly, so
-    that a stiff bristle does not oscillate from step to step.
+    The relaxation of the deflection is integrated implicitly, so that a stiff bristle does not oscillate from step to
+    step.
     """
     level = row[POSITIVE] if v > 0.0 else row[NEGATIVE]
     level *= 1.0 + (row[SLOPE] + row[BEND] * x) * x

@@ -1,4 +1,9 @@
-"""Position- and velocity-dependent forces on one axis of the handle at one instant (compiled)."""
+"""Forces on one axis of the handle that depend on its position x and velocity v only (compiled).
+
+    F = c - k2 x^2 - k3 x^3 + A sin(2 pi x / pitch + phase) - (b |v| + d x^2) v - k_s (x - x_s) beyond an end stop x_s
+
+`mechanism_kernel` adds it to the motion at every integration step.
+"""
 
 from math import pi, sin
 
@@ -7,13 +12,14 @@ from numba import njit
 from equalizer.signals.signal import FloatArray
 
 CONSTANT, SQUARE, CUBE, RIPPLE, PITCH, PHASE, ABOVE, BELOW, STOP, DRAG, DAMPING_SQUARE = range(11)
-"""Columns of an axis: N; N/m^2; N/m^3; amplitude (N), pitch (m) and phase (rad) of cogging; upper and lower position
-(m) at which an end stop begins, and its N/m; N s^2/m^2; N s/m per square metre from the centre."""
+"""Columns of an axis: constant force c (N); k2 (N/m^2); k3 (N/m^3); amplitude A (N), pitch (m) and phase (rad) of
+cogging; upper and lower position (m) at which an end stop begins, and its stiffness k_s (N/m); quadratic damping b
+(N s^2/m^2); position-dependent damping d (N s/m^3)."""
 
 
 @njit(cache=True, nogil=True)
 def handle_force(row: FloatArray, x: float, v: float) -> float:
-    """Force on the handle, N."""
+    """Force on the handle, N. row: the columns above; x (m), v (m/s)."""
     force: float = row[CONSTANT] - (row[SQUARE] + row[CUBE] * x) * x * x
     force -= (row[DRAG] * abs(v) + row[DAMPING_SQUARE] * x * x) * v
     if row[RIPPLE] != 0.0:

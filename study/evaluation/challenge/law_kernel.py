@@ -1,4 +1,7 @@
-"""Forces outside the catalogue, one row per law, at one integration step (compiled)."""
+"""Forces of concealed laws outside the catalogue, a row for each law, at an integration step (compiled).
+
+The formulas and the ranges of their parameters are in `laws.concealed_laws`, by the same kinds.
+"""
 
 from math import atan, pi, sin, sqrt, tanh
 
@@ -7,19 +10,22 @@ from numba import njit
 from equalizer.signals.signal import FloatArray
 
 KIND, AXIS, OTHER, FACTOR, FIRST, SECOND, SIDE = range(7)
-"""Columns of a row: law; axis on which it acts; another axis; its three parameters; +1 or -1 for a side."""
+"""Columns of a row: kind of law; axis on which it acts; another axis; size k and parameters a and b of its formula; its
+sign s, +1 or -1."""
 COLUMNS = 7
-"""Columns of a row."""
+"""Number of columns of a row."""
 (
     SPEED_POWER, PLACE_POWER, PLACE_DRAG, SPEED_SPRING, ATTRACTION, SOFT_DRAG, SOFT_SPRING, FADING_DRAG, CONTACT,
     EDGE_DRAG, GAIN_RIPPLE, PUMPED, RELAXATION, HEATING, CROSS_SQUARE, CROSS_SPRING, CROSS_DRAG, WHIRL, ALL_DRAG,
 ) = range(19)  # fmt: skip
-"""Kinds: of the axis's own motion, then with more, then across; `LAW_KINDS` in `concealed_laws` says what each is."""
+"""Kinds of law: of the axis's own motion (to EDGE_DRAG), of command, time or a memory (to HEATING), of two axes. The
+order matters for `law_force`; `LAW_KINDS` in `laws.concealed_laws` gives the formulas."""
 
 
 @njit(cache=True, nogil=True)
 def law_force(row: FloatArray, q: FloatArray, v: FloatArray, drive: FloatArray, kept: float, t: float) -> float:
-    """Force along the row's axis, N. kept: state of a law with memory (`law_memory`)."""
+    """Force along the row's axis, N. q: positions (m); v: velocities (m/s); drive: forces of the drives (N); kept:
+    state of a law with memory (`law_memory`); t: time (s)."""
     kind, j, k = int(row[KIND]), int(row[AXIS]), int(row[OTHER])
     if kind >= CROSS_SQUARE:
         return _cross_axis_force(row, q[j], v[j], q[k], v[k])
@@ -30,7 +36,7 @@ def law_force(row: FloatArray, q: FloatArray, v: FloatArray, drive: FloatArray, 
 
 @njit(cache=True, nogil=True)
 def _own_motion_force(row: FloatArray, x: float, speed: float) -> float:
-    """Laws of the axis's own position and velocity."""
+    """Force of a law of the axis's own position (m) and velocity (m/s), N."""
     kind, first, side = int(row[KIND]), row[FIRST], row[SIDE]
     if kind == SPEED_POWER:
         force = abs(speed) ** first * (1.0 if speed > 0.0 else -1.0)
@@ -58,7 +64,7 @@ def _own_motion_force(row: FloatArray, x: float, speed: float) -> float:
 
 @njit(cache=True, nogil=True)
 def _command_or_memory_force(row: FloatArray, x: float, drive: float, kept: float, t: float) -> float:
-    """Laws of the command, the time or a memory state."""
+    """Force of a law of the drive force, the time or a memory state, N."""
     kind, first, second = int(row[KIND]), row[FIRST], row[SECOND]
     if kind == GAIN_RIPPLE:
         force = -drive * sin(2.0 * pi * x / first + second)
@@ -74,7 +80,7 @@ def _command_or_memory_force(row: FloatArray, x: float, drive: float, kept: floa
 
 @njit(cache=True, nogil=True)
 def _cross_axis_force(row: FloatArray, x: float, speed: float, other_x: float, other_speed: float) -> float:
-    """Laws of another axis's motion."""
+    """Force of a law of the motion of two axes, N."""
     kind, side = int(row[KIND]), row[SIDE]
     if kind == CROSS_SQUARE:
         force = side * other_x * other_x
@@ -92,7 +98,8 @@ def _cross_axis_force(row: FloatArray, x: float, speed: float, other_x: float, o
 
 @njit(cache=True, nogil=True)
 def law_memory(row: FloatArray, q: FloatArray, drive: FloatArray, kept: float, step_s: float) -> float:
-    """Memory state at the end of the step."""
+    """Memory state at the end of a step, a first-order low pass (explicit Euler) with the time constant a (s): of the
+    position (RELAXATION, m) or of the squared drive force (HEATING, N^2). Other laws have none."""
     kind, j, now = int(row[KIND]), int(row[AXIS]), kept
     if kind == RELAXATION:
         now += (q[j] - kept) * step_s / row[FIRST]
@@ -105,8 +112,8 @@ def law_memory(row: FloatArray, q: FloatArray, drive: FloatArray, kept: float, s
 def law_forces(
     rows: FloatArray, at: tuple[FloatArray, FloatArray, FloatArray], kept: FloatArray, t: float, out: FloatArray
 ) -> None:
-    """Add up all laws in `out` (3,), N. at: positions, velocities and drive forces, of which the first three count.
-    kept: memory states (laws,)."""
+    """Sum of the forces of all laws, in `out` (3,), N. at: positions, velocities and drive forces, of which the first
+    three elements (the handle's) are used. kept: memory states (laws,)."""
     out[:] = 0.0
     for number in range(rows.shape[0]):
         out[int(rows[number, AXIS])] += law_force(rows[number], at[0], at[1], at[2], kept[number], t)

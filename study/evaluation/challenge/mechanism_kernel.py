@@ -1,8 +1,12 @@
-"""Equations of motion of the mechanism: semi-implicit Euler, many steps per sample (compiled).
+"""Equations of motion of the mechanism, integrated by semi-implicit Euler with many steps per sample (compiled).
 
-Velocity is updated first, then position, so that a velocity belongs half a step before its position. Damping and
-friction use the velocity extrapolated by half a step with the previous acceleration: otherwise all modes would seem
-lighter by damping times half a step.
+    M(q) d2q/dt2 = -C dq/dt - K q + (drive + friction + handle forces + creep + time-varying forces + laws, 0)
+
+q: positions of the handle (3) and of the attached oscillators. Optionally, the drive force acts through play.
+
+The velocity is updated first, then the position, so that a velocity belongs half a step before its position. Damping
+and friction use the velocity extrapolated by half a step with the previous acceleration: otherwise the mass of each
+mode would seem smaller by its damping times half a step.
 """
 
 from math import pi, sin
@@ -17,37 +21,37 @@ from study.evaluation.challenge.handle_force_kernel import handle_force
 from study.evaluation.challenge.law_kernel import law_forces, law_memory
 
 RATE, DAMPING_DEPTH, STIFFNESS_DEPTH, TURN, SQUARE = range(5)
-"""Columns of `varying`: frequency (Hz), modulation of the ground's damping (N s/m) and stiffness (N/m), phase (rad),
-1 = square wave."""
+"""Columns of `varying`: frequency (Hz, 0 = none), amplitude of the modulation of the ground's damping (N s/m) and
+stiffness (N/m), phase (rad), 1 = square wave, 0 = sine."""
 AXIS, MOTOR_MASS, GAP, CONTACT, CONTACT_DAMPING = range(5)
 """Columns of `play`: axis (-1 = none), motor mass (kg), total gap (m), contact stiffness (N/m) and damping (N s/m)."""
 
 
 class Mechanism(NamedTuple):
-    """Parameters in the coordinates of the handle, then of the attached oscillators: n in all."""
+    """Parameters, in the coordinates of the handle (3), then of the attached oscillators: n in total."""
 
     inverse_mass: FloatArray
-    """(n, n), 1/kg; of the handle without the motor, where there is play."""
+    """(n, n), 1/kg; without the mass of the motor on an axis with play"""
     damping: FloatArray
-    """(n, n)"""
+    """(n, n), N s/m"""
     stiffness: FloatArray
-    """(n, n)"""
+    """(n, n), N/m"""
     friction: FloatArray
     """(3, 7), columns in `friction_kernel`"""
     forces: FloatArray
     """(3, 11), columns in `handle_force_kernel`"""
     inertia_per_m: FloatArray
-    """(3,), of the whole handle, along each axis"""
+    """(3,), 1/m: relative change of the whole handle's inertia with the position along each axis"""
     axis_mass_per_m: FloatArray
-    """(3,), kg/m, of one axis's motion alone, along that axis"""
+    """(3,), kg/m: change of the mass for motion along an axis with the position along it"""
     varying: FloatArray
-    """(3, 5), one row for each axis"""
+    """(3, 5), a row for each axis, columns above"""
     play: FloatArray
-    """(5,)"""
+    """(5,), columns above"""
     creep_stiffness: FloatArray
-    """(3, elements), N/m"""
+    """(3, elements), N/m: springs to the ground, each in series with a damper (Maxwell elements)"""
     creep_share: FloatArray
-    """(elements,), relaxed fraction of the remaining creep in one step."""
+    """(elements,), step over relaxation time: fraction of a spring's deflection that relaxes in a step"""
     coupling: float
     """N/m^2: the potential coupling * x^2 y / 2."""
     laws: FloatArray
@@ -55,13 +59,13 @@ class Mechanism(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion at the samples, (samples, 3) each, SI."""
+    """Motion of the handle at the samples, (samples, 3) each, SI units."""
 
     acceleration: FloatArray
     position: FloatArray
     velocity: FloatArray
     lawful: FloatArray
-    """N, force of the laws alone, at the start of the sample."""
+    """N, force of the laws (`law_kernel`) alone, at the start of the sample."""
 
 
 @njit(cache=True, nogil=True)
@@ -113,9 +117,9 @@ def _accelerate_before(
     f: FloatArray,
     a: FloatArray,
 ) -> None:
-    """Acceleration under the drive force that acted until now, in the laws of the command as well. at: positions,
-    velocities, that drive force. laws: memory states, the time, and the laws' forces under the next drive force, which
-    are in `f`."""
+    """Acceleration `a` (n,) under the drive force of the previous step, also in laws of the command. at: positions,
+    velocities, that drive force. laws: memory states, time (s), and the forces of the laws under the drive force of
+    this step, which `f` contains."""
     kept, t, pushed = laws
     if m.laws.shape[0] == 0:
         _accelerate(m, at[0], f, at[2], a)
@@ -129,6 +133,7 @@ def _accelerate_before(
 
 @njit(cache=True, nogil=True)
 def _inner(m: Mechanism, q: FloatArray, v: FloatArray, f: FloatArray) -> None:
+    """Set `f` (n,) to the linear forces -K q - C v, N."""
     n = f.shape[0]
     for i in range(n):
         total = 0.0
@@ -139,7 +144,7 @@ def _inner(m: Mechanism, q: FloatArray, v: FloatArray, f: FloatArray) -> None:
 
 @njit(cache=True, nogil=True)
 def _ground(m: Mechanism, q: FloatArray, v: FloatArray, bend: FloatArray, h: float, f: FloatArray) -> None:
-    """Add the forces between handle and ground to `f`."""
+    """Add friction, `handle_force` and the coupling of x and y to `f`. bend: deflections of the bristles, updated."""
     for j in range(3):
         rubbing, bend[j] = bristle_force(m.friction[j], q[j], v[j], bend[j], h)
         f[j] += rubbing + handle_force(m.forces[j], q[j], v[j])
@@ -150,7 +155,7 @@ def _ground(m: Mechanism, q: FloatArray, v: FloatArray, bend: FloatArray, h: flo
 
 @njit(cache=True, nogil=True)
 def _slow_ground(m: Mechanism, q: FloatArray, v: FloatArray, slow: FloatArray, t: float, f: FloatArray) -> None:
-    """Add creep and time-varying forces to `f`."""
+    """Add creep and time-varying forces to `f`. slow: relaxed part of the creep springs' deflection, updated; t: s."""
     for j in range(3):
         for e in range(slow.shape[1]):
             if m.creep_stiffness[j, e] != 0.0:
@@ -168,7 +173,8 @@ def _slow_ground(m: Mechanism, q: FloatArray, v: FloatArray, slow: FloatArray, t
 def _through_play(
     play: FloatArray, q: FloatArray, v: FloatArray, motor: FloatArray, drive: FloatArray, h: float
 ) -> None:
-    """Move the motor and replace its drive force by the contact force."""
+    """Move the motor and replace its drive force by the contact force: a spring and a damper where the motor, relative
+    to the handle, is beyond half of the gap. motor: its position and velocity, updated."""
     j = int(play[AXIS])
     apart, closing = motor[0] - q[j], motor[1] - v[j]
     into = max(apart - 0.5 * play[GAP], 0.0) + min(apart + 0.5 * play[GAP], 0.0)
@@ -182,6 +188,7 @@ def _through_play(
 
 @njit(cache=True, nogil=True)
 def _accelerate(m: Mechanism, q: FloatArray, f: FloatArray, drive: FloatArray, a: FloatArray) -> None:
+    """Acceleration `a` (n,). A mass added to a single axis enters by the Sherman-Morrison formula."""
     n = f.shape[0]
     heavier = 1.0 + m.inertia_per_m[0] * q[0] + m.inertia_per_m[1] * q[1] + m.inertia_per_m[2] * q[2]
     for i in range(n):

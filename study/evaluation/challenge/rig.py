@@ -1,27 +1,28 @@
-"""Size of a bench: driven axes, length of the recording, amount of unlabelled physics."""
+"""Size of a simulated case: driven axes, length of the recording, size of the nuisance effects, integration step."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """The other axes move passively: their parameters are known."""
+    """Size of a case. Axes that are not driven move passively, and their parameters are known exactly."""
 
     axes: tuple[int, ...] = (0, 1, 2)
-    """Driven and read axes."""
+    """Driven and measured axes."""
     period: int = 2000
     """Period of a multisine (samples); sweeps and slow sines scale with it."""
     periods: int = 4
+    """Periods of each multisine for the fit."""
     extras: float = 0.0
-    """Factor of the unlabelled effects of real devices; 1 = barely visible."""
+    """Factor of the nuisance effects (`extras`), which no label names; 0 = none, 1 = about a tenth of the noise."""
 
     steps: int = 20
     """Integration steps per sample. At 20 the integration error looks like a sensor gain error of 0.2 % on one axis."""
     loud_n: float = 0.0
-    """Level (N) of an additional test stretch with all axes at once; 0 = none."""
+    """Level (N) of an additional test segment with all axes at once; 0 = none."""
 
     def along(self, samples: int) -> int:
-        """A duration (samples) of the whole rig's drive, scaled to this period."""
+        """Scale a duration (samples), stated for a period of 2000 samples, to this period."""
         return samples * self.period // 2000
 
 

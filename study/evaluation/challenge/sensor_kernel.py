@@ -1,4 +1,4 @@
-"""First-order lag and play hysteresis of a sensor at the sample rate (compiled)."""
+"""First-order lag and play hysteresis of a simulated sensor, at the sample rate (compiled); used by `sensor`."""
 
 import numpy as np
 from numba import njit
@@ -8,7 +8,7 @@ from equalizer.signals.signal import FloatArray
 
 @njit(cache=True, nogil=True)
 def one_pole(samples: FloatArray, share: float) -> FloatArray:
-    """First-order low-pass y += share (x - y) from rest. samples: (n, channels)."""
+    """First-order low-pass y += share (x - y), with y = 0 at the start. samples: (n, channels); share: 0 to 1."""
     smoothed = np.zeros(samples.shape)
     for j in range(samples.shape[1]):
         y = 0.0
@@ -20,8 +20,8 @@ def one_pole(samples: FloatArray, share: float) -> FloatArray:
 
 @njit(cache=True, nogil=True)
 def play_hysteresis(samples: FloatArray, half_width: float) -> FloatArray:
-    """Play operator: the output moves only once the input has moved by `half_width` beyond it. samples: (n,
-    channels)."""
+    """Play operator: the output stays within `half_width` of the input and moves only when it must; 0 at the start.
+    samples: (n, channels)."""
     followed = np.zeros(samples.shape)
     for j in range(samples.shape[1]):
         y = 0.0

@@ -1,4 +1,8 @@
-"""Blind test for a laboratory: draw the order of physical changes and seal the table by its SHA-256."""
+"""Blind test for a laboratory: draws the random order of physical changes to a device, and seals the table of labels.
+
+The seal is a commitment by hash: the SHA-256 of the table is published before the recordings are diagnosed, so that the
+labels cannot be changed to suit the answers. `score_kit` scores the answers.
+"""
 
 import secrets
 from pathlib import Path
@@ -14,14 +18,15 @@ from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import read_text, write_text
 
 SEAL_SUFFIX = ".sha256"
-"""Added to the name of the table."""
+"""Suffix of the seal file, added to the name of the table."""
 CORRECT_FIRST = "Correct it before it is sealed; from then on nothing in it may be changed."
+"""Advice for an invalid table."""
 
 
 def draw_labels(out: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
     """Write a table with every change `repeats` times, and the control (nothing is changed) twice as often, in random
-    order. Each row has a random salt, so that the seal's hash does not reveal the order to a reader who tries all
-    orders. seed: None draws a secret one. Raises AlreadyThereError, CannotWriteError."""
+    order. Each row has a random salt, so that the order cannot be found by trying all orders against the seal's hash.
+    seed: of the order; None draws a secret seed. Raises AlreadyThereError, CannotWriteError."""
     every = [change.name for change in CHANGES for _ in range(repeats * (2 if change.name == NOTHING else 1))]
     order = np.random.default_rng(secrets.randbits(64) if seed is None else seed).permutation(len(every))
     labels = tuple(
@@ -33,7 +38,8 @@ def draw_labels(out: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
 
 
 def read_labels(path: Path) -> tuple[Label, ...]:
-    """The rows of a table of labels. Raises CannotReadError, UnusableFileError."""
+    """The rows of a table of labels. Raises CannotReadError; UnusableFileError for an invalid or empty table, an
+    unknown change, or a recording that appears twice."""
     try:
         labels = rows_from_csv(read_text(path), Label)
     except CsvError as error:
@@ -52,8 +58,8 @@ def read_labels(path: Path) -> tuple[Label, ...]:
 
 
 def seal_labels(path: Path) -> str:
-    """SHA-256 of the table's bytes, also written beside it in the format of `sha256sum --check`. A sealed table
-    keeps its seal. Raises StudyError where the table is invalid or was sealed with other content."""
+    """SHA-256 of the table's bytes, also written to the file `seal_of` in the format of `sha256sum --check`. An
+    existing seal is not replaced. Raises StudyError where the table is invalid or was sealed with other content."""
     read_labels(path)
     digest, seal = sha256_of(path), seal_of(path)
     if not seal.exists():
@@ -70,12 +76,12 @@ def seal_labels(path: Path) -> str:
 
 
 def seal_of(path: Path) -> Path:
-    """Path of the seal file of a table."""
+    """Path of the seal file of a table, in the same folder."""
     return path.with_name(path.name + SEAL_SUFFIX)
 
 
 def read_sealed_hash(path: Path) -> str:
-    """Hash in the seal file beside the table; empty where there is none. Raises CannotReadError."""
+    """Hash in the seal file of a table, lower case; empty where there is none. Raises CannotReadError."""
     seal = seal_of(path)
     texts = read_text(seal).split() if seal.exists() else []
     return texts[0].lower() if texts else ""

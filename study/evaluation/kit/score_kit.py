@@ -1,4 +1,8 @@
-"""Score a laboratory's blind test: the revealed table against the diagnoses."""
+"""Score a laboratory's blind test: compare the revealed table of physical changes with the diagnoses.
+
+The table was sealed by its SHA-256 before the diagnoses (`hapteq kit seal`). Its hash is checked first, so that labels
+that were changed afterwards are refused. `analysis.evaluation.blind_test.lab_kit` defines which diagnoses are right.
+"""
 
 import re
 from dataclasses import dataclass
@@ -15,6 +19,7 @@ from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, read_diagnosis
 
 UNSCORED = "Nothing was scored, and nothing written."
+"""Part of every error message of this module: what was saved."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,18 +27,19 @@ class KitScore:
     """Diagnoses of a lab's recordings compared with the sealed labels."""
 
     rows: tuple[Scored, ...]
-    """One for every label, also of recordings without a diagnosis."""
+    """One row per label, including labels without a diagnosis."""
     figures: tuple[Figure, ...]
+    """Rates with their 95 % confidence intervals."""
     sha256: str
     """SHA-256 of the table of labels."""
     compared_with: str
-    """Source of the hash that it was compared with, in words."""
+    """Source of the hash with which `sha256` was compared, in words."""
 
 
 def score_kit(path: Path, diagnoses: Path, out: Path, seal: str | None = None) -> KitScore:
-    """Score a laboratory's diagnoses against its revealed table. diagnoses: a folder per recording, as `hapteq diagnose
-    --out` writes them. seal: the hash that was handed over before the diagnoses; None compares with the file beside the
-    table alone. Raises StudyError."""
+    """Score a laboratory's diagnoses against its revealed table, and write the scored rows to `out` as CSV. diagnoses:
+    a folder per recording, as `hapteq diagnose --out` writes them. seal: the hash that was handed over before the
+    diagnoses; None: the table is compared only with the seal file next to it. Raises StudyError."""
     digest = sha256_of(path)
     compared_with = _require_sealed(path, digest, seal)
     labels = read_labels(path)
@@ -47,13 +53,14 @@ def score_kit(path: Path, diagnoses: Path, out: Path, seal: str | None = None) -
 
 
 def score_lines(score: KitScore) -> tuple[str, ...]:
-    """The score as terminal lines."""
+    """The score as lines for a terminal: rates, labels that were missed or have no diagnosis, and the hash."""
     figures = (_figure_line(figure) for figure in score.figures)
     rows = (_row_line(row) for row in score.rows if not row.right)
     return (*figures, *rows, f"Labels: SHA-256 {score.sha256}, {score.compared_with}.")
 
 
 def _figure_line(figure: Figure) -> str:
+    """A rate in percent, with its 95 % confidence interval in brackets."""
     if figure.value is None or figure.low is None or figure.high is None:
         return f"{figure.name}: none"
     interval = f"[{100 * figure.low:.0f}, {100 * figure.high:.0f}]"
@@ -61,6 +68,7 @@ def _figure_line(figure: Figure) -> str:
 
 
 def _row_line(each: Scored) -> str:
+    """A label that was missed by its diagnosis, or has none."""
     if each.verdict == MISSING:
         return f"Missing: {each.recording}, {each.change}: no diagnosis; it counts as not right."
     return (
@@ -69,7 +77,8 @@ def _row_line(each: Scored) -> str:
 
 
 def _diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | None, ...]:
-    """Diagnosis of each label, in order; None where there is none."""
+    """Diagnosis of each label, in order; None for a label without one. Raises StudyError where the folder is missing or
+    no label has a diagnosis."""
     if not folder.is_dir():
         raise StudyError(
             "There is no such folder",
@@ -90,6 +99,7 @@ def _diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | Non
 
 
 def _diagnosis(folder: Path, recording: str) -> Diagnosis | None:
+    """Diagnosis of a recording; None where its file is missing. Raises StudyError where the file is unusable."""
     place = folder / recording / DIAGNOSIS_NAME
     if not place.is_file():
         return None
@@ -105,7 +115,8 @@ def _diagnosis(folder: Path, recording: str) -> Diagnosis | None:
 
 
 def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
-    """What the hash was compared with, in words. Raises StudyError where it differs."""
+    """The hash with which the hash of the table was compared, in words. Raises StudyError where they differ, or without
+    a seal."""
     beside = seal_of(path)
     if seal is None:
         sealed_digest, who = read_sealed_hash(path), f"{beside.name} says"
@@ -128,7 +139,8 @@ def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
 
 
 def _hash(typed: str) -> str:
-    """The hash in typed text, which may be the whole line of the seal file."""
+    """The hash in the value of --seal, which may be the whole line of the seal file. Raises WrongUseError without a
+    hash."""
     first_word = (typed.split() or [""])[0].lower()
     if re.fullmatch("[0-9a-f]{64}", first_word):
         return first_word

@@ -1,4 +1,9 @@
-"""`hapteq real`: diagnose all recordings of a folder; existing answers are kept."""
+"""Diagnose all recordings of a folder of real devices (`hapteq real`).
+
+`diagnose_folder` takes the inventory, reuses the answers of an earlier run whose inputs are unchanged, diagnoses the
+other recordings here or on the workers of an executor, injects faults if `RealPlan.inject` is above 0, and writes page
+and table. Each answer is written as soon as it is known, so that an interrupted run can be resumed.
+"""
 
 import errno
 import math
@@ -44,39 +49,43 @@ from study.workflows.run_on_executor import run_pieces
 RETUNED_NAME = "retuned.toml"
 """Re-tuned model, in the folder of a recording's answer."""
 DIAGNOSED_OF_BOTH = 0.5
-"""Progress at which the injection of faults begins."""
+"""Progress, 0 to 1, at which the diagnosis ends and the injection of faults begins."""
 EVALUATIONS = 4000
-"""Limit of the search for one recording, counted in evaluations (a structure weighed, a law simulated or fitted); it
-then ends with its best result. A count, because seconds would make answers depend on the load of the machine."""
+"""Limit of the search for one recording, counted in evaluations (a structure weighed, a law simulated or fitted). At
+the limit the search ends with its best result. Evaluations are counted instead of seconds, because answers would
+otherwise depend on the load of the machine."""
 FOLDERS_AHEAD = 16
-"""Sub-folders of recordings in memory at once, on their way to workers."""
+"""Most recordings in flight on an executor: each is sent with all files of its sub-folder, which are in memory until
+then."""
 BESIDE_S = 25.0
-"""Seconds for fitting a model, page and figures beside the search, where seconds are asked for."""
+"""Processor time (s) subtracted from the time of a recording, where `RealPlan.seconds` is given: for all work other
+than the search (fit of a model, page, figures)."""
 
 Progress = Callable[[str, float], None]
-"""Called with the current step and the share that is done, 0 to 1."""
+"""Called with the current step in words and the fraction that is done, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class RealPlan:
-    """Order of `diagnose_folder`: folder of recordings, folder for the results, limit of the search, faults to
+    """Settings of `diagnose_folder`: folder of recordings, folder for the results, limit of the search, faults to
     inject."""
 
     folder: Path
     out: Path
     seconds: float | None = None
-    """Processor time for all recordings of a folder together; None = evaluations are counted."""
+    """Processor time (s) for all recordings of a sub-folder together; None: evaluations are counted instead."""
     inject: int = 0
     """Number of faults to inject into the diagnosed recordings; 0 = none."""
     seed: int = 1
-    """Seed of the draws."""
+    """Seed of the random draws of faults."""
 
 
 def diagnose_folder(
     plan: RealPlan, on_progress: Progress, clock: Clock | None = None, executor: Executor | None = None
 ) -> WrittenReal:
-    """Diagnose a folder and write page and table. `on_progress(step, share)`. executor: does it on its workers, which
-    may share no disk. Resumable after UserInterruptError. Raises StudyError."""
+    """Diagnose all recordings of a folder, and write page and table. executor: diagnoses on its workers, which may
+    share no disk; None: here. Resumable after UserInterruptError. Raises StudyError; WrongUseError for an executor
+    together with `plan.seconds`."""
     if executor is not None and plan.seconds is not None:
         raise WrongUseError(
             "Seconds are of this computer's processor",
@@ -102,7 +111,8 @@ def diagnose_folder(
 
 
 def _take_inventory(plan: RealPlan) -> RealFolder:
-    """The inventory. Raises StudyError where there is nothing to diagnose, or no time for it."""
+    """Recordings of the folder. Raises WrongUseError for seconds that are not finite, StudyError without a
+    recording."""
     if plan.seconds is not None and not math.isfinite(plan.seconds):
         raise WrongUseError(
             "That is no number of seconds",
@@ -134,6 +144,7 @@ def _make_writable(out: Path) -> None:
 def _inject_faults(
     plan: RealPlan, found: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress, workers: Workers
 ) -> tuple[InjectedOutcome, ...]:
+    """Inject `plan.inject` faults into diagnosed recordings and diagnose them; no outcomes where it is 0."""
     if plan.inject == 0:
         return ()
     begun = DIAGNOSED_OF_BOTH
@@ -149,6 +160,10 @@ def _inject_faults(
 def _answers(
     plan: RealPlan, found: RealFolder, kept: Mapping[Path, RealAnswer], on_progress: Progress, clock: Clock
 ) -> tuple[RealAnswer, ...]:
+    # The last 2 % of the progress are for writing the page.
+    """Answers of all recordings in order, diagnosed here one after another; those in `kept` are reused. With
+    `plan.seconds`, the remaining time of a sub-folder is divided evenly among its remaining recordings; each gets at
+    least a tenth of `plan.seconds`."""
     answers, count, end = [], max(len(found.recordings), 1), DIAGNOSED_OF_BOTH if plan.inject else 0.98
     whole = plan.seconds or 0.0
     left = dict.fromkeys((each.folder.name for each in found.recordings), whole)
@@ -175,6 +190,8 @@ def _sent_answers(
     on_progress: Progress,
     executor: Executor,
 ) -> tuple[RealAnswer, ...]:
+    """Answers of all recordings in order; those not in `kept` are diagnosed on the workers of the executor, which
+    return the files of the results."""
     places = [answer_place(plan.out, each) for each in found.recordings]
     left = [(place, each) for place, each in zip(places, found.recordings, strict=True) if place not in kept]
     sent = ((place, (each.folder.name, each.name, read_files(each.folder))) for place, each in left)
@@ -188,7 +205,8 @@ def _sent_answers(
 
 
 def answer_sent_recording(folder: str, name: str, files: Files) -> Files:
-    """Runs on a worker: the results of one recording. folder, files: the sub-folder that it lies in."""
+    """Diagnose one recording on a worker, and return the files of its results. folder, files: name and content of its
+    sub-folder; name: of the recording. Raises StudyError where the recording is not in these files."""
     with TemporaryDirectory() as place, without_forking():
         plan = RealPlan(Path(place) / "recordings", Path(place) / "out")
         write_files(plan.folder / folder, files)
@@ -209,7 +227,8 @@ def answer_sent_recording(folder: str, name: str, files: Files) -> Files:
 def _answer(
     plan: RealPlan, real_recording: RealRecording, budget_s: float, on_progress: Progress, clock: Clock
 ) -> RealAnswer:
-    """Diagnose one recording and write its results. budget_s: processor time for the search."""
+    """Diagnose one recording and write its results. budget_s: processor time for the search, used where `plan.seconds`
+    is given. A crash is written as an answer, unless the crash guard is off."""
     begun_s, worked, guard = clock.now_s(), processor_s(), crash_guard()
     timed: TimeBudget = lambda: processor_s() - worked < budget_s  # noqa: E731
     time_left = CountedBudget(EVALUATIONS) if plan.seconds is None else timed
@@ -234,7 +253,8 @@ def _answer(
 
 
 def _write(folder: Path, done: RealDiagnosis, origin: Provenance) -> None:
-    """Write the results of one recording atomically."""
+    """Write the results of one recording atomically: the answer, and unless it was refused, diagnosis and re-tuned
+    model."""
     with _new_folder_in_parents(folder) as part:
         if done.findings is not None:
             write_diagnosis_into(part, done.findings, done.parents)

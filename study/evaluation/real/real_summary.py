@@ -1,4 +1,4 @@
-"""Summary of a folder of real recordings for the terminal."""
+"""Lines for the terminal that summarise the diagnosis of a folder of real recordings (`hapteq real`)."""
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.unit_wording import error_text
@@ -20,6 +20,8 @@ def real_lines(done: WrittenReal) -> tuple[str, ...]:
 
 
 def _line(real_answer: RealAnswer) -> str:
+    """One recording: verdict, effects, held-out errors as fractions of the signal (model as given, re-tuned, with the
+    effects, black box), and duration in seconds; the answer in words where no error was measured."""
     named = f": {', '.join(real_answer.effects)}" if real_answer.effects else ""
     if real_answer.verdict == "unexplained" and real_answer.candidates:
         named = f", best candidate (not confirmed) {real_answer.candidates[0].effect}"

@@ -1,7 +1,7 @@
 """Reuse of answers of an earlier run of `hapteq real`.
 
-An answer is reused if the hashes of its input files and its settings are unchanged; otherwise the whole run is refused
-before any work, with the changes.
+An answer is reused if the hashes of its input files and its settings are unchanged. If any of them has changed, the
+whole run is refused before any work, with a list of the changes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,10 +21,12 @@ ANSWER_NAME, INJECTED_NAME = "answer.json", "injected"
 
 @dataclass(frozen=True, slots=True)
 class _EarlierAnswer:
+    """An answer of an earlier run, and what has changed since it was given."""
+
     place: Path
     answer: RealAnswer
     changes: tuple[str, ...]
-    """Changes of its inputs and settings since then, as sentences."""
+    """Changes of input files and settings, as clauses; empty if the answer can be reused."""
 
 
 def answer_place(out: Path, real_recording: RealRecording) -> Path:
@@ -33,14 +35,15 @@ def answer_place(out: Path, real_recording: RealRecording) -> Path:
 
 
 def origin_of_answer(real_recording: RealRecording, seconds: float | None) -> Provenance:
-    """Provenance: all inputs on which an answer depends. Raises CannotReadError."""
+    """Provenance of an answer: hashes of all input files, and settings, on which it depends. seconds: of --seconds;
+    None if left out. Raises CannotReadError."""
     files = tuple(dict.fromkeys((*real_recording.parents, *real_recording.tested_on)))
     return gather_provenance(parents=files, settings={"seconds": seconds})
 
 
 def reusable_answers(out: Path, wanted: Sequence[RealRecording], seconds: float | None) -> dict[Path, RealAnswer]:
-    """Earlier answers by folder; nothing is written. Raises StudyError where one is damaged or was made from other
-    inputs."""
+    """Earlier answers by the folder of their results; nothing is written. Raises StudyError where an answer is damaged
+    or was given for other inputs or settings."""
     answered = [recording for recording in wanted if (answer_place(out, recording) / ANSWER_NAME).is_file()]
     earlier = [_read_earlier_answer(answer_place(out, recording), recording, seconds) for recording in answered]
     if outdated := [answer for answer in earlier if answer.changes]:
@@ -49,6 +52,7 @@ def reusable_answers(out: Path, wanted: Sequence[RealRecording], seconds: float 
 
 
 def _read_earlier_answer(place: Path, real_recording: RealRecording, seconds: float | None) -> _EarlierAnswer:
+    """The answer in a folder of results, with its changes. Raises StudyError where it is damaged."""
     try:
         answer, origin = read_answer_and_origin(place / ANSWER_NAME)
     except StudyError as error:
@@ -66,12 +70,14 @@ def _read_earlier_answer(place: Path, real_recording: RealRecording, seconds: fl
 
 
 def _files_in(origin: Mapping[str, Any]) -> set[tuple[str, str]]:
+    """(name, SHA-256) of all input files in a stored provenance."""
     stored = origin.get("parents")
     parents = stored if isinstance(stored, list) else []
     return {(str(parent.get("file")), str(parent.get("sha256"))) for parent in parents if isinstance(parent, dict)}
 
 
 def _file_changes(then: set[tuple[str, str]], now: set[tuple[str, str]]) -> Iterator[str]:
+    """Clauses about input files that were added, changed or removed. then, now: sets of (name, SHA-256)."""
     names_then, names_now = ({name for name, _ in files} for files in (then, now))
     for name in sorted({name for name, _ in then ^ now}):
         if name not in names_then:
@@ -81,6 +87,7 @@ def _file_changes(then: set[tuple[str, str]], now: set[tuple[str, str]]) -> Iter
 
 
 def _compare_settings(origin: Mapping[str, Any], seconds: float | None) -> Iterator[str]:
+    """A clause where --seconds, the only setting, has changed or was not recorded."""
     settings = origin.get("settings")
     then = settings.get("seconds", "") if isinstance(settings, dict) else ""
     if not isinstance(then, int | float | None):
@@ -94,6 +101,7 @@ def _seconds(limit_s: float | None) -> str:
 
 
 def _inputs_changed_error(out: Path, outdated: Sequence[_EarlierAnswer]) -> StudyError:
+    """The error that lists the changes of all outdated answers, and what to move away."""
     texts = (f"{answer.place.relative_to(out) / ANSWER_NAME}: {', '.join(answer.changes)}." for answer in outdated)
     places = [str(answer.place) for answer in outdated]
     if (injected := out / INJECTED_NAME).exists():

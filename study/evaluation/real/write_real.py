@@ -1,4 +1,4 @@
-"""Write page, table and figures for a folder of real recordings."""
+"""Write the results for a folder of real recordings: an HTML page, tables (CSV) and figures."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,31 +13,41 @@ from study.store.disk.text_file import write_text
 from study.workflows.picture_files import write_pictures
 
 PAGE_NAME, TABLE_NAME, INJECTED_NAME, FIGURES_NAME = "report.html", "recordings.csv", "injected.csv", "figures"
+"""Names in the folder for the results: page, table of recordings, table of injected faults, folder of figures."""
 
 
 @dataclass(frozen=True, slots=True)
 class RealRow:
-    """One row of the table. Errors are normalised by the signal, on held-out data."""
+    """A row of the table of recordings. Errors are on held-out data, as fractions of the signal; empty where none was
+    measured."""
 
     folder: str
     recording: str
     verdict: str
     effects: str
+    """Effects that are named, separated by spaces."""
     measured_by: str
+    """How the errors were measured, in words."""
     before: float | None
+    """Error of the model as given."""
     retuned: float | None
+    """Error of the model after its parameters were re-tuned."""
     after: float | None
+    """Error with the named effects."""
     black_box: float | None
+    """Error of a black-box model."""
     noise: float | None
+    """Error that repeats of the measurement allow."""
     seconds: float
+    """Duration of the diagnosis (s)."""
     candidates: str
-    """Unconfirmed candidates, best first."""
+    """Effects that were not confirmed, best first, separated by spaces."""
 
 
 @dataclass(frozen=True, slots=True)
 class InjectedRow:
-    """One row per injected fault. `change`: held-out error with the fault over that without it, of a base model
-    fitted to the intact half."""
+    """A row of the table of injected faults; the fields are those of `InjectedOutcome`. `change`: held-out error with
+    the fault, divided by that without it, of a base model fitted to the intact half."""
 
     recording: str
     injected: str
@@ -54,7 +64,7 @@ class InjectedRow:
 
 @dataclass(frozen=True, slots=True)
 class RealResults:
-    """Answers for a folder of real recordings, what could not be used, and outcomes of injected faults."""
+    """Answers for a folder of real recordings, files that could not be used, and outcomes of injected faults."""
 
     answers: tuple[RealAnswer, ...]
     troubles: tuple[Trouble, ...]
@@ -63,7 +73,7 @@ class RealResults:
 
 @dataclass(frozen=True, slots=True)
 class WrittenReal:
-    """Results for a folder of real recordings, and the paths of page and table that were written."""
+    """Results for a folder of real recordings, and the paths of page and table."""
 
     results: RealResults
     page: Path
@@ -71,7 +81,8 @@ class WrittenReal:
 
 
 def write_real(out: Path, results: RealResults, generated: str) -> WrittenReal:
-    """Write page, table and figures, replacing earlier ones. Raises CannotWriteError."""
+    """Write page, tables and figures, replacing earlier ones. generated: time shown on the page. Raises
+    CannotWriteError."""
     answers = results.answers
     pictures = {(answer.folder, answer.recording): real_picture(answer) for answer in answers}
     write_pictures(out / FIGURES_NAME, tuple(pictures.values()))

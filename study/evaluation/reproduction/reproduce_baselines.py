@@ -1,4 +1,8 @@
-"""Baseline methods of driving the device, played on it at the centre, at the edge, and in a simulated hand."""
+"""Play baseline methods of equalization on the simulated device, for comparison with the equalizer.
+
+Each method is played at the centre of the workspace, near its edge, and in a simulated hand. All baselines are designed
+from the data of the centre without a hand; `equalizer.tracking.feedforward.baselines` defines them.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,6 +25,8 @@ from study.evaluation.reproduction.reproduction_plan import CENTRE, EDGE, Place,
 
 @dataclass(frozen=True, slots=True)
 class _Placement:
+    """Place of the handle (m), and whether a simulated hand holds it. words: its description in the name of a row."""
+
     words: str
     place_m: Place
     hand: bool
@@ -31,16 +37,16 @@ _PLACEMENTS = (
     _Placement("edge", EDGE, False),
     _Placement("in the hand", CENTRE, True),
 )
-"""Where the methods are compared."""
+"""Conditions under which the methods are compared."""
 
 
 def play_baselines(
     plan: ReproductionPlan, models: PlacedModels, estimate: FrequencyResponse, on_share: Callable[[float], None]
 ) -> tuple[PlayedResponse, ...]:
-    """Play all baselines, designed from what was identified at the centre without a hand; last, our equalizer for each
-    place.
+    """Play all baselines under each condition; at the edge and in the hand, they are followed by the equalizer that was
+    designed for this condition.
 
-    estimate: frequency response at the centre, including the spring.
+    estimate: frequency response at the centre, including the spring. on_share: called with the fraction done, 0 to 1.
     """
     inverses = baseline_inverses(models.centre, estimate, _lines_hz(plan, models.centre.sample_rate_hz))
     wanted = len(_PLACEMENTS) * len(inverses) + 2
@@ -59,6 +65,8 @@ def play_baselines(
 
 
 def _for_the_place(where: _Placement, models: PlacedModels) -> tuple[PlaybackRow, ...]:
+    """The equalizer designed for a condition: from the model identified in the hand, or at the edge from the blended
+    models of other places; none at the centre."""
     if where.hand:
         return (PlaybackRow("model identified in the hand", make_single_model_driver(models.hand), hand=True),)
     if where.place_m == EDGE:
@@ -71,6 +79,7 @@ def _for_the_place(where: _Placement, models: PlacedModels) -> tuple[PlaybackRow
 
 
 def _lines_hz(plan: ReproductionPlan, rate_hz: float) -> FloatArray:
+    """(lines,): frequencies (Hz) of the spectral lines of one period that lie in the band."""
     period = round(plan.period_s * rate_hz)
     return np.asarray(
         np.fft.rfftfreq(period, 1 / rate_hz)[lines_of_band(plan.band_hz, period, rate_hz)], dtype=np.float64
@@ -78,6 +87,9 @@ def _lines_hz(plan: ReproductionPlan, rate_hz: float) -> FloatArray:
 
 
 def _driver(plan: ReproductionPlan, inverse: Inverse) -> Driver:
+    """The driver that multiplies the spectrum of the wanted acceleration by the inverse, line by line in the band;
+    other lines are zero."""
+
     def drive(wanted: Signal) -> FloatArray:
         used = lines_of_band(plan.band_hz, len(wanted), wanted.sample_rate_hz)
         spectrum = np.fft.rfft(wanted.samples, axis=0)

@@ -49,13 +49,13 @@ class PlaybackRow:
     name: str
     driver: Driver
     place_m: Place = CENTRE
-    """Place of the handle in the workspace."""
+    """Place of the handle in the workspace: x, y, z (m)."""
     device: str = SIMULATED
-    """Name of the device, as of `--device`."""
+    """Name of the device, as the option `--device` takes it."""
     hand: bool = False
     """Whether a simulated hand holds the handle."""
     signal: SignalKind = "sweep"
-    """Kind of the wanted acceleration."""
+    """Kind of the wanted acceleration: sweep or multisine."""
 
 
 def not_equalized(wanted: Signal) -> FloatArray:
@@ -80,8 +80,8 @@ def play_row(plan: ReproductionPlan, row: PlaybackRow) -> PlayedResponse:
 
 
 def _play_axes(plan: ReproductionPlan, row: PlaybackRow, device: Device, peak_n: float) -> PlayedResponse:
-    """The response from wanted to true acceleration, (lines, 3, 3), from one play per axis with the peak force
-    `peak_n`."""
+    """Response from wanted to true acceleration, (lines, 3, 3). Each axis is played in turn; its forces are scaled to
+    the peak `peak_n` (N), and the wanted acceleration by the same factor."""
     rate_hz = device.info.sample_rate_hz
     wave = make_wanted_wave(row.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
     wanted, delivered, clipped = [], [], 0

@@ -1,4 +1,4 @@
-"""Settings of `hapteq reproduce`, its folders, and its progress."""
+"""Settings of `hapteq reproduce`, the folders of its results, and the progress over its steps."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ CENTRE: Place = (0.0, 0.0, 0.0)
 EDGE: Place = (0.0, 0.05, 0.0)
 """Near the edge of a workspace whose soft stops begin at 75 mm."""
 BETWEEN: tuple[Place, ...] = ((0.0, 0.03, 0.0), (0.0, 0.065, 0.0))
-"""Places where models for interpolation are identified beside the centre: never the edge place itself, so that
-playback there tests the interpolation."""
+"""Places at which further models are identified for interpolation, in addition to the centre. `EDGE` is not among them,
+so that playback there tests the interpolation."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReproducedProtocols:
-    """Names of shipped protocols, or files."""
+    """Protocols of the reproduction: names of shipped protocols, or paths of files."""
 
     study: str = "direction_threshold"
     ellipsoid: str = "ellipsoid"
@@ -27,12 +27,13 @@ class ReproducedProtocols:
     band: str = "sweep_band"
     """Sweep over the equalized band, for figure 5."""
     hand: str = "sweep_hand"
-    """The same in a hand, for the table of baselines."""
+    """Sweep over the same band with a hand on the handle, for the table of baselines."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReproductionPlan:
-    """Order of a reproduction: output folder, number of participants, seed, and settings of the identified models."""
+    """Settings of a reproduction: output folder, number of participants, seed, and settings of the identified
+    models."""
 
     out: Path
     subjects: int = 10
@@ -40,9 +41,11 @@ class ReproductionPlan:
     workers: int = 2
     protocols: ReproducedProtocols = ReproducedProtocols()
     order: int = 26
+    """Order of the identified models."""
     band_hz: tuple[float, float] = (5.0, 35.0)
+    """Equalized band: lowest and highest frequency (Hz)."""
     period_s: float = 10.0
-    """Period of what is played through the equalizer; its inverse is the line spacing."""
+    """Period (s) of the signals played through the equalizer; its inverse is the line spacing (Hz)."""
 
     @property
     def study(self) -> Path:
@@ -66,7 +69,7 @@ class ReproductionPlan:
 
 
 class Steps:
-    """Combines the progress of steps of different length."""
+    """Overall progress of steps of different duration: the mean of their progress, weighted by `weights`."""
 
     def __init__(self, weights: Mapping[str, float], on_progress: Callable[[float], None]) -> None:
         self._weights = weights
@@ -78,7 +81,7 @@ class Steps:
         return lambda share: self._report_share(step, share)
 
     def _report_share(self, step: str, share: float) -> None:
-        # Where a piece is played again its progress steps back; the whole does not.
+        # A step that is repeated reports a smaller share again; the overall progress must not decrease.
         self._done[step] = max(self._done.get(step, 0.0), min(share, 1.0))
         done = sum(weight * self._done.get(name, 0.0) for name, weight in self._weights.items())
         self._on_progress(done / sum(self._weights.values()))

@@ -1,4 +1,4 @@
-"""Write the folder of a reproduction: figures, document of numbers, page."""
+"""Write the results of a reproduction to its folder: figures, document of numbers (JSON), page (HTML)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from study.store.formats.reproduction_file import REPRODUCTION_NAME, write_repro
 from study.workflows.picture_files import write_pictures
 
 PAGE_NAME = "report.html"
-"""Page of the reproduction, in its folder."""
+"""Name of the page in the folder of the reproduction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class WrittenReproduction:
 
     reproduction: Reproduction
     lines: tuple[str, ...]
-    """One per figure, for a terminal."""
+    """One line per figure, for a terminal."""
     document: Path
     report: Path
 
@@ -43,8 +43,10 @@ class WrittenReproduction:
 def write_reproduction_folder(
     plan: ReproductionPlan, results: Results, on_share: Callable[[float], None]
 ) -> WrittenReproduction:
-    """Write everything, replacing an earlier run. Raises CannotWriteError."""
+    """Write figures, document and page, replacing those of an earlier run. on_share: called with the fraction done, 0
+    to 1. Raises CannotWriteError."""
     limit_hz = direction_limit_hz(results.study)
+    # Where the thresholds give no limit of direction, the published one separates the bands.
     used_limit_hz = PUBLISHED_DIRECTION_LIMIT_HZ if limit_hz is None else limit_hz
     bands = frequency_bands(results.device.onset.frequency_hz, used_limit_hz)
     reproduction = _document(plan, results, bands, limit_hz, used_limit_hz)
@@ -72,6 +74,8 @@ def _document(
     limit_hz: float | None,
     used_limit_hz: float,
 ) -> Reproduction:
+    """The document: findings on each figure, playback rows, baselines and models. limit_hz: limit of direction from the
+    thresholds, None without one; used_limit_hz: the limit that separates the bands (Hz)."""
     played = results.played
     return Reproduction(
         device=results.device_name,
@@ -93,13 +97,14 @@ def _document(
 
 
 def _equalization_findings(results: Results) -> FigureFindings:
+    """Findings on figure 5, with the errors of the tested models with and without friction where both are known."""
     with_it, without = results.tested, results.tested_frictionless
     tested = (with_it.error, without.error) if with_it and without else None
     return find_equalized(results.played.rows, tested, (*results.remarks, *results.played.remarks))
 
 
 def _origin_entries(origin: Provenance) -> dict[str, str]:
-    """Entries of the page's last section."""
+    """Provenance as entries of the last section of the page."""
     return {
         "recordings": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in origin.parents),
         "study protocol": f"hash {origin.protocol_hash}",

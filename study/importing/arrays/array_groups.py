@@ -9,9 +9,9 @@ from typing import Any
 import numpy.typing as npt
 
 _SEPARATORS = ("__", "/", ".", "_", " ")
-"""Marks between the prefix of a run and the name of an array; on a tie the first one wins."""
+"""Separators between the prefix of a run and the name of an array; on a tie the first one counts."""
 _LOOSE = ("_", " ", ".")
-"""Common separators in names; a prefix before one of them must contain a digit."""
+"""Separators that are also common within names; a prefix before one of them must contain a digit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,13 +25,15 @@ class Groups:
 
 
 def groups_in(arrays: Mapping[str, npt.NDArray[Any]], least: int) -> Groups:
-    """Groups by the largest number of common arrays; each must contain one of `least` samples or more."""
+    """Runs in a file, by the separator that gives the largest number of arrays in runs. Each run must contain an array
+    of at least `least` samples; without two such runs there are none."""
     long_ones = [name for name, array in arrays.items() if array.size >= least]
     found = [_group_arrays(tuple(arrays), long_ones, separator) for separator in _SEPARATORS]
     return max(found, key=lambda groups: len(groups.prefixes) * len(groups.names))
 
 
 def _group_arrays(names: Sequence[str], long_ones: Sequence[str], separator: str) -> Groups:
+    """Runs by one separator: prefixes that are followed by the same set of names, the most common one."""
     members: dict[str, list[str]] = {}
     for name in names:
         before, between, after = _split(name, separator)
@@ -54,7 +56,8 @@ def _group_arrays(names: Sequence[str], long_ones: Sequence[str], separator: str
 
 
 def _split(name: str, separator: str) -> tuple[str, str, str]:
-    """Splits a name at the last slash, else at the first separator; text in brackets is a unit."""
+    """Prefix, separator and rest of a name, split at its last slash, or else at the first separator. A unit in brackets
+    is not searched for separators."""
     plain, bracket, unit = re.match(r"([^\[(]*)([\[(]?)(.*)", name, re.DOTALL).groups()  # type: ignore[union-attr]
     before, between, after = plain.rpartition(separator) if separator == "/" else plain.partition(separator)
     return before, between, after + bracket + unit if between else ""

@@ -1,4 +1,8 @@
-"""Contents of a foreign file: arrays by name, for all formats."""
+"""Read the arrays of a file by name: tables, workbooks, JSON, NumPy, Matlab and HDF5 files.
+
+The format follows from the ending of the file; `csv_arrays`, `workbook_arrays`, `json_arrays`, `mat_arrays` and
+`stored_arrays` read one format each. Dates and clock times become seconds since the first.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -31,12 +35,12 @@ RECORDS = (".json", ".jsonl", ".ndjson")
 HDF5 = (".h5", ".hdf5")
 """File types that are read as HDF5."""
 FOREIGN = (*TABLES, *WORKBOOKS, *RECORDS, ".npz", ".npy", ".mat")
-"""File types that never hold our own recordings; HDF5 may."""
+"""File types that never hold recordings of hapteq; HDF5 may."""
 
 _CHECK = "Check the file; nothing else can be read from it."
 """Remedy where a file is damaged or of the wrong kind."""
 MEND = "Do that, and import again; docs/importing.md lists the keys of a map."
-"""Remedy where the message itself says what to do: cause; remedy."""
+"""Remedy for messages of the form "cause; remedy", which already state what to correct."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +52,7 @@ class Arrays:
     clocks: tuple[str, ...] = ()
     """Arrays that were dates or clock times, now in seconds since the first."""
     notes: tuple[str, ...] = ()
-    """Sentences on how such arrays were read, and on what was left out."""
+    """Sentences on how dates and clock times were read, and on what was left out."""
 
     @property
     def name(self) -> str:
@@ -57,14 +61,14 @@ class Arrays:
 
 
 def left_out(array: Array) -> str:
-    """Placeholder for an array that is not read, with its kind or its problem as text; empty for all other arrays."""
+    """Kind or problem of an array that is not read, as text, from its placeholder; empty for all other arrays."""
     text = array.item() if array.dtype.kind == "O" and array.size == 1 else ""
     return text if isinstance(text, str) else ""
 
 
 def read_arrays(path: Path, table: CsvMap) -> Arrays:
-    """Read all arrays of a file, whose type follows from its ending. table: how a table of text is laid out (separator,
-    decimal mark, header). Raises CannotReadError, ImportRefusedError."""
+    """Read all arrays of a file. table: layout of a text table (separator, decimal mark, header) where it is stated.
+    Raises CannotReadError, ImportRefusedError."""
     try:
         open_regular(path).close()
     except OSError as problem:
@@ -75,7 +79,7 @@ def read_arrays(path: Path, table: CsvMap) -> Arrays:
         raise ImportRefusedError(path.name, refused.happened, _CHECK) from refused
     except DAMAGED as problem:
         words = str(problem) or type(problem).__name__
-        # Our own messages are "cause; remedy", those of a library name a cause alone.
+        # Messages of this program have the form "cause; remedy"; those of a library give only the cause.
         raise ImportRefusedError(path.name, words, MEND if "; " in words else _CHECK) from problem
     if not found.by_name:
         raise ImportRefusedError(path.name, "it holds no arrays", "Check that it is the right file.")
@@ -83,6 +87,7 @@ def read_arrays(path: Path, table: CsvMap) -> Arrays:
 
 
 def _read(path: Path, table: CsvMap) -> Table:
+    """Columns of a text table or of the sheets of a workbook, or arrays of another file."""
     if path.suffix.lower() in TABLES:
         return read_csv_arrays(path, table)
     if path.suffix.lower() in WORKBOOKS:
@@ -91,6 +96,7 @@ def _read(path: Path, table: CsvMap) -> Table:
 
 
 def _read_stored(path: Path) -> dict[str, Array]:
+    """Arrays of a file that is not a table. Raises ValueError for an unknown ending."""
     match path.suffix.lower():
         case ".npz" | ".npy":
             return read_npz_arrays(path)

@@ -1,4 +1,8 @@
-"""Columns of a table as arrays: encoding and layout are detected, invalid fields are reported."""
+"""Read the columns of a text table as arrays.
+
+Encoding, delimiter, decimal sign, header and units are detected (`table_text`, `table_layout`). Empty fields are
+missing samples. An invalid field is reported with its line and column, but only where its column is used.
+"""
 
 import io
 import re
@@ -23,29 +27,29 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MOST_ROWS = 20_000_000
-"""Most rows of a table: five hours at 1 kHz."""
+"""Most rows of a table: more than five hours at 1 kHz."""
 MOST_COLUMNS = 10_000
 """Most columns of a table: a file with more is no recording, and would fill the memory."""
 _LONGEST_LINE = 2**20
-"""Longest line in characters: a hundred for each of the most columns."""
+"""Longest line, in characters: about a hundred for each of `MOST_COLUMNS` columns."""
 _LONGEST_SHOWN = 60
-"""Most characters of a field that are quoted in a sentence about it."""
+"""Most characters of an invalid field that its message quotes."""
 _HOLDS_NUMBER = re.compile(r'(?:^|[,;\t|])[\s"]*[-+.]?\d[\d.,:eE+-]*[\s"]*(?:[,;\t|]|$)')
 """Matches a line with a field that is a number, with any delimiter between its fields."""
 _THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
-"""A number with marks between thousands, which is not read."""
+"""A number with thousands separators, which is not read."""
 _MISSING = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
 """Fields that stand for a missing sample."""
 
 
 class FaultyColumn(str):
-    """Placeholder for a column with an invalid field, with the problem as text: it matters only where the column is
-    used."""
+    """Problem of a column with an invalid field, in place of its values: reported only where the column is used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """Columns by name; names of those that were dates or clock times, now in seconds since the first; remarks."""
+    """by_name: columns. clocks: names of the columns that were dates or clock times, now in seconds since the first.
+    notes: remarks."""
 
     by_name: dict[str, npt.NDArray[Any]]
     clocks: tuple[str, ...]
@@ -180,6 +184,8 @@ def _seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], str] | N
 
 
 def _lines(text: str, settings: CsvMap) -> list[Line]:
+    """Lines that are not empty, with their numbers, after the skipped ones. Raises ValueError for too many or too long
+    lines."""
     if max(text.count("\n"), text.count("\r")) > MOST_ROWS:
         raise ValueError(f"it has more than {MOST_ROWS} lines; save it as .npz or .h5")
     kept: list[Line] = []
@@ -205,7 +211,7 @@ def _with_whole_header(lines: list[Line]) -> list[Line]:
 
 
 def _comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
-    """Number of comment lines between the rows. Raises ValueError for a comment with as many fields as a row."""
+    """A remark on comment lines below the first row. Raises ValueError for a comment that has the fields of a row."""
     first, width = layout.body[0][0], len(layout.names)
     header = max((number for number, line in lines if number < first and not is_comment(line)), default=first)
     below = [line for line in lines if line[0] > header and is_comment(line[1])]
@@ -223,6 +229,7 @@ def _comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
 
 
 def _require_equal_rows(body: list[Line], layout: TableLayout) -> None:
+    """Raises ValueError where a row has another number of fields than there are columns."""
     delimiter, columns = layout.delimiter, len(layout.names)
     for number, line in body:
         if '"' in line:
@@ -235,7 +242,7 @@ def _require_equal_rows(body: list[Line], layout: TableLayout) -> None:
 
 
 def _mend_row(number: int, line: str, body: list[Line], delimiter: str) -> str:
-    """Advice for a row of another width."""
+    """Remedy for a row with another number of fields, by what it looks like."""
     if any(_THOUSANDS.fullmatch(field.strip(' "')) for field in re.split(r"[;\t|]", line)):
         return NO_THOUSANDS
     if delimiter in ", " and re.search(rf"(?<![\d.])[1-9]\d{{0,2}}{delimiter}\d{{3}}(?!\d)", line):
@@ -248,7 +255,7 @@ def _mend_row(number: int, line: str, body: list[Line], delimiter: str) -> str:
 
 
 def _read(text: str, layout: TableLayout, how: dict[str, Any]) -> "pd.DataFrame":
-    # Imported where tables are read: it takes longer than reading any other file.
+    # Imported only here, because the import takes longer than reading a file of any other format.
     import pandas as pd
 
     table: pd.DataFrame = pd.read_csv(
@@ -265,6 +272,7 @@ def _read(text: str, layout: TableLayout, how: dict[str, Any]) -> "pd.DataFrame"
 
 
 def _numbers(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> npt.NDArray[np.float64]:
+    """A column of texts as numbers. Raises ValueError with line, field and remedy for an invalid field."""
     import pandas as pd
 
     fields = column.str.strip()

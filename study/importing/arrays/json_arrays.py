@@ -1,5 +1,8 @@
-"""Read arrays from JSON: records (`[{"t": 0, "u": 1}, ...]`), columns (`{"t": [...], "u": [...]}`), and lines of
-records; inside an object they are named by it (`run1/u`), unless it is the only one."""
+"""Read arrays from JSON files.
+
+Three forms are read: records (`[{"t": 0, "u": 1}, ...]`), columns (`{"t": [...], "u": [...]}`), and JSON Lines (a
+record per line). Arrays inside an object have its name as prefix (`run1/u`), unless it is the only object with arrays.
+"""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -19,21 +22,21 @@ Array = npt.NDArray[Any]
 JSON_BYTES = 2**26
 """Largest JSON file in bytes: parsed, it takes about twenty times as much memory."""
 _MOST_OBJECTS, _MOST_VALUES = 2**21, 2**24
-"""Most records: each takes hundreds of bytes of memory."""
+"""Most objects and lists of a file, each of which takes hundreds of bytes of memory, and most values of it."""
 _OURS = "hapteq"
 """Beginning of the names of hapteq's own formats."""
 _OWN_FORMAT = re.compile(rb'"format"\s*:\s*"hapteq')
-"""Bytes by which a document names one of these formats."""
+"""Bytes in which a document declares one of these formats."""
 _LOOKED_AT = 4096
-"""Bytes at the start of a file in which a hapteq format names itself."""
+"""Bytes at the start of a file that are searched for `_OWN_FORMAT`."""
 _UNIT_KEYS = ("unit", "units")
-"""Keys beside values that state their unit."""
+"""Keys that state the unit of the values in the same object."""
 _VALUE_KEYS = ("values", "value", "data", "samples")
-"""Keys of the values, beside a unit, where several keys hold lists; the first one found counts."""
+"""Keys of the values in an object with a unit and several lists; the first one found counts."""
 
 
 def read_json_arrays(path: Path) -> dict[str, Array]:
-    """Arrays of a JSON file. Raises OSError; ValueError with the problem."""
+    """Arrays of a JSON file by name. Raises OSError; ValueError with the problem."""
     try:
         text = read_regular(path, JSON_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as problem:
@@ -57,6 +60,8 @@ def is_own_document(path: Path) -> bool:
 
 
 def _parse(text: str) -> Any:
+    """The document of a JSON text, or the records of JSON Lines. Raises ValueError for another text, or too much
+    content."""
     if text.count("{") + text.count("[") > _MOST_OBJECTS or text.count(",") > _MOST_VALUES:
         raise ValueError(f"it has more than {_MOST_OBJECTS} records or {_MOST_VALUES} values; save it as .csv or .npz")
     try:
@@ -73,6 +78,7 @@ def _parse(text: str) -> Any:
 
 
 def _record(number: int, line: str) -> Any:
+    """The record on one line. Raises ValueError unless it is a JSON object."""
     try:
         found = load_json(line, with_nan=True)
     except ValueError as problem:
@@ -96,7 +102,7 @@ def _arrays(value: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...
 
 
 def _arrays_of_object(value: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
-    """The array of `{"unit": "N", "values": [...]}`, with its unit in brackets."""
+    """Arrays of an object. `{"unit": "N", "values": [...]}` is one array, with the unit in brackets behind its name."""
     units = [value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)]
     lists = [key for key, entry in value.items() if isinstance(entry, list)]
     values = lists[0] if len(lists) == 1 else next((key for key in _VALUE_KEYS if key in lists), "")
@@ -112,8 +118,8 @@ def _arrays_of_object(value: Mapping[str, Any], place: tuple[str, ...]) -> Itera
 
 
 def _arrays_beside_values(entry: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
-    """Texts beside values, as their description. Raises ValueError for keys that may change the values, such as a
-    scale."""
+    """Placeholder for an entry in the same object as values and their unit, such as a description. Raises ValueError
+    unless the entry is a text or null: a number, such as a scale, may change the values."""
     if entry is not None and (not isinstance(entry, str) or is_number(entry.strip(), ".")):
         name = "/".join(place[:-1])
         raise ValueError(
@@ -124,8 +130,8 @@ def _arrays_beside_values(entry: Any, place: tuple[str, ...]) -> Iterator[tuple[
 
 
 def _columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
-    """One column for each key of any record, with missing samples where a record lacks it; objects inside a record are
-    read one level deep, as `imu.x`. Raises ValueError with too many keys."""
+    """One column for each key of any record, None where a record lacks it; objects inside a record are read one level
+    deep, as `imu.x`. Raises ValueError with too many keys or values."""
     flat = [dict(_fields(record)) for record in records]
     keys = dict.fromkeys(key for record in flat for key in record)
     if len(keys) > MOST_COLUMNS or len(keys) * len(flat) > _MOST_VALUES:
@@ -136,6 +142,7 @@ def _columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
 
 
 def _fields(record: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Keys and values of a record; those of an object inside it as `key.inner`."""
     for key, value in record.items():
         if isinstance(value, dict):
             yield from ((f"{key}.{inner}", entry) for inner, entry in value.items())
@@ -144,8 +151,8 @@ def _fields(record: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _array(value: Any) -> Array:
-    """Numbers, missing where an entry has none; texts, which may be dates, where any entry is not a number; else a
-    placeholder for entries without numbers."""
+    """Array of an entry: numbers, NaN where a value is missing; texts, which may be dates, where any value is not a
+    number; a placeholder where there is no rectangular array of numbers."""
     if isinstance(value, list) and value and all(_is_scalar(entry) for entry in value):
         if all(isinstance(entry, str) or entry is None for entry in value):
             return _array_of_texts(["" if entry is None else entry.strip() for entry in value])
@@ -160,6 +167,7 @@ def _array(value: Any) -> Array:
 
 
 def _array_of_texts(texts: list[str]) -> Array:
+    """Numbers if each text is a number or missing; otherwise the texts."""
     if all(is_number(text, ".") for text in texts):
         return np.array([np.nan if is_empty(text) else float(text) for text in texts])
     return np.array(texts)

@@ -1,5 +1,9 @@
-"""Read arrays from MAT files of version 5 (Matlab's -v6 and -v7) in Python instead of a C library: declared sizes
-and nesting are checked against the file before memory is allocated. Format: MAT-File Level 5, MathWorks, 2010."""
+"""Read arrays from MAT files of version 5 (Matlab's -v6 and -v7).
+
+They are read in Python, not by a C library, so that declared sizes and nesting are checked against the file before
+memory is allocated. Real numeric arrays, structures, and cells of similar arrays are read; texts, objects, functions
+and sparse matrices are replaced by placeholders with their kind. Format: MAT-File Level 5, MathWorks, 2010.
+"""
 
 import math
 import re
@@ -28,23 +32,24 @@ _CELL, _STRUCT, _OBJECT, _TEXT, _FIRST_NUMBER, _LAST_NUMBER, _OPAQUE = 1, 2, 3, 
 _COMPLEX = 0x0800
 """Flag of an array with an imaginary part."""
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-"""Type of the numbers of an element, by its number in the format."""
+"""NumPy type of the numbers of a data element, by its data type in the MAT-file format."""
 _CLASSES = {
     6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8",
 }  # fmt: skip
-"""Type of a numeric array, by the number of its class in the format."""
+"""NumPy type of a numeric array, by its array class in the MAT-file format."""
 _LEFT_OUT = {_TEXT: "a text", _OBJECT: "an object", 5: "a sparse matrix", 16: "a function"}
-"""Classes that hold no numbers, in words."""
+"""Array classes that are not read, in words."""
 _SAVED_INSTEAD = {
     "a cell": "{plain}_1 = {name}{{1}}",
     "class timeseries": "{name} = struct('time', {name}.Time, 'values', {name}.Data)",
     "class table": "{name} = table2struct({name}, 'ToScalar', true)",
 }
-"""Statement of Matlab that makes a readable array of one that is left out, by a part of its description."""
+"""Matlab statement that makes a readable array of one that is not read, by a part of its description."""
 
 
 def instead(name: str, what: str) -> str:
-    """Advice by the kind of array: how to convert it in Matlab before saving; empty where nothing general is known."""
+    """Matlab statement that converts an array of this kind before saving, as advice; empty where none is known. what:
+    its kind."""
     for problem, statement in _SAVED_INSTEAD.items():
         if problem in what:
             return f"in Matlab: {statement.format(name=name, plain=name.replace('.', '_'))}"
@@ -52,15 +57,15 @@ def instead(name: str, what: str) -> str:
 
 
 OF_CELL = re.compile(r"\d+-of-\d+/")
-"""Prefix of the name of an array from a cell."""
+"""Prefix of the name of an array that was an entry of a cell."""
 
 
 class _Cells(tuple[Array, ...]):
-    """Arrays of one kind, a run each."""
+    """Similar arrays of a cell, each of which is taken as a run."""
 
 
 class _Bytes:
-    """Unread part of one element, with the file's byte order."""
+    """A data element of the file, read from `at` onwards, with the byte order of the file."""
 
     def __init__(self, content: memoryview, order: str) -> None:
         self.content = content
@@ -69,11 +74,12 @@ class _Bytes:
 
     @property
     def left(self) -> int:
+        """Number of bytes that are not read yet."""
         return len(self.content) - self.at
 
     def element(self) -> "tuple[int, _Bytes]":
-        """Type and content of the next element; `at` moves behind it. Raises ValueError if it is longer than the rest
-        of the file."""
+        """Data type and content of the next element; `at` moves to its end. Raises ValueError if it is longer than the
+        rest of the file."""
         if self.left < 8:
             raise ValueError("it is cut off")
         kind, size = struct.unpack_from(self.order + "II", self.content, self.at)
@@ -89,7 +95,7 @@ class _Bytes:
         return kind, _Bytes(self.content[begin : begin + size], self.order)
 
     def numbers(self) -> Array:
-        """Numbers of the next element. Raises ValueError if it has none."""
+        """Numbers of the next element. Raises ValueError if it is of another data type."""
         kind, found = self.element()
         if kind not in _TYPES:
             raise ValueError(f"an element of the type {kind} stands where numbers are needed")
@@ -97,8 +103,7 @@ class _Bytes:
 
 
 def read_mat5_arrays(path: Path) -> dict[str, Array]:
-    """Arrays by name: fields of structures as in `data.u`, arrays of a cell as in `2-of-6/u`. Raises ValueError,
-    OSError."""
+    """Arrays by name: fields of structures as `data.u`, entries of a cell as `2-of-6/u`. Raises ValueError, OSError."""
     content = read_regular(path, MOST_MAT_BYTES)
     if len(content) < _HEADER_BYTES or content[126:128] not in (b"IM", b"MI"):
         raise ValueError("it is no MAT file of version 5 to 7.3; save it in Matlab with -v7")
@@ -117,6 +122,7 @@ def read_mat5_arrays(path: Path) -> dict[str, Array]:
 
 
 def _unpack(packed: _Bytes, limit: SizeLimit) -> _Bytes:
+    """Decompress a variable. Raises DeclaredSizeError where it is larger than the limit."""
     unpacker = zlib.decompressobj()
     content = unpacker.decompress(packed.content, limit.most_bytes)
     if unpacker.unconsumed_tail:
@@ -126,7 +132,8 @@ def _unpack(packed: _Bytes, limit: SizeLimit) -> _Bytes:
 
 
 def _matrix(element: _Bytes, depth: int) -> tuple[str, Any]:
-    """Name and value: an array, a dict of arrays for a structure, or arrays of a cell."""
+    """Name and value of a miMATRIX element: an array, a dict of arrays for a structure, or the arrays of a cell. depth:
+    its level of nesting. Raises ValueError where it is damaged or too deep."""
     if depth > DEEPEST:
         raise ValueError(f"its structures are nested more than {DEEPEST} levels deep")
     if not element.left:
@@ -153,6 +160,7 @@ def _no_numbers(what: str) -> Array:
 
 
 def _numeric(element: _Bytes, shape: tuple[int, ...], number: str) -> Array:
+    """A numeric array; Matlab stores columns first. Raises ValueError where its shape and its numbers do not agree."""
     values = element.numbers()
     if math.prod(shape) != len(values) or min(shape, default=0) < 0:
         raise ValueError(f"an array of the shape {shape} has {len(values)} numbers")
@@ -160,7 +168,8 @@ def _numeric(element: _Bytes, shape: tuple[int, ...], number: str) -> Array:
 
 
 def _structures(element: _Bytes, count: int, depth: int) -> dict[str, Any]:
-    """Fields by name; of an array of structures each under its number, as in `signals.2`."""
+    """Fields of a structure by name; for an array of structures, those of each under its number, as in `signals.2`.
+    Raises ValueError where it is damaged."""
     length = int(element.numbers()[0])
     names = bytes(element.element()[1].content)
     if length < 1 or len(names) % length:
@@ -173,7 +182,8 @@ def _structures(element: _Bytes, count: int, depth: int) -> dict[str, Any]:
 
 
 def _cells(element: _Bytes, count: int, depth: int) -> Any:
-    """Arrays of numbers with the same number of dimensions, and of rows or columns; all others are left out."""
+    """Arrays of a cell, if all hold numbers and have the same number of dimensions and the same shorter side; otherwise
+    a placeholder. Raises ValueError where it is damaged."""
     if count * 8 > element.left:
         raise ValueError(f"a cell of {count} arrays is longer than what is left of the file")
     every = [_field(element, f"{number}", depth) for number in range(1, count + 1)]
@@ -188,6 +198,7 @@ def _cells(element: _Bytes, count: int, depth: int) -> Any:
 
 
 def _field(element: _Bytes, word: str, depth: int) -> Any:
+    """Value of the next field or entry. word: its name, for messages."""
     kind, inner = element.element()
     if kind != _MATRIX:
         raise ValueError(f"the field '{word}' of a structure or cell is damaged")
@@ -195,6 +206,7 @@ def _field(element: _Bytes, word: str, depth: int) -> Any:
 
 
 def _add(found: dict[str, Array], name: str, value: Any) -> None:
+    """Add a value to the arrays found, under names as `read_mat5_arrays` describes."""
     if isinstance(value, dict):
         for field, inner in value.items():
             _add(found, f"{name}.{field}", inner)

@@ -22,13 +22,14 @@ Array = npt.NDArray[Any]
 _PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Compressions that numpy.savez and numpy.savez_compressed use."""
 _CELL = "a cell, which is read where the file was saved with -v7"
-"""Words for a cell of Matlab, which stands in an HDF5 file as references."""
+"""Description of a Matlab cell, which an HDF5 file stores as references."""
 _NO_NUMBERS = np.array(None, dtype=object)
 """Placeholder for texts and objects, which are reported but not read."""
 
 
 def read_npz_arrays(path: Path) -> dict[str, Array]:
-    """Arrays by name; a single `.npy` is `data`. Raises ValueError and other exceptions for damaged files."""
+    """Arrays by name; that of a single `.npy` is called `data`. Raises OSError, ValueError, and for a damaged file
+    another exception of `file_errors.DAMAGED`."""
     with open_regular(path) as file:
         limit = SizeLimit(path.stat().st_size)
         if file.peek(6)[:6] == b"\x93NUMPY":
@@ -39,6 +40,8 @@ def read_npz_arrays(path: Path) -> dict[str, Array]:
 
 
 def _members(archive: zipfile.ZipFile, limit: SizeLimit) -> dict[str, Array]:
+    """Arrays of the members of an archive, except Python objects. Raises ValueError for a compression that numpy does
+    not use."""
     found: dict[str, Array] = {}
     for member in archive.infolist():
         if not member.filename.endswith(".npy"):
@@ -54,7 +57,8 @@ def _members(archive: zipfile.ZipFile, limit: SizeLimit) -> dict[str, Array]:
 
 
 def _npy(file: Any, size: int, limit: SizeLimit, name: str) -> Array | None:
-    """One array; None for Python objects. size: unpacked size of its container."""
+    """One array; None for Python objects. size: unpacked size of its container (bytes). Raises ValueError where the
+    declared shape does not fit."""
     shape, fortran_order, dtype = _header(file)
     if dtype.hasobject:
         return None
@@ -69,6 +73,8 @@ def _npy(file: Any, size: int, limit: SizeLimit, name: str) -> Array | None:
 
 
 def _header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, whether the order is Fortran, and type of an array. Raises ValueError for an unknown version of the
+    format."""
     version = np.lib.format.read_magic(file)
     if version == (1, 0):
         return np.lib.format.read_array_header_1_0(file)
@@ -78,8 +84,8 @@ def _header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
 
 
 def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
-    """Datasets by their path, as in `run1/force`. transposed: reverse dimensions stored in Matlab's order. Raises
-    UnusableFileError."""
+    """Datasets by their path, as in `run1/force`. transposed: the file is of Matlab: dimensions are reversed, and names
+    have dots for slashes. Raises UnusableFileError."""
     found: dict[str, Array] = {}
     with open_any_hdf5(path, "HDF5 file") as file:
         for name, entry in datasets_in(file):

@@ -1,4 +1,4 @@
-"""Cells of a table: rows split into fields, and recognition of numbers in them."""
+"""Fields of a text table: split a row into fields, and classify each as number, text, unit, time stamp or missing."""
 
 import csv
 import re
@@ -11,20 +11,20 @@ Line = tuple[int, str]
 """A line with its number in the file, from 1."""
 
 NOT_AVAILABLE = "#n/a"
-"""Error value of spreadsheets that stands for a missing number."""
+"""Error value of spreadsheets for a missing number."""
 EMPTY = (
     "", "nan", "-nan", "na", "n/a", "n.a.", NOT_AVAILABLE, "null", "none", "-", "--", "---", "1.#qnan", "-1.#qnan",
     "1.#ind", "-1.#ind", "nan(ind)", "-nan(ind)",
 )  # fmt: skip
 """Fields, in lower case, that stand for a missing number."""
 COMMENTS = ("#", "%")
-"""Marks at the start of a line that is a comment."""
+"""Marks with which a comment line begins."""
 _ERRORS = (NOT_AVAILABLE, "#div/0!", "#ref!", "#value!", "#name?", "#num!", "#null!")
 """Cells of a spreadsheet that look like the beginning of a comment but are not."""
 _LONGEST_ERROR = 8
 """Characters of a spreadsheet's longest error value, such as `#DIV/0!`."""
 _LIKE_A_NUMBER = re.compile(r"[-+]?[.,]?\d[\d.,:/' \u00a0\u202f-]*(?:[dDeE][-+]?\d+)?(?P<rest>.*)")
-"""A field that begins as a number, date or clock time does; `rest` is what follows."""
+"""A field that begins like a number, date or clock time; `rest` is the text behind that."""
 _BRACKETED = re.compile(r"[\[(].*[\])]")
 """A unit in brackets."""
 
@@ -36,8 +36,8 @@ def is_comment(line: str) -> bool:
 
 
 def split_row(line: str, delimiter: str) -> list[str]:
-    """Split a line into stripped fields; none for an empty line. With a blank as delimiter `force [N]` stays
-    together."""
+    """Split a line into stripped fields; none for an empty line. Where blanks delimit, a name and its unit in brackets
+    (`force [N]`) are one field."""
     if not line:
         return []
     if delimiter == " " and '"' not in line:
@@ -68,13 +68,13 @@ def is_empty(field: str) -> bool:
 
 
 def count_filled_fields(fields: Sequence[str]) -> int:
-    """The fields without empty ones at the end."""
+    """Number of fields, without empty ones at the end."""
     return max((place for place, field in enumerate(fields, start=1) if field), default=0)
 
 
 def is_text(field: str) -> bool:
     """Whether a field is words, or a digit with letters (`3a`). A number in an unknown notation (`1.234,5`, `12:30`, `3
-    mm`), or several numbers in one field, are not words."""
+    mm`), and several numbers in one field, are not words."""
     like = _LIKE_A_NUMBER.fullmatch(field)
     number = like is not None and (not re.fullmatch(r"\w+", like["rest"]) or is_unit(like["rest"]))
     return not number and not is_stamp(field) and not is_number(field, ".")
@@ -90,18 +90,19 @@ def is_unit(text: str) -> bool:
 
 
 def holds_data(fields: Sequence[str], decimal: str) -> bool:
-    """Whether any field is a number in any notation, a date or a clock time, which a header does not contain."""
+    """Whether any field is a number in any notation, a date or a clock time, none of which occurs in a header."""
     return holds_number(fields, decimal) or any(is_stamp(field) or _is_spelled_number(field) for field in fields)
 
 
 def _is_spelled_number(field: str) -> bool:
+    """Whether a field is a number, date or clock time in any notation, without text behind it."""
     like = _LIKE_A_NUMBER.fullmatch(field)
     return like is not None and not like["rest"]
 
 
 def are_numbers(fields: Sequence[str], decimal: str, texts: Collection[int] = ()) -> bool:
-    """Whether a row consists of numbers, or of dates and clock times with at least one number. texts: columns of words,
-    which do not count."""
+    """Whether a row consists of numbers, or of dates and clock times with at least one number. texts: indices of
+    columns of words, which are ignored."""
     plain = [field for place, field in enumerate(fields) if place not in texts and not is_stamp(field)]
     return all(is_number(field, decimal) for field in plain) and not all(map(is_empty, plain))
 
@@ -113,7 +114,7 @@ def holds_number(fields: Sequence[str], decimal: str) -> bool:
 
 def first_numbers(rows: Sequence[Line], delimiter: str, decimal: str, texts: Collection[int] = ()) -> int | None:
     """Index of the first row of numbers, or of the first of the rows directly above it in which every number is
-    missing."""
+    missing; None without a row of numbers."""
     split = (split_row(text, delimiter) for _, text in rows)
     found = next(((k, len(row)) for k, row in enumerate(split) if are_numbers(row, decimal, texts)), None)
     begin, width = found or (None, 0)

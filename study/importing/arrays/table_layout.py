@@ -1,7 +1,7 @@
-"""Layout of a table: delimiter, decimal sign, header, row of units, and rows of numbers.
+"""Detect the layout of a table: delimiter, decimal sign, header, row of units, and rows of numbers.
 
-It is found from the rows of numbers, which all tables have: the row above them is the header, or units with the header
-above; rows further up are remarks.
+The rows of numbers are found first, because every table has them. The row above them is the header, or a row of units
+with the header above it; rows further up are remarks.
 """
 
 import re
@@ -32,7 +32,7 @@ from study.importing.map_format.signal_words import is_peak_value, name_signal
 _UNITLESS = (*EMPTY, "1")
 """Entries of a row of units that state none."""
 _BRACKETED = re.compile(r"(?<![^\[\]()])[^\[\]()]+[\[(][^\[\]()]*[\])]")
-"""A name with its unit in brackets. The match begins at the start of the text or at a bracket: otherwise a search would
+"""A name with its unit in brackets. The match begins at the start of the text or at a bracket; otherwise a search would
 take quadratic time."""
 
 
@@ -46,12 +46,14 @@ class TableLayout:
     """Column names, with the unit in brackets where a row of units states it."""
     body: Sequence[Line]
     texts: frozenset[int] = frozenset()
-    """Indices of columns of words."""
+    """Indices of the columns of words."""
     notes: tuple[str, ...] = ()
 
 
 def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
-    """Layout from the lines that are not empty, comments included. Raises ValueError for contradictions."""
+    """Layout from the lines that are not empty, comments included: marks, first row of numbers, remarks below the rows,
+    empty fields at the ends of rows, then header and units. Rows between header and numbers that are data with an
+    invalid field count as data. Raises ValueError for contradictions."""
     rows = [line for line in lines if not is_comment(line[1])]
     if not rows:
         raise ValueError("it holds no lines")
@@ -84,8 +86,8 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
 
 
 def _with_given_names(rows: Sequence[Line], begin: int | None, marks: TableMarks, settings: CsvMap) -> TableLayout:
-    """Layout of a table whose map names its columns, or that has no row of numbers: its header is as wide as its last
-    row."""
+    """Layout of a table whose map names its columns, or that has no row of numbers. In the latter case the header is
+    the first row as wide as the last."""
     width = len(split_row(rows[-1][1], marks.delimiter))
     wide = [place for place, (_, text) in enumerate(rows) if len(split_row(text, marks.delimiter)) == width]
     rows = rows[0 if settings.names else wide[0] :]
@@ -97,7 +99,7 @@ def _with_given_names(rows: Sequence[Line], begin: int | None, marks: TableMarks
 
 
 def _without_empty_ends(body: Sequence[Line], delimiter: str, least: int) -> Sequence[Line]:
-    """The rows without the delimiters at the end of every row, as long as at least `least` columns are left."""
+    """The rows without the delimiters with which every row ends, as long as at least `least` columns remain."""
     if delimiter == " ":
         return body
     surplus = len(split_row(body[0][1], delimiter)) - max(least, 1)
@@ -112,7 +114,8 @@ def _without_empty_ends(body: Sequence[Line], delimiter: str, least: int) -> Seq
 def _without_remarks_below(
     rows: Sequence[Line], begin: int, marks: TableMarks
 ) -> tuple[Sequence[Line], tuple[str, ...]]:
-    """The rows without lines of words below the last row, such as `End of file`; with a sentence for each."""
+    """The rows without lines of words below the last row, such as `End of file`; and a sentence about each of these
+    lines."""
     width, end = len(split_row(rows[begin][1], marks.delimiter)), len(rows)
     while end > begin + 1:
         fields = [field for field in split_row(rows[end - 1][1], marks.delimiter) if field]
@@ -129,12 +132,14 @@ def _count_faulty(above: Sequence[Line], width: int, marks: TableMarks) -> int:
 
 
 def _strip_comment(line: str) -> str:
+    """The line without its comment mark."""
     return line.strip().lstrip("".join(COMMENTS)).strip() if is_comment(line) else line
 
 
 def _rows_above(lines: Sequence[Line], rows: Sequence[Line], begin: int, delimiter: str) -> list[list[str]]:
-    """Header lines: those that are not comments, and a comment below them that states units; comments if there are no
-    others. A comment mark alone in the first of as many fields as there are columns is a name."""
+    """Fields of the header lines: lines that are not comments, and a comment below them that states units; comments if
+    there are no others. A line whose first field is only a comment mark, with as many fields as columns, is a header
+    too: the mark is a name."""
     narrow = len(split_row(_without_empty_ends(rows[begin:], delimiter, 1)[0][1], delimiter))
     widths = range(narrow, len(split_row(rows[begin][1], delimiter)) + 1)
     plain = [
@@ -153,19 +158,21 @@ def _rows_above(lines: Sequence[Line], rows: Sequence[Line], begin: int, delimit
 
 
 def _is_marked_header(fields: list[str], widths: range, delimiter: str) -> bool:
+    """Whether the first field of a line is only a comment mark, and the line is as wide as a row."""
     return delimiter != " " and len(fields) in widths and fields[0] in COMMENTS and not any(map(is_comment, fields[1:]))
 
 
 def _first_header(above: Sequence[Line], width: int, marks: TableMarks) -> int:
-    """The first row above the numbers with the same width and without a number; else the first row."""
+    """Index of the first row above the numbers with the same width, without a number and not of units; otherwise 0."""
     split = [split_row(text, marks.delimiter) for _, text in above]
     words = [len(row) == width and not holds_number(row, marks.decimal) and not _are_units(row) for row in split]
     return words.index(True) if True in words else 0
 
 
 def _fit_header(header: list[str], fields: Sequence[str], delimiter: str) -> list[str]:
-    """Whether a row is as wide as a row of numbers, apart from: empty fields at its end; names that contain the
-    delimiter, where each ends with its unit in brackets; or one name for a date and the clock time behind it."""
+    """A header row with as many fields as a row of numbers, where it can be converted: without empty fields at its end;
+    with names that contain the delimiter joined again, if each ends with its unit in brackets; or with a name added for
+    a date next to a clock time. Otherwise the row as it is."""
     width = len(fields)
     if len(header) > width and not any(header[width:]):
         return header[:width]
@@ -178,7 +185,8 @@ def _fit_header(header: list[str], fields: Sequence[str], delimiter: str) -> lis
 def _header_and_units(
     above: Sequence[list[str]], width: int, decimal: str
 ) -> tuple[list[str] | None, list[str] | None]:
-    """The header rows directly above the numbers; None without a row of their width that has no number."""
+    """Header and row of units from the rows directly above the numbers. The header is None without a row of the right
+    width that holds no data; the units are None without a row of units."""
     words = [fields if len(fields) == width else None for fields in above]
     last = words[-1] if words else None
     before = words[-2] if len(words) > 1 else None
@@ -188,7 +196,7 @@ def _header_and_units(
 
 
 def _are_units(fields: Sequence[str]) -> bool:
-    """Whether each field is a known unit, in brackets or not, or empty; or all texts are in brackets."""
+    """Whether each field is a known unit, in brackets or not, or empty; or whether all texts are in brackets."""
     stated = [field for field in fields if field.lower() not in _UNITLESS]
     return bool(stated) and (
         all(is_unit(_strip_quotes(field)) for field in stated) or all(_strip_quotes(field) != field for field in stated)
@@ -196,11 +204,13 @@ def _are_units(fields: Sequence[str]) -> bool:
 
 
 def _strip_quotes(field: str) -> str:
+    """Text of a field without the brackets around it."""
     match = re.fullmatch(r"[\[(]\s*(.*?)\s*[\])]", field)
     return match[1] if match else field
 
 
 def _name_columns(header: Sequence[str]) -> list[str]:
+    """Names of the columns; `column3` where the third has none."""
     return [name or f"column{number}" for number, name in enumerate(header, start=1)]
 
 

@@ -1,4 +1,4 @@
-"""Delimiter, decimal sign and columns of words of a table, found by which reading makes its rows numbers."""
+"""Detect delimiter, decimal sign and columns of words of a table: the choice by which most rows consist of numbers."""
 
 import re
 from collections import Counter
@@ -19,12 +19,13 @@ from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.signal_words import name_signal
 
 _DELIMITERS = (",", ";", "\t", "|", " ")
-"""Marks that are tried, in this order."""
+"""Delimiters that are tried, in this order."""
 _SAMPLED = 32
-"""Number of rows on which delimiters and decimal signs are tried."""
+"""Approximate number of rows on which delimiters and decimal signs are tried, spread over the table."""
 _POINTED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+")
-"""A number whose points can separate thousands."""
+"""A number whose points may separate thousands."""
 NO_THOUSANDS = "write numbers without signs between thousands"
+"""Advice in messages about such numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,14 +35,14 @@ class TableMarks:
     delimiter: str
     decimal: str
     texts: frozenset[int] = frozenset()
-    """Indices of columns of words."""
+    """Indices of the columns of words."""
 
 
 def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
-    """Find delimiter and decimal sign: those that give as many columns as the map names; else those by which most rows
-    are numbers. Among several, tabs are preferred to blanks, then delimiters that split the line above alike, then
-    those with the most columns. Else those with the most columns of numbers beside columns of words; else those that
-    split all rows alike. Raises ValueError where a comma or point is ambiguous."""
+    """Find delimiter and decimal sign. Pairs are ranked in this order: as many columns as the map names; most rows of
+    numbers; tabs before blanks in a table with tabs; a line above the numbers that has as many fields; most columns.
+    Columns of words are assumed where more rows consist of numbers with them. If no row consists of numbers, the
+    delimiter is taken that splits most rows alike. Raises ValueError where a comma or point is ambiguous."""
     sample = rows[:: max(len(rows) // _SAMPLED, 1)]
     tabbed = all("\t" in text for _, text in sample[len(sample) // 2 :])
     best, found = (False, 0, False, False, 0), None
@@ -70,12 +71,13 @@ def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
 
 
 def _rows_of_numbers(sample: Sequence[Line], marks: TableMarks) -> list[list[str]]:
+    """Fields of the rows that consist of numbers, apart from columns of words."""
     split = (split_row(text, marks.delimiter) for _, text in sample)
     return [fields for fields in split if are_numbers(fields, marks.decimal, marks.texts)]
 
 
 def _pairs(sample: Sequence[Line], settings: CsvMap) -> Iterator[tuple[str, str]]:
-    """Possible pairs of delimiter and decimal sign; both may be a comma where fields are quoted."""
+    """Possible pairs of delimiter and decimal sign. Both may be a comma where fields are quoted."""
     quoted = any('"' in text for _, text in sample)
     for decimal in (settings.decimal,) if settings.decimal else (".", ","):
         for delimiter in (settings.delimiter,) if settings.delimiter else _DELIMITERS:
@@ -94,7 +96,8 @@ def _is_no_name(header: str, decimal: str, columns: int) -> bool:
 
 
 def _beside_words(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None:
-    """Columns of words, from the lower half of the rows, which is below any header."""
+    """The marks with the most columns of numbers where other columns hold words; None if there are none. Only the lower
+    half of the rows is used, which is below any header."""
     best, found = 0, None
     for delimiter, decimal in _pairs(sample, settings):
         rows = [split_row(text, delimiter) for _, text in sample[len(sample) // 2 :]]
@@ -109,7 +112,7 @@ def _beside_words(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None
 
 
 def _require_decimals(sample: Sequence[Line], marks: TableMarks) -> None:
-    """Raises ValueError where each comma in a number may be a thousands separator, as in 1,250 but not in 0,250."""
+    """Raises ValueError where each comma in a number may separate thousands, as in 1,250 but not in 0,250."""
     read = [(number, split_row(text, marks.delimiter)) for number, text in sample]
     with_comma = [
         (number, field)
@@ -127,7 +130,7 @@ def _require_decimals(sample: Sequence[Line], marks: TableMarks) -> None:
 
 
 def _require_points(rows: Sequence[Line], sample: Sequence[Line], marks: TableMarks) -> None:
-    """Raises ValueError where each point in a column may be a thousands separator, as in 1.886 beside 946."""
+    """Raises ValueError where each point in a column may separate thousands, as in a column with 1.886 and 946."""
     columns = list(zip(*_rows_of_numbers(sample, marks), strict=False))
     for place in (place for place, fields in enumerate(columns) if _may_be_thousands(fields)):
         whole = [fields[place] for fields in _rows_of_numbers(rows, marks) if len(fields) > place]
@@ -140,6 +143,8 @@ def _require_points(rows: Sequence[Line], sample: Sequence[Line], marks: TableMa
 
 
 def _may_be_thousands(fields: Sequence[str]) -> bool:
+    """Whether some numbers of a column have points that may separate thousands, and the others have at most three
+    digits."""
     numbers = [field for field in fields if not is_empty(field)]
     pointed = [field for field in numbers if "." in field]
     return (
@@ -150,7 +155,7 @@ def _may_be_thousands(fields: Sequence[str]) -> bool:
 
 
 def _likely_delimiter(sample: Sequence[Line], decimal: str) -> str:
-    """The delimiter that splits the most rows of the lower half alike, into the most fields: for a precise error
+    """The delimiter that splits most rows of the lower half into the same number of fields, for a precise error
     message."""
     lower = [text for _, text in sample[len(sample) // 2 :]]
 

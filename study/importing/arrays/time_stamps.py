@@ -1,8 +1,8 @@
-"""Read dates and clock times (`2024-03-01T12:00:00.123+01:00`, `12:00:00.123`) as seconds since the first.
+"""Read dates and clock times (`2024-03-01T12:00:00.123+01:00`, `12:00:00.123`) as seconds.
 
-Field by field: the date, the time of day and the offset from UTC. A date in a column of its own belongs to the clock
-time beside it. In dates that do not begin with the year, day and month cannot be distinguished: they are accepted only
-where all dates are the same.
+A field holds a date, a clock time with or without an offset from UTC, or both. Where one column holds dates and another
+clock times, they are added. In dates that do not begin with the year, day and month cannot be distinguished: they are
+accepted only where all dates are the same.
 """
 
 import re
@@ -19,26 +19,29 @@ if TYPE_CHECKING:
 Seconds = npt.NDArray[np.float64]
 
 _DATE = r"\d{4}(?P<between>[-/.])\d{1,2}(?P=between)\d{1,2}|\d{1,2}(?P<mark>[-/.])\d{1,2}(?P=mark)\d{4}"
-"""Year first, or last; the same mark twice."""
+"""Date with the year first or last, and the same separator twice."""
 _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2}(?:[.,]\d+|:\d{3})?)\s?(?P<half>[AaPp]\.?[Mm]\.?)?"
-"""Hour, minute, and second with its fraction behind a point, a comma or a colon; perhaps AM or PM."""
+"""Hour, minute, and second with its fraction behind a point, a comma or a colon; AM or PM where present."""
 _ZONE = r"\s?(?P<zone>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)"
-"""UTC, or an offset from it."""
+"""Time zone: UTC, or an offset from it."""
 _STAMP = re.compile(rf"(?:(?P<date>{_DATE})(?:[T ]\s*|$))?(?:{_CLOCK}(?:{_ZONE})?)?")
 """Date, clock time, or both; an empty text matches too."""
 DAY_S, HOUR_S = 86400.0, 3600.0
+"""Length of a day and of an hour (s)."""
 STAMP_WORDS = "dates and clock times are understood as 2024-03-01T12:00:00.123, with or without a zone, or 12:00:00.123"
+"""Notations that are read, for messages."""
 
 
 @dataclass(frozen=True, slots=True)
 class StampColumn:
-    """Fields of one column: seconds of a date, of a clock time, or of both."""
+    """Time stamps of one column: dates, clock times, or both."""
 
     seconds: npt.NDArray[np.float64]
-    """(n,), since the midnight before the first; NaN where the field is empty."""
+    """(n,), since midnight of the first date, in UTC where a zone is stated; NaN where the field is empty."""
     has_date: bool
     has_clock: bool
     first: str
+    """The first stamp, as in the file."""
 
 
 def is_stamp(field: str) -> bool:
@@ -68,6 +71,8 @@ def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
 
 
 def _clock_seconds(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
+    """Seconds since midnight, in UTC where a zone is stated. Raises ValueError for minutes or seconds above 59, and
+    where only some have a zone."""
     for place in np.flatnonzero((parts["minute"].astype(int) > 59) | (parts["second"].str[:2].astype(int) > 59)):
         raise ValueError(f"'{text.iloc[place]}' is no clock time, with more than 59 minutes or seconds")
     if parts["zone"].isna().any() != parts["zone"].isna().all():
@@ -81,13 +86,15 @@ def _clock_seconds(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
 
 
 def _zone_s(zone: str) -> float:
+    """Offset of a zone from UTC (s), positive to the east; 0 without a zone."""
     digits = re.sub(r"\D", "", zone)
     ahead_s = (int(digits[:2]) * 60 + int(digits[2:] or 0)) * 60.0 if digits else 0.0
     return -ahead_s if zone.startswith("-") else ahead_s
 
 
 def _date_seconds(dates: "pd.Series[str]") -> Seconds:
-    """Seconds since the first date: seconds since 1970 would leave no digits for microseconds."""
+    """Seconds since the first date; seconds since 1970 would be resolved to 0.24 µs only (float64). Raises ValueError
+    for several dates of ambiguous order."""
     days: dict[str, float] = {}  # no value for a single date of ambiguous order
     several = dates.nunique() > 1
     for date in dates.unique():
@@ -101,6 +108,7 @@ def _date_seconds(dates: "pd.Series[str]") -> Seconds:
 
 
 def _day(numbers: list[int], date: str) -> float:
+    """Seconds from 1970-01-01 to a date (year, month, day). Raises ValueError for a date that does not exist."""
     year, month, day = numbers
     try:
         return float(np.datetime64(f"{year:04d}-{month:02d}-{day:02d}", "D").astype(np.int64)) * DAY_S
@@ -109,8 +117,8 @@ def _day(numbers: list[int], date: str) -> float:
 
 
 def join_stamps(columns: Mapping[str, StampColumn]) -> dict[str, StampColumn]:
-    """Columns of dates are added to the columns of clock times beside them, and removed. Clock times without a date
-    continue with the next day at midnight."""
+    """Add the only column of dates to the only column of clock times, and remove it. Otherwise clock times without a
+    date continue into the next day where they fall by more than half a day."""
     dates = {name: column for name, column in columns.items() if not column.has_clock}
     clocks = {name: column for name, column in columns.items() if not column.has_date}
     joined = dict(columns)

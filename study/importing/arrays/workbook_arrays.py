@@ -1,7 +1,7 @@
-"""Read the sheets of a workbook (.xlsx) as tables: their cells are converted to lines and read like a text file.
+"""Read the sheets of a workbook (.xlsx, .xlsm) as tables: cells are converted to lines and read like a text file.
 
-Hidden sheets and sheets without rows of numbers are left out. With several sheets, names begin with that of the sheet
-(`Run 1/force [N]`).
+Hidden sheets and sheets without rows of numbers are left out. With several sheets, the names of arrays begin with that
+of the sheet (`Run 1/force [N]`).
 """
 
 import io
@@ -29,25 +29,25 @@ if TYPE_CHECKING:
 _BEGIN_OF_OLD = b"\xd0\xcf\x11\xe0"
 """First bytes of the container of .xls and of locked workbooks (OLE2)."""
 _DELIMITER = "\t"
-"""Delimiter of the lines that are made of a sheet."""
+"""Delimiter of the lines that are made from a sheet."""
 _MOST_ROWS, _MOST_COLUMNS = 2**20, 2**14
 """Most rows and columns of a sheet, by the standard."""
 _MOST_CELLS = 2**24
-"""Most filled cells that are read of a sheet."""
+"""Most filled cells that are read from a sheet."""
 _MOST_STATED = 2**22
 """Most cells of a sheet: each takes a tenth of a millisecond; a text table is read a hundred times faster."""
 _NEVER_COMPUTED = re.compile(rb'<c (?![^<>]*t="str")[^<>]*><f[^<>]*(?:/>|>[^<]*</f>)(?:<v ?/>|<v></v>)?</c>')
-"""In a sheet's XML: a cell with a formula and no value, which is no text."""
+"""In the XML of a sheet: a cell with a formula but no stored value, and not of type text."""
 _PERCENT = re.compile(r"%|percent|pct", re.IGNORECASE)
-"""Words of a header whose column is percentages."""
+"""Words in a text cell by which its column holds percentages."""
 
 
 class _NotReadError(ValueError):
-    """A valid sheet that is not read, with the reason."""
+    """A valid sheet that is not read; the message states the reason."""
 
 
 class _Percent(float):
-    """A number that its sheet displays times 100, with a percent sign."""
+    """A number that the sheet displays multiplied by 100, with a percent sign."""
 
 
 def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
@@ -78,7 +78,9 @@ def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
 
 
 def _open_workbook(data: bytes) -> "Workbook":
-    # Imported where workbooks are read: it takes longer than reading any other file.
+    # Imported only here, because the import takes longer than reading a file of any other format.
+    """The workbook, after its declared sizes were checked. Raises ValueError where it is too large, damaged or of
+    another kind."""
     from openpyxl import load_workbook
 
     if data.startswith(_BEGIN_OF_OLD):
@@ -92,7 +94,7 @@ def _open_workbook(data: bytes) -> "Workbook":
                 if name.startswith("xl/worksheets/"):
                     _require_plain(name, archive.read(name))
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about styles and extensions, which do not affect numbers
+            warnings.simplefilter("ignore")  # warnings about styles and extensions, which do not affect numbers
             return load_workbook(io.BytesIO(data), read_only=True, data_only=True)
     except (DeclaredSizeError, _NotReadError):
         raise
@@ -101,6 +103,7 @@ def _open_workbook(data: bytes) -> "Workbook":
 
 
 def _read_rows(sheet: Any) -> list[tuple[int, tuple[Any, ...]]]:
+    """All rows of a sheet with their numbers. Raises ValueError where the sheet is damaged."""
     try:
         return list(_rows(sheet))
     except _NotReadError:
@@ -110,7 +113,7 @@ def _read_rows(sheet: Any) -> list[tuple[int, tuple[Any, ...]]]:
 
 
 def _require_plain(member: str, sheet: bytes) -> None:
-    """Raises ValueError where a sheet has too many cells; they are counted before anything parses them."""
+    """Raises ValueError where a sheet has too many cells. They are counted in the XML before it is parsed."""
     cells, rows = sheet.count(b"<c ") + sheet.count(b"<c>"), sheet.count(b"<row")
     if cells > min(_MOST_STATED, rows * _MOST_COLUMNS):
         raise _NotReadError(f"{member} of it has {cells} cells in {rows} rows; save the sheet as .csv")
@@ -126,7 +129,8 @@ def _require_computed(sheet: Any) -> None:
 
 
 def _rows(sheet: Any) -> Iterator[tuple[int, tuple[Any, ...]]]:
-    """Rows with any content, with their numbers."""
+    """Rows with any content, with their numbers. Raises ValueError for too many rows, columns or cells, and for
+    formulas without stored values."""
     _require_computed(sheet)
     sheet.reset_dimensions()  # some programs state fewer rows than they write
     filled = 0
@@ -147,12 +151,13 @@ def _rows(sheet: Any) -> Iterator[tuple[int, tuple[Any, ...]]]:
 
 
 def _value(cell: Any) -> Any:
+    """Value of a cell; a `_Percent` where the cell is displayed as a percentage."""
     value = cell.value
     return _Percent(value) if isinstance(value, int | float) and "%" in cell.number_format else value
 
 
 def _is_of_numbers(cells: Sequence[Any]) -> bool:
-    """Whether a row has two numbers or more, or nothing else: a name with a value is a setting."""
+    """Whether a row has two numbers or more, or only numbers. A name with a single number is a setting."""
     filled = [cell for cell in cells if cell is not None]
     numbers = [cell for cell in filled if isinstance(cell, int | float) or _is_number_in_text(cell)]
     return len(numbers) > 1 or (bool(numbers) and len(numbers) == len(filled))
@@ -163,6 +168,7 @@ def _is_number_in_text(cell: Any) -> bool:
 
 
 def _table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: CsvMap) -> Table:
+    """Columns of one sheet. Raises ValueError with the sheet and the problem."""
     width = max(len(cells) for _, cells in rows)
     percents = {
         place
@@ -190,12 +196,13 @@ def _table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: CsvMa
 
 
 def _width(cells: Sequence[Any]) -> int:
+    """Number of cells without empty ones at the end."""
     return max((place for place, cell in enumerate(cells, start=1) if cell is not None), default=0)
 
 
 def _line(number: int, cells: Sequence[Any], width: int, how: tuple[Collection[int], str]) -> Line:
-    """The cells of a row as text. how: columns in which a cell shows percent, whose numbers are taken as displayed; and
-    the decimal sign."""
+    """The cells of a row as a line of text. how: indices of columns with percentages, whose numbers are taken as
+    displayed, and the decimal sign."""
     percents, decimal = how
     fields = [
         f"{cell * 100:.15g}".replace(".", decimal)
@@ -207,6 +214,7 @@ def _line(number: int, cells: Sequence[Any], width: int, how: tuple[Collection[i
 
 
 def _field(cell: Any, decimal: str) -> str:
+    """A cell as text, in a notation that `csv_arrays` reads."""
     match cell:
         case None:
             return ""
@@ -222,4 +230,4 @@ def _field(cell: Any, decimal: str) -> str:
             minutes, seconds = divmod(cell.total_seconds(), 60)
             return f"{int(minutes // 60)}:{int(minutes % 60):02d}:{seconds:09.6f}"
     text = " ".join(str(cell).replace('"', "").split())
-    return f'"{text}"' if is_comment(text) else text  # a sheet has no comments
+    return f'"{text}"' if is_comment(text) else text  # quoted, because a sheet has no comment lines

@@ -1,6 +1,7 @@
-"""Evaluate expressions of a map: arithmetic over arrays. Parsed by Python's parser, never evaluated by it.
+"""Evaluate expressions of a map: arithmetic over arrays.
 
-Everything outside the lists below is refused by name: no attributes, no other function calls, no comprehensions.
+The text is parsed by Python's parser and evaluated here on the syntax tree, never by Python itself. What is not in the
+lists below is refused by name: attributes, other function calls, comprehensions.
 """
 
 import ast
@@ -18,12 +19,12 @@ from study.importing.expressions.functions import FUNCTIONS, Clock, Value
 from study.importing.map_format.map_errors import ImportProblemError, suggestion
 
 Lookup = Callable[[str], Value]
-"""Value of a name. Raises ImportProblemError for an unknown one."""
+"""Returns the value of a name. Raises ImportProblemError for an unknown name."""
 
 LONGEST = 2000
-"""Longest expression of a map, in characters: parsing takes time and depth of the stack."""
+"""Longest expression of a map, in characters: parsing takes time and stack depth."""
 _CALL_COSTS = 20
-"""Cost of a function call in additions: the slowest ones sort, or compute a sine."""
+"""Cost of a function call per element, in additions: the slowest functions sort, or compute a sine."""
 
 _OPERATIONS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: np.add,
@@ -33,20 +34,20 @@ _OPERATIONS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Pow: np.power,
     ast.Mod: np.mod,
 }
-"""Operators between arrays, and what computes them."""
+"""Operators between arrays, and the functions that compute them."""
 _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: np.less,
     ast.LtE: np.less_equal,
     ast.Gt: np.greater,
     ast.GtE: np.greater_equal,
 }
-"""Comparisons of arrays, and what computes them; the results count as 0 and 1."""
+"""Comparisons of arrays, and the functions that compute them; the results count as 0 and 1."""
 ALLOWED = "allowed are numbers, names, + - * / ** %, < <= > >=, [ ] and the functions " + ", ".join(sorted(FUNCTIONS))
-"""What an expression may hold, for messages."""
+"""What an expression may contain, for messages."""
 
 
 def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
-    """Value of an expression: an array of float64, or a number as an array of shape ().
+    """Value of an expression: an array of float64; a single number has the shape ().
 
     Raises ImportProblemError with the part that is not understood, or that exceeds the budget.
     """
@@ -63,7 +64,7 @@ def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
 
 
 def names_in(text: str) -> set[str]:
-    """Arrays, channels and definitions that an expression needs. Raises ImportProblemError."""
+    """Names of arrays, channels and definitions that an expression uses. Raises ImportProblemError."""
     tree = parse_expression(text)
     functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     plain = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in functions}
@@ -85,6 +86,8 @@ def parse_expression(text: str) -> ast.expr:
 
 
 class _Evaluation:
+    """Evaluation of one expression. All methods raise ImportProblemError."""
+
     def __init__(self, text: str, lookup: Lookup, clock: Clock, budget: Budget) -> None:
         self.text = text
         self.lookup = lookup
@@ -92,6 +95,7 @@ class _Evaluation:
         self.budget = budget
 
     def of(self, node: ast.expr) -> Any:
+        """Value of a node of the syntax tree: numbers, or a text."""
         with self.budget.deeper(self.text):
             match node:
                 case ast.Constant() | ast.Name():
@@ -111,6 +115,7 @@ class _Evaluation:
             raise self._refusal(node)
 
     def _leaf(self, node: ast.Constant | ast.Name) -> Any:
+        """Value of a name, a number or a text."""
         self.budget.spend(0, self.text)
         match node:
             case ast.Name(id="pi"):
@@ -124,6 +129,7 @@ class _Evaluation:
         raise self._refusal(node)
 
     def _numbers(self, node: ast.expr) -> Value:
+        """Value of a node that must be numbers."""
         value = self.of(node)
         if isinstance(value, str):
             raise ImportProblemError(f"in '{self.text}' the text '{value}' stands where numbers are needed")
@@ -136,6 +142,7 @@ class _Evaluation:
         return np.negative(value)
 
     def _combine(self, operation: Callable[[Any, Any], Any], left: ast.expr, right: ast.expr) -> Value:
+        """Value of an operator or comparison between two nodes."""
         first = self._numbers(left)
         with self.budget.hold_numbers(np.size(first)):
             second = self._numbers(right)
@@ -156,6 +163,7 @@ class _Evaluation:
             self.budget.spend(size, self.text, times)
 
     def _call(self, name: str, arguments: list[ast.expr]) -> Value:
+        """Value of a function call; its cost is counted before it is computed."""
         if name == "array":
             return self._array_by_name(arguments)
         if name not in FUNCTIONS:
@@ -181,12 +189,14 @@ class _Evaluation:
             raise ImportProblemError(f"in '{self.text}' {function.usage} fails: {error}") from error
 
     def _array_by_name(self, arguments: list[ast.expr]) -> Value:
+        """Value of `array("NAME")`, for names that are not identifiers."""
         match arguments:
             case [ast.Constant(value=str() as name)]:
                 return self.lookup(name)
         raise ImportProblemError(f"in '{self.text}' array(\"NAME\") takes one name in quotes")
 
     def _index_array(self, inner: ast.expr, index: ast.expr) -> Value:
+        """Value of an indexed array."""
         whole = self._numbers(inner)
         entries = index.elts if isinstance(index, ast.Tuple) else [index]
         places: list[int | slice] = []
@@ -200,6 +210,7 @@ class _Evaluation:
         return part
 
     def _index(self, node: ast.expr) -> int | slice:
+        """An index or a slice of whole numbers."""
         if not isinstance(node, ast.Slice):
             return self._whole_number(node)
         bounds = [None if bound is None else self._whole_number(bound) for bound in (node.lower, node.upper, node.step)]
@@ -215,6 +226,7 @@ class _Evaluation:
 
     def _refusal(self, node: ast.expr) -> ImportProblemError:
         # As written in the source: unparsing would need memory in proportion to its depth.
+        """The error for a node that is not allowed."""
         part = ast.get_source_segment(self.text.strip(), node) or self.text
         return ImportProblemError(f"in '{self.text}' this is not understood: {part}; {ALLOWED}")
 

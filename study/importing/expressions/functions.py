@@ -1,4 +1,7 @@
-"""Functions available in expressions of a map."""
+"""Functions that expressions of a map may call, such as `derivative(x)` and `clip(x, lowest, highest)`.
+
+`FUNCTIONS` lists them with their usage and meaning. Functions of time take the times of the samples from a `Clock`.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,13 +17,13 @@ class Clock(Protocol):
     """Times of the samples that an expression works on."""
 
     def times_s(self, count: int) -> Value:
-        """(count,). Raises ValueError if this clock does not know them."""
+        """(count,): times of the samples (s). Raises ValueError if this clock does not know them."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A function of expressions, with the fewest and most arguments that it takes."""
+    """A function of expressions, with the fewest and the most arguments that it takes."""
 
     usage: str
     meaning: str
@@ -31,30 +34,37 @@ class Function:
 
 
 def _plain(usage: str, meaning: str, function: Callable[..., Any], count: int = 1) -> Function:
+    """A function with a fixed number of arguments that does not depend on time."""
     return Function(usage, meaning, count, count, lambda clock, *values: function(*values))
 
 
 def _line(values: Value) -> Value:
+    """The array, if it has one dimension. Raises ValueError otherwise."""
     if np.ndim(values) != 1:
         raise ValueError(f"it needs an array of one dimension, not of shape {np.shape(values)}")
     return values
 
 
 def _difference(values: Value) -> Value:
+    """Differences of neighbouring samples (n,); the first is 0."""
     return np.diff(_line(values), prepend=values[:1])
 
 
 def _derivative(clock: Clock, values: Value) -> Value:
+    """Derivative (n,) per second, by central differences; one-sided at the ends."""
     found: Value = np.gradient(_line(values), clock.times_s(len(values)))
     return found
 
 
 def _integral(clock: Clock, values: Value) -> Value:
+    """Integral (n,) over seconds from the first sample, by the trapezoidal rule."""
     steps = np.diff(clock.times_s(len(_line(values))))
     return np.concatenate([[0.0], np.cumsum(steps * (values[1:] + values[:-1]) / 2)])
 
 
 def _onset(clock: Clock, values: Value, threshold: Value) -> int:
+    """Index of the first sample that differs from the mean of the first ten by more than the threshold. Raises
+    ValueError without such a sample."""
     away = np.abs(_line(values) - np.mean(values[:10])) > float(threshold)
     if not away.any():
         raise ValueError(f"nothing leaves the mean of the first ten samples by more than {float(threshold):g}")
@@ -62,6 +72,7 @@ def _onset(clock: Clock, values: Value, threshold: Value) -> int:
 
 
 def _repeat(values: Value, times: Value) -> Value:
+    """The array, repeated `times` times."""
     return np.tile(_line(values), int(times))
 
 
@@ -92,4 +103,4 @@ FUNCTIONS: dict[str, Function] = {
     "flatten": _plain("flatten(x)", "the rows of a table one after another", np.ravel),
     "transpose": _plain("transpose(x)", "rows as columns", np.transpose),
 }
-"""`array("NAME")`, for names that are not identifiers, is handled by the expression itself."""
+"""Functions by name. `array("NAME")`, for names that are not identifiers, is evaluated in `expression`."""

@@ -1,4 +1,4 @@
-"""Meaning of names in an expression: arrays of a file, and the map's own definitions."""
+"""Values of names in an expression: arrays of a file, and definitions ([let]) of the map."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,15 +17,15 @@ from study.importing.map_format.map_errors import ImportProblemError, suggestion
 from study.importing.map_format.signal_words import unit_in
 
 _SHOWN = 24
-"""Arrays that a message names."""
+"""Most arrays that a message names."""
 
 
 @dataclass(frozen=True, slots=True)
 class NoTime:
-    """Clock of expressions for the rate and for the time stamps themselves, where no time is known."""
+    """Clock of the expressions that define a rate or time stamps, for which no time is known yet."""
 
     def times_s(self, count: int) -> Value:
-        """Raises ValueError."""
+        """Raises ValueError, because no time is known."""
         raise ValueError("there is no clock in this place yet")
 
 
@@ -38,26 +38,27 @@ class Namespace:
     where: str
     """The file, for messages."""
     budget: Budget
-    """What all expressions of the import may cost together."""
+    """Limit of the cost of all expressions of an import together."""
     _open: set[str] = field(default_factory=set)
-    """Definitions being evaluated: a recursive one is refused."""
+    """Definitions that are being evaluated: a recursive definition is refused."""
 
     def value_of(self, text: str, clock: Clock) -> Value:
-        """Value of an array by its name, with any characters, or of an expression. Raises ImportProblemError."""
+        """Value of an array by its name, which may contain any characters, or of an expression. Raises
+        ImportProblemError."""
         if text in self.arrays:
             return self._numbers(text)
         return evaluate(text, lambda name: self.lookup(name, clock), clock, self.budget)
 
     def number(self, text: str) -> float:
-        """A single number. Raises ImportProblemError otherwise."""
+        """Value of an expression that must be a single finite number. Raises ImportProblemError otherwise."""
         value = self.value_of(text, NoTime())
         if np.size(value) != 1 or not np.isfinite(value).all():
             raise ImportProblemError(f"'{text}' has the shape {np.shape(value)}; it must be one number")
         return float(np.ravel(value)[0])
 
     def lookup(self, name: str, clock: Clock) -> Value:
-        """Value of an array or a definition; clock: whose times its expression may use. Raises ImportProblemError for
-        an unknown name."""
+        """Value of an array or a definition. clock: gives the times for the expression of a definition. Raises
+        ImportProblemError for an unknown name."""
         if name in self.arrays:
             return self._numbers(name)
         if name in self.definitions:
@@ -80,6 +81,7 @@ class Namespace:
         return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
     def _value_of_definition(self, name: str, clock: Clock) -> Value:
+        """Value of a definition. Raises ImportProblemError where it needs itself."""
         if name in self._open:
             raise ImportProblemError(f"the definition of '{name}' needs itself")
         self._open.add(name)
@@ -90,6 +92,7 @@ class Namespace:
             self._open.discard(name)
 
     def _numbers(self, name: str) -> Value:
+        """An array as float64. Raises ImportProblemError where it holds no real numbers."""
         array = self.arrays[name]
         problem = left_out(array)
         if isinstance(problem, FaultyColumn):
@@ -105,8 +108,8 @@ class Namespace:
 
 
 def of_file(arrays: Arrays, definitions: Mapping[str, str], prefix: str, budget: Budget) -> Namespace:
-    """Names that begin with the prefix are also known without it, and `fx [N]` as `fx`. Raises ImportProblemError if
-    none begins with it."""
+    """Namespace of a file. Names that begin with the prefix are also known without it, and `fx [N]` as `fx`. Raises
+    ImportProblemError if a prefix is given and no name begins with it."""
     short = {name.removeprefix(prefix): array for name, array in arrays.by_name.items() if name.startswith(prefix)}
     plain = {unit_in(name)[0]: array for name, array in arrays.by_name.items()}
     if prefix and not short:
@@ -117,6 +120,7 @@ def of_file(arrays: Arrays, definitions: Mapping[str, str], prefix: str, budget:
 
 
 def _shape(array: npt.NDArray[Any]) -> str:
+    """Shape of an array in words."""
     if array.dtype.kind not in "fiub":
         return "(no numbers)"
     return "(a number)" if array.ndim == 0 else f"({' x '.join(str(count) for count in array.shape)})"

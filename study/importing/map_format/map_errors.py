@@ -1,4 +1,4 @@
-"""Errors of an import, with advice."""
+"""Errors of an import: what is wrong, and what to do about it."""
 
 import re
 from collections.abc import Iterable
@@ -9,23 +9,25 @@ from analysis.wording import as_sentence
 from study.errors import StudyError, WrongUseError
 
 _LONGEST_WORD = 60
-"""Characters of a name that are compared and shown."""
+"""Most characters of a name that are compared and shown."""
 _LONGEST_SENTENCE = 2000
-"""Characters of a message."""
+"""Most characters of a message."""
 _MOST_NAMES = 500
-"""Known names with which an unknown one is compared."""
+"""Most known names with which an unknown name is compared."""
 _QUOTED = re.compile(rf"(?<!\w)'([^']{{{_LONGEST_WORD}}})[^']+'(?!\w)")
-"""A quotation longer than a message shows."""
+"""A quotation that is longer than a message may show."""
 
 NOTHING_WRITTEN = "Nothing was written."
+"""Statement of import errors on what was saved."""
 
 
 class ImportProblemError(ValueError):
-    """One problem: a sentence fragment that names the key, channel, array or file."""
+    """One problem of an import: a clause that names the key, channel, array or file. `ImportRefusedError` reports
+    it."""
 
 
 class ImportRefusedError(StudyError):
-    """An import that failed."""
+    """An import that failed. what: the files; problem: a clause; do_now: remedy, by default to correct the map."""
 
     def __init__(self, what: str, problem: str, do_now: str = "") -> None:
         super().__init__(
@@ -37,7 +39,8 @@ class ImportRefusedError(StudyError):
 
 
 class MapNeededError(WrongUseError):
-    """The meaning of the arrays is not known. `skeleton`: a map for this file, to be completed."""
+    """An import without a map of a file whose arrays are not all understood. why: what is open; skeleton: a map for
+    this file, to be completed."""
 
     def __init__(self, file: str, why: str, skeleton: str) -> None:
         super().__init__(
@@ -51,7 +54,8 @@ class MapNeededError(WrongUseError):
 
 
 def _sentence(problem: str) -> str:
-    """Shorten names and fields: those of a damaged file may have a million letters."""
+    """The problem as a sentence. Long quotations and long lists are shortened: a name in a damaged file may have a
+    million letters."""
     short = _QUOTED.sub(r"'\1…'", problem)
     if len(short) > _LONGEST_SENTENCE:
         short = f"{short[:_LONGEST_SENTENCE].rpartition('; ')[0] or short[:_LONGEST_SENTENCE]}; and more"
@@ -59,8 +63,8 @@ def _sentence(problem: str) -> str:
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """ "; did you mean 'x'" for a similar name; else empty."""
-    names = list(islice(known, _MOST_NAMES))  # for a name of a million letters it would take minutes
+    """The clause "; did you mean 'x'" with the known name x that is most similar; empty without a similar name."""
+    names = list(islice(known, _MOST_NAMES))  # comparing a name of a million letters would take minutes
     close = (
         get_close_matches(word[:_LONGEST_WORD], names, n=1)
         or [name for name in names if name.lower() == word.lower()][:1]

@@ -1,5 +1,8 @@
-"""Interpret channel names: quantity and unit, as in `fx [N]`, `displacement_mm`, `motor speed (rpm)`; and the roles
-of a file's channels."""
+"""Interpret channel names: quantity and unit, as in `fx [N]`, `displacement_mm`, `motor speed (rpm)`; and derive the
+roles of channels (command, response, ...) from them.
+
+`name_signal` interprets one name; `roles_of`, `open_roles` and `propose_roles` take all names of a file.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -24,12 +27,12 @@ from study.importing.map_format.import_map import SignalRole
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+(?:\([^\[\]()]*\))?)[\])]\s*")
 """A name followed by its unit in brackets."""
 _SAID_BEHIND = re.compile(r"(?<=\w)(?:\s*/\s*|\s*,\s+|\s+in\s+)(?=\S)")
-"""Units behind a slash, comma or `in` (`force / N`, `force, N`, `Kraft in N`), as in standards and of testing
-machines."""
+"""Separator between a name and its unit without brackets (`force / N`, `force, N`, `Kraft in N`), as in standards and
+in files of testing machines."""
 _NO_UNITS = ("n/a", "na", "none", "-", "--")
-"""Words in the place of a unit that say that there is none."""
+"""Words in the place of a unit that state that there is none."""
 _PEAK = re.compile(r"(?<![a-z])(peak|pk|rms)\b|(?<=[av])(peak|pk|rms)\b", re.IGNORECASE)
-"""Marks of a unit that stands for a peak or an rms value."""
+"""Mark of a unit whose numbers are peak or rms values."""
 LONGEST_NAME = 300
 """Longest name in characters; the search for a unit takes quadratic time."""
 _REMEMBERED = 2**14
@@ -47,31 +50,33 @@ _FOREIGN = {
     "temperature": ("温度", "온도", "температура", "θερμοκρασία"),
     "pressure": ("压力", "圧力", "압력", "давление", "πίεση"),
 }
-"""Words of other scripts for a quantity."""
+"""Words for a quantity in other scripts."""
 FOREIGN_WORDS = {word: quantity for quantity, words in _FOREIGN.items() for word in words}
-"""Words in other scripts, by which an encoding is recognised, and the quantity of each."""
+"""Quantity of each word in another script; the words are also used to detect an encoding."""
 _SURE = ("rad", "mrad", "rpm", "kN", "N m", "mN m")
-"""Units that are unambiguous at the end of a name, unlike `A` in `phase_A`; so are those with a slash."""
+"""Units that are unambiguous at the end of a name, unlike `A` in `phase_A`; units with a slash are unambiguous, too."""
 _WRITTEN_TOGETHER = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
-"""Units written without blanks or slashes, as in names, and what they stand for."""
+"""Units as written in names, without blanks or slashes, and their usual notation."""
 _SAID: dict[str, SignalRole] = {
     **dict.fromkeys(("command", "cmd", "commanded", "comando", "mando", "befehl", "commande"), "command"),
     **dict.fromkeys(("ref", "reference", "target", "setpoint", "desired"), "helper"),
     **dict.fromkeys(("referencia", "sollwert", "consigne"), "helper"),
     **dict.fromkeys(("supply", "battery", "bus", "ambient", "setting"), "condition"),
 }  # fmt: skip
-"""Roles by a word of a name."""
+"""Role that a word in a name states."""
 _SHORT: dict[str, SignalRole] = {"u": "command", "y": "response"}
-"""Textbook names of input and output, if both exist and there is no `x`: `y` would then be an axis."""
+"""Role of the textbook names of input and output. They count only if both occur and no name is `x`: `y` would then be
+an axis."""
 _ALONE: dict[str, SignalRole] = {
     **dict.fromkeys(("input", "entrada", "eingang", "entrée", "entree"), "command"),
     **dict.fromkeys(("output", "salida", "ausgang", "sortie"), "response"),
 }
-"""Names of input and output, valid only as the whole name: an output speed is a speed."""
+"""Role of names of input and output, valid only as the whole name: an "output speed" is a speed."""
 _Role = SignalRole | Literal[""]
-"""Role of a signal; empty: not known yet."""
+"""Role of a channel; empty: not known."""
 _DRIVES, _FEEDS = ("force", "torque"), ("current", "voltage")
 _MOTIONS, _PLACES = ("acceleration", "velocity"), ("position", "angle")
+"""Quantities of channels: forces, electrical quantities, rates of motion, and positions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,14 +84,16 @@ class ParsedName:
     """A header or array name, interpreted as far as possible."""
 
     header: str
+    """Name as in the file."""
     name: str
+    """Name without its unit in brackets."""
     unit: str
     """Unit as in the file; empty if none is stated or known."""
     quantity: str
     """Quantity; empty if neither the unit nor a word determines it."""
     doubt: str
-    """Uncertainty: an unknown unit, a unit from a name without a supporting word (`phase_A`), or a contradiction; else
-    empty."""
+    """What is uncertain, as a clause: an unknown unit, a unit in a name without a word for its quantity (`phase_A`), or
+    a contradiction. Otherwise empty."""
 
     @property
     def sure(self) -> bool:
@@ -95,13 +102,14 @@ class ParsedName:
 
 
 def plain_names(columns: Sequence[ParsedName]) -> list[str]:
-    """Names without the unit suffix (`displacement_in` becomes `displacement`, since samples are converted to SI),
-    where that is certain and keeps names distinct."""
+    """Names without the unit at their end (`displacement_in` becomes `displacement`, because samples are converted to
+    SI), where the unit is certain and the names stay distinct."""
     plain = [_without_unit(column) for column in columns]
     return [name if plain.count(name) == 1 else column.name for name, column in zip(plain, columns, strict=True)]
 
 
 def _without_unit(column: ParsedName) -> str:
+    """Name without the unit at its end, where that is certain."""
     before, unit = unit_at_end(column.name)
     return before if unit and unit == column.unit and not column.doubt else column.name
 
@@ -117,13 +125,14 @@ def unit_in(header: str) -> tuple[str, str]:
 
 
 def is_peak_value(unit: str) -> bool:
-    """Whether a unit as a file states it says that its numbers are rms or peak values (`A (peak)`, `mV_rms`)."""
+    """Whether a unit, as written in a file, states rms or peak values (`A (peak)`, `mV_rms`)."""
     return plain_unit(unit) != unit and _PEAK.search(unit) is not None
 
 
 @lru_cache(_REMEMBERED)
 def name_signal(header: str) -> ParsedName:
-    """Interpret one header."""
+    """Interpret one header. The quantity follows from a word of the name if there is one, otherwise from the unit; a
+    contradiction between both is a doubt."""
     name, unit = unit_in(header)
     foreign = max((word for word in FOREIGN_WORDS if word in name.lower()), key=len, default="")
     word = quantity_in(name) if FOREIGN_WORDS.get(foreign, "time") == "time" else FOREIGN_WORDS[foreign]
@@ -153,6 +162,7 @@ def name_signal(header: str) -> ParsedName:
 
 
 def _unknown(unit: str) -> str:
+    """Clause about an unknown unit."""
     near = suggest_unit(unit)
     return f"'{unit}' is not a unit known here" + (f" (did you mean '{near}'?)" if near else "")
 
@@ -186,20 +196,22 @@ def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
 
 
 def propose_roles(columns: Sequence[ParsedName]) -> list[_Role]:
-    """Roles by names, then by quantity; empty if open. A reference is a helper, and so are currents and voltages
-    beside a force."""
+    """Roles by words of the names, otherwise by quantity; empty where open. A reference is a helper; so are currents
+    and voltages where there is a force."""
     all_stated = _find_stated_roles(columns)
     return [stated or role for stated, role in zip(all_stated, _roles(columns, all_stated), strict=True)]
 
 
 def may_be_imposed(columns: Sequence[ParsedName]) -> bool:
-    """Whether there are only forces and positions, and no name says which of them is the command."""
+    """Whether there are forces (or torques) and positions (or angles), no velocities or accelerations, and no name that
+    states a command, a response or a helper."""
     quantities = {column.quantity for column in columns}
     plain = not {"command", "helper", "response"} & set(_find_stated_roles(columns))
     return plain and bool(quantities & set(_DRIVES) and quantities & set(_PLACES)) and not quantities & set(_MOTIONS)
 
 
 def _roles(columns: Sequence[ParsedName], stated: Sequence[_Role]) -> list[_Role]:
+    """Role of each channel by quantity, with conditions and commands that names state; empty where open."""
     by_quantity = _by_quantity(columns, stated)
     return [_role(column, role, by_quantity) for column, role in zip(columns, stated, strict=True)]
 
@@ -214,6 +226,7 @@ def _role(column: ParsedName, stated: _Role, by_quantity: Mapping[str, SignalRol
 
 
 def _find_stated_roles(columns: Sequence[ParsedName]) -> list[_Role]:
+    """Role that each name states; empty where it states none."""
     firsts = {column.name.split("_")[0].lower() for column in columns}
     short = _SHORT if {"u", "y"} <= firsts and "x" not in firsts else {}
     found: list[_Role] = []
@@ -226,12 +239,13 @@ def _find_stated_roles(columns: Sequence[ParsedName]) -> list[_Role]:
 
 
 def _by_quantity(columns: Sequence[ParsedName], stated: Sequence[_Role]) -> dict[str, SignalRole]:
+    """Role of each quantity, given which quantities occur in the file (see `roles_of`)."""
     quantities = {column.quantity for column, role in zip(columns, stated, strict=True) if role != "condition"}
     answers = _MOTIONS if quantities & set(_MOTIONS) else _PLACES
     by_quantity: dict[str, SignalRole] = {}
     if quantities & set(_DRIVES):
         by_quantity.update({**dict.fromkeys(_FEEDS, "helper"), **dict.fromkeys(_DRIVES, "command")})
-    elif len(quantities & set(_FEEDS)) == 1:  # the command cannot be identified
+    elif len(quantities & set(_FEEDS)) == 1:  # with both currents and voltages, the command cannot be identified
         by_quantity.update(dict.fromkeys(_FEEDS, "command"))
     by_quantity.update(dict.fromkeys(_PLACES, "position"))
     by_quantity.update(dict.fromkeys(answers, "response"))
@@ -240,8 +254,8 @@ def _by_quantity(columns: Sequence[ParsedName], stated: Sequence[_Role]) -> dict
 
 @lru_cache(_REMEMBERED)
 def unit_at_end(name: str) -> tuple[str, str]:
-    """Name and unit at its end as in `displacement_mm`, `omega_rad_s`, `a_mps2`, `force / N` (the longest that is a
-    unit); the whole name and empty if there is none."""
+    """Name, and the unit at its end as in `displacement_mm`, `omega_rad_s`, `a_mps2`, `force / N` (the longest ending
+    that is a unit). Without such a unit: the whole name, and an empty unit."""
     if len(name) > LONGEST_NAME:
         return name, ""
     parts = name.split("_")
@@ -258,7 +272,7 @@ def unit_at_end(name: str) -> tuple[str, str]:
 
 
 def _join_unit(parts: Sequence[str]) -> str:
-    """A unit whose signs are written as underscores."""
+    """A unit in usual notation, from the parts of a name between underscores."""
     text = "_".join(parts)
     text = re.sub(r"mps2$", "m/s^2", text)
     text = _WRITTEN_TOGETHER.get(text, text.replace("_per_", "/").replace("_", "/"))

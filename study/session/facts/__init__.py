@@ -1,6 +1,6 @@
-"""The facts of a session, one JSON line each, and what their fields mean.
+"""The facts of a session, one JSON line each in events.jsonl, and the meaning of their fields.
 
-`fact_types` (kinds of values) -> `sitting_events`, `answer_given`, `level_scale` -> `events` (all of them);
-`log_chain` and `log_time` are their checksum and their time, `event_words` says them in sentences. Begin at
-`events.py`.
+`fact_types` (types of values) -> `sitting_events`, `sensor_facts`, `answer_given`, `level_scale` -> `events` (the union
+of all facts). `log_chain` is the checksum of the lines, `log_time` the elapsed time, `void_reasons` the reasons for
+void trials, and `event_words` describes each fact in a sentence. Begin at `events.py`.
 """

@@ -1,6 +1,6 @@
-"""The event of an answer, with the device's counters at that moment.
+"""The event of an answer, with the counters of the device at that moment.
 
-If the program is killed before the measurement of the trial is logged, the trial is judged by these counters.
+If the program is killed before the measurement of the trial is logged, these counters decide whether the trial counts.
 """
 
 from typing import Annotated, Literal
@@ -14,10 +14,10 @@ from study.session.facts.sitting_events import FACT
 
 @dataclass(frozen=True, config=FACT)
 class AnswerHealth:
-    """Device counters in ticks since the stimulus began, as in `study.devices.device.Health`."""
+    """Counters of the device, in ticks since the stimulus began, as in `study.devices.device.Health`."""
 
     fault: Annotated[str, Field(pattern="^[A-Z_]{1,40}$")]
-    """Name of the device's fault; NONE where there was none."""
+    """Name of the fault of the device; NONE without a fault."""
     felt_whole: bool
     """Whether the stimulus was complete until the answer: no fault had stopped it."""
     ticks: Count
@@ -27,9 +27,11 @@ class AnswerHealth:
     slew_limited: Count
     sensor_clipped: Count
     peak_command_n: Magnitude
+    """Largest magnitude of the commanded force (N)."""
     late_ticks: Count | None = None
     latest_s: Seconds | None = None
-    """Both are null in logs of older versions."""
+    """Longest time from when a tick was due until its work was done (s). This field and `late_ticks` are null in logs
+    of older versions."""
 
 
 @dataclass(frozen=True, config=FACT)
@@ -44,5 +46,5 @@ class AnswerGiven:
     response_time_s: Seconds
     monotonic_s: Seconds | None = None
     health: AnswerHealth | None = None
-    """Null in logs of older versions."""
+    """Counters at the answer; null in logs of older versions."""
     event: Literal["answer_given"] = "answer_given"

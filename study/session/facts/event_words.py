@@ -1,7 +1,8 @@
 """The log of a session in words: one plain sentence per fact.
 
-Health answers are left out, and so is the direction of a trial that does not count (yet): it may be repeated, and a
-reader may sit beside the participant. Runs and trials count from 1 here, as on the participant's screen.
+Answers to questions about health are left out. The direction of a trial that does not count (yet) is left out, too: the
+trial may be repeated, and the participant may see the text. Runs and trials count from 1 here, as on the screen of the
+participant.
 """
 
 from collections.abc import Iterable
@@ -39,7 +40,8 @@ _Key = tuple[int, int, int]
 
 
 def log_in_words(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...]:
-    """One line per event, oldest first: local time and a sentence; a line wherever date or UTC offset change."""
+    """One line per event, oldest first: local time and a sentence. A line with the date precedes each change of date or
+    UTC offset."""
     events = tuple(events)
     counted = {_key(event) for event in events if isinstance(event, TrialMeasured)}
     presented = {_key(e): e for e in events if isinstance(e, TrialPresented) and _key(e) in counted}
@@ -56,12 +58,12 @@ def log_in_words(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...
 
 
 def in_words(event: Event) -> str:
-    """One event by itself: direction and correctness, which depend on other events, are left out."""
+    """One event alone. Direction and correctness of a trial, which depend on other events, are left out."""
     return _describe(event, {})
 
 
 def _describe(event: Event, presented: dict[_Key, TrialPresented]) -> str:
-    """The sentence for an event. presented: the trials that count."""
+    """The sentence for an event. presented: the presentations of trials that count."""
     match event:
         case TrialPresented():
             return _describe_presented(event, with_direction=_key(event) in presented)
@@ -78,6 +80,7 @@ def _describe(event: Event, presented: dict[_Key, TrialPresented]) -> str:
 
 
 def _describe_other(event: Event) -> str:
+    """The sentence for an event outside the trials."""
     match event:
         case SessionOpened() | SessionResumed() | SessionInterrupted() | SessionClosed():
             return _describe_sitting(event)
@@ -106,6 +109,7 @@ def _describe_other(event: Event) -> str:
 
 
 def _describe_beside(event: OnsetPulsed | MaskingPlayed | ProbePlayed | ProbeMeasured) -> str:
+    """The sentence for an event that accompanies the trials: onset pulse, masking noise, or probe."""
     if isinstance(event, ProbePlayed | ProbeMeasured):
         return _describe_probe(event)
     if isinstance(event, OnsetPulsed):
@@ -161,6 +165,7 @@ def _describe_presented(event: TrialPresented, with_direction: bool) -> str:
 
 
 def _describe_answer(event: AnswerGiven, presented: TrialPresented | None) -> str:
+    """The answer, and whether it was right; the latter only if `presented` is given."""
     text = f"Answer {event.answer} after {event.response_time_s:.2f} s"
     if presented is None:
         return f"{text}."
@@ -168,6 +173,7 @@ def _describe_answer(event: AnswerGiven, presented: TrialPresented | None) -> st
 
 
 def _describe_measured(event: TrialMeasured) -> str:
+    """The delivered acceleration of a trial that counts, and its flags."""
     if event.status == "unmeasured":
         return " ".join(("Counts, without a measurement.", *map(_as_sentence, event.flags)))
     parts = []
@@ -180,6 +186,7 @@ def _describe_measured(event: TrialMeasured) -> str:
 
 
 def _describe_form(event: FormFilled) -> str:
+    """The outcome of a form, without the answers to questions about the participant."""
     version = f", version {event.version}" if event.version else ""
     ethics = f" (ethics approval {event.ethics_id})" if event.ethics_id else ""
     match event.form:
@@ -225,6 +232,6 @@ def _one_line(text: str) -> str:
 
 
 def _as_sentence(text: str) -> str:
-    """A flag or finding as a sentence of its own."""
+    """A flag or finding as a sentence with capital and full stop."""
     line = _one_line(text)
     return f"{line[:1].upper()}{line[1:]}{'' if line.endswith(('.', '!', '?')) else '.'}" if line else ""

@@ -1,7 +1,8 @@
 """The facts of a session, one JSON line each in `events.jsonl`.
 
-A fact is what the program cannot recompute: what was opened, presented, answered, measured. What follows from
-facts (levels, reversals, thresholds) is folded from them; where it is written too, it is there as a check.
+A fact is what the program cannot recompute: what was opened, presented, answered, measured. Quantities that follow from
+facts (levels, reversals, thresholds) are computed from them (`study.session.state.fold`); where a fact states one of
+them, too, it serves as a check.
 """
 
 from typing import Annotated, Literal
@@ -80,7 +81,7 @@ __all__ = [
 SESSION_FORMAT: Literal["hapteq-session"] = "hapteq-session"
 """Name of the format, in the opening line of a log."""
 SESSION_VERSION: Literal[1] = 1
-"""Version of the log's format; facts and fields may be added within it."""
+"""Version of the format of the log; facts and fields may be added within it."""
 
 FIELDS_SINCE: dict[str, object] = {
     "monotonic_s": None,
@@ -99,7 +100,7 @@ FIELDS_SINCE: dict[str, object] = {
 
 @dataclass(frozen=True, config=FACT)
 class DeviceFacts:
-    """The device of a session: its name, whether it is simulated, and the rate of its loop."""
+    """The device of a session: its name, whether it is simulated, and the rate of its control loop (Hz)."""
 
     name: str
     simulated: bool
@@ -128,7 +129,7 @@ class SessionOpened:
     equalizer: str
     versions: dict[str, str]
     equalized: EqualizedFacts | None = None
-    """Equalizer of the stimuli; null: the commanded force is the wanted force."""
+    """Equalizer of the stimuli; null: commanded and wanted force are the same."""
     monotonic_s: Seconds | None = None
     dose_elsewhere: DoseElsewhere | None = None
     rules: Literal[1, 2] = 1
@@ -139,7 +140,7 @@ class SessionOpened:
 
 @dataclass(frozen=True, config=FACT)
 class TrialPresented:
-    """Written before the device moves."""
+    """The stimulus of a trial. Written before the device moves."""
 
     utc: UtcTime
     run: Index
@@ -175,15 +176,18 @@ class TrialMeasured:
     sha256: Sha256 | None = None
     delivered_mps2: Measured | None = None
     off_axis_mps2: Measured | None = None
+    """Amplitudes of the delivered acceleration at the stimulus frequency (m/s²), along the direction (`delivered_mps2`)
+    and across it."""
     displacement_mm: Measured | None = None
     harmonics_mps2: Magnitude | None = None
     missed_ticks: Count | None = None
     late_ticks: Count | None = None
     latest_s: Seconds | None = None
     vibrated_s: Seconds | None = None
-    """Duration of the vibration, fades included, for the vibration dose."""
+    """Duration of the vibration (s), fades included, for the vibration dose."""
     offset_mm: Magnitude | None = None
-    """Farthest the handle was from its place while recorded: a lean on the spring."""
+    """Largest distance of the handle from its place during the recording (mm): large if the participant leaned on the
+    spring."""
     sensor: SensorFacts | None = None
     """Null where the acceleration is read with each tick, and in logs of older versions."""
     monotonic_s: Seconds | None = None
@@ -192,7 +196,7 @@ class TrialMeasured:
 
 @dataclass(frozen=True, config=FACT)
 class TrialSpoiled:
-    """The presentation is void, answered or not; the trial comes again as the next attempt."""
+    """The presentation is void, answered or not; the trial is repeated as the next attempt."""
 
     utc: UtcTime
     run: Index
@@ -205,7 +209,7 @@ class TrialSpoiled:
     vibrated_s: Seconds | None = None
     monotonic_s: Seconds | None = None
     cause: VoidCause | None = None
-    """Null in logs of before there were causes."""
+    """Null in logs of versions that did not record causes."""
     sensor: SensorFacts | None = None
     event: Literal["trial_spoiled"] = "trial_spoiled"
 
@@ -222,13 +226,13 @@ class SessionInterrupted:
 
 @dataclass(frozen=True, config=FACT)
 class SessionResumed:
-    """A session goes on after a crash or a pause, perhaps with another device or version."""
+    """A session continues after a crash or a pause, possibly with another device or version of the program."""
 
     utc: UtcTime
     device: DeviceFacts
     versions: dict[str, str]
     mended: str = ""
-    """An incomplete last line that a crash left behind, kept for the record."""
+    """An incomplete last line that a crash left behind; it was removed from the log and is kept here."""
     dose_elsewhere: DoseElsewhere | None = None
     monotonic_s: Seconds | None = None
     event: Literal["session_resumed"] = "session_resumed"
@@ -259,17 +263,17 @@ Event = (
 """Any fact of a session."""
 
 EVENTS: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="event")])
-"""Reads and writes a fact; `event` says which one it is."""
+"""Reads and writes facts; the field `event` states the kind of a fact."""
 
 
 def event_line(event: Event) -> bytes:
     """One line of JSON, newline included. Fields that earlier versions did not log are left out where they have their
-    default."""
+    default value."""
     unsaid = {name for name, untouched in FIELDS_SINCE.items() if getattr(event, name, untouched) == untouched}
     return EVENTS.dump_json(event, exclude=unsaid) + b"\n"
 
 
 def parse_event(line: bytes) -> Event:
-    """Parse a line to its event type. Raises pydantic.ValidationError (a ValueError) where the line is none of our
-    events."""
+    """Parse a line of the log. Raises pydantic.ValidationError (a ValueError) where the line is not a fact of this
+    format."""
     return EVENTS.validate_json(line, strict=True)

@@ -1,7 +1,7 @@
 """Meaning of a level where stimuli are equalized: a wanted acceleration, equal for both directions.
 
-Levels stay newtons, so that cap, steps and rules do not change: a level is the larger of the two forces that the
-directions need for the same acceleration. Both directions then reach the cap at the same acceleration.
+Levels remain forces in newtons, so that cap, steps and rules do not change: a level is the larger of the two forces
+that the directions need for the same acceleration. Both directions therefore reach the cap at the same acceleration.
 """
 
 from pydantic.dataclasses import dataclass
@@ -12,7 +12,7 @@ from study.session.facts.sitting_events import FACT
 
 @dataclass(frozen=True, config=FACT)
 class LevelScale:
-    """Scale at one frequency."""
+    """Relation of level and acceleration at one frequency."""
 
     frequency_hz: FrequencyHz
     n_per_mps2: Positive
@@ -32,7 +32,7 @@ class EqualizedFacts:
     levels: tuple[LevelScale, ...]
     """Scales, one per frequency that may be played."""
     quality: str = ""
-    """Errors of the model by what was measured, in words; empty in logs of earlier versions."""
+    """Errors of the model, and how they were measured, in words; empty in logs of earlier versions."""
 
 
 def acceleration_of_level(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float | None:
@@ -47,6 +47,7 @@ def acceleration_of_level(equalized: EqualizedFacts | None, level_n: float, freq
 
 
 def equalizer_amplitude(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float:
-    """Amplitude of a level in the unit that the equalizer takes: N without one, m/s^2 with one."""
+    """Amplitude of a level in the unit of the input: N without an equalizer, m/s^2 with one. Raises ValueError for a
+    frequency without a scale."""
     wanted = acceleration_of_level(equalized, level_n, frequency_hz)
     return level_n if wanted is None else wanted

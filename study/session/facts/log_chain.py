@@ -1,7 +1,8 @@
 """Hash chain of a log: each line carries a checksum of its own bytes and of all lines before it.
 
-A line without checksum (of an older version) enters the hash too, so that when such a log is continued, its first
-checksum covers what came before. There is no key: the chain detects damage, and edits without recomputing it; it does
+The checksum of line n is the first 128 bits of SHA-256(checksum of line n - 1, line feed, bytes of the event). A line
+without checksum (of an older version) enters the hash, too, so that when such a log is continued, the first checksum
+covers all lines before it. There is no key: the chain detects damage, and edits without recomputed checksums; it does
 not prove who wrote a log.
 """
 
@@ -15,9 +16,9 @@ SEED = "0" * DIGITS
 
 _FIELD, _END = b',"chain":"', b'"}'
 _LENGTH = len(_FIELD) + DIGITS + len(_END)
-"""Bytes of the checksum's field at the end of a line."""
+"""Length in bytes of the field with the checksum, at the end of a line."""
 _HEXADECIMAL = frozenset(b"0123456789abcdef")
-"""Bytes that a checksum may have."""
+"""Bytes that a checksum may contain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,7 @@ class Chain:
     """State of the chain after the lines read or written so far."""
 
     head: str = SEED
+    """Checksum of the last line."""
     lines: int = 0
     since: int = 0
     """Number of the first line with a checksum, from 1; 0 if there is none."""
@@ -58,13 +60,15 @@ def read_chained(chain: Chain, line: bytes) -> tuple[Chain, bytes]:
 
 
 def _extend_chain(chain: Chain, event: bytes, carried: bool) -> Chain:
+    """The chain after one more event. carried: whether its line has a checksum."""
     lines = chain.lines + 1
     head = hashlib.sha256(chain.head.encode() + b"\n" + event).hexdigest()[:DIGITS]
     return Chain(head, lines, chain.since or (lines if carried else 0))
 
 
 def _split(line: bytes) -> tuple[bytes, str | None]:
-    """Bytes of the event and checksum, split on the raw bytes, so that nothing is parsed and written again."""
+    """Bytes of the event, and its checksum or None. The raw bytes are split, so that nothing is parsed and written
+    again."""
     digits = line[-len(_END) - DIGITS : -len(_END)]
     ends_so = line[-_LENGTH:].startswith(_FIELD) and line.endswith(_END)
     if not ends_so or len(line) <= _LENGTH or not _HEXADECIMAL.issuperset(digits):

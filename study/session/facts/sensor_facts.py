@@ -1,4 +1,8 @@
-"""Counts of the samples received and lost from an accelerometer with its own clock, while a stimulus was played."""
+"""Counts of received and lost samples of an accelerometer that has its own clock, logged for each trial.
+
+A trial is void where the missing fraction (`missing`) exceeds the limit of the protocol; see
+`study.workflows.trial.judge_trial`.
+"""
 
 from pydantic.dataclasses import dataclass
 
@@ -8,27 +12,30 @@ from study.session.facts.sitting_events import FACT
 
 @dataclass(frozen=True, config=FACT)
 class SensorFacts:
-    """What the log says of the accelerometer for one trial, from the onset until the handle was at rest."""
+    """Record of the accelerometer for one trial, from the onset of the stimulus until the handle was at rest."""
 
     packets: Count
-    """Whole ones."""
+    """Number of complete packets received."""
     lost: Count
-    """Missing between those, by their numbers: torn and garbled ones are among them."""
+    """Number of packets missing between the received ones, by their sequence numbers; it includes incomplete and
+    garbled packets."""
     spoiled_bytes: Count
-    """That belonged to no whole packet."""
+    """Number of received bytes that belong to no complete packet."""
     restarts: Count
     """Number of restarts of the sensor's board."""
     ticks: Count = 0
-    """Ticks of the recording; 0 where there is none."""
+    """Number of ticks of the control loop in the recording; 0 without a recording."""
     unplaced_ticks: Count = 0
-    """Those of them at which the acceleration is not known."""
+    """Number of ticks of the recording at which the acceleration is unknown."""
     drift_ppm: Measured | None = None
-    """Drift of the sensor's clock against the computer's, > 0: it is slow. Null where it was not fitted."""
+    """Relative drift (ppm) of the sensor's clock against the computer's; positive: the sensor's clock is slow. None
+    where the clock could not be fitted."""
     longest_delay_s: Seconds | None = None
-    """Longest delay of an arrival, beyond the shortest, in the minutes to which the clock was fitted."""
+    """Largest delay of an arrival minus the smallest (s), over the interval to which the clock was fitted; None where
+    it could not be fitted."""
 
     @property
     def missing(self) -> float:
-        """Share of what should be there: of packets or of ticks, the larger one. 1 where nothing came."""
+        """Missing fraction, 0 to 1: of packets or of ticks, the larger of the two; 1 where no packet arrived."""
         packets = self.lost / (self.packets + self.lost) if self.packets else 1.0
         return max(packets, self.unplaced_ticks / max(self.ticks, 1))

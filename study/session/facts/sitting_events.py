@@ -1,4 +1,10 @@
-"""Facts of a sitting around its trials: forms, checks, demonstrations, rests, pauses, notes, the end."""
+"""Logged events of a sitting apart from its trials: forms, checks, demonstrations, probes, rests, pauses, notes, end.
+
+Each class with a field `event` is one kind of line of the session's log `events.jsonl`; `event` names the kind. `utc`
+is the wall-clock time, `monotonic_s` the session's monotonic clock (s; None where it was not logged). A unit that is
+not stated is given by the type of the field (`fact_types`) or the suffix of its name. A session and a sitting are
+defined in `study.session`.
+"""
 
 from typing import Literal
 
@@ -19,27 +25,29 @@ from study.session.facts.fact_types import (
 )
 
 FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
-"""Of every logged fact: no unknown fields, no NaN or infinity."""
+"""Configuration of all event classes: unknown fields, NaN and infinity are refused."""
 
 
 @dataclass(frozen=True, config=FACT)
 class DoseElsewhere:
-    """Vibration dose of the same hand since its last night's rest in other sessions of the participant, see `Dose`."""
+    """Vibration dose of the same hand since its last night's rest, in other sessions of the participant: a field of the
+    events that begin a sitting. squared_s, vibrated_s, unmeasured_s: as in `vibration_dose.Dose`."""
 
     sessions: tuple[str, ...]
+    """Names of these sessions."""
     squared_s: Magnitude
     vibrated_s: Seconds
     unmeasured_s: Seconds
     still_s: Seconds
-    """Seconds since the hand last moved in any of them."""
+    """Time since the handle last moved in any of these sessions (s)."""
     unread: tuple[str, ...] = ()
-    """Sessions that cannot be read and are not included."""
+    """Names of sessions that could not be read and are not included."""
 
 
 @dataclass(frozen=True, config=FACT)
 class FormFilled:
-    """Answers to a form: consent, exclusion, questions before the trials, set-up or debrief. Answers that matter only
-    at the moment (why a person may not take part) are not kept: `answers` contains what the study needs."""
+    """A form that was filled in: consent, exclusion, questions before the trials, set-up or debrief. Only answers that
+    the study needs are kept in `answers`; the reason why a person may not take part, for example, is not."""
 
     utc: UtcTime
     form: Literal["consent", "exclusion", "setup", "debrief", "questionnaire"]
@@ -49,18 +57,20 @@ class FormFilled:
     passed: bool
     """False: consent was not given, or a person may not take part. Always true for the other forms."""
     answers: dict[str, str]
+    """Logged answer by the key of its question."""
     monotonic_s: Seconds | None = None
     event: Literal["form_filled"] = "form_filled"
 
 
 @dataclass(frozen=True, config=FACT)
 class PlaceTaken:
-    """A person takes part: consent, exclusion questions, set-up and device check are passed."""
+    """A person takes part: consent, exclusion questions, set-up and device check are passed. The event assigns the
+    participant's place in the counterbalanced order."""
 
     utc: UtcTime
     participant_number: Count
-    """Number of participants of this protocol who took their places before; it replaces the number of the opening
-    line."""
+    """Number of participants of this protocol who took their places before; it replaces the number in the opening line
+    of the log."""
     monotonic_s: Seconds | None = None
     event: Literal["place_taken"] = "place_taken"
 
@@ -72,90 +82,105 @@ class DeviceChecked:
     utc: UtcTime
     passed: bool
     findings: tuple[str, ...]
-    """One sentence each."""
+    """One sentence for each finding."""
     monotonic_s: Seconds | None = None
     event: Literal["device_checked"] = "device_checked"
 
 
 @dataclass(frozen=True, config=FACT)
 class DemoPlayed:
-    """A labelled demonstration, written before the device moves."""
+    """A stimulus of the labelled demonstration; logged before the device moves."""
 
     utc: UtcTime
     frequency_hz: FrequencyHz
     level_n: ForceN
+    """Amplitude of the force; for equalized stimuli, the level (`level_scale`)."""
     direction: Literal[1, 2]
     """Number of the direction on the screen."""
     angle_deg: AngleDeg
+    """Angle of the direction in the plane of the test directions."""
     seconds: Seconds
+    """Duration, as the protocol sets it."""
     monotonic_s: Seconds | None = None
     event: Literal["demo_played"] = "demo_played"
 
 
 @dataclass(frozen=True, config=FACT)
 class OnsetPulsed:
-    """A trigger pulse on the lab's line at the onset of the trial's force; logged when the trial is over."""
+    """A trigger pulse on an output line of the laboratory, at the onset of the trial's force. It is logged after the
+    trial, because writing to the disk must not delay the trial."""
 
     utc: UtcTime
     run: Index
     trial: Index
     attempt: Index
     line: str
+    """Description of the output line."""
     pulsed_s: Seconds | None
-    """Monotonic time of the session at which the line accepted the pulse; null: lost, see `trouble`."""
+    """Reading of the monotonic clock at which the line accepted the pulse; None: the pulse was lost, see `trouble`."""
     trouble: str = ""
+    """Why the pulse was lost; empty otherwise."""
     monotonic_s: Seconds | None = None
     event: Literal["onset_pulsed"] = "onset_pulsed"
 
 
 @dataclass(frozen=True, config=FACT)
 class ProbePlayed:
-    """A known force between trials, written before the device moves."""
+    """A probe: a known force between two trials (`probe_state`). It is logged before the device moves."""
 
     utc: UtcTime
     number: Index
     """Number of the probe in the session, from 0."""
     kind: Literal["hand", "free", "reference"]
-    """Kind: with a hand on the handle; a test whether the handle is free; the reference."""
+    """`hand`: with the hand on the handle; `free`: a test whether the handle is free; `reference`: the longer force
+    with no hand on the handle."""
     level_n: ForceN
-    """Peak of the norm of the force."""
+    """Peak of the norm of the force (N)."""
     monotonic_s: Seconds | None = None
     event: Literal["probe_played"] = "probe_played"
 
 
 @dataclass(frozen=True, config=FACT)
 class ProbeMeasured:
-    """Result of the last probe. A probe without this line was cut off by the program's end."""
+    """Result of the last probe. Where this event is missing after a probe, the program ended while the probe was
+    playing. A reference that was declined has this event alone."""
 
     utc: UtcTime
     number: Index
     vibrated_s: Seconds
+    """Duration of the force; it adds to the vibration dose only with a hand on the handle. 0 for a reference that was
+    declined or cut short."""
     recording: RecordingPath | None = None
     sha256: Sha256 | None = None
+    """SHA-256 of the recording; None without a recording."""
     rms_mps2: Magnitude | None = None
-    """Rms of the measured acceleration, all axes together; null without a recording."""
+    """Root mean square of the norm of the measured acceleration (m/s²); None without a recording."""
     apparent_mass_kg: Magnitude | None = None
-    """Apparent mass: force over acceleration at the upper lines; a hand on the handle increases it."""
+    """Apparent mass (kg): median of the real part of force over acceleration at the upper lines of the multisine. A
+    hand on the handle increases it. None where it could not be estimated."""
     trouble: str = ""
-    """Why there is no recording, or why it should not be used."""
+    """Why there is no recording, or why it should not be used; empty otherwise."""
     monotonic_s: Seconds | None = None
     event: Literal["probe_measured"] = "probe_measured"
 
 
 @dataclass(frozen=True, config=FACT)
 class MaskingPlayed:
-    """The program starts or stops playing masking noise."""
+    """The program started or stopped the masking noise, which makes the device inaudible."""
 
     utc: UtcTime
     playing: bool
     output: str
+    """Name of the sound output."""
     level_db: float
-    """Level relative to the file of `hapteq noise`."""
+    """Level in dB relative to the sound file that `hapteq noise` writes."""
     low_hz: FrequencyHz
     high_hz: FrequencyHz
+    """Upper end of the band of the noise; `low_hz` is the lower end."""
     seed: Count
+    """Seed of the noise, which makes it reproducible."""
     trouble: str = ""
-    """Why it stopped, where it was not stopped on purpose."""
+    """Why the noise stopped, where it was not stopped on purpose; empty otherwise."""
     monotonic_s: Seconds | None = None
     event: Literal["masking_played"] = "masking_played"
 
@@ -171,7 +196,7 @@ class DemoFinished:
 
 @dataclass(frozen=True, config=FACT)
 class RestTaken:
-    """An enforced rest is over."""
+    """An enforced rest has ended."""
 
     utc: UtcTime
     run: Index
@@ -184,10 +209,11 @@ class RestTaken:
 
 @dataclass(frozen=True, config=FACT)
 class PauseTaken:
-    """A pause is over."""
+    """A pause has ended."""
 
     utc: UtcTime
     who: Literal["participant", "experimenter", "program"]
+    """Who asked for the pause."""
     paused_s: Seconds
     monotonic_s: Seconds | None = None
     event: Literal["pause_taken"] = "pause_taken"
@@ -201,14 +227,15 @@ class NoteTaken:
     who: Literal["participant", "experimenter", "program"]
     text: str
     adverse: bool = False
-    """An adverse event of the participant: pain, numbness, a fright."""
+    """Whether the note reports an adverse event of the participant, such as pain, numbness or fright."""
     monotonic_s: Seconds | None = None
     event: Literal["note_taken"] = "note_taken"
 
 
 @dataclass(frozen=True, config=FACT)
 class SessionClosed:
-    """Last line of a session that is over: finished, or final because the person does not take part."""
+    """Last event of a session: all runs were completed, or the person does not take part (consent refused,
+    excluded)."""
 
     utc: UtcTime
     outcome: Literal["completed", "refused", "excluded"]

@@ -1,4 +1,8 @@
-"""Check a logged presentation against the one that follows from rules, seed and position."""
+"""Check of a logged presentation against the presentation that follows from rules, seed and position in the session.
+
+The state is computed from the log; a log that was written under other rules, or altered, is refused here instead of
+giving a wrong state.
+"""
 
 import math
 
@@ -7,11 +11,12 @@ from study.session.state.due_trial import Present
 
 
 class LogContradiction(ValueError):  # noqa: N818 - a contradiction is what it is
-    """An event cannot follow the previous ones, or a logged level differs from that of the rules."""
+    """A logged event cannot follow the previous events, or its values differ from those that the rules give."""
 
 
 def check_draw(event: TrialPresented, expected: Present) -> None:
-    """Raise LogContradiction unless the logged presentation is the expected one."""
+    """Raise LogContradiction unless the logged presentation agrees with `expected`: position, phase, frequency (Hz),
+    level (N, dB), direction, angle (degrees), polarity, wanted acceleration (m/s²)."""
     place = (expected.run, expected.trial, expected.attempt)
     if (event.run, event.trial, event.attempt) != place:
         raise LogContradiction(
@@ -38,7 +43,8 @@ def check_draw(event: TrialPresented, expected: Present) -> None:
 
 
 def _is_same(logged: str | float | None, due: str | float | None) -> bool:
-    """Equal up to the last bits of floating-point powers, which may differ between machines."""
+    """Whether the values are equal; floats up to 1e-9 relative or absolute, because the last bits of floating-point
+    powers differ between computers."""
     if isinstance(logged, float) and isinstance(due, float):
         return math.isclose(logged, due, rel_tol=1e-9, abs_tol=1e-9)
     return logged == due

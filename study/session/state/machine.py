@@ -1,4 +1,9 @@
-"""State machine of a session: the next action from the folded state."""
+"""State machine of a session: the next action, as a function of the state that the log gives (`fold`).
+
+`next_preparation` gives the steps before the instructions of a sitting (forms, device check), `next_action` those after
+them. Order of precedence there: end of the session, limits of the sitting, demonstration, rest, reference, probe,
+trial.
+"""
 
 from dataclasses import dataclass
 
@@ -22,26 +27,28 @@ class FillIn:
 
 @dataclass(frozen=True, slots=True)
 class CheckDevice:
-    """The device is to be checked, before a person holds the handle."""
+    """The device must be checked before a person holds the handle."""
 
 
 @dataclass(frozen=True, slots=True)
 class Demonstrate:
-    """The demonstration: each direction at each frequency, labelled, as often as the participant wants."""
+    """The demonstration must be shown: each direction at each frequency, labelled, as often as the participant
+    wants."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """An enforced rest before the next trial."""
+    """A rest of this length (s) is enforced before the next trial."""
 
     seconds: float
 
 
 @dataclass(frozen=True, slots=True)
 class Leave:
-    """The sitting must end here; the session can be resumed."""
+    """The sitting must end here."""
 
     reason: str
+    """Why, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,13 +57,13 @@ class Finish:
 
 
 Preparation = FillIn | CheckDevice | Leave
-"""What can come before the instructions of a sitting."""
+"""The possible steps before the instructions of a sitting."""
 Action = Demonstrate | Present | Probe | Reference | Rest | FillIn | Leave | Finish
-"""What can come next in a session."""
+"""The possible next actions of a session."""
 
 
 def next_preparation(state: SessionState) -> Preparation | None:
-    """Next step before the instructions, in each sitting; None when all are done. Simulated participants need none."""
+    """Next step before the instructions of this sitting; None when all are done, and for simulated participants."""
     sitting = state.sitting
     if state.opened.observer is not None or state.finished:
         return None
@@ -78,7 +85,7 @@ def next_preparation(state: SessionState) -> Preparation | None:
 def next_action(state: SessionState, utc: str = "", monotonic_s: float | None = None) -> Action:
     """The next action. Raises ValueError while a trial is open: it must be answered, measured or spoiled first.
 
-    utc, monotonic_s: time now, for the limits of a sitting; utc is empty where these are not to be applied.
+    utc, monotonic_s: the present time, which the limits of a sitting need; with an empty utc they are not applied.
     """
     if state.presented is not None:
         raise ValueError("a trial is open; it must be closed before the next action")
@@ -97,7 +104,8 @@ def next_action(state: SessionState, utc: str = "", monotonic_s: float | None = 
 
 
 def limit_reached(state: SessionState, utc: str, monotonic_s: float | None = None) -> str:
-    """Why this sitting must end; empty if it may continue."""
+    """Why this sitting must end, in words; empty if it may continue. The limits are the duration of the sitting
+    (minutes) and the daily exposure A(8) of the hand (m/s²)."""
     limits = state.protocol.limits
     sitting = pass_time(state.sitting, Moment(utc, monotonic_s))
     if (sitting.sat_s or 0.0) / 60.0 >= limits.longest_min:

@@ -48,7 +48,7 @@ class Probe:
     """A probe with the hand on the handle is due."""
 
     level_n: float
-    """Peak of the norm of the force."""
+    """Peak of the norm of the force (N)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class Reference:
 
 
 def due_probe(probing: ProbeState, settings: ProbeSettings) -> Probe | None:
-    """The next probe with a hand; None where none is due yet, or the protocol has none. The levels take turns."""
+    """The next probe with a hand; None where none is due yet, or the protocol has none. The levels are used in turn."""
     if not settings.levels_n or (probing.since_s is not None and probing.since_s < settings.interval_s):
         return None
     return Probe(settings.levels_n[probing.with_hand % len(settings.levels_n)])
@@ -73,8 +73,7 @@ def due_reference(probing: ProbeState, settings: ProbeSettings) -> Reference | N
 def begin_probe(probing: ProbeState, event: ProbePlayed, settings: ProbeSettings) -> ProbeState:
     """The state while this probe plays.
 
-    Raises LogContradiction where the protocol has no probes, the force is above its cap, or the number does not follow
-    the last.
+    Raises LogContradiction where the protocol has no probes, the force is above its cap, or the number is not the next.
     """
     hand = event.kind == "hand"
     highest_n = settings.reference_n if event.kind == "reference" else settings.probe_cap_n
@@ -96,7 +95,7 @@ def begin_probe(probing: ProbeState, event: ProbePlayed, settings: ProbeSettings
 
 def end_probe(probing: ProbeState, event: ProbeMeasured) -> ProbeState:
     """The state after the measurement of a probe, or after a reference that the experimenter declined (it has the next
-    number and no recording). Raises LogContradiction where another probe is playing, or none."""
+    number and no recording). Raises LogContradiction where this probe is not playing."""
     declined = event.number == probing.played and event.recording is None
     if not declined and (probing.open is None or probing.open.number != event.number):
         raise LogContradiction(f"a measurement of probe {event.number}, which is not playing")
@@ -109,8 +108,8 @@ def end_probe(probing: ProbeState, event: ProbeMeasured) -> ProbeState:
 def after_break(probing: ProbeState, event: PauseTaken | RestTaken, settings: ProbeSettings) -> ProbeState:
     """The state after a pause or a rest.
 
-    After `reference_after_pause_s` or longer the grip may be another: a probe and a reference are due again. After a
-    shorter pause the interval to the next probe starts anew, because the participant is still finding the grip. A
+    After `reference_after_pause_s` or longer the grip may have changed: a probe and a reference are due again. After a
+    shorter pause the interval to the next probe starts anew, because the participant has just taken the handle again. A
     shorter rest changes nothing.
     """
     seconds = event.paused_s if isinstance(event, PauseTaken) else event.rested_s

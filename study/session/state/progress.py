@@ -1,4 +1,7 @@
-"""Progress of a session from completed runs and counted trials, without revealing levels."""
+"""Progress of a session for the participant, estimated from completed runs and counted trials.
+
+Levels are not used, because the display would reveal the state of the staircase and so the participant's performance.
+"""
 
 import math
 from statistics import median
@@ -9,29 +12,31 @@ from study.session.state.state import SessionState
 from study.session.views.views import Progress
 
 USUAL_TRIALS = 65
-"""Trials of a staircase with 13 reversals; 60 with few errors, 110 for guessing."""
+"""Typical number of trials of a staircase with 13 reversals; about 60 with few errors, 110 for pure guessing."""
 USUAL_PER_REVERSAL = USUAL_TRIALS / 13
-"""Trials per reversal."""
+"""Typical number of trials per reversal."""
 
 
 LATEST = 30
-"""Number of latest answers that give the pace."""
+"""Number of latest answers from which the time per trial is estimated."""
 FIRST = 8
-"""No time is estimated before this many answers: the first ones are slow."""
+"""Number of answers in this sitting before which no time is estimated, because the first answers are slow."""
 
 
 def progress(state: SessionState) -> Progress:
-    """Share done, and minutes left at the pace of the latest answers, pending rests included."""
+    """Fraction of the session done, 0 to 1, and minutes left, estimated from the latest answers; later rests are
+    included."""
     expected = [_usual_trials(state, run) for run in state.runs]
     done = sum(expected[: state.run])
     if not state.finished:
-        # A long run must not seem to end: its next trial must not seem to be the last.
+        # A run that takes more trials than is typical must not be shown as completed.
         done += min(state.trial, 0.95 * expected[state.run])
     share = done / sum(expected)
     return Progress(share_done=share, minutes_left=_minutes_left(state, sum(expected) - done))
 
 
 def _usual_trials(state: SessionState, run: Run) -> float:
+    """Typical number of trials of a run, from the settings of its rule."""
     protocol = state.protocol
     if run.practice:
         return protocol.practice.of_last
@@ -42,8 +47,8 @@ def _usual_trials(state: SessionState, run: Run) -> float:
 
 
 def _minutes_left(state: SessionState, trials_left: float) -> int | None:
-    """Minutes left, estimated from the duration of answers, not from the clock: forms, instructions and pauses do not
-    predict the rest."""
+    """Minutes left, rounded up; None before `FIRST` answers in this sitting. Estimated from the median response time,
+    not from the clock, because forms, instructions and pauses do not predict the time of further trials."""
     answered = state.answers - state.sitting.answers_before
     taken_s = [trial.response_time_s for trial in state.trials if trial.counts and trial.response_time_s is not None]
     if answered < FIRST or not taken_s:

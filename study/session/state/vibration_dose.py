@@ -1,22 +1,25 @@
-"""The vibration that a hand has had in a sitting: daily exposure A(8) of hand-transmitted vibration.
+"""Vibration dose of a hand: daily exposure A(8) of hand-transmitted vibration.
 
-Source: ISO 5349-1:2001 (weighting Wh, its band limits, and A(8)); the analogue filter is that of its annex A.
-Directive 2002/44/EC acts on A(8) at 2.5 m/s^2 (action value) and 5 m/s^2 (limit value). Both are meant for the
-vector sum of three axes; a stimulus along one direction has its whole sum in that direction.
+    A(8) = sqrt( (1 / T0) * integral of a_hw(t)^2 dt ),        T0 = 8 h
+
+a_hw: rms acceleration, weighted by Wh. Source: ISO 5349-1:2001 (weighting Wh, its band limits, and A(8)); the analogue
+filter is that of its annex A. Directive 2002/44/EC sets an action value of 2.5 m/s^2 and a limit value of 5 m/s^2 for
+A(8). Both apply to the vector sum of three axes, which equals the acceleration along the stimulus where a stimulus has
+a single direction.
 """
 
 import math
 from dataclasses import dataclass, replace
 
 WORKING_DAY_S = 8 * 3600.0
-"""Reference duration of A(8)."""
+"""Reference duration T0 of A(8) (s): eight hours."""
 
 _F1_HZ, _F2_HZ, _Q1 = 10**0.8, 10**3.1, 0.71
-"""Band limits: second-order high-pass and low-pass."""
+"""Band limits of Wh: corner frequencies (Hz) of a second-order high-pass and low-pass, and their quality factor."""
 _F3_HZ = _F4_HZ = 100 / (2 * math.pi)
-"""Corners of the transition from constant acceleration to constant velocity (15.9 Hz)."""
+"""Corner frequencies of the transition (15.9 Hz): below, Wh weights acceleration evenly; above, velocity."""
 _Q2 = 0.64
-"""Quality factor of that transition, whose gain is 1."""
+"""Quality factor of that transition, whose gain at low frequencies is 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,14 +35,18 @@ class Dose:
 
 
 NO_DOSE = Dose(0.0, 0.0, 0.0)
-"""Before the first vibration."""
+"""The dose before the first vibration."""
 
 
 def hand_arm_weight(frequency_hz: float) -> float:
-    """Frequency weighting Wh of an acceleration.
+    """Frequency weighting Wh of an acceleration: |band transition| at s = 2 pi i f, with wn = 2 pi fn and
 
-    The standard defines it for octave bands of 8 Hz to 1 kHz, from 5.6 Hz. Below, the same filter is used: it falls
-    with the square of the frequency, to 0.55 at 5 Hz.
+        band = s² w2² / ((s² + s w1/Q1 + w1²) (s² + s w2/Q1 + w2²))
+        transition = (s + w3) w4² / ((s² + s w4/Q2 + w4²) w3)
+
+    The standard defines it for octave bands of 8 Hz to 1 kHz, that is from 5.6 Hz. Below, the same filter is used; it
+    is 0.55 at 5 Hz and, far below its corner, falls with the square of the frequency. Raises ValueError for a frequency
+    that is not above 0.
     """
     if frequency_hz <= 0:
         raise ValueError(f"frequency_hz is {frequency_hz:g}; a weight exists above 0 Hz")
@@ -51,9 +58,10 @@ def hand_arm_weight(frequency_hz: float) -> float:
 
 
 def add(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, seconds: float) -> Dose:
-    """The dose after one more sinusoid. amplitude_mps2: peak; None if unmeasured.
+    """The dose after one more sinusoid of this duration (s). amplitude_mps2: peak; None if it was not measured.
 
-    Fades count at full amplitude, which overestimates the dose, never underestimates it.
+    Fades count at full amplitude, so the dose is overestimated, never underestimated. Raises ValueError for a negative
+    duration.
     """
     if seconds < 0:
         raise ValueError(f"seconds is {seconds:g}; a vibration lasts 0 s or longer")
@@ -80,5 +88,5 @@ def a8_mps2(dose: Dose) -> float:
 
 
 def _frequency_weighted_rms(frequency_hz: float, amplitude_mps2: float) -> float:
-    """Weighted rms (m/s^2) of a sinusoid with this peak."""
+    """Weighted rms acceleration (m/s^2) of a sinusoid with this peak."""
     return hand_arm_weight(frequency_hz) * amplitude_mps2 / math.sqrt(2)

@@ -1,6 +1,7 @@
-"""The stimulus that a device has to play, its limits, and what was delivered.
+"""Forces that a device has to play, the limits for them, and the acceleration that was delivered.
 
-A level -> `stimulus` (one loop of whole periods) -> `held_stimulus` (the device's part of it) -> `delivered`.
-`recording_pieces` is the same for recordings; `limits` and `timing_verdict` say what is allowed. Begin at
-`stimulus.py`.
+Order of the data in a trial: level -> `stimulus` (one loop of whole periods) -> `held_stimulus` (the form that a device
+plays) -> `delivered` (amplitudes from the recording). `probe_stimulus` computes the forces of probes,
+`recording_pieces` those of recordings; `limits` holds the safety limits, `timing_verdict` the timing requirements.
+Begin at `stimulus.py`.
 """

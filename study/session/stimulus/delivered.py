@@ -1,4 +1,8 @@
-"""Delivered stimulus of a trial: acceleration along and across the direction, its harmonics, and displacement."""
+"""Delivered stimulus of a trial: acceleration along and across the played direction, harmonics, and displacement.
+
+The amplitudes are phasors, fitted to the measured acceleration at the stimulus frequency and its harmonics
+(`equalizer.signals.lockin`).
+"""
 
 import math
 from dataclasses import dataclass
@@ -10,31 +14,36 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 HIGHEST_HARMONIC = 5
-"""Highest harmonic, as for acceleration ellipses: a mechanism transmits little beyond it."""
+"""Highest harmonic that is measured, because a mechanism transmits little beyond it; the same as in the acceleration
+ellipses."""
 
 STIFFEST_N_PER_M, STRONGEST_DAMPING_N_S_PER_M, HEAVIEST_KG = 2000.0, 30.0, 3.0
-"""Assumed upper limits of the hand: more than four times a whole arm (135 N/m, 6.5 N s/m, 0.55 kg by Sci. Rep.
-srep18004). The device's own mass is added."""
+"""Assumed upper limits of the hand's stiffness (N/m), damping (N s/m) and mass (kg): more than four times those of a
+whole arm (135 N/m, 6.5 N s/m, 0.55 kg by Sci. Rep. srep18004). The device's own mass is added."""
 
 LEAST_MPS2 = 0.1
-"""Where even less may arrive, a sensor's noise could hide it: nothing is said then."""
+"""Least expected acceleration (m/s²) for which `hardly_arrived` decides; a smaller one could be hidden by the sensor's
+noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class Delivered:
-    """Amplitudes at the stimulus frequency."""
+    """Peak amplitudes of the delivered motion at the stimulus frequency."""
 
     along_mps2: float
+    """Acceleration along the played direction."""
     off_axis_mps2: float
+    """Norm of the acceleration phasor across that direction."""
     displacement_mm: float
+    """Displacement along the direction: acceleration over (2 pi f)^2."""
     harmonics_mps2: float | None = None
     """Root of the summed squares of the amplitudes at 2 to 5 times the frequency, over all axes, as far as they lie
     below half the sample rate; None where not even the second does."""
 
 
 def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_hz: float) -> Delivered | None:
-    """Amplitudes from a trial's recording by a Fourier projection at the stimulus frequency; None if less than one
-    period was measured. unit_vector: (3,), the direction played."""
+    """Amplitudes from a trial's recording, by a least-squares fit of a sinusoid at the stimulus frequency; None if less
+    than one period was measured. unit_vector: (3,), the direction played."""
     measured = int(np.isfinite(recording.response.samples).all(axis=1).sum())
     if not covers_a_period(measured, recording.sample_rate_hz, frequency_hz):
         return None
@@ -44,7 +53,7 @@ def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_h
     return Delivered(
         along_mps2=float(np.abs(along)),
         off_axis_mps2=float(np.linalg.norm(off_axis)),
-        # From the accelerometer at the handle: encoders are behind elastic cables.
+        # From the accelerometer at the handle, because the encoders measure behind elastic cables.
         displacement_mm=1000.0 * float(np.abs(along)) / (2 * np.pi * frequency_hz) ** 2,
         harmonics_mps2=_harmonics(recording, frequency_hz),
     )
@@ -53,10 +62,12 @@ def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_h
 def hardly_arrived(
     recording: Recording, unit_vector: FloatArray, frequency_hz: float, friction_n: float, device_kg: float
 ) -> bool:
-    """Whether the acceleration along the direction is less than the stiffest, heaviest hand leaves of the force sent:
-    motors that do nothing, a blocked handle, a dead sensor, or an antiresonance at this frequency. friction_n: force
-    that may move nothing; device_kg: effective mass of the device without a hand. Both amplitudes are fitted at the
-    stimulus frequency; the recording has at least one period, as for `measure_delivered`."""
+    """Whether less acceleration arrived than with the stiffest, heaviest assumed hand:
+
+    |a| < (|F| - friction_n) w² / (K + C w + (M + device_kg) w²), the least acceleration for any phase of the three
+    terms. Causes: motors without force, a blocked handle, a dead sensor, an antiresonance. F, a: phasors of commanded
+    force and acceleration along the direction; friction_n: force that may cause no motion; device_kg: effective mass of
+    the device alone. Raises ValueError for less than one period."""
     rate_hz, w = recording.sample_rate_hz, 2 * math.pi * frequency_hz
     force_n = abs(phasors(recording.command.samples, rate_hz, frequency_hz)[0] @ unit_vector)
     along_mps2 = abs(phasors(recording.response.samples, rate_hz, frequency_hz)[0] @ unit_vector)
@@ -66,10 +77,11 @@ def hardly_arrived(
 
 
 def _harmonics(recording: Recording, frequency_hz: float) -> float | None:
+    """As `Delivered.harmonics_mps2`."""
     below = math.ceil(recording.sample_rate_hz / 2 / frequency_hz) - 1
     highest = min(HIGHEST_HARMONIC, below)
     if highest < 2:
         return None
-    # Harmonics are fitted separately: the fundamental of older sessions was fitted without them, and must not change.
+    # A separate fit, so that the fundamental is the same as in earlier sessions, which were fitted without harmonics.
     found = phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz, highest)
     return float(np.linalg.norm(found[1:]))

@@ -1,6 +1,6 @@
 """The stimulus of a trial in the form that a device plays: a periodic force that is held until the answer.
 
-It is separate from `stimulus`, which computes it, so that devices do not depend on equalizers.
+The module is separate from `stimulus`, which computes the force, so that devices do not depend on equalizers.
 """
 
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ class HeldStimulus:
     """Duration of the fade-in, over which the virtual spring also takes hold. Not applied to the force of a stimulus
     with an `onset`."""
     fade_out_s: float
-    """Duration of the fade-out, which begins when the answer is in."""
+    """Duration of the fade-out, which begins when the participant has answered."""
     fade_shape: str
     """Shape of both fades: "raised_cosine" or "linear"."""
     onset: Signal | None = None
-    """(ticks, 3) in N, played once before the loop: of an equalized stimulus, whose transient is computed so that the
-    acceleration rises smoothly, in place of a fade-in."""
+    """(ticks, 3) in N, played once before the loop in place of a fade-in: the transient of an equalized stimulus,
+    computed so that the acceleration rises smoothly. None: the loop is faded in."""
 
     @property
     def played_once_then_loop(self) -> FloatArray:

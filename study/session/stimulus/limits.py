@@ -1,4 +1,9 @@
-"""Safety limits of a sitting from its protocol, which the safety layer enforces at every tick."""
+"""Safety limits of a sitting, computed from its protocol; the device's safety layer enforces them at every tick.
+
+The slew rate is the largest slope that a stimulus of the protocol can have, plus an allowance for the spring:
+
+    |d/dt (fade(t) A sin(2 pi f t))| <= A (2 pi f + pi / (2 T)),        T: duration of the fade
+"""
 
 import math
 from dataclasses import dataclass, field
@@ -11,7 +16,7 @@ from protocols.definition.study_contradictions import highest_roved_n
 from protocols.definition.study_protocol import StudyProtocol
 
 SPRING_SLEW_N_PER_S = 100.0
-"""Allowance for the centring spring: 150 N/m at 0.6 m/s, faster than a hand moves in a trial."""
+"""Allowance for the centring spring (N/s): 150 N/m at 0.6 m/s (90 N/s), faster than a hand moves in a trial."""
 
 SLEW_MARGIN = 1.05
 """Factor on the steepest slope of the stimuli, for rounding and fades."""
@@ -19,27 +24,31 @@ SLEW_MARGIN = 1.05
 BETWEEN_SAMPLES = math.sqrt(2)
 """Bound of a multisine between its samples: with lines below a quarter of the rate the continuous signal exceeds the
 largest sample by at most this factor (Ehlich and Zeller 1964), and Bernstein's inequality then bounds its slope like
-that of a sine. Above a quarter, consecutive samples of opposite sign change by less than that bound anyway."""
+that of a sine. Above a quarter, the bound exceeds twice the largest sample per tick, the most that two consecutive
+samples can differ."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits that the device's safety layer enforces: caps of the forces, slew rate, and times."""
+    """Limits that the device's safety layer enforces: caps of the forces (N), slew rate (N/s) and durations (s)."""
 
     stimulus_cap_n: float
     total_cap_n: float
     slew_n_per_s: float
     longest_hold_s: float
+    """Longest duration of a stimulus, after which it is released."""
     watchdog_s: float
+    """Longest time without a sign of life of the program, after which the force is faded out."""
     release_s: float
+    """Duration of a safety fade."""
     feedback_cap_n: float = SafetySettings.feedback_cap_n
-    """Limits of the force of spring and damper: each alone, and their sum."""
+    """Limit of the forces of spring and damper: of each alone, and of their sum."""
     plausibility: PlausibilitySettings = field(default_factory=PlausibilitySettings)
 
 
 def limits_of_study(protocol: StudyProtocol) -> Limits:
-    """Limits with a slew rate just above the steepest stimulus: the highest frequency at the cap and roved to its
-    highest, during its fade."""
+    """Limits with a slew rate just above that of the steepest stimulus: the highest frequency at the highest level,
+    while it is faded."""
     stimulus = protocol.stimulus
     fastest_hz = max(protocol.all_frequencies_hz)
     fade_s = min(stimulus.fade_in_s, stimulus.fade_out_s)
@@ -47,12 +56,12 @@ def limits_of_study(protocol: StudyProtocol) -> Limits:
 
 
 def highest_level_n(protocol: StudyProtocol) -> float:
-    """Highest level (N) of a trial: the staircase's cap, roved to its highest."""
+    """Highest level (N) of a trial: the staircase's cap plus the largest roving, limited by the safety cap."""
     return min(highest_roved_n(protocol.staircase.cap_n, protocol.stimulus.rove_db), protocol.safety.stimulus_cap_n)
 
 
 def limits_of_recording(protocol: RecordingProtocol) -> Limits:
-    """Limits with a slew rate just above the steepest excitation of this recording."""
+    """Limits with a slew rate just above that of the steepest excitation of this recording."""
     slews = [
         (BETWEEN_SAMPLES if isinstance(segment, MultisineSegment) else 1.0)
         * _slew(highest_hz(segment), segment.amplitude_n, protocol.fade_s)
@@ -62,7 +71,7 @@ def limits_of_recording(protocol: RecordingProtocol) -> Limits:
 
 
 def forces_in_words(safety: SafetySettings) -> str:
-    """Largest forces on the hand, in words, for places where a person decides."""
+    """Largest forces (N) on the hand, in words, for messages on which a person decides."""
     feedback_n = min(safety.feedback_cap_n, safety.total_cap_n)
     return (
         f"stimulus at most {safety.stimulus_cap_n:g} N, spring and damper {feedback_n:g} N, "
@@ -71,7 +80,8 @@ def forces_in_words(safety: SafetySettings) -> str:
 
 
 def _slew(frequency_hz: float, amplitude_n: float, fade_s: float) -> float:
-    """Bound of |d/dt (fade(t) A sin(2 pi f t))|: the fade's own slope is at most pi / (2 fade_s)."""
+    """Slew rate (N/s): bound of |d/dt (fade(t) A sin(2 pi f t))| with margin and spring. The slope of a raised-cosine
+    fade is at most pi / (2 fade_s), that of a linear fade less."""
     steepest = amplitude_n * (2 * math.pi * frequency_hz + math.pi / (2 * fade_s))
     return SLEW_MARGIN * steepest + SPRING_SLEW_N_PER_S
 

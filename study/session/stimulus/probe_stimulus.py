@@ -1,8 +1,9 @@
-"""Forces of probes and references: an odd multisine on three axes at once, every line on a single axis.
+"""Forces of probes and references: an odd multisine on three axes at once, each line on a single axis.
 
-Lines at odd multiples of 1 / period leave the even ones to distortion, and interleaved axes let one period show the
-response to each axis (Pintelon and Schoukens, System Identification, 2nd ed., 2012, chapters 2 and 4). A probe is
-played with the hand on the handle, between trials; a reference without it, longer and at two levels.
+Only odd multiples of 1 / period are excited, so that even-order distortion appears at the even lines, and the lines of
+the axes are interleaved, so that one period gives the response to each axis (Pintelon and Schoukens, System
+Identification, 2nd ed., 2012, chapters 2 and 4). A probe is played with the hand on the handle, between trials; a
+reference is longer, at two levels, and played with no hand on the handle.
 """
 
 import numpy as np
@@ -15,7 +16,7 @@ from protocols.definition.probes import FROM_HZ, PERIOD_S, ProbeSettings
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 FADE_S = 0.25
-"""Raised-cosine fade at both ends (s), so that the beginning excites few modes. By hand."""
+"""Duration of the raised-cosine fade at both ends (s), so that the onset excites few modes. Chosen by hand."""
 HELD_S = FADE_S + PERIOD_S + 0.1
 """Time from the start until the program asks for the fade-out (s): fade-in, one whole period, and a margin of 0.1 s."""
 PHASES_SEED = 16
@@ -23,14 +24,15 @@ PHASES_SEED = 16
 
 
 def probe_wave(settings: ProbeSettings, sample_rate_hz: float) -> FloatArray:
-    """(n, 3): one period whose norm peaks at 1. Axis a has every third odd line, beginning with the a-th."""
+    """One period, (n, 3), whose norm over the axes peaks at 1. Each axis has every third odd line from `FROM_HZ` on."""
     n = round(PERIOD_S * sample_rate_hz)
     lines = lines_between(FROM_HZ, settings.to_hz, n, sample_rate_hz, odd_only=True)
     return make_interleaved_multisine(lines, n, 3, PHASES_SEED)
 
 
 def probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz: float) -> HeldStimulus:
-    """A probe with this peak of its norm. Raises ValueError above the probes' own cap."""
+    """A probe whose norm peaks at `level_n` (N). Raises ValueError for a level above the cap of probes, or not above
+    0."""
     if not 0 < level_n <= settings.probe_cap_n:
         raise ValueError(f"a probe of {level_n:g} N is not within its cap of {settings.probe_cap_n:g} N")
     loop = _forces(level_n * probe_wave(settings, sample_rate_hz), sample_rate_hz)
@@ -38,12 +40,13 @@ def probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz: floa
 
 
 def reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> tuple[Signal, tuple[Segment, ...]]:
-    """The reference as commands, and its whole periods as segments: first at full level, then at half of it, because
-    friction shows in the difference. The last third of each part is held out for the test of a model."""
+    """The reference as commands (n, 3) in N, and its whole periods as segments: first at full level, then at half of
+    it, because a response that depends on the level shows friction. The last third of each part is held out, to test a
+    model."""
     wave = probe_wave(settings, sample_rate_hz)
     n, fade = len(wave), round(FADE_S * sample_rate_hz)
     part = max(4, round(settings.reference_s / PERIOD_S / 2))
-    # Between the parts the level falls over one period.
+    # Between the parts the level falls linearly over one period.
     level = np.concatenate([np.ones(fade + part * n), np.linspace(1.0, 0.5, n), np.full(part * n + fade, 0.5)])
     level_n = settings.reference_n * level
     # A segment begins at the first sample of a period, after the fade.
@@ -60,4 +63,5 @@ def reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> tuple[
 
 
 def _forces(samples: FloatArray, sample_rate_hz: float) -> Signal:
+    """Samples (n, 3) in N as a signal of forces along x, y and z."""
     return Signal(samples, sample_rate_hz, "force", "N", ("fx", "fy", "fz"))

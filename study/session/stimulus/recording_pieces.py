@@ -1,10 +1,11 @@
-"""The pieces of a recording: a protocol's segments as commands, one per sinusoid, sweep or multisine realisation.
+"""Pieces of a recording: the segments of a protocol as commands, a piece for each sinusoid, sweep or multisine
+realisation.
 
-rest | fade in and settling | evaluated part | fade out | rest
+    rest | fade in and settling | evaluated part | fade out | rest
 
-The evaluated part is the only one that an analysis uses: whole periods at constant amplitude (a sweep's first period
-contains its transient). Each piece is played by itself (`workflows/recording/play_pieces`), again with less force where
-the accelerometer clipped (`Piece.at`).
+An analysis uses only the evaluated part: whole periods at constant amplitude (the first period of a sweep contains its
+transient). Each piece is played by itself (`workflows/recording/play_pieces`), and again with less force where the
+accelerometer clipped (`Piece.at`).
 """
 
 from dataclasses import dataclass, replace
@@ -32,18 +33,18 @@ class Piece:
     number: int
     """Number of its segment in the protocol, from 1."""
     along: str
-    """x, y, z, direction_1, direction_2, or all."""
+    """Axis or test direction of the force: x, y, z, direction_1, direction_2, or all (three axes at once)."""
     unit_vector: tuple[float, float, float] | None
-    """None for all axes at once."""
+    """Unit vector of the force; None for all axes at once."""
     frequency_hz: float | None = None
     """Frequency of a sinusoid; None for a sweep or a multisine."""
     band_hz: tuple[float, float] | None = None
-    """Band of a sweep or a multisine."""
+    """Lowest and highest frequency of a sweep or a multisine; None for a sinusoid."""
     realisation: int = 1
     """Number of the realisation of a multisine's phases, from 1."""
 
     def at(self, amplitude_n: float) -> "Piece":
-        """The same excitation with another peak (N)."""
+        """The same excitation, scaled to another peak (N)."""
         samples = self.commands.samples * (amplitude_n / self.segment.amplitude)
         return replace(
             self,
@@ -54,7 +55,7 @@ class Piece:
 
 def pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[Piece, ...]:
     """All pieces in the order of the protocol's segments, the whole sequence as often as the protocol repeats it.
-    sample_rate_hz: of the device."""
+    sample_rate_hz: sample rate of the device."""
     once: list[Piece] = []
     for number, segment in enumerate(protocol.segments, start=1):
         match segment:
@@ -68,7 +69,7 @@ def pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[Piece, .
 
 
 def unit_vector(directions: TestDirections, along: str) -> FloatArray:
-    """(3,): a device axis, or a test direction."""
+    """Unit vector (3,) of a device axis or of a test direction."""
     if along in ("x", "y", "z"):
         axis: FloatArray = np.eye(3)["xyz".index(along)]
         return axis
@@ -78,7 +79,7 @@ def unit_vector(directions: TestDirections, along: str) -> FloatArray:
 def _sine_piece(
     protocol: RecordingProtocol, number: int, segment: SineSegment, frequency_hz: float, rate_hz: float
 ) -> Piece:
-    """The evaluated part is whole loops; settling time and fades lie outside."""
+    """A sinusoid. The evaluated part is a whole number of loops of whole periods; settling and fades lie outside."""
     period = loop_length(frequency_hz, rate_hz)
     fade = round(protocol.fade_s * rate_hz)
     settle = max(fade, round(segment.settle_s * rate_hz))
@@ -98,7 +99,8 @@ def _sine_piece(
 
 
 def _sweep_piece(protocol: RecordingProtocol, number: int, segment: SweepSegment, rate_hz: float) -> Piece:
-    """Faded in during the first period, which contains the transient; every period ends at zero."""
+    """A sweep. With several periods it is faded in during the first, which contains the transient; every period ends at
+    zero, so that no fade-out is needed."""
     period = round(segment.duration_s * rate_hz)
     wave = np.tile(log_sweep(segment.from_hz, segment.to_hz, segment.amplitude_n, period, rate_hz), segment.periods)
     vector = unit_vector(protocol.directions, segment.along)
@@ -117,7 +119,8 @@ def _sweep_piece(protocol: RecordingProtocol, number: int, segment: SweepSegment
 def _multisine_pieces(
     protocol: RecordingProtocol, number: int, segment: MultisineSegment, rate_hz: float
 ) -> list[Piece]:
-    """One for each realisation. A multisine does not start at zero, so its fades lie outside its periods."""
+    """A piece for each realisation of a multisine. A multisine does not start at zero, so its fades lie outside the
+    evaluated periods."""
     period, fade = round(segment.duration_s * rate_hz), round(protocol.fade_s * rate_hz)
     lines = lines_between(segment.from_hz, segment.to_hz, period, rate_hz, odd_only=segment.odd_only)
     vector = None if segment.along == "all" else unit_vector(protocol.directions, segment.along)

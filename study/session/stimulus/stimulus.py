@@ -4,8 +4,9 @@ The force (N), or the wanted acceleration (m/s²) where stimuli are equalized, i
 
     w(t) = A sin(2 pi f t) d,        d = (cos a, sin a) in the protocol's plane, a = symmetry + 45° or - 45°
 
-The two directions are orthogonal, and mirror images of each other in the device's line of symmetry, so that the device
-itself favours neither. The loop holds whole periods: it is repeated as long as the participant feels.
+A: amplitude, signed (its sign is the polarity); f: frequency (Hz); "symmetry": angle of the device's line of symmetry
+in the plane. The two directions are orthogonal and mirror images of each other in that line, so that the device itself
+favours neither. The loop holds whole periods and is repeated until the participant answers.
 """
 
 import math
@@ -36,18 +37,20 @@ def direction_vector(directions: TestDirections, direction: int) -> FloatArray:
 
 
 def direction_angle_deg(directions: TestDirections, direction: int) -> float:
-    """Angle of direction 1 or 2 in the plane (degrees), from its first axis towards its second."""
+    """Angle of direction 1 or 2 in the plane (degrees), from the plane's first axis towards its second."""
     return directions.symmetry_deg + (45.0 if direction == 1 else -45.0)
 
 
 def loop_length(frequency_hz: float, sample_rate_hz: float) -> int:
-    """Samples of the shortest loop of whole periods; frequencies are multiples of 0.1 Hz."""
+    """Number of samples in the shortest loop of whole periods. Frequency and sample rate are rounded to multiples of
+    0.1 Hz."""
     rate, frequency = round(sample_rate_hz * 10), round(frequency_hz * 10)
     return rate // math.gcd(rate, frequency)
 
 
 def fade_in(settings: StimulusSettings, sample_rate_hz: float) -> FloatArray:
-    """(ticks,): amplitude envelope at the start, as the safety layer applies it to a stimulus without its own onset."""
+    """Envelope (ticks,) of the fade-in, from 0 towards 1, as the safety layer applies it to a stimulus without
+    `onset`."""
     ticks = round(settings.fade_in_s * sample_rate_hz)
     share: FloatArray = np.arange(ticks) / max(ticks, 1)
     return share if settings.fade_shape == "linear" else 0.5 - 0.5 * np.cos(np.pi * share)
@@ -61,8 +64,8 @@ def held_stimulus(
     equalizer: Equalizer,
     sample_rate_hz: float,
 ) -> HeldStimulus:
-    """The stimulus of one trial. The sign of `amplitude` is the polarity of the onset; its unit is the equalizer's:
-    N without one, m/s^2 with one. unit_vector: (3,)."""
+    """The stimulus of one trial. amplitude: peak, in N where the equalizer takes a force, in m/s^2 where it takes an
+    acceleration; its sign is the polarity of the onset. unit_vector: (3,)."""
     n = loop_length(frequency_hz, sample_rate_hz)
     phase = 2 * math.pi * frequency_hz / sample_rate_hz * np.arange(n)
     force = equalizer.takes == "force"
@@ -76,7 +79,7 @@ def held_stimulus(
     envelope = fade_in(settings, sample_rate_hz)
     loop, onset = equalizer.periodic(wanted), equalizer.onset(wanted, envelope)
     if onset is not None:
-        # The loop goes on where its onset ends, so its first sample is the one after the envelope.
+        # The loop is rotated so that its first sample is the one that follows the last sample of the onset.
         loop = replace(loop, samples=np.roll(loop.samples, -len(envelope), axis=0))
     return HeldStimulus(
         loop=loop,

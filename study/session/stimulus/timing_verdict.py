@@ -1,9 +1,9 @@
-"""Timing requirements of a device and the verdict on a computer from a measurement (`hapteq doctor`, device check).
-Whether a trial is void for its timing is decided elsewhere: `study.workflows.trial.judge_trial`.
+"""Timing requirements of a device, and the verdict on a computer whose timing was measured (`hapteq doctor`, device
+check). Whether a single trial is void for its timing is decided by `study.workflows.trial.judge_trial`.
 
-A real device does not wait: a loop that wakes up later than one tick has missed it. A simulated device waits for its
-computer, so that lateness is only a warning there. A timing that is too late for a real device is never reported as
-fine.
+Lateness is the time from the moment at which a tick of the control loop is due to its actual wake-up. A real device
+does not wait: a loop that wakes up more than one tick late has missed that tick. A simulated device waits for its
+computer, so that lateness is only a warning there.
 """
 
 import math
@@ -18,32 +18,34 @@ from study.session.views.views import DeviceFinding
 MS_PER_S = 1000.0
 
 LATE_TICKS = 1.0
-"""99 % of the wake-ups must be less than this many ticks late: 1 ms at 1 kHz."""
+"""Limit of the 99th percentile of the lateness, in ticks: 1 ms at 1 kHz."""
 
 LATE_SHARE = 0.002
-"""Allowed fraction of late ticks, missed ones included: what a loop with real-time priority keeps on an idle
-computer."""
+"""Allowed fraction of late ticks, missed ones included, on an idle computer: a loop with real-time priority stays
+below it."""
 
 BUSY_LATE_SHARE = 0.01
-"""The same with all cores busy."""
+"""Allowed fraction of late ticks, missed ones included, with all cores busy."""
 
 ALL_BUSY = 1.0
-"""Load average per processor from which all cores are busy."""
+"""Load average per processor from which all cores are taken as busy."""
 
 ADVICE = "Close other programs, switch power saving off, and measure again."
-"""Shown where the timing is too late."""
+"""Advice that is shown where the timing is too late."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """Lateness of a real device's own loop, or of this program, which tried to wake up at every tick."""
+    """Statistics of the lateness (ms) of a real device's own loop, or of this program when it wakes up at every
+    tick."""
 
     median_ms: float
     p99_ms: float
     longest_ms: float
     missing_a_tick: float
-    """Fraction of the wake-ups that were later than a tick."""
+    """Fraction of the wake-ups that were more than one tick late."""
     tick_ms: float
+    """Duration of a tick."""
 
     @property
     def too_late(self) -> bool:
@@ -83,7 +85,8 @@ def judge_lateness(lateness: Lateness, simulated: bool) -> DeviceFinding:
 
 
 def judge_missed(missed_ticks: int, ticks: int, simulated: bool, load_per_processor: float | None) -> DeviceFinding:
-    """Judge missed ticks as late ticks: they have no limit of their own."""
+    """Verdict on missed ticks, by the limit of late ticks: missed ticks have no limit of their own. load_per_processor:
+    None if unknown."""
     share, limit = missed_ticks / max(ticks, 1), _late_limit(load_per_processor)
     fine = share <= limit
     value = f"{missed_ticks} of {ticks} ({share:.2%})"
@@ -99,12 +102,13 @@ def _is_busy(load_per_processor: float | None) -> bool:
 
 
 def _late_limit(load_per_processor: float | None) -> float:
+    """Allowed fraction of late ticks at this load; None: that of an idle computer."""
     return BUSY_LATE_SHARE if _is_busy(load_per_processor) else LATE_SHARE
 
 
 def judge_late(late_ticks: int, latest_ms: float, ticks: int, load_per_processor: float | None) -> DeviceFinding:
-    """Verdict for a real device. late_ticks: ticks whose work ended after the next was due, missed ones included.
-    load_per_processor: None if unknown; then the limit is that of a quiet computer."""
+    """Verdict on late ticks of a real device. late_ticks: ticks whose work ended after the next tick was due, missed
+    ones included. load_per_processor: None if unknown; the limit is then that of an idle computer."""
     share = late_ticks / max(ticks, 1)
     busy, limit = _is_busy(load_per_processor), _late_limit(load_per_processor)
     fine = share <= limit
@@ -121,7 +125,8 @@ def judge_late(late_ticks: int, latest_ms: float, ticks: int, load_per_processor
 
 
 def judge_load(per_processor: float | None) -> DeviceFinding:
-    """Verdict on the load average; per_processor: None if unknown. Only a warning: what counts is the lateness."""
+    """Verdict on the load average; per_processor: None if unknown. A high load is only a warning, because the measured
+    lateness decides."""
     if per_processor is None:
         return DeviceFinding("Load", "this system does not tell it, so it was not checked", fine=True)
     value = f"{per_processor:.0%} of what its processors can do, over the last minute"

@@ -1,5 +1,7 @@
-"""What screens, lines and lists may show: values only, light to import, without level, frequency or correctness.
+"""Data classes that screens, text lines and lists display: plain values, quick to import.
 
-`views` (a participant's display), `form_views` -> `forms` -> `form_entry` (questions and answers), `archive_views`
-(past sessions); `local_time`, `printable` and `count_text` are small texts. Begin at `views.py`.
+The values for a participant contain no level, frequency or correctness of answers. `views` (the participant's display);
+`form_views` (structure of a form) -> `forms` (made from a protocol) -> `form_entry` (while it is filled in);
+`archive_views` (past sessions); `handle_notice` (warning before a device moves). Formatting of text: `local_time`,
+`printable`, `count_text`, `participant_codes`. Begin at `views.py`.
 """

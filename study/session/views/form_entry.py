@@ -1,7 +1,7 @@
-"""A form while it is filled in: the question that the keys belong to, and the answers so far. Values only.
+"""State of a form while it is filled in: position of the cursor, and the answers so far. Immutable values, no drawing.
 
-A screen is a picture of it. Each key makes a new value from the one before, in the order of arrival, so an answer
-belongs to the question at which the cursor stood when its key arrived, however fast the keys come.
+Each key gives a new state from the previous one, in the order of arrival; a screen only draws the state. An answer
+therefore belongs to the question at which the cursor was when the key arrived, however fast the keys are pressed.
 """
 
 from dataclasses import dataclass, replace
@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from study.session.views.form_views import Form, FormField, FormKind, FormReply, find_missing_fields
 
 MOST_CHARACTERS = 500
-"""Longest free text of a field, in characters; more is not taken."""
+"""Largest number of characters of free text in a field; further characters are ignored."""
 CHECKED = (FormKind.CONSENT, FormKind.EXCLUSION)
 """Forms in which changed choices are shown once more before sending, because safety depends on them."""
 STEPS = {"down": 1, "up": -1, "tab": 1, "shift+tab": -1}
-"""Fields that a key moves the cursor by."""
+"""Number of fields by which each key moves the cursor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +21,7 @@ class FieldEntry:
     """Content of one field."""
 
     answer: str = ""
+    """The answer in the language shown; empty if not given."""
     marked: int | None = None
     """Index of the choice that Space would choose; None before the first move."""
     caret: int = 0
@@ -33,16 +34,18 @@ class FormEntry:
 
     form: Form
     given: tuple[FieldEntry, ...]
-    """In the order of the form's fields."""
+    """Content of each field, in the order of the form's fields."""
     at: int = 0
     """Index of the field under the cursor; the number of fields means Continue, below the last."""
     replaced: frozenset[int] = frozenset()
-    """Indices of choices that were changed and not shown again yet; only of the forms in CHECKED."""
+    """Indices of fields whose choice was changed and not yet shown again for a check; only in forms of `CHECKED`."""
     open: tuple[int, ...] = ()
-    """Indices of the fields without an answer when sending was last tried; empty after the next answer."""
+    """Indices of the fields without a valid answer at the last attempt to send the form; empty after the next
+    answer."""
     check: tuple[int, ...] = ()
-    """Indices of the changed choices to be checked before sending; empty after the next answer."""
+    """Indices of the fields whose changed choices must be checked before sending; empty after the next answer."""
     sent: bool = False
+    """Whether the form is complete and was sent; no key changes it then."""
 
     @property
     def field(self) -> FormField | None:
@@ -56,15 +59,16 @@ def blank_entry(form: Form) -> FormEntry:
 
 
 def reply_of(entry: FormEntry) -> FormReply:
-    """The reply that a sent entry makes."""
+    """The reply that an entry contains: answers by key, without blanks at their ends."""
     return FormReply({f.key: given.answer.strip() for f, given in zip(entry.form.fields, entry.given, strict=True)})
 
 
 def press(entry: FormEntry, key: str, character: str | None = None, stacked: bool = False) -> FormEntry | None:
     """The entry after one key; None if the key has no meaning in a form. After sending no key changes anything.
 
-    key: Textual's name, such as "enter", "shift+tab", "1". character: what it prints, None if nothing. stacked: the
-    choices under the cursor are listed vertically, so Up and Down move through them first.
+    key: name of the key in Textual (the library for screens), such as "enter", "shift+tab", "1". character: the
+    character that the key prints; None without one. stacked: the choices under the cursor are listed vertically, so Up
+    and Down move through them first.
     """
     if entry.sent:
         return entry
@@ -86,7 +90,7 @@ def go_to(entry: FormEntry, at: int) -> FormEntry:
 
 
 def click_choice(entry: FormEntry, at: int, choice: int) -> FormEntry:
-    """The mouse on a choice: the cursor goes there, and it is chosen."""
+    """The entry after a click on a choice: the cursor moves to its field, and it is chosen. at, choice: indices."""
     return entry if entry.sent else _choose(go_to(entry, at), choice)
 
 
@@ -96,7 +100,7 @@ def click_continue(entry: FormEntry) -> FormEntry:
 
 
 def paste(entry: FormEntry, text: str) -> FormEntry:
-    """Insert pasted text where free text is asked for; ignored elsewhere."""
+    """The entry after text was pasted: inserted into free text, ignored in other fields."""
     field = entry.field
     if entry.sent or field is None or field.choices:
         return entry
@@ -104,8 +108,8 @@ def paste(entry: FormEntry, text: str) -> FormEntry:
 
 
 def move_mark(marked: int | None, step: int, choices: int, stay: bool = True) -> int | None:
-    """Index of the choice after a step: from none to the first or last. At the ends it stays, or is None if `stay`
-    is false."""
+    """Index of the marked choice after a step of 1 or -1; from no mark to the first or the last choice. A step beyond
+    the ends leaves the mark unchanged; if `stay` is false, it gives None, and so does a step of -1 without a mark."""
     if marked is None:
         return (0 if step > 0 else choices - 1) if stay or step > 0 else None
     there = marked + step
@@ -113,8 +117,9 @@ def move_mark(marked: int | None, step: int, choices: int, stay: bool = True) ->
 
 
 def find_choice(choices: tuple[str, ...], character: str) -> int | None:
-    """Index of the choice by its number, or by a first letter that is unique. Where choices are numbers, a digit
-    means that choice."""
+    """Index of the choice that a typed character means: its number from 1, or its first letter if no other choice has
+    the same. Where choices are numbers themselves, a digit means the choice with this text. None without such a
+    choice."""
     if character.isdecimal():
         if any(choice.isdigit() for choice in choices):
             return choices.index(character) if character in choices else None
@@ -124,6 +129,7 @@ def find_choice(choices: tuple[str, ...], character: str) -> int | None:
 
 
 def _press_choice(entry: FormEntry, field: FormField, key: str, character: str | None) -> FormEntry | None:
+    """The entry after a key in a field with choices; None if the key has no meaning there."""
     given = entry.given[entry.at]
     if key in ("left", "right"):
         return _change_field(entry, marked=move_mark(given.marked, 1 if key == "right" else -1, len(field.choices)))
@@ -138,6 +144,7 @@ def _press_choice(entry: FormEntry, field: FormField, key: str, character: str |
 
 
 def _press_text(entry: FormEntry, key: str, character: str | None) -> FormEntry | None:
+    """The entry after a key in a field with text or a number; None if the key has no meaning there."""
     text, caret = entry.given[entry.at].answer, entry.given[entry.at].caret
     match key:
         case "enter":
@@ -154,14 +161,15 @@ def _press_text(entry: FormEntry, key: str, character: str | None) -> FormEntry 
 
 
 def _write(entry: FormEntry, characters: str) -> FormEntry:
-    """Insert characters at the caret, as far as they fit."""
+    """Insert characters at the caret, up to `MOST_CHARACTERS` in the field."""
     text, caret = entry.given[entry.at].answer, entry.given[entry.at].caret
     fitting = characters[: MOST_CHARACTERS - len(text)]
     return _change_field(entry, answer=text[:caret] + fitting + text[caret:], caret=caret + len(fitting))
 
 
 def _choose(entry: FormEntry, choice: int) -> FormEntry:
-    """Choose under the cursor; in forms that safety depends on, a changed choice is noted to be shown once more."""
+    """Choose an answer in the field under the cursor; in forms of `CHECKED`, a changed choice is noted in
+    `replaced`."""
     field, before = entry.form.fields[entry.at], entry.given[entry.at].answer
     answer = field.choices[choice]
     chosen = _change_field(entry, answer=answer, marked=choice)
@@ -173,7 +181,7 @@ def _choose(entry: FormEntry, choice: int) -> FormEntry:
 def _change_field(
     entry: FormEntry, answer: str | None = None, marked: int | None = None, caret: int | None = None
 ) -> FormEntry:
-    """The entry with changes to the field under the cursor; None leaves a value."""
+    """The entry with changes to the field under the cursor; None leaves a value unchanged."""
     before = entry.given[entry.at]
     now = FieldEntry(
         before.answer if answer is None else answer,
@@ -186,8 +194,8 @@ def _change_field(
 
 
 def _send_form(entry: FormEntry) -> FormEntry:
-    """Send the form; refused, with the cursor on the first problem, while answers are missing or changed choices
-    unchecked."""
+    """Send the form. Where answers are missing, or changed choices are not checked, it is not sent, and the cursor
+    moves to the first such field."""
     gaps = find_missing_fields(entry.form, reply_of(entry))
     if gaps:
         places = tuple(entry.form.fields.index(field) for field in gaps)

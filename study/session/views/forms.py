@@ -1,4 +1,8 @@
-"""The forms of a sitting, made from its protocol, and the meaning of a filled one."""
+"""Forms of a sitting, made from its protocol, and the evaluation of a filled form.
+
+Consent, exclusion criteria, questionnaires before and after the trials, set-up, and state of the handle. The data
+classes are those of `form_views`.
+"""
 
 from dataclasses import dataclass
 
@@ -10,7 +14,7 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.form_views import Form, FormField, FormKind, FormReply, Limits, coded
 
 YES_NO = ("yes", "no")
-"""Answers as they are logged; the shown text depends on the language."""
+"""Codes of the two answers as they are logged; the text that is shown depends on the language."""
 HEARING = {
     "ear plugs": "hearing_plugs",
     "ear muffs": "hearing_muffs",
@@ -18,31 +22,31 @@ HEARING = {
     "plugs and noise": "hearing_both",
     "nothing": "hearing_nothing",
 }
-"""Choices of the set-up form: what is logged, and the key of what the participant reads."""
+"""Hearing protection, a question of the set-up form: logged code, and key of the text that the participant reads."""
 GRIPS = {"pen grip": "grip_pen", "whole hand": "grip_hand", "finger tips": "grip_tips", "other": "grip_other"}
-"""Grips of the handle to choose from: what is logged, and the key of what the participant reads."""
+"""Grips of the handle, a question of the set-up form: logged code, and key of the text."""
 HANDS = {"right": "hand_right", "left": "hand_left"}
-"""Answers as they are logged, and the keys of their texts."""
+"""Hand on the handle, a question of the set-up form: logged code, and key of the text."""
 
 
 @dataclass(frozen=True, slots=True)
 class FormOutcome:
-    """Evaluation of a filled form: whether the person may go on, and what is logged."""
+    """Evaluation of a filled form: whether the participant may continue, and what is logged."""
 
     passed: bool
     kept: dict[str, str]
     """Answers that go into the log, in codes that do not depend on the language."""
     reminder: str = ""
-    """Where the set-up differs from the protocol, in English, as it is logged; empty if it agrees."""
+    """Differences between set-up and protocol, as an English sentence for the log; empty if they agree."""
 
 
 def words_of(protocol: StudyProtocol) -> Words:
-    """Everything that its participants read."""
+    """All texts of this protocol that participants read, in its language."""
     return Words(protocol.text.words)
 
 
 def form_of(protocol: StudyProtocol, kind: FormKind) -> Form | None:
-    """The form; None if the protocol asks nothing of that kind."""
+    """The form of this kind; None if the protocol has no questions of this kind."""
     words = words_of(protocol)
     match kind:
         case FormKind.CONSENT:
@@ -60,15 +64,15 @@ def form_of(protocol: StudyProtocol, kind: FormKind) -> Form | None:
 
 
 def judge_form(protocol: StudyProtocol, form: Form, reply: FormReply) -> FormOutcome:
-    """Whether the form is passed, and what of it is kept."""
+    """Whether the form is passed, and which of its answers are logged."""
     answers = coded(form, reply)
     match form.kind:
         case FormKind.CONSENT:
             agreed = all(answer == "yes" for answer in answers.values())
-            # Of a person who does not take part only that is kept.
+            # Of a person who refuses, only the refusal is logged.
             return FormOutcome(agreed, answers if agreed else {})
         case FormKind.EXCLUSION:
-            # Which question it was is about the person's health, and no study needs it.
+            # Which question excludes the person concerns the person's health and is not needed by the study.
             return FormOutcome(all(answer == "no" for answer in answers.values()), {})
         case FormKind.SETUP:
             return FormOutcome(True, answers, _reminder(protocol.setup, answers))
@@ -79,7 +83,8 @@ def judge_form(protocol: StudyProtocol, form: Form, reply: FormReply) -> FormOut
 
 
 def confirmation_of(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS) -> Form:
-    """Confirmation form before a refused consent or an exclusion becomes final."""
+    """Form that asks to confirm a refused consent or an exclusion before it becomes final, with the questions
+    concerned."""
     consent, answers = form.kind is FormKind.CONSENT, coded(form, reply)
     texts = [
         words.fill("quoted", {"text": field.label})
@@ -102,15 +107,17 @@ def is_confirmed(confirmation: Form, reply: FormReply) -> bool:
 
 
 def _yes_no(key: str, label: str, words: Words) -> FormField:
+    """A question to be answered by yes or no."""
     return FormField(key, label, tuple(words[each] for each in YES_NO), codes=YES_NO)
 
 
 def _one_of(key: str, label: str, choices: dict[str, str], words: Words) -> FormField:
+    """A question with choices. choices: logged code, and key of the text."""
     return FormField(key, label, tuple(words[each] for each in choices.values()), codes=tuple(choices))
 
 
 def _consent(protocol: StudyProtocol, words: Words) -> Form:
-    """Probes are consented to by a statement of their own, which no protocol can leave out."""
+    """Consent form: the statements of the protocol, and a statement on probes, which no protocol can leave out."""
     settings = protocol.consent
     statements = (*settings.statements, *probe_statements(protocol.probes, words))
     fields = tuple(
@@ -121,7 +128,7 @@ def _consent(protocol: StudyProtocol, words: Words) -> Form:
 
 
 def probe_statements(probes: ProbeSettings, words: Words = ENGLISH_WORDS) -> tuple[str, ...]:
-    """What a participant agrees to beside the trials."""
+    """Statements of consent to the probes between trials; empty where the protocol has none."""
     if not probes.levels_n:
         return ()
     strongest = {"seconds": f"{probes.interval_s:g}", "newtons": f"{max(probes.levels_n):g}"}
@@ -129,6 +136,8 @@ def probe_statements(probes: ProbeSettings, words: Words = ENGLISH_WORDS) -> tup
 
 
 def _let_go(protocol: StudyProtocol, words: Words) -> Form:
+    """Form that asks the participant to release the handle for the reference. The duration shown is
+    `reference_s` plus 5 s."""
     probes = protocol.probes
     shaken = {"seconds": f"{probes.reference_s + 5:.0f}", "newtons": f"{probes.reference_n:g}"}
     free = {"yes": "yes", "not now": "let_go_not_now"}
@@ -155,6 +164,8 @@ def _exclusion(settings: ConsentSettings, words: Words) -> Form:
 
 
 def _setup(settings: SetupSettings, words: Words) -> Form:
+    """Set-up form. Where the protocol has a requirement, the question states it."""
+
     def asked(key: str, wished: bool) -> str:
         return f"{words[key]} {words[f'{key}_wanted']}" if wished else words[key]
 
@@ -173,6 +184,7 @@ def _setup(settings: SetupSettings, words: Words) -> Form:
 
 
 def _reminder(setup: SetupSettings, answers: dict[str, str]) -> str:
+    """As `FormOutcome.reminder`."""
     differing = (
         (setup.hearing_masked and answers.get("hearing") == "nothing", "the device can be heard"),
         (setup.hand_hidden and answers.get("hand_hidden") == "no", "the hand can be seen"),
@@ -183,12 +195,13 @@ def _reminder(setup: SetupSettings, answers: dict[str, str]) -> str:
 
 
 def _questions(kind: FormKind, name: str, questions: tuple[Question, ...], words: Words) -> Form:
-    """Form of voluntary questions: taking part does not depend on their answers."""
+    """Form of voluntary questions: participation does not depend on their answers."""
     fields = tuple(_question(question, words) for question in questions)
     return Form(kind, words[f"{name}_title"], words[f"{name}_intro"], fields)
 
 
 def _question(question: Question, words: Words) -> FormField:
+    """A question of the protocol as a field; the meaning of a scale's ends is added to the question."""
     label = question.question
     if question.ends:
         meaning = {"low_end": question.ends[0], "high_end": question.ends[1]}

@@ -1,4 +1,4 @@
-"""Notice before a real device moves by itself: who may touch it."""
+"""Safety notices before a real device moves: whether a hand may be on the handle, largest force, duration."""
 
 from collections.abc import Callable
 
@@ -6,11 +6,12 @@ from protocols.definition.recording_protocol import RecordingProtocol
 from study.errors import StudyError
 
 BeforeMoving = Callable[[str], None]
-"""Shows a notice to the people around a real device; an exception from it keeps the device still."""
+"""Shows a notice to the people around a real device. If it raises an exception, the device does not move."""
 
 
 def refuse_unannounced(notice: str) -> None:
-    """Refuse to move a real device, for a caller that cannot announce it to a person. Raises StudyError."""
+    """A `BeforeMoving` for callers that cannot show a notice to a person: always raises StudyError, so the device does
+    not move."""
     raise StudyError(
         "The device was not moved",
         f"A real device would move without a warning. {notice}",
@@ -20,7 +21,7 @@ def refuse_unannounced(notice: str) -> None:
 
 
 def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> str:
-    """The notice. total_s: duration if nothing is repeated."""
+    """Notice before a recording. device: name of the device; total_s: duration (s) if no piece is repeated."""
     peak_n = max(segment.amplitude_n for segment in protocol.segments)
     if protocol.hand == "held":
         return (
@@ -32,7 +33,7 @@ def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> s
 
 
 def free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
-    """Notice before a device moves the handle by itself."""
+    """Notice before a device moves a handle that no hand holds. peak_n: largest force (N); total_s: duration (s)."""
     return (
         f"No person may hold the handle: '{device}' is going to move by itself {_duration_words(total_s)}, pushed with "
         f"up to {peak_n:g} N and held at its place by a weak spring. Keep hands away and the workspace free; Ctrl-C "
@@ -41,8 +42,8 @@ def free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
 
 
 def limit_test_notice(device: str, force_n: float) -> str:
-    """Notice before the proof that a device's cap holds and that it lets go: without a spring, so the handle moves
-    freely."""
+    """Notice before the test that a device's force cap and its release of the force work. force_n: force of the test
+    (N). The test is without a spring, so the handle moves freely."""
     return (
         f"No person may hold the handle: within some seconds '{device}' is shaken along x for a quarter of a second, "
         f"by {force_n:g} N, or twice as much where its cap does not hold; then it is pushed along x with {force_n:g} N "
@@ -51,4 +52,5 @@ def limit_test_notice(device: str, force_n: float) -> str:
 
 
 def _duration_words(total_s: float) -> str:
+    """A duration (s) in words, in minutes from one minute on."""
     return f"for about {round(total_s / 60)} min" if total_s >= 60 else f"for about {max(1, round(total_s))} s"

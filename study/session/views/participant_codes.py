@@ -1,14 +1,18 @@
-"""Form of a participant code: one rule for screens, command line and store. Pure, and light to import."""
+"""Valid participant codes: the same rule for screens, command line and stored files.
+
+A code is 1 to 16 ASCII letters and digits with at least one digit, such as P01.
+The module has no state and is quick to import.
+"""
 
 import re
 
 ALLOWED = "a code has 1 to 16 letters and digits, at least one digit, such as P01"
-"""The rule in words, part of a sentence."""
+"""The rule in words, as a part of messages."""
 
 _CODE = re.compile(r"(?=.*\d)[A-Za-z0-9]{1,16}")
-"""The rule."""
+"""The rule as a pattern."""
 _NUMBERED = re.compile(r"(?P<letters>[A-Za-z]*)(?P<digits>\d{1,9})")
-"""Codes that can be counted on: letters, then a number."""
+"""Codes that can be continued by the next number: letters, then up to nine digits."""
 
 
 def is_code(text: str) -> bool:
@@ -26,7 +30,8 @@ def code_problem(text: str) -> str:
 
 
 def next_code(taken: tuple[str, ...]) -> str:
-    """A free code that continues the latest one; P01 if there is none. taken: latest first."""
+    """A free code: the latest numbered code with the next number of its letters; P01 without such a code. taken: codes
+    in use, latest first."""
     for code in taken:
         match = _NUMBERED.fullmatch(code)
         if match is None:

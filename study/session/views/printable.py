@@ -1,4 +1,7 @@
-"""Text from files, made fit for a terminal: a note or a damaged file must not move its cursor or clear its screen."""
+"""Removes control characters from text of files before it is shown in a terminal.
+
+Control characters in a note or a damaged file could otherwise move the cursor or clear the screen.
+"""
 
 import dataclasses
 from typing import Any, TypeVar
@@ -7,14 +10,14 @@ T = TypeVar("T")
 
 
 def printable_text(text: str) -> str:
-    """Control characters are shown as blanks; line ends stay."""
+    """The text with each non-printable character replaced by a blank; line ends are kept."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
 
 
 def printable(view: T) -> T:
-    """A value of dataclasses, tuples and text, with all its text made printable."""
+    """A copy of a value of dataclasses, tuples and text, in which `printable_text` is applied to all text."""
     cleaned: T = _clean(view)
     return cleaned
 

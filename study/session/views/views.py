@@ -1,6 +1,7 @@
-"""Values for the participant's display. None of them reveals level, frequency or correctness.
+"""Data classes that the participant's display shows, and the participant's replies.
 
-Values only, and light to import: a screen shows its first frame before anything heavy is loaded.
+No value reveals level, frequency or correctness of a trial, so that the display cannot give hints. The module is quick
+to import, because a screen shows its first frame before numerical libraries are loaded.
 """
 
 from __future__ import annotations
@@ -16,101 +17,108 @@ if TYPE_CHECKING:
 
 
 class Task(Enum):
-    """What a trial asks."""
+    """Question of a trial."""
 
     DIRECTION = "direction"
-    """Along which of the two directions did it shake?"""
+    """Along which of the two directions did the handle vibrate?"""
     INTERVAL = "interval"
-    """In which of the two intervals did it shake at all?"""
+    """In which of the two intervals did the handle vibrate?"""
 
 
 @dataclass(frozen=True, slots=True)
 class DirectionPicture:
-    """The two directions as oriented segments: angle of each number in the plane, from its first axis."""
+    """Picture of the two directions as line segments in the plane of the test directions."""
 
     plane: str
+    """xy, yz or zx."""
     angle_deg: tuple[float, float]
-    """Angles of directions 1 and 2, as this participant sees them."""
+    """Angles of directions 1 and 2 as numbered for this participant (degrees), from the plane's first axis."""
 
 
 @dataclass(frozen=True, slots=True)
 class Welcome:
-    """What a participant reads before the first trial."""
+    """Facts that a participant reads before the first trial."""
 
     title: str
     picture: DirectionPicture
     runs: int
+    """Number of runs in the session."""
     training_runs: int
     device: str
+    """Name of the device."""
     felt: bool
     """False where no device moves: the answers are practice."""
     resumed_after: int
-    """Answers already on disk."""
+    """Number of answers from earlier sittings."""
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far the session is. Made from runs and counted trials, never from levels."""
+    """Progress of the session, from runs and counted trials; never from levels."""
 
     share_done: float
-    """0 to 1."""
+    """Fraction of the session done, 0 to 1."""
     minutes_left: int | None
-    """Rounded up; None until there is a trial to estimate it from."""
+    """Estimated minutes left, rounded up; None while there are too few answers for an estimate."""
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One trial as the participant sees it. A catch trial looks like any other: its phase says TEST."""
+    """One trial as the participant sees it. A catch trial looks like any other: its phase is given as TEST."""
 
     phase: Phase
     run_number: int
-    """From 1, within its phase."""
+    """Number of the run within its phase, from 1."""
     runs_in_phase: int
     trial_number: int
-    """From 1, within the run."""
+    """Number of the trial within the run, from 1."""
     repeated: bool
-    """Presented again because the last presentation was void."""
+    """Whether the trial is presented again because its last presentation was void."""
     time_limit_s: float
+    """Time for an answer, as the protocol sets it."""
     picture: DirectionPicture
     task: Task = Task.DIRECTION
     practice: bool = False
-    """A short practice, with a criterion to pass."""
+    """Whether the trial belongs to a short practice run with a criterion to pass."""
     progress: Progress | None = None
     repeats_left: int | None = None
-    """How often the participant may still ask for a trial of this run again. None: no limit (first rules)."""
+    """How often the participant may still ask for a repetition of a trial in this run; None: without limit (version 1
+    of `study.session.state.rules`)."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlayingNotice:
-    """A stimulus (or its absence) of a fixed length, to which nothing is answered yet."""
+    """Notice while a stimulus, or an interval without stimulus, of fixed duration is played; no answer is taken."""
 
     title: str
     """Title of the interval or direction, such as "Direction 1" or "Interval 2"."""
     number: int
-    """1 or 2: what is highlighted."""
+    """Direction or interval that is highlighted, 1 or 2; 0: none."""
     seconds: float
+    """Duration of the notice."""
     picture: DirectionPicture | None
-    """None where there is nothing to draw (an interval)."""
+    """None where no direction is drawn (an interval, a probe)."""
 
 
 @dataclass(frozen=True, slots=True)
 class DemoMenu:
-    """The labelled demonstration: each direction at each vibration, as often as wanted."""
+    """Menu of the labelled demonstration: each direction at each vibration (frequency), as often as wanted."""
 
     picture: DirectionPicture
     vibrations: int
-    """How many; number 1 is the slowest."""
+    """Number of vibrations; vibration 1 has the lowest frequency."""
     vibration: int
-    """The present one, from 1."""
+    """Number of the present vibration, from 1."""
     felt: tuple[tuple[int, int], ...]
-    """(vibration, direction number) already played."""
+    """Pairs (vibration, direction number) that were played."""
     handle_moves: bool
-    """False with a simulated device."""
+    """Whether a real handle moves; False with a simulated device."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlayDemo:
-    """Choice in the demonstration menu: direction `number` (1 or 2) at vibration `vibration` (from 1, the slowest)."""
+    """Choice in the demonstration menu: direction `number` (1 or 2) at vibration `vibration` (from 1, the lowest
+    frequency)."""
 
     vibration: int
     number: int
@@ -118,39 +126,39 @@ class PlayDemo:
 
 @dataclass(frozen=True, slots=True)
 class DemoDone:
-    """Enough was felt."""
+    """Choice of the participant to end the demonstration."""
 
 
 DemoChoice = PlayDemo | DemoDone
-"""What a participant can choose in the demonstration."""
+"""The possible choices of a participant in the demonstration."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceFinding:
-    """One line of the device check."""
+    """One finding of the device check, shown as a line."""
 
     name: str
     value: str
     fine: bool
     advice: str = ""
-    """What to do where it is not fine."""
+    """Advice to the experimenter where the finding is not fine."""
     warning: bool = False
-    """Not fine, but no obstacle to anything that this device is used for."""
+    """Whether a finding that is not fine does not prevent the use of the device."""
 
     @property
     def wrong(self) -> bool:
-        """Whether it hinders the study: not fine, and no mere warning."""
+        """Whether the finding prevents the study: neither fine nor a warning."""
         return not self.fine and not self.warning
 
     @property
     def verdict(self) -> str:
-        """ok, warn (a warning) or look (wrong), for a column."""
+        """Verdict in one word for a table: ok, warn (a warning) or look (wrong)."""
         return "ok" if self.fine else "warn" if self.warning else "look"
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceReport:
-    """Findings of a device check; simulated: nothing moves."""
+    """Findings of a device check. simulated: whether the device is simulated, so that no real handle moves."""
 
     device: str
     simulated: bool
@@ -158,25 +166,26 @@ class DeviceReport:
 
     @property
     def fine(self) -> bool:
-        """Whether all findings are fine; False with a mere warning too."""
+        """Whether all findings are fine; False with a warning too."""
         return all(finding.fine for finding in self.findings)
 
     @property
     def usable(self) -> bool:
-        """Warnings aside, nothing is wrong."""
+        """Whether no finding is wrong; warnings are allowed."""
         return not any(finding.wrong for finding in self.findings)
 
 
 @dataclass(frozen=True, slots=True)
 class HandleView:
-    """Whether the handle is where a trial may start."""
+    """Position of the handle, and whether a trial may start with it."""
 
     ready: bool
     sentence: str
     """Instruction, such as "Bring the handle 12 mm back to the centre"."""
     offset_mm: tuple[float, float]
-    """From the centre, right and up in the plane of the picture."""
+    """Offset from the centre along the first and second axis of the plane; drawn to the right and up."""
     radius_mm: float
+    """Radius around the centre within which a trial may start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,32 +195,33 @@ class PracticeResult:
     passed: bool
     right: int
     of: int
-    """Number of last answers of which the right ones are counted."""
+    """Number of latest answers among which `right` answers were correct."""
 
 
 @dataclass(frozen=True, slots=True)
 class PauseNotice:
-    """What the participant sees during a pause."""
+    """Notice to the participant during a pause."""
 
     reason: str
-    """Who asked, or what happened: shown to the participant."""
+    """Who asked for the pause, or what happened, as a text for the participant."""
     answers: int
-    """On disk."""
+    """Number of answers that are stored."""
 
 
 class AfterPause(Enum):
     """The participant's decision that ends a pause."""
 
     GO_ON = "go_on"
+    """Continue with the sitting."""
     LEAVE = "leave"
-    """The session can be resumed."""
+    """End the sitting; the session can be resumed."""
     WITHDRAW = "withdraw"
-    """The participant withdraws the consent: leave, and erase after the device is closed."""
+    """Withdraw consent: end the sitting, and erase the data after the device is closed."""
 
 
 @dataclass(frozen=True, slots=True)
 class RestNotice:
-    """What the participant sees during an enforced rest: its length, the runs left, and the progress."""
+    """Notice to the participant during an enforced rest: its duration, the number of runs left, and the progress."""
 
     seconds: float
     runs_left: int
@@ -220,14 +230,14 @@ class RestNotice:
 
 @dataclass(frozen=True, slots=True)
 class Goodbye:
-    """Last notice of a sitting. finished: the whole session, not only this sitting."""
+    """Last notice of a sitting. finished: whether the whole session is finished; answers: number of stored answers."""
 
     finished: bool
     answers: int
     reason: str = ""
     """Why the sitting ended before the session was finished."""
     outcome: Literal["", "refused", "excluded"] = ""
-    """Why a person does not take part: then there is no session to continue."""
+    """Why a person does not take part; the session cannot be continued then. Empty for a participant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +246,7 @@ class Answered:
 
     answer: int
     at_s: float
-    """Clock time at which the key arrived."""
+    """Time at which the key arrived, by the session's monotonic clock (s)."""
 
     def __post_init__(self) -> None:
         if self.answer not in (1, 2):
@@ -245,17 +255,18 @@ class Answered:
 
 @dataclass(frozen=True, slots=True)
 class Unanswered:
-    """No answer: the trial is void."""
+    """Reply without an answer: the trial is void."""
 
     reason: str
+    """Why, in words, as it is logged."""
     leave: bool
-    """The participant or experimenter ends the sitting; it can be resumed."""
+    """Whether the participant or the experimenter ends the sitting; the session can be resumed."""
     asked: bool = False
-    """The participant asked for the trial again, and so is there."""
+    """Whether the participant asked for a repetition of the trial; this shows that the participant is present."""
     pause: bool = False
-    """Asked for a pause: hands free at once, and nothing is played until it goes on."""
+    """Whether a pause was asked for: the force ends at once, and nothing is played until the session continues."""
     cause: VoidCause = VoidCause.FAULT
-    """Why no answer came, where `leave`, `asked` and `pause` do not tell."""
+    """Cause of the void trial where `leave`, `asked` and `pause` are all false."""
 
 
 Reply = Answered | Unanswered
@@ -263,7 +274,7 @@ Reply = Answered | Unanswered
 
 
 def picture_of(directions: TestDirections, swapped: bool) -> DirectionPicture:
-    """Picture of the two directions, 45 degrees to either side of the symmetry axis. swapped: numbers 1 and 2 are
-    exchanged."""
+    """Picture of the two directions, 45 degrees to either side of the line of symmetry. swapped: whether numbers 1 and
+    2 are exchanged for this participant."""
     first, second = directions.symmetry_deg + 45.0, directions.symmetry_deg - 45.0
     return DirectionPicture(directions.plane, (second, first) if swapped else (first, second))

@@ -1,4 +1,8 @@
-"""Trials and runs of a followed session, as shown to the experimenter. Used by `make_watch_view`."""
+"""Trials and runs of a followed session as the experimenter's view shows them; `make_watch_view` combines them.
+
+The direction of a trial is withheld until its answer counts, because an experimenter who knows the direction could
+reveal it to the participant.
+"""
 
 from protocols.procedure.practice import PracticeState, practice_passed, right_of_last
 from protocols.procedure.schedule import Run
@@ -9,11 +13,12 @@ from study.session.watching.followed_session import FollowedSession
 from study.session.watching.watch_view import ClosedTrial, OpenTrial, PracticeLine, StaircasePoint, WatchedRun
 
 LAST_TRIALS = 40
-"""Latest trials that the experimenter's view lists."""
+"""Number of latest trials that the experimenter's view lists."""
 
 
 def shown_run(state: SessionState) -> int | None:
-    """Index of the run to plot: the current one, or the last one while nothing is answered in it."""
+    """Index of the run to plot: the current run while a trial is open or before the first answer of the session,
+    otherwise the run of the latest counted answer. None for a finished session without answers."""
     answered = [trial.run for trial in state.trials if trial.counts]
     if not state.finished and (not answered or state.presented is not None):
         return state.run
@@ -21,11 +26,13 @@ def shown_run(state: SessionState) -> int | None:
 
 
 def _select_counted(state: SessionState, run: int) -> list[Trial]:
+    """Trials of a run that count."""
     return [trial for trial in state.trials if trial.run == run and trial.counts]
 
 
 def points(state: SessionState, run: int | None) -> tuple[StaircasePoint, ...]:
-    """Counted trials of a run. An answer whose trial is not closed yet may still become void and is left out."""
+    """Counted trials of a run without catch trials, as points of its staircase. The open trial is left out even after
+    its answer, because it may still become void."""
     if run is None:
         return ()
     closed = [t for t in _select_counted(state, run) if t.phase is not Phase.CATCH and not _is_open(state, t)]
@@ -33,11 +40,12 @@ def points(state: SessionState, run: int | None) -> tuple[StaircasePoint, ...]:
 
 
 def _is_open(state: SessionState, trial: Trial) -> bool:
+    """Whether this is the presented trial, which is not completed."""
     return state.presented is not None and trial is state.trials[-1]
 
 
 def next_level_n(state: SessionState, shown: int | None) -> float | None:
-    """Level of the next trial of the shown run (N); None if it is over."""
+    """Level of the next trial of the shown run (N); None if the run is over or is not the current one."""
     if state.finished or shown != state.run:
         return None
     run = state.runs[state.run]
@@ -75,7 +83,7 @@ def open_trial(state: SessionState, presented_s: float) -> OpenTrial | None:
 
 
 def last_trials(watched: FollowedSession) -> tuple[ClosedTrial, ...]:
-    """Latest trials, newest first."""
+    """Latest answered or void trials, at most `LAST_TRIALS`, newest first."""
     rows = list(zip(watched.state.trials, watched.remarks, strict=True))[-LAST_TRIALS - 1 :]
     closed = [
         _close_trial(watched.state, trial, remark) for trial, remark in rows if trial.status is not TrialStatus.OPEN
@@ -84,8 +92,8 @@ def last_trials(watched: FollowedSession) -> tuple[ClosedTrial, ...]:
 
 
 def _close_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
-    # Of a void trial it stays hidden, answered or not: it tells something about the draws, and the same comes again.
-    # While the device is judged the answer may still turn out void.
+    # The direction and correctness of a void trial stay hidden, because the same stimulus is presented again. They stay
+    # hidden, too, until the health of the device is judged, because the trial may still become void.
     known = trial.counts and not _is_open(state, trial)
     phase = "practice" if state.runs[trial.run].practice else trial.phase.value
     return ClosedTrial(

@@ -1,4 +1,8 @@
-"""Live state of a running session, written beside its log for a viewer. Values only, replaced often."""
+"""Live state of a running session, which a viewer in another terminal reads.
+
+The session writes it to `live.json` beside its log, several times a second; the file is replaced each time. The log
+alone is the record of the session.
+"""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -7,29 +11,31 @@ Activity = Literal[
     "preparing", "form", "instructions", "demo", "waiting for the handle", "trial", "rest", "pause", "idle",
     "probe", "reference",
 ]  # fmt: skip
-"""What the session does now. `idle`: between two trials; `probe`, `reference`: measurements between trials."""
+"""Present activity of the session. `idle`: between two trials; `probe`, `reference`: measurements between trials."""
 
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """Current state. Never contains a direction: it is readable while a trial runs."""
+    """Present state of the session. It contains no direction, because it can be read while a trial runs."""
 
     utc: str
+    """Time at which this state was written."""
     activity: Activity
     since_utc: str
-    """When this activity began."""
+    """Time at which this activity began."""
     fault: str
-    """The device's fault in words; empty where there is none."""
+    """Fault of the device in words; empty without a fault."""
     offset_mm: float | None
-    """Present distance of the handle from its place."""
+    """Present distance of the handle from the place at which trials start; None where the position is unknown."""
     handle_ready: bool
-    """Within the gate's radius; true where there is no gate."""
+    """Whether the handle is within the gate (the radius within which a trial may start); true without a gate."""
     acceleration_mps2: float | None
-    """What the accelerometer reads now, norm; None without a reading."""
+    """Present reading of the accelerometer, norm of the three axes; None without a reading."""
     sensor_clipped: bool
+    """Whether the accelerometer is at the limit of its range."""
     missed_ticks: int
-    """In the present stimulus."""
+    """Number of missed ticks of the control loop in the present stimulus."""
     monotonic_s: float | None = None
     """Reading of the session's monotonic clock at `utc`, as in its log; None from older versions."""
     telemetry: str = ""
-    """Path of the ring into which the device's loop writes every tick; empty if there is none."""
+    """Path of the ring buffer into which the device's control loop writes every tick; empty if there is none."""

@@ -1,34 +1,37 @@
-"""Requests to a running session from another terminal or from a key outside the trial. Values only."""
+"""Requests to a running session, from another terminal, from a key, or from the program itself.
+
+Plain values: the request inbox (`study.store.sessions.request_inbox`) carries them, and the session obeys.
+"""
 
 from dataclasses import dataclass
 from typing import Literal
 
 Who = Literal["participant", "experimenter", "program"]
-"""Who asks; `program`: a finding of the session itself."""
+"""Origin of a request; `program`: a finding of the session itself."""
 
 
 @dataclass(frozen=True, slots=True)
 class StopAsked:
-    """Force off at once; the sitting ends and can be resumed."""
+    """Request to stop: the force is switched off at once and the sitting ends; the session can be resumed."""
 
     who: Who
 
 
 @dataclass(frozen=True, slots=True)
 class PauseAsked:
-    """Hands free at once; the present trial is void and comes again."""
+    """Request to pause: the force ends at once; the present trial is void and is presented again."""
 
     who: Who
 
 
 @dataclass(frozen=True, slots=True)
 class NoteAsked:
-    """Write this into the log."""
+    """Request to write a note into the log."""
 
     who: Who
     text: str
     adverse: bool = False
-    """Something happened to the participant: pain, numbness, a fright."""
+    """Whether the note reports an adverse event of the participant, such as pain, numbness or fright."""
 
 
 Request = StopAsked | PauseAsked | NoteAsked

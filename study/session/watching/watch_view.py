@@ -1,7 +1,8 @@
-"""What a person who watches a running session may see. Values only, light to import, without a seed.
+"""Data classes of the view that an experimenter has of a running session. Plain values, quick to import.
 
-The direction of a trial is not in here before its answer is in: an experimenter who knows it can give it away.
-Numbers of runs, trials and attempts count from 0, as in the files; a screen that shows them adds one.
+The view contains no seed, and the direction of a trial only after the answer, because an experimenter who knows the
+direction could reveal it to the participant. Runs, trials and attempts are numbered from 0, as in the files; a screen
+adds one. `make_watch_view` fills these classes.
 """
 
 from dataclasses import dataclass
@@ -10,10 +11,11 @@ from typing import Literal
 from study.session.watching.live import Live
 
 Standing = Literal["running", "paused", "resting", "not running", "finished", "stopped", "refused", "excluded"]
-"""`stopped`: the sitting was ended; `not running`: the program ended without writing so. Both can be resumed."""
+"""Status of a session. `stopped`: the sitting was ended; `not running`: the program ended without logging the end. Both
+can be resumed."""
 
 ON: tuple[Standing, ...] = ("running", "paused", "resting")
-"""Standings of a session whose program runs."""
+"""The statuses in which the program of the session runs."""
 
 RunStatus = Literal["done", "present", "to come"]
 """State of a run within the schedule."""
@@ -25,19 +27,19 @@ class WatchedRun:
 
     run: int
     phase: str
-    """training, practice, test or detection."""
+    """Training, practice, test or detection."""
     frequency_hz: float
     status: RunStatus
     reversals: int
     reversals_needed: int
-    """0 for a practice run, which has none."""
+    """Number of reversals that end the run; 0 where the run ends by another rule (practice, Bayesian placement)."""
     trials: int
-    """Counted ones."""
+    """Number of trials that count."""
 
 
 @dataclass(frozen=True, slots=True)
 class StaircasePoint:
-    """A counted trial that steers the run; catch trials do not steer it."""
+    """A counted trial of a staircase; catch trials, which do not affect the staircase, are left out."""
 
     trial: int
     level_n: float
@@ -47,7 +49,7 @@ class StaircasePoint:
 
 @dataclass(frozen=True, slots=True)
 class OpenTrial:
-    """Presented, its answer not in."""
+    """A trial that is presented and not answered yet. catch: whether it is a catch trial."""
 
     run: int
     trial: int
@@ -56,13 +58,13 @@ class OpenTrial:
     level_n: float
     catch: bool
     presented_s: float
-    """Seconds since."""
+    """Time since its presentation."""
 
 
 @dataclass(frozen=True, slots=True)
 class ClosedTrial:
-    """A trial that was answered or is void. `shown` and `correct` are None for a void trial, and while it is
-    measured."""
+    """A trial that was answered or is void. `shown` and `correct` are None for a void trial, and while the trial is not
+    judged yet."""
 
     run: int
     trial: int
@@ -71,42 +73,46 @@ class ClosedTrial:
     frequency_hz: float
     level_n: float
     shown: int | None
-    """1 or 2: the direction, in a detection run the interval. None where no answer ever came."""
+    """Correct answer, 1 or 2: number of the direction or, in a detection run, of the interval."""
     answer: int | None
     correct: bool | None
     reversal: bool
     response_time_s: float | None
     delivered_mps2: float | None
+    """Measured acceleration along the direction (peak)."""
     off_axis_mps2: float | None
+    """Measured acceleration across the direction (peak)."""
     status: str
-    """ok, flagged, unmeasured, spoiled; or measuring, while what the device did is not in the log."""
+    """ok, flagged, unmeasured or spoiled (`TrialStatus`); measuring while the measurement is not in the log."""
     remark: str
-    """Flags, or why it is void."""
+    """Flags, or the reason why the trial is void."""
 
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """What the participant got in this sitting, and how much is allowed."""
+    """Duration of the sitting and vibration dose of the hand, with their limits."""
 
     elapsed_min: float
     limit_min: float
     dose_a8_mps2: float
+    """Daily exposure A(8), as in `vibration_dose`."""
     dose_limit_mps2: float
 
     @property
     def time_share(self) -> float:
-        """Elapsed time over its limit; above 1 beyond it."""
+        """Elapsed time as a fraction of its limit."""
         return self.elapsed_min / self.limit_min
 
     @property
     def dose_share(self) -> float:
-        """A(8) over its limit; above 1 beyond it."""
+        """A(8) as a fraction of its limit."""
         return self.dose_a8_mps2 / self.dose_limit_mps2
 
 
 @dataclass(frozen=True, slots=True)
 class PracticeLine:
-    """Result of a practice run: `right` of the last `of` answers were correct; passed: its criterion was met."""
+    """Result of a practice run: `right` of the last `of` answers were correct. passed: whether the criterion was
+    met."""
 
     frequency_hz: float
     right: int
@@ -137,80 +143,89 @@ class NoteLine:
 
 @dataclass(frozen=True, slots=True)
 class DriftLine:
-    """Something that the probes of the session found changed."""
+    """A change of device or grip that the probes of the session show."""
 
     since_s: float
-    """Since the session was opened, when it was first seen."""
+    """Time from the opening of the session to the first probe with this change."""
     sentence: str
+    """The change in words."""
     beyond: bool
     """Whether the drift exceeds what the analysis of the session allows."""
 
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """An alert for the experimenter: a state that lasts, or a single event of the followed session."""
+    """An alarm for the experimenter: a lasting state, or a single event, of the followed session."""
 
     kind: str
+    """Short name that identifies the alarm, such as "device"."""
     sentence: str
     """What is wrong, and what to do."""
     since: str
-    """UTC. The same alarm keeps its time as long as it lasts."""
+    """Start time, UTC. An alarm keeps its start time as long as it lasts."""
     urgent: bool = True
-    """Rings until it was seen; others ring once."""
+    """Whether the alarm sounds until the experimenter has seen it; other alarms sound once."""
     event: bool = False
-    """Something that happened, each time anew; others are states that come and go."""
+    """Whether the alarm is a single event, which is new each time it happens; other alarms are states that last."""
 
 
 @dataclass(frozen=True, slots=True)
 class WatchView:
-    """The complete view of a followed session at a moment, from which screens and lines for watchers are made."""
+    """The complete view of a followed session at one moment, from which screens and text lines are made."""
 
     utc: str
-    """When this was true."""
+    """Time of the view."""
     session: str
+    """Name of the session."""
     subject: str
+    """Code of the participant."""
     protocol: str
     """Title of the protocol."""
     device: str
     simulated: bool
-    """Nothing moves."""
+    """Whether the device is simulated, so that no real handle moves."""
     observer: str | None
     """Name of the simulated participant; None for a person."""
     standing: Standing
     reason: str
-    """Why it does not run; empty while it runs."""
+    """Why the session does not run, in words; empty while it runs."""
     activity: str
-    """In words."""
+    """Present activity in words."""
     activity_s: float
-    """For how long."""
+    """Duration of this activity so far."""
     runs: tuple[WatchedRun, ...]
     shown_run: int | None
-    """The run that `points` belong to: the present one, or the last one while nothing is answered in it."""
+    """Index of the run that `points` belong to: the present run, or the run of the latest answer (`shown_run`)."""
     points: tuple[StaircasePoint, ...]
+    """Counted trials of that run."""
     next_level_n: float | None
     """Next level of the staircase in `shown_run`, after the last point; None where the run is over."""
     cap_n: float
+    """Highest level of the staircase."""
     open_trial: OpenTrial | None
     last: tuple[ClosedTrial, ...]
-    """Newest first."""
+    """Latest closed trials, newest first."""
     answers: int
+    """Number of answers that count."""
     exposure: Exposure
     catch_given: int
+    """Number of catch trials that count."""
     catch_lapses: int
+    """Number of wrong answers to catch trials."""
     practice: tuple[PracticeLine, ...]
     forms: tuple[FormLine, ...]
     notes: tuple[NoteLine, ...]
-    """Newest first."""
+    """Notes of the log, newest first."""
     gate_radius_mm: float
-    """0 where there is no gate."""
+    """Radius within which the handle must be for a trial to start; 0 without a gate."""
     live: Live | None
-    """Live values; None where nothing was received for some seconds."""
+    """Live state; None where it is out of date or the program does not run."""
     alarms: tuple[Alarm, ...]
     probes: int = 0
-    """Kept so far, references included."""
+    """Number of probes in the log with their measurement, references included."""
     drifts: tuple[DriftLine, ...] = ()
 
     @property
     def present_run(self) -> WatchedRun | None:
-        """The run that is under way, or would be next; None after the last."""
+        """The run in progress, or the next run; None after the last run."""
         return next((run for run in self.runs if run.status == "present"), None)

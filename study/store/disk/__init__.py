@@ -1,6 +1,7 @@
-"""Safe reading and writing for all formats: regular files only, limited in size, written atomically.
+"""Safe reading and writing for all file formats: regular files only, limited in size, written atomically.
 
-`declared_size`, `strict_json` (reading) and `atomic_write`, `new_folder`, `privacy` (writing) -> `text_file` (also
-TOML), `json_document`, `hdf5_file`, `csv_rows`, `wav_file`; `file_errors` are the errors of all of them. Begin at
-`json_document.py`.
+Basic checks and operations: `declared_size`, `strict_json`, `hdf5_contents`, `hdf5_attributes` (reading);
+`atomic_write`, `new_folder`, `privacy`, `real_folder` (writing and erasing). Used by the general formats: `text_file`
+(also TOML), `json_document`, `hdf5_file`, `csv_rows`, `wav_file`. `provenance` states the origin of a result,
+`file_errors` holds the errors of all modules. Begin at `json_document.py`.
 """

@@ -1,6 +1,7 @@
-"""CSV tables whose columns are the fields of a frozen dataclass, in declared order.
+"""CSV tables whose columns are the fields of a frozen dataclass, in declared order: conversion to and from text.
 
-Booleans are `true` and `false`, None is an empty field, floats have all digits.
+Booleans are `true` and `false`, None is an empty field, enumerations are their values, and floats have all digits that
+are needed to read the same number again (`repr`).
 """
 
 import csv
@@ -19,15 +20,15 @@ if TYPE_CHECKING:
 Row = TypeVar("Row", bound="DataclassInstance")
 
 _SHOWN = 8
-"""Largest number of problems that are listed individually."""
+"""Number of problems that are listed individually; the others are counted."""
 
 
 class CsvError(ListedProblemsError):
-    """A table that cannot be used. `problems`: one sentence each, with line and column."""
+    """A table that cannot be used. `problems`: one sentence for each, with line and column where they apply."""
 
 
 def columns(row_type: type[Any]) -> tuple[str, ...]:
-    """Column names of a row type."""
+    """Column names of a row type: the names of its fields."""
     return tuple(field.name for field in fields(row_type))
 
 
@@ -39,8 +40,8 @@ def rows_to_csv(rows: Iterable[Row], row_type: type[Row]) -> str:
 
 
 def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
-    """Parse rows. Unknown columns are ignored, but none may be there twice; trailing columns with a default may be
-    missing. Raises CsvError."""
+    """Parse rows. Unknown columns after the known ones are ignored, no column may occur twice, and trailing columns
+    with a default may be missing. Raises CsvError with all problems."""
     try:
         lines = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) or [[]]
     except csv.Error as error:
@@ -70,7 +71,8 @@ def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
 
 
 def as_written_in(text: str, rows: Iterable[Row], row_type: type[Row]) -> tuple[Row, ...]:
-    """Rows restricted to the columns of an earlier version's table: columns it lacks have their defaults."""
+    """Rows as a table of an earlier version would hold them. text: that table; in columns that it lacks, the rows get
+    their defaults."""
     header = next(csv.reader(io.StringIO(text.partition("\n")[0])), [])
     absent = columns(row_type)[len(_present_columns(tuple(header), row_type)) :]
     defaults = {field.name: field.default for field in fields(row_type) if field.name in absent}
@@ -78,7 +80,7 @@ def as_written_in(text: str, rows: Iterable[Row], row_type: type[Row]) -> tuple[
 
 
 def _present_columns(header: tuple[str, ...], row_type: type[Any]) -> tuple[str, ...]:
-    """The columns to read: trailing ones with a default may be missing, as in tables of earlier versions."""
+    """The columns to read; trailing columns with a default may be missing, as in tables of earlier versions."""
     names = columns(row_type)
     needed = sum(field.default is MISSING for field in fields(row_type))
     while len(names) > needed and header[: len(names)] != names:
@@ -87,7 +89,7 @@ def _present_columns(header: tuple[str, ...], row_type: type[Any]) -> tuple[str,
 
 
 def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
-    """Problem with the header; empty if it begins with the expected columns."""
+    """Problem with the header, in words; empty if the header begins with the expected columns."""
     if header[: len(expected)] == expected:
         return ""
     for position, name in enumerate(expected, start=1):
@@ -98,7 +100,8 @@ def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
 
 
 def _find_doubled_column(header: Sequence[str]) -> str:
-    """Problem with a header that names a column twice; spreadsheets leave empty names at its end."""
+    """Problem with a header that names a column twice, in words; empty if there is none. Empty names, which
+    spreadsheets leave at the end of a header, are ignored."""
     names = [name.strip() for name in header]
     doubled = next((name for place, name in enumerate(names) if name and name in names[:place]), None)
     return f"the header names the column '{doubled}' twice; only one of both can be meant" if doubled else ""
@@ -107,13 +110,13 @@ def _find_doubled_column(header: Sequence[str]) -> str:
 def csv_line(fields_of_row: Sequence[str]) -> str:
     """A row of CSV without the line end; fields are quoted where needed."""
     text = io.StringIO()
-    # Only the characters of its own line end make the writer quote a field: with both, a carriage return is safe.
+    # The writer quotes fields that contain a character of its line terminator: with both, a carriage return is quoted.
     csv.writer(text, lineterminator="\r\n").writerow(fields_of_row)
     return text.getvalue().removesuffix("\r\n")
 
 
 def in_words(hint: Any) -> str:
-    """Content of a column of this type, for people."""
+    """Content of a column of this type in words, for the documentation of a table."""
     if get_origin(hint) in (Union, UnionType):
         (inner,) = (option for option in get_args(hint) if option is not NoneType)
         return f"{in_words(inner)}, or empty"
@@ -137,6 +140,7 @@ def _field_text(value: Any) -> str:
 
 
 def _read(field: str, hint: Any) -> Any:
+    """The value of a field, by the type of its column. Raises ValueError with a sentence fragment."""
     if get_origin(hint) in (Union, UnionType):
         if field == "" and NoneType in get_args(hint):
             return None

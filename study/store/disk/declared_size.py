@@ -1,30 +1,32 @@
-"""Limit of the declared size of a file's contents, checked before memory is allocated.
+"""Limit of the size that a file declares for its contents, checked before memory is allocated.
 
-A small file can declare gigabytes. Contents may have PLAIN_BYTES in any case, beyond that FACTOR times the bytes on
-disk, and never more than MOST_BYTES: an hour of nine channels at 10 kHz is 2.6 GB.
+A small damaged or malicious file can declare gigabytes. The limit is FACTOR times the bytes on the disk, but at least
+PLAIN_BYTES and at most MOST_BYTES. For comparison: an hour of nine channels at 10 kHz in float64 has 2.6 GB.
 """
 
 PLAIN_BYTES = 2**27
-"""Declared bytes that any file may have."""
+"""Declared bytes that every file may have (128 MiB)."""
 FACTOR = 100
-"""Declared bytes per byte on disk: more than that is no compressed data."""
+"""Largest accepted ratio of declared bytes to bytes on the disk; compressed measurements stay below it."""
 MOST_BYTES = 2**32
-"""Declared bytes that no file may have more of."""
+"""Largest number of declared bytes of any file (4 GiB)."""
 
 
 class DeclaredSizeError(ValueError):
-    """More is declared than allowed. A sentence fragment for `UnusableFileError` and `ImportRefusedError`."""
+    """A file declares more than is allowed. The message is a sentence fragment for `UnusableFileError` and
+    `ImportRefusedError`."""
 
 
 class SizeLimit:
-    """Budget of one file. file_bytes: on disk."""
+    """Budget of declared bytes for one file. file_bytes: its size on the disk."""
 
     def __init__(self, file_bytes: int) -> None:
         self.most_bytes = min(MOST_BYTES, max(PLAIN_BYTES, FACTOR * file_bytes))
         self._declared = 0
 
     def take(self, what: str, size: int) -> None:
-        """Count a declared size. Raises DeclaredSizeError beyond the limit."""
+        """Add a declared size (bytes); what: its name in messages. Raises DeclaredSizeError where the sum exceeds the
+        limit."""
         self._declared += size
         if self._declared > self.most_bytes:
             raise DeclaredSizeError(

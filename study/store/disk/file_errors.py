@@ -1,4 +1,7 @@
-"""Errors of files that cannot be read, used or written, with advice."""
+"""Errors of files that cannot be read, used or written, each with advice to the user.
+
+They are shown to the user without further text, so that each states what happened and what to do.
+"""
 
 import csv
 import errno
@@ -13,7 +16,7 @@ from study.errors import StudyError
 from study.regular_file import RefusedFileError
 
 CHECKED = "Correct it, or make it again; `hapteq validate` checks it."
-"""What to do about a file whose content is wrong."""
+"""Advice for a file whose content is wrong."""
 
 
 DAMAGED = (
@@ -21,18 +24,19 @@ DAMAGED = (
     AssertionError, SystemError, SyntaxError, csv.Error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
     struct.error,
 )  # fmt: skip
-"""Exceptions of reading libraries for damaged or misnamed files."""
+"""Exceptions that reading libraries raise for damaged or misnamed files."""
 
 _LONGEST_PROBLEM = 600
-"""Characters of a problem that are shown."""
+"""Number of characters of a problem that are shown."""
 _MOST_PROBLEMS = 40
-"""Problems that are listed; the rest is counted."""
+"""Number of problems that are listed; the others are counted."""
 
 
 class UnusableFileError(StudyError):
-    """A file was read and is invalid.
+    """A file was read, and its content is invalid.
 
-    `problems`: one each, without a full stop; `sentences`: the same, ready to be shown.
+    `problems`: a sentence fragment for each problem, without a full stop; `sentences`: the same as whole sentences.
+    kind: what the file should be, for the title; do_now: advice.
     """
 
     def __init__(self, path: Path, kind: str, problems: tuple[str, ...], do_now: str = CHECKED) -> None:
@@ -71,7 +75,7 @@ class CannotWriteError(StudyError):
 
 
 class AlreadyThereError(StudyError):
-    """Nothing existing is overwritten unless asked for."""
+    """A file exists under the name to be written. Existing files are overwritten on request only."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(
@@ -83,11 +87,12 @@ class AlreadyThereError(StudyError):
 
 
 _PROSE = {"it", "its", "this", "the", "there", "line", "segment", "segments", "effect", "unknown", "column", "and"}
-"""First words of a problem that begin a sentence; any other first word is a key or a name."""
+"""First words of problems that get a capital letter; any other first word is a key or a name, which keeps its case."""
 
 
 def _shorten_problems(problems: tuple[str, ...]) -> tuple[str, ...]:
-    """Shortened: a damaged file may contain a name of a million letters, and a million problems."""
+    """The problems, limited in number and length: a damaged file may have a million problems or a name of a million
+    letters."""
     rest = len(problems) - _MOST_PROBLEMS
     more = (f"and {rest} problems more",) if rest > 0 else ()
     cut = (text if len(text) <= _LONGEST_PROBLEM else f"{text[:_LONGEST_PROBLEM]}…" for text in problems)
@@ -95,12 +100,13 @@ def _shorten_problems(problems: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _sentence(problem: str) -> str:
-    """The problem as a sentence; a key or name at its beginning keeps its case."""
+    """The problem as a sentence, with capital letter and full stop; a key or name at its beginning keeps its case."""
     capital = problem[:1].upper() if problem.partition(" ")[0] in _PROSE else problem[:1]
     return capital + problem[1:].rstrip(".") + "."
 
 
 def _why_not_read(path: Path, problem: OSError | UnicodeDecodeError) -> str:
+    """Reason in words, without a full stop."""
     match problem:
         case FileNotFoundError():
             return f"There is no file {path}"
@@ -116,6 +122,7 @@ def _why_not_read(path: Path, problem: OSError | UnicodeDecodeError) -> str:
 
 
 def _why_not_written(path: Path, problem: OSError) -> tuple[str, str]:
+    """Reason in words, without a full stop, and advice."""
     match problem.errno:
         case errno.ENOSPC | errno.EDQUOT:
             return "The disk is full", "Make room and do it again."

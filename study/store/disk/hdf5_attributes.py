@@ -1,4 +1,7 @@
-"""Attributes of HDF5 files as Python values, independent of how they were stored."""
+"""Attributes of HDF5 files as Python values, independent of whether they are stored as scalars or as arrays.
+
+Values of another type or number are refused with a message that names the attribute and its object.
+"""
 
 import math
 from typing import Any
@@ -7,17 +10,18 @@ import h5py
 import numpy as np
 
 _MOST_ENTRIES = 1000
-"""Largest attribute that is read, in entries."""
+"""Largest number of entries of an attribute that is read."""
 _LONGEST_SHOWN = 100
-"""Characters of a value that a message shows."""
+"""Number of characters of a value that a message shows."""
 
 
 class AttributeProblemError(ValueError):
-    """An attribute is missing or has another type. A sentence fragment for `UnusableFileError`."""
+    """An attribute is missing, too large, or of another type. The message is a sentence fragment for
+    `UnusableFileError`."""
 
 
 def text_attribute(owner: Any, name: str, default: str | None = None) -> str:
-    """Text. Raises AttributeProblemError if there is none and no default."""
+    """A single text. Raises AttributeProblemError if it is missing and has no default, or is not exactly one text."""
     texts = texts_attribute(owner, name, None if default is None else (default,))
     if len(texts) != 1:
         raise AttributeProblemError(f"{_describe_attribute(owner, name)} holds {len(texts)} texts; it must be one")
@@ -25,7 +29,7 @@ def text_attribute(owner: Any, name: str, default: str | None = None) -> str:
 
 
 def texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
-    """One text or a list of texts, as a tuple. Raises AttributeProblemError."""
+    """One text or a list of texts, as a tuple; UTF-8 is required. Raises AttributeProblemError."""
     if name not in owner.attrs:
         if default is None:
             raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
@@ -43,7 +47,8 @@ def texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = Non
 
 
 def numbers_attribute(owner: Any, name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
-    """`count` numbers; a single one may be a scalar or a list of one. Raises AttributeProblemError."""
+    """`count` numbers as floats; a single number may be a scalar or a list of length 1. Raises
+    AttributeProblemError."""
     if name not in owner.attrs:
         if default is None:
             raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
@@ -57,7 +62,7 @@ def numbers_attribute(owner: Any, name: str, count: int, default: tuple[float, .
 
 
 def text_or_list(texts: tuple[str, ...]) -> str | tuple[str, ...]:
-    """One text if all are equal, otherwise one per channel."""
+    """The text itself where the tuple has one entry, which then holds for all channels; otherwise the tuple."""
     return texts[0] if len(texts) == 1 else texts
 
 
@@ -70,7 +75,7 @@ def write_texts(owner: Any, name: str, texts: str | tuple[str, ...]) -> None:
 
 
 def _value(owner: Any, name: str) -> Any:
-    """The raw value. Raises AttributeProblemError, before memory is allocated, if it is too large."""
+    """The value as h5py gives it. Raises AttributeProblemError, before memory is allocated, if it is too large."""
     shape = owner.attrs.get_id(name).shape
     if shape is None or math.prod(shape) > _MOST_ENTRIES:
         raise AttributeProblemError(
@@ -85,5 +90,6 @@ def _shorten(value: Any) -> str:
 
 
 def _describe_attribute(owner: Any, name: str) -> str:
+    """Name of the attribute and of its object, for messages."""
     where = owner.name.strip("/")
     return f"the attribute '{name}' of {where}" if where else f"the attribute '{name}'"

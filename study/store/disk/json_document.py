@@ -1,4 +1,7 @@
-"""Our JSON documents: with format and version, written atomically."""
+"""JSON documents of hapteq: objects with `format`, `version` and, for results, `provenance`; written atomically.
+
+All JSON formats of `study.store.formats` use these functions. Numbers are finite (`strict_json`).
+"""
 
 import json
 from collections.abc import Mapping
@@ -21,9 +24,9 @@ def write_json(
     *,
     overwrite: bool = False,
 ) -> None:
-    """`payload`: plain values; a NaN raises ValueError, because JSON has none (write null).
+    """Write a document. payload: plain values for JSON, in addition to format, version and provenance.
 
-    Raises AlreadyThereError, CannotWriteError.
+    Raises ValueError for NaN and infinity, which JSON does not have (write null), AlreadyThereError, CannotWriteError.
     """
     origin = {} if provenance is None else {"provenance": provenance.as_dict()}
     document = {"format": format_name, "version": version, **payload, **origin}
@@ -35,9 +38,9 @@ def write_json(
 
 
 def read_json(path: Path, format_name: str, version: int) -> dict[str, Any]:
-    """Content besides format and version, provenance included.
+    """Read a document: its content without format and version, provenance included.
 
-    Raises CannotReadError, UnusableFileError.
+    Raises CannotReadError, and UnusableFileError for another format or version.
     """
     document = parse_json(path, read_text(path, DOCUMENT_BYTES), format_name)
     found, number = document.pop("format", None), document.pop("version", None)
@@ -50,7 +53,7 @@ def read_json(path: Path, format_name: str, version: int) -> dict[str, Any]:
 
 
 def parse_json(path: Path, text: str, kind: str) -> dict[str, Any]:
-    """A JSON object. Raises UnusableFileError."""
+    """Parse text as a JSON object. kind: what messages call the document. Raises UnusableFileError."""
     try:
         document = load_json(text)
     except ValueError as error:

@@ -1,4 +1,7 @@
-"""Entries of our file formats; the tables of docs/formats.md are made from these."""
+"""Description of an entry of a file format, from which the tables of docs/formats.md are made.
+
+The module of each format lists its entries in a constant `LAYOUT`.
+"""
 
 from dataclasses import dataclass
 
@@ -11,4 +14,6 @@ class Entry:
     holds: str
     """Type and shape."""
     meaning: str
+    """Meaning and unit."""
     required: bool = True
+    """Whether the entry must be present in the file."""

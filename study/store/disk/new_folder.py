@@ -1,4 +1,8 @@
-"""A result folder that appears complete or not at all."""
+"""Result folders that appear complete or not at all.
+
+The results are written into a hidden temporary folder beside the final place, which is synced and renamed at the end.
+Results are never mixed with existing files.
+"""
 
 import errno
 import os
@@ -15,7 +19,8 @@ from study.store.disk.privacy import make_folder
 
 
 def require_new_folder(out: Path) -> None:
-    """Raise StudyError unless `out` is new or empty and its parent exists."""
+    """Raise StudyError unless `out` is new or an empty folder, and its parent exists and is writable (otherwise
+    CannotWriteError, a StudyError)."""
     try:
         empty, there, inside = out.is_dir() and not any(out.iterdir()), out.exists(), out.absolute().parent.is_dir()
     except OSError as problem:
@@ -43,7 +48,8 @@ def require_new_folder(out: Path) -> None:
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
-    """A temporary folder that is renamed to `out` at the end; on an exception nothing remains. Raises StudyError."""
+    """A temporary folder that is renamed to `out` at the end; on an exception it is removed. Raises StudyError as
+    `require_new_folder`, and CannotWriteError."""
     require_new_folder(out)
     part = out.absolute().with_name(f".{out.absolute().name}.{secrets.token_hex(4)}.part")
     try:

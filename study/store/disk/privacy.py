@@ -1,7 +1,7 @@
 """Access rights: participants' data are readable only by the account that recorded them.
 
-Folders of a study have mode 700 and their files 600, regardless of the umask. Elsewhere, files get the rights of their
-folder.
+Folders of a study have mode 700 and their files 600, regardless of the umask. A new file elsewhere gets the usual
+rights (666 minus umask) where its folder is open to others, otherwise 600.
 """
 
 import contextlib
@@ -13,8 +13,9 @@ from pathlib import Path
 from study.store.disk.real_folder import RealFolder, is_real_folder, open_folder
 
 PRIVATE_FOLDER, PRIVATE_FILE = 0o700, 0o600
+"""Modes of folders and files with participants' data."""
 OTHERS = 0o077
-"""Permission bits of group and others."""
+"""All permission bits of group and others."""
 
 
 def open_to_others(folder: Path) -> bool:
@@ -26,19 +27,21 @@ def open_to_others(folder: Path) -> bool:
 
 
 def file_mode(folder: Path) -> int:
-    """Mode for a new file in `folder`, before the umask."""
+    """Mode of a new file in `folder`, before the umask: private where the folder is."""
     return 0o666 if open_to_others(folder) else PRIVATE_FILE
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Replace a file without syncing. A link in its place is refused. Raises OSError."""
+    """Write a file with mode 600, or replace the content of an existing file; not atomic and not synced. A symbolic
+    link in its place is refused, where the system can. Raises OSError."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
     with os.fdopen(os.open(path, flags, PRIVATE_FILE), "wb") as file:
         file.write(content)
 
 
 def make_folder(folder: Path, *, private: bool = False) -> None:
-    """Create the folder and its parents. private: with mode 700. Raises OSError."""
+    """Create the folder and its missing parents. private: with mode 700; otherwise, new folders are private where their
+    parent is. Raises OSError."""
     if folder.is_dir():
         return
     parent = folder.absolute().parent
@@ -50,14 +53,15 @@ def make_folder(folder: Path, *, private: bool = False) -> None:
 
 
 def close_to_others(folder: Path, *, inside: bool = False) -> None:
-    """Remove the rights of group and others; inside: also from all contents. Links are not followed, and files of
-    another account are unchanged. Never raises."""
+    """Remove the rights of group and others from a folder; inside: also from all its contents. Links are not followed,
+    and files of another account are unchanged. Never raises OSError."""
     with contextlib.suppress(OSError), open_folder(folder.absolute()) as place:
         _close(place, inside)
 
 
 def close_data_folder(data: Path) -> None:
-    """Remove others' rights from the data folder and its folders, unless `why_open` gives a reason."""
+    """Remove the rights of group and others from the data folder and its folders, unless `why_open` gives a reason
+    against it. Raises OSError where the folder cannot be listed."""
     if not open_to_others(data) or why_open(data):
         return
     close_to_others(data.resolve())
@@ -66,7 +70,8 @@ def close_data_folder(data: Path) -> None:
 
 
 def why_open(data: Path) -> str:
-    """Why a data folder readable by others is not closed automatically; empty if nothing speaks against it."""
+    """Why a data folder that is open to others is not closed automatically, in words; empty if there is no reason: it
+    belongs to another account, is meant to be shared (sticky or set-group bit), or holds the working or home folder."""
     if not open_to_others(data):
         return ""
     found, place = data.stat(), data.resolve()
@@ -80,7 +85,7 @@ def why_open(data: Path) -> str:
 
 
 def privacy_warning(folder: Path, why: str = "") -> str:
-    """Warning if others have rights to the folder, else empty. why: reason that it stays so."""
+    """Warning if others have rights to the folder, otherwise empty. why: reason why a session does not remove them."""
     if not open_to_others(folder):
         return ""
     mode = stat.S_IMODE(folder.stat().st_mode)
@@ -89,12 +94,13 @@ def privacy_warning(folder: Path, why: str = "") -> str:
 
 
 def data_folder_warning(data: Path) -> str:
-    """Warning if others have rights to a data folder that a session will not remove; else empty."""
+    """Warning if others have rights to a data folder that a session will not remove; otherwise empty."""
     why = why_open(data)
     return privacy_warning(data, why) if why else ""
 
 
 def _close(place: RealFolder, inside: bool) -> None:
+    """As `close_to_others`, for an open folder. Non-blocking opening, because an entry may be a pipe."""
     if place.descriptor is None:
         return
     _restrict_access(place.descriptor)
@@ -110,6 +116,7 @@ def _close(place: RealFolder, inside: bool) -> None:
 
 
 def _restrict_access(descriptor: int) -> None:
+    """Remove the rights of group and others from an open folder or regular file. Raises OSError."""
     found = os.fstat(descriptor)
     if found.st_mode & OTHERS and (stat.S_ISDIR(found.st_mode) or stat.S_ISREG(found.st_mode)):
         os.fchmod(descriptor, stat.S_IMODE(found.st_mode) & ~OTHERS)

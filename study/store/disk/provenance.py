@@ -1,5 +1,7 @@
-"""Provenance of a result: versions, protocol, seeds, input files. Without machine paths and dates, so that the same
-work gives the same file."""
+"""Provenance of a result: versions, command, protocol, seeds, settings, and input files with their checksums.
+
+It contains no paths of the computer and no dates, so that the same work gives the same file.
+"""
 
 import hashlib
 import platform
@@ -15,7 +17,7 @@ from study.regular_file import open_regular
 from study.store.disk.file_errors import CannotReadError
 
 PACKAGES = ("hapteq", "numpy", "scipy", "numba", "h5py", "pandas", "statsmodels")
-"""Packages whose versions a result states, beside that of Python."""
+"""Packages whose versions a result states, in addition to that of Python."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +25,9 @@ class Parent:
     """An input file of a result."""
 
     file: str
+    """Name without folders."""
     sha256: str
+    """SHA-256 of the content, in hexadecimal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,16 +35,20 @@ class Provenance:
     """Origin of a result, as it is written into the result's file."""
 
     versions: Mapping[str, str]
+    """Version of Python and of each of `PACKAGES`."""
     command: tuple[str, ...]
-    """As typed, with paths reduced to file names."""
+    """Command line, with paths reduced to file names."""
     protocol_hash: str | None = None
+    """Hash of the protocol; None where none was used."""
     seeds: Mapping[str, int] | None = None
+    """Seeds of random numbers, by what they were used for."""
     settings: Mapping[str, float | None] | None = None
-    """Effective options on which the result depends."""
+    """Values in effect of the options on which the result depends."""
     parents: tuple[Parent, ...] = ()
+    """Input files of the result."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values for JSON, TOML and HDF5; unknown ones are left out."""
+        """Plain values for JSON, TOML and HDF5; fields that are None are left out."""
         plain = asdict(self)
         plain["command"] = list(self.command)
         plain["parents"] = list(plain["parents"])
@@ -54,7 +62,8 @@ def gather_provenance(
     settings: Mapping[str, float | None] | None = None,
     parents: Sequence[Path] = (),
 ) -> Provenance:
-    """Provenance of the running program. Raises CannotReadError for a missing parent."""
+    """Provenance of a result of the running program. parents: paths of the input files. Raises CannotReadError where
+    one cannot be read."""
     return Provenance(
         versions=versions(),
         command=command_line(sys.argv),
@@ -66,12 +75,12 @@ def gather_provenance(
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of all packages that compute."""
+    """Versions of Python and of `PACKAGES`; "not installed" where a package is missing."""
     return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
 
 
 def command_line(arguments: Sequence[str]) -> tuple[str, ...]:
-    """Arguments with file names only: paths reveal a machine and its owner."""
+    """Arguments in which paths are reduced to file names, because paths reveal a computer and its owner."""
     return tuple(_without_folders(argument) for argument in arguments)
 
 

@@ -1,17 +1,20 @@
-"""Strict JSON of ordinary size: what Python accepts beyond the standard would fail later elsewhere."""
+"""Strict parsing of JSON: NaN, infinity, duplicate keys, lone surrogates, deep nesting and huge numbers are refused.
+
+The JSON module of Python accepts most of them; they would fail later, in other code or in other programs.
+"""
 
 import json
 import math
 from typing import Any
 
 DEEPEST = 64
-"""Deepest nesting of a document: deeper ones would overflow the parser's stack."""
+"""Largest depth of nesting of a document, well below the recursion limit of Python."""
 _LONGEST_NUMBER = 40
-"""Digits of a whole number: seeds may have 128 bits."""
+"""Largest number of digits of a whole number; a seed of 128 bits has up to 39."""
 
 
 def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
-    """Parse JSON. with_nan: NaN is accepted for unknown numbers. Raises only ValueError, with a sentence fragment."""
+    """Parse JSON. with_nan: NaN and infinity are accepted. Raises only ValueError, with a sentence fragment."""
     try:
         found = json.loads(
             text,
@@ -27,6 +30,7 @@ def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
 
 
 def _check(found: Any) -> None:
+    """Raise ValueError for nesting deeper than `DEEPEST` and for texts with lone surrogates. Without recursion."""
     waiting = [(found, 0)]
     while waiting:
         value, depth = waiting.pop()
@@ -44,6 +48,7 @@ def _check(found: Any) -> None:
 
 
 def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object as a dictionary. Raises ValueError for a duplicate key, of which Python would keep the last value."""
     found = dict(pairs)
     if len(found) < len(pairs):
         names = [name for name, _ in pairs]
@@ -52,10 +57,12 @@ def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _refuse(constant: str) -> None:
+    """Raise ValueError for NaN, Infinity and -Infinity."""
     raise ValueError(f"JSON has no {constant}; write null")
 
 
 def _finite(digits: str) -> float:
+    """A finite number. Raises ValueError for one beyond the range of floats, which Python reads as infinity."""
     number = float(digits)
     if not math.isfinite(number):
         raise ValueError(f"the number {digits[:30]} is larger than any that is read")
@@ -63,6 +70,7 @@ def _finite(digits: str) -> float:
 
 
 def _parse_whole(digits: str) -> int:
+    """A whole number. Raises ValueError for more than `_LONGEST_NUMBER` digits."""
     if len(digits) > _LONGEST_NUMBER + digits.startswith("-"):
         raise ValueError(f"a whole number in it has {len(digits)} digits; up to {_LONGEST_NUMBER} are read")
     return int(digits)

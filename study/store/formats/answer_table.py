@@ -1,4 +1,8 @@
-"""Table of the answers to a protocol's questionnaires, for exported data: a row per session, a column per question."""
+"""Table of the answers to a protocol's questionnaires, for exported data.
+
+A row for each session and a column for each question that the protocol asks before or after the trials. The exports
+`psych_ds` and `bids_behaviour` describe the columns by the text of the questions.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +12,7 @@ from protocols.definition.study_protocol import StudyProtocol
 from study.store.disk.csv_rows import csv_line
 
 ASKED = {"before": "questionnaire", "debrief": "debrief"}
-"""Per table of questions in a protocol ([[before]], [[debrief]]), the name of the form in the log."""
+"""Name of the form in the log for each table of questions in a protocol ([[before]], [[debrief]])."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +26,7 @@ class FilledForm:
     form: str
     """Name of the form, as in `ASKED`."""
     answers: Mapping[str, str]
-    """Answer by the question's key."""
+    """Logged answers by the keys of the questions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +44,14 @@ class AnswerColumn:
 
     @property
     def description(self) -> str:
-        """The question, and what its answers mean, in one line."""
+        """The question and the meaning of its coded answers, as a single line."""
         question, meaning = self.question, "; ".join(f"{code}: {level}" for code, level in self.levels.items())
         return f"{' '.join(question.question.split())}{f' ({meaning})' if meaning else ''}"
 
     @property
     def levels(self) -> dict[str, str]:
-        """Meaning of each coded value; of a scale, of its two ends only. Empty for numbers and free text, and where
-        codes and choices are the same."""
+        """Meaning of each coded value, for a scale of its two ends only. Values whose code equals the text of the
+        choice are left out; empty for numbers and free text."""
         question = self.question
         if question.ends:
             return {question.steps[0]: question.ends[0], question.steps[-1]: question.ends[1]}

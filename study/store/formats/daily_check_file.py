@@ -1,4 +1,8 @@
-"""The file of a daily check, format `hapteq-daily-check`, version 1: compared numbers, then and now."""
+"""Result of a daily check of a device: the format `hapteq-daily-check`, version 1 (JSON).
+
+A daily check compares a recording of today with an accepted earlier one (the baseline): friction, gain, response,
+noise.
+"""
 
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -13,22 +17,27 @@ FORMAT, VERSION = "hapteq-daily-check", 1
 
 @dataclass(frozen=True, slots=True)
 class DailyCheck:
-    """Content of a daily check's file."""
+    """Content of the file of a daily check."""
 
     device: str
+    """Name of the device."""
     details: str
     """Serial number, firmware and SDK."""
     utc: str
+    """Time of the check, ISO 8601."""
     passed: bool
-    """Whether nothing changed beyond its limit."""
+    """Whether no quantity changed beyond its limit."""
     sentences: tuple[str, ...]
     """One line for each kind of change, as on the screen; or why the check was aborted."""
     changes: tuple[dict[str, Any], ...]
-    """Kind, axis, accepted and today's number, error, limit, unit, whether it changed, band."""
+    """The compared quantities: kind, axis, accepted value and today's, error, limit, unit, whether it changed, band."""
     recording: str
-    """File beside this one; empty where the check was aborted before it was written."""
+    """Name of today's recording, in the same folder; empty where the check was aborted before the recording was
+    written."""
     recording_sha256: str
+    """SHA-256 of that file; empty without it."""
     baseline_sha256: str
+    """SHA-256 of the accepted recording."""
 
 
 def write_daily_check(path: Path, check: DailyCheck) -> None:

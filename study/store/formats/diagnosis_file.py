@@ -1,4 +1,7 @@
-"""`diagnosis.json`: the format `hapteq-diagnosis`, version 1."""
+"""Result of a diagnosis of missing physics, `diagnosis.json`: the format `hapteq-diagnosis`, version 1.
+
+This module reads and writes the file; `analysis.diagnosis.document` defines its content and checks it.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -16,11 +19,11 @@ from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import Provenance
 
 DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME = "diagnosis.json", "improved.toml", "report.html"
-"""Files in the folder of a diagnosis."""
+"""Names of the files in the folder of a diagnosis: the result, the improved model, and the report."""
 
 
 def read_diagnosis(path: Path) -> Diagnosis:
-    """Read the document. Raises CannotReadError, UnusableFileError."""
+    """Read a diagnosis, without its provenance. Raises CannotReadError, and UnusableFileError with all problems."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:
@@ -30,5 +33,5 @@ def read_diagnosis(path: Path) -> Diagnosis:
 
 
 def write_diagnosis(path: Path, diagnosis: Diagnosis, provenance: Provenance | None = None) -> None:
-    """Write the document. Raises AlreadyThereError, CannotWriteError."""
+    """Write a diagnosis. Raises AlreadyThereError, CannotWriteError."""
     write_json(path, FORMAT, VERSION, diagnosis_to_json(diagnosis), provenance)

@@ -1,4 +1,8 @@
-"""Identified models as HDF5: the format `hapteq-model`, version 1."""
+"""Identified models as HDF5 files: the format `hapteq-model`, version 1.
+
+A model is a discrete-time linear state space, x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k], with its band, units,
+uncertainty and quality; `equalizer.plant.identified_model` checks it.
+"""
 
 import json
 from dataclasses import fields
@@ -24,7 +28,7 @@ from study.store.disk.strict_json import load_json
 
 FORMAT, VERSION = "hapteq-model", 1
 KIND = "identified model"
-"""What messages call such a file."""
+"""Name of this kind of file in messages."""
 
 LAYOUT = (
     Entry("format", "attribute, text", f"`{FORMAT}`"),
@@ -69,8 +73,8 @@ def read_identified_model(path: Path | str) -> IdentifiedModel:
 
 
 def is_identified_model(path: Path) -> bool:
-    """True for an identified model, by its format and version; its contents are not read. Raises StudyError where the
-    file is none."""
+    """True for an identified model, by its format and version; its contents are not read. Raises CannotReadError or
+    UnusableFileError for any other file, so that the result is never False."""
     with open_hdf5(path, KIND, FORMAT, VERSION):
         return True
 
@@ -96,7 +100,7 @@ def write_identified_model(path: Path | str, model: IdentifiedModel, *, overwrit
 
 
 QUALITY = tuple(field.name for field in fields(ModelQuality) if field.name != "remarks")
-"""Figures of a model's quality, each an attribute of the file."""
+"""Names of the numbers of a model's quality, each an attribute of the file; see `ModelQuality`."""
 
 
 def _write_quality(file: Any, quality: ModelQuality) -> None:
@@ -107,7 +111,7 @@ def _write_quality(file: Any, quality: ModelQuality) -> None:
 
 
 def _quality(file: Any) -> ModelQuality | None:
-    """Quality figures; None for a file of an earlier version. Raises ValueError."""
+    """Quality of the model; None for a file of an earlier version. Raises ValueError for an unusable attribute."""
     if "expected_error" not in file.attrs:
         return None
     found = {name: numbers_attribute(file, name, 1)[0] for name in QUALITY if name in file.attrs}
@@ -124,7 +128,7 @@ def _quality(file: Any) -> ModelQuality | None:
 
 
 def _parts(file: Any, problems: Problems) -> dict[str, Any]:
-    """Fields of the model, by name."""
+    """Fields of the model, by name. Problems are collected; a field with a problem has a substitute value."""
 
     def matrix(name: str) -> FloatArray:
         return problems.attempt(lambda: float_dataset(file, name, "(rows, columns)"), np.empty((0, 0)))
@@ -151,6 +155,7 @@ def _parts(file: Any, problems: Problems) -> dict[str, Any]:
 
 
 def _provenance(file: Any) -> dict[str, Any]:
+    """Provenance, empty where the file has none. Raises ValueError where it is no JSON object."""
     text = text_attribute(file, "provenance", "{}")
     try:
         found = load_json(text)

@@ -1,4 +1,7 @@
-"""Mechanical models as TOML files."""
+"""Mechanical models as TOML files: mass, damping and stiffness matrices, sensor, actuator, and added effects.
+
+This module reads and writes the file and describes its keys; `equalizer.plant.mechanical_model_toml` converts the text.
+"""
 
 from pathlib import Path
 
@@ -9,7 +12,7 @@ from study.store.disk.layout import Entry
 from study.store.disk.text_file import read_toml_text, write_text
 
 KIND = "mechanical model"
-"""What messages call such a file."""
+"""Name of this kind of file in messages."""
 
 LAYOUT = (
     Entry("model.name", "text", "what it is a model of"),
@@ -42,7 +45,7 @@ LAYOUT = (
 
 
 def read_mechanical_model(path: Path | str) -> MechanicalModel:
-    """Read a model. Raises CannotReadError, UnusableFileError."""
+    """Read a model. Raises CannotReadError, and UnusableFileError with all problems."""
     path = Path(path)
     try:
         return parse_mechanical_model(read_toml_text(path, KIND))

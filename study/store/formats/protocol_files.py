@@ -1,5 +1,7 @@
-"""Read protocols from the disk, shipped ones by name, others by path, and the locks that fix them before data are
-collected."""
+"""Protocols on the disk: shipped protocols are read by name, others by path; and the locks of protocols.
+
+A lock (`NAME.lock.json`) fixes a protocol before data are collected: a protocol that differs from its lock is refused.
+"""
 
 import os
 from dataclasses import dataclass
@@ -26,24 +28,25 @@ P = TypeVar("P", bound=Protocol, covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class ProtocolFile(Generic[P]):
-    """A protocol and its origin."""
+    """A protocol, and the file that it was read from."""
 
     protocol: P
     text: str
-    """The file's text, comments included; where it names a language, with all texts filled in."""
+    """Text of the file, comments included; where the file names a language, with all texts of that language filled
+    in."""
     path: Path | None
-    """None for a shipped protocol."""
+    """Path of the file; None for a shipped protocol."""
     lock: ProtocolLock | None
-    """The lock that it was checked against, if there is one."""
+    """The lock that the protocol was checked against; None without a lock."""
 
     @property
     def locked(self) -> bool:
-        """Whether a lock lies beside the protocol."""
+        """Whether the protocol is locked, beside its file or in the data folder."""
         return self.lock is not None
 
 
 class ProtocolRefusedError(StudyError):
-    """An invalid protocol file."""
+    """A protocol file is invalid. `problems`: every problem, with its key."""
 
     def __init__(self, name: str, error: ProtocolError) -> None:
         super().__init__(
@@ -56,7 +59,7 @@ class ProtocolRefusedError(StudyError):
 
 
 class LockedProtocolChangedError(StudyError):
-    """A protocol differs from the locked one."""
+    """A protocol differs from the version that its lock fixes."""
 
     def __init__(self, lock_path: Path, error: LockError) -> None:
         super().__init__(
@@ -75,9 +78,9 @@ def list_shipped_protocols() -> tuple[str, ...]:
 
 
 def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]:
-    """A shipped protocol by its name, or any by its path.
+    """Read a shipped protocol by its name, or any protocol by its path. data: the data folder, if there is one.
 
-    A lock beside the file or in `data` must match this protocol. Raises WrongUseError (no such protocol),
+    A lock beside the file or in `data` must agree with the protocol. Raises WrongUseError (no such protocol),
     CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock, a table of texts).
     """
     path = None if name in list_shipped_protocols() else _path_of(name)
@@ -128,12 +131,15 @@ def lock_path(protocol: Protocol, folder: Path) -> Path:
 
 
 def _find_lock(protocol: Protocol, path: Path | None, data: Path | None) -> ProtocolLock | None:
+    """Lock of the protocol, in `data` or else beside its file; both are checked. Raises as `_lock_at`."""
     folders = [folder for folder in (data, path.parent if path else None) if folder is not None]
     locks = [_lock_at(lock_path(protocol, folder), protocol) for folder in folders]
     return next((lock for lock in locks if lock is not None), None)
 
 
 def _lock_at(path: Path, protocol: Protocol) -> ProtocolLock | None:
+    """The lock at this path; None if there is none. Raises CannotReadError, UnusableFileError, and
+    LockedProtocolChangedError where the protocol differs."""
     if not os.path.lexists(path):  # a dangling link is an unreadable lock, not a missing one
         return None
     text = read_text(path, DOCUMENT_BYTES)
@@ -149,6 +155,7 @@ def _lock_at(path: Path, protocol: Protocol) -> ProtocolLock | None:
 
 
 def _path_of(name: str) -> Path:
+    """The name as a path. Raises WrongUseError where it is neither a path nor a shipped protocol."""
     path = Path(name)
     if _is_toml(name) or path.parent != Path() or path.exists():
         return path
@@ -166,6 +173,7 @@ def _is_toml(name: str) -> bool:
 
 
 def _other_kind(protocol: Protocol, wanted: str, command: str) -> WrongUseError:
+    """The error for a protocol of another kind. command: the command that takes it."""
     return WrongUseError(
         title="This protocol is of another kind",
         happened=f"'{protocol.name}' is a {protocol.kind} protocol, not one that {wanted}.",

@@ -1,8 +1,8 @@
-"""Trials as a Psych-DS dataset: one CSV per session below `data/`, described by `dataset_description.json`.
+"""Export of trials as a Psych-DS dataset: a CSV table for each session below `data/`, and a description of its columns.
 
-Psych-DS, schema version 0.4.0 (https://psych-ds.github.io): file names of `keyword-value` pairs that end in
-`_data.csv`, and schema.org JSON-LD that names every column. The protocol is stored in `materials/`, so that the dataset
-can be analysed again.
+Psych-DS, schema version 0.4.0 (https://psych-ds.github.io), sets the file names (`keyword-value` pairs, ending in
+`_data.csv`) and `dataset_description.json` (schema.org JSON-LD that names every column). The protocol is stored in
+`materials/`, so that `hapteq analyze` can analyse the dataset again.
 """
 
 import json
@@ -22,15 +22,15 @@ from study.store.formats.trial_columns import TRIAL_COLUMNS
 from study.store.formats.trials_file import trial_problems
 
 DESCRIPTION_NAME = "dataset_description.json"
-"""The dataset's description, whose name the standard sets."""
+"""Name of the dataset's description, as the standard sets it."""
 PROTOCOL_NAME = "materials/protocol.toml"
-"""The protocol within the dataset."""
+"""Path of the protocol within the dataset."""
 ANSWERS_NAME = "data/description-answers_data.csv"
-"""Only where the protocol asks questions."""
+"""Path of the answers to questionnaires; written only where the protocol has questions."""
 KIND = "Psych-DS dataset"
-"""What messages call such a folder."""
+"""Name of this kind of folder in messages."""
 FACTS_KEY = "hapteq"
-"""Key of the description whose value only this program reads: provenance, seeds, devices."""
+"""Key in the description for facts that only hapteq reads: provenance, seeds, devices."""
 
 README = """# {name}
 
@@ -38,18 +38,19 @@ Trials of a study of force directions, exported by hapteq: one table per session
 presentation. `dataset_description.json` says what each column means and its unit. A row is identified by the columns
 session, run, trial and attempt. `materials/protocol.toml` is the protocol; `hapteq analyze` takes this folder.
 """
-"""Text of the dataset's README; the names are filled in."""
+"""Text of the dataset's README; {name} is replaced by the name of the dataset."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExportedTrials:
-    """A dataset read back."""
+    """Content of an exported dataset."""
 
     trials: tuple[Trial, ...]
     protocol_text: str
     facts: Mapping[str, Any]
-    """Provenance, seeds, devices, which only this program needs."""
+    """Provenance, seeds and devices, as under `FACTS_KEY`."""
     files: tuple[Path, ...]
+    """The tables of trials, sorted by name."""
 
 
 def is_psych_ds(folder: Path) -> bool:
@@ -65,7 +66,8 @@ def write_psych_ds(
     facts: Mapping[str, Any],
     answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
-    """Write the dataset. folder: existing and empty. facts: JSON values. Raises CannotWriteError."""
+    """Write the dataset, and return the paths of its files. folder: existing and empty; facts: plain values for JSON.
+    Raises CannotWriteError, and OSError where a folder cannot be made."""
     (folder / "data").mkdir()
     (folder / "materials").mkdir()
     written = []
@@ -98,7 +100,7 @@ def write_psych_ds(
 
 
 def read_psych_ds(folder: Path) -> ExportedTrials:
-    """Read a dataset of `write_psych_ds`. Raises CannotReadError, UnusableFileError."""
+    """Read a dataset that `write_psych_ds` wrote. Raises CannotReadError, UnusableFileError."""
     path = folder / DESCRIPTION_NAME
     try:
         description = load_json(read_text(path))
@@ -118,7 +120,8 @@ def read_psych_ds(folder: Path) -> ExportedTrials:
 
 
 def trials_in(path: Path, kind: str) -> tuple[Trial, ...]:
-    """Rows of a CSV table of trials. kind: of the dataset, for the error. Raises CannotReadError, UnusableFileError."""
+    """Trials of a CSV table. kind: name of the kind of dataset for messages. Raises CannotReadError,
+    UnusableFileError."""
     try:
         rows = rows_from_csv(read_text(path), Trial)
     except CsvError as error:
@@ -129,11 +132,11 @@ def trials_in(path: Path, kind: str) -> tuple[Trial, ...]:
 
 
 def _variable(column: str, description: str, unit: str) -> dict[str, str]:
-    """A column as schema.org describes it."""
+    """Description of a column as a schema.org PropertyValue."""
     variable = {"@type": "PropertyValue", "name": column, "description": description}
     return {**variable, "unitText": unit} if unit else variable
 
 
 def _keyword_value(text: str) -> str:
-    """The letters and digits only, as values in file names must be."""
+    """The ASCII letters and digits of a text: the only characters that Psych-DS allows for values in file names."""
     return re.sub(r"[^A-Za-z0-9]", "", text)

@@ -1,4 +1,7 @@
-"""`answer.json` of a real recording: the format `hapteq-real-answer`, version 1."""
+"""Answer of the diagnosis to a real recording, `answer.json`: the format `hapteq-real-answer`, version 1.
+
+This module reads and writes the file; `analysis.diagnosis.real_answer.real_answer` defines its content and checks it.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -17,12 +20,13 @@ from study.store.disk.provenance import Provenance
 
 
 def read_real_answer(path: Path) -> RealAnswer:
-    """Read the document. Raises CannotReadError, UnusableFileError."""
+    """Read an answer, without its provenance. Raises CannotReadError, UnusableFileError."""
     return read_answer_and_origin(path)[0]
 
 
 def read_answer_and_origin(path: Path) -> tuple[RealAnswer, dict[str, Any]]:
-    """The answer and its provenance; empty if it has none. Raises CannotReadError, UnusableFileError."""
+    """Read an answer and its provenance (an empty dictionary where the file has none). Raises CannotReadError, and
+    UnusableFileError with all problems."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     origin = document.pop("provenance", None)
     try:
@@ -32,5 +36,5 @@ def read_answer_and_origin(path: Path) -> tuple[RealAnswer, dict[str, Any]]:
 
 
 def write_real_answer(path: Path, answer: RealAnswer, provenance: Provenance | None = None) -> None:
-    """Write the document. Raises AlreadyThereError, CannotWriteError."""
+    """Write an answer. Raises AlreadyThereError, CannotWriteError."""
     write_json(path, FORMAT, VERSION, real_answer_to_json(answer), provenance)

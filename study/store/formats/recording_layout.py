@@ -1,4 +1,8 @@
-"""Layout of a recording's file: the format `hapteq-recording`, version 1."""
+"""Layout of the file of a recording: the format `hapteq-recording`, version 1 (HDF5).
+
+The constants are the tables of docs/formats.md; `recording_file` reads and writes the file. Sample k is taken at time
+t_k; all datasets have the same rate and number n of samples.
+"""
 
 from equalizer.signals.recording import SEGMENT_KINDS, Hold
 from equalizer.signals.units import UNSTATED
@@ -6,7 +10,7 @@ from study.store.disk.layout import Entry
 
 FORMAT, VERSION = "hapteq-recording", 1
 KIND = "recording"
-"""What messages call such a file."""
+"""Name of this kind of file in messages."""
 
 LAYOUT = (
     Entry("format", "attribute, text", f"`{FORMAT}`"),
@@ -46,4 +50,4 @@ SEGMENT_FIELDS = (
     Entry("period", "whole number", "samples per period, 0 = not periodic"),
     Entry("role", "text", "`fit`, `test`, or empty"),
 )
-"""Fields of a row of `segments`."""
+"""Fields of a row of the table `segments`."""

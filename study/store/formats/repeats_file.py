@@ -1,7 +1,7 @@
-"""`*.repeats.json` beside a table of forces: the format `hapteq-repeats`, version 1.
+"""Record of iterative learning control on a device, `*.repeats.json`: the format `hapteq-repeats`, version 1.
 
-Record of iterative learning control on the device: the errors of each play, and for which trajectory, model and device
-the forces were found, so that a later run continues from them only for the same.
+It is stored beside the table of forces that was found, and contains the errors of each play and the trajectory, model
+and device for which the forces were found, so that a later run continues from the forces only for the same ones.
 """
 
 from dataclasses import asdict, dataclass
@@ -15,15 +15,15 @@ from study.store.disk.provenance import Provenance
 
 FORMAT, VERSION = "hapteq-repeats", 1
 SUFFIX = ".repeats.json"
-"""In place of the suffix of the table of forces."""
+"""Suffix of the document, in place of that of the table of forces."""
 KIND = "document of repeats"
-"""What messages call such a file."""
+"""Name of this kind of file in messages."""
 
 
 @dataclass(frozen=True, slots=True)
 class Repeats:
-    """Errors are root mean squares in the band, relative to the wanted signal. A play is one repetition of the whole
-    trajectory; a correction leads from one to the next."""
+    """Content of the document. Errors are root mean squares in the band, relative to the wanted signal (1 = 100 %). A
+    play is one repetition of the whole trajectory; between two plays the forces are corrected."""
 
     trajectory_sha256: str
     """SHA-256 of the wanted samples and their rate."""
@@ -32,25 +32,31 @@ class Repeats:
     forces_sha256: str
     """SHA-256 of the table of forces beside this document."""
     device: str
+    """Name of the device."""
     place_m: tuple[float, float, float]
+    """Place of the handle in the workspace."""
     band_hz: tuple[float, float]
+    """Band in which errors are computed and corrected."""
     errors: tuple[float, ...]
     """Measured errors, noise included, play by play; the first is that of the initial forces."""
     kept: int
-    """Index of the play whose forces are in the table, from 0."""
+    """Index (from 0) of the play whose forces are in the table."""
     noise_floor: float
     """Error due to the sensor's noise alone."""
     gains: tuple[float, ...]
-    """Share of each error that was corrected."""
+    """Learning gain beta of each correction, before the limits of force and slew rate."""
     fitted: tuple[float, ...]
-    """Share of each correction that fits under the cap."""
+    """Factor by which cap and slew limit reduced each correction; 1: not reduced."""
     verdict: str
+    """Why the iteration ended, as the name of a verdict in lower case."""
     remark: str
+    """Sentence on the corrections that cap and slew limit reduced; empty where they reduced none."""
     interrupted: bool
+    """Whether the run was interrupted before its end."""
 
 
 REPEATS: TypeAdapter[Repeats] = TypeAdapter(Repeats)
-"""Checks the document."""
+"""Validates the types of a document."""
 
 
 def repeats_path(forces: Path) -> Path:
@@ -59,7 +65,7 @@ def repeats_path(forces: Path) -> Path:
 
 
 def read_repeats(path: Path) -> Repeats:
-    """Read the document. Raises CannotReadError, UnusableFileError."""
+    """Read the document, without its provenance. Raises CannotReadError, and UnusableFileError with all problems."""
     document = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:

@@ -1,4 +1,8 @@
-"""`reproduction.json`: the format `hapteq-reproduction`, version 1."""
+"""Read and write `reproduction.json`: published figures and their reproduction (format `hapteq-reproduction`).
+
+The content is defined and checked in `analysis.evaluation.reproduction.document`; this module adds the file, with
+format, version and provenance.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -16,10 +20,12 @@ from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import Provenance
 
 REPRODUCTION_NAME = "reproduction.json"
+"""Name of the file."""
 
 
 def read_reproduction(path: Path) -> Reproduction:
-    """Read the document. Raises CannotReadError, UnusableFileError."""
+    """Read the document, without its provenance. Raises CannotReadError where the file cannot be read, and
+    UnusableFileError for another format or version, or content that is not a reproduction."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:

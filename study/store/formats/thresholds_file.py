@@ -1,5 +1,8 @@
-"""`thresholds.csv`, and `detection.csv` for detection runs: one row per run, columns as the fields of
-`analysis.psychophysics.thresholds.Threshold`."""
+"""Read and write tables of thresholds: `thresholds.csv`, and `detection.csv` for detection runs.
+
+One row per run. The columns are the fields of `analysis.psychophysics.thresholds.Threshold`, which states how each is
+computed; units are part of the names (`_n`: newtons, `_db`: dB re 1 N).
+"""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -10,21 +13,24 @@ from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_text, write_text
 
 THRESHOLDS_NAME = "thresholds.csv"
+"""Table of direction thresholds."""
 DETECTION_NAME = "detection.csv"
-"""Table of detection thresholds; written only where there are detection runs."""
+"""Table of detection thresholds, written only if there are detection runs."""
 THRESHOLDS_HEADER = columns(Threshold)
-"""Names of the columns, in their order."""
+"""Names of the columns, in order."""
 KIND = "table of thresholds"
-"""What messages call such a file."""
+"""Name of this kind of file in error messages."""
 
 
 def write_thresholds(path: Path, thresholds: Iterable[Threshold]) -> None:
-    """Write the table; replaces an older one, since it can be recomputed. Raises CannotWriteError."""
+    """Write the table. An existing table is replaced, because it can be recomputed from the trials. Raises
+    CannotWriteError."""
     write_text(path, rows_to_csv(thresholds, Threshold), overwrite=True)
 
 
 def read_thresholds(path: Path) -> tuple[Threshold, ...]:
-    """Read the table. Raises CannotReadError, UnusableFileError."""
+    """Read the table. Raises CannotReadError where the file cannot be read, UnusableFileError where it is not such a
+    table."""
     try:
         return rows_from_csv(read_text(path), Threshold)
     except CsvError as error:

@@ -1,4 +1,7 @@
-"""Wanted accelerations and the corresponding forces, as CSV."""
+"""Read and write trajectories as CSV files: desired accelerations (m/s²) or commanded forces (N) over time (s).
+
+`equalizer.tracking.feedforward.trajectory` defines the tables and parses them; this module adds the file access.
+"""
 
 from pathlib import Path
 
@@ -8,7 +11,8 @@ from study.store.disk.text_file import read_text, write_text
 
 
 def read_trajectory(path: Path) -> Trajectory:
-    """Read a table of either kind, distinguished by its header. Raises CannotReadError, UnusableFileError."""
+    """Read a table; its header determines its kind (`TABLE_KINDS`). Raises CannotReadError, and UnusableFileError for
+    text that is not such a table."""
     try:
         return parse_trajectory(read_text(path))
     except TableError as error:
@@ -16,5 +20,6 @@ def read_trajectory(path: Path) -> Trajectory:
 
 
 def write_trajectory(path: Path, trajectory: Trajectory) -> None:
-    """Write either kind. Raises AlreadyThereError, CannotWriteError; TableError for missing samples."""
+    """Write the table of the trajectory's kind. Raises AlreadyThereError for an existing file, CannotWriteError, and
+    TableError for missing samples."""
     write_text(path, trajectory_csv(trajectory), overwrite=False)

@@ -1,4 +1,8 @@
-"""`trials.csv`: one row per presentation, derived from the log."""
+"""Read and write `trials.csv`: one row per presentation of a stimulus, derived from the session log.
+
+The columns are the fields of `protocols.trial.Trial`; `trial_columns` states their meaning and unit. A table that is
+read is also checked for values that no session can produce, because it may have been edited by hand.
+"""
 
 import math
 from collections.abc import Iterable
@@ -10,19 +14,21 @@ from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_text, write_text
 
 TRIALS_NAME = "trials.csv"
+"""Name of the file."""
 TRIALS_HEADER = columns(Trial)
-"""Names of the columns, in their order."""
+"""Names of the columns, in order."""
 KIND = "table of trials"
-"""What messages call such a file."""
+"""Name of this kind of file in error messages."""
 
 
 def write_trials(path: Path, trials: Iterable[Trial]) -> None:
-    """Write the table, replacing an older one. Raises CannotWriteError."""
+    """Write the table. An existing table is replaced, because it can be derived again. Raises CannotWriteError."""
     write_text(path, rows_to_csv(trials, Trial), overwrite=True)
 
 
 def read_trials(path: Path | str) -> tuple[Trial, ...]:
-    """Read the table. Raises CannotReadError, UnusableFileError."""
+    """Read the table. Raises CannotReadError where the file cannot be read, and UnusableFileError where it is not a
+    table of trials or has rows with `trial_problems`."""
     path = Path(path)
     try:
         trials = rows_from_csv(read_text(path), Trial)
@@ -34,13 +40,14 @@ def read_trials(path: Path | str) -> tuple[Trial, ...]:
 
 
 def _not_finite(trial: Trial) -> list[str]:
-    """Columns that hold an infinity or NaN, which no session writes: what is missing is left empty."""
+    """Names of the columns with an infinity or NaN. A session writes neither: a missing value is an empty field."""
     values = ((name, getattr(trial, name)) for name in TRIALS_HEADER)
     return [name for name, value in values if isinstance(value, float) and not math.isfinite(value)]
 
 
 def trial_problems(trials: Iterable[Trial]) -> tuple[str, ...]:
-    """Rows that no session can have written."""
+    """Problems of the rows that no session can have written, each with its line number (the header is line 1): invalid
+    direction, answer, level or frequency, a `correct` that contradicts the answer, values that are not finite."""
     found = []
     for line, trial in enumerate(trials, start=2):
         if trial.direction_shown not in (1, 2):

@@ -1,4 +1,8 @@
-"""Trials as a MATLAB file (version 5): a structure of columns, beside protocol and provenance as text."""
+"""Export the trials of a study as a MATLAB file (MAT-file version 5), for analysis in MATLAB or Octave.
+
+The file contains a structure `trials` with one field per column, structures `units` and `descriptions` with the same
+fields, the answers to questionnaires, and the protocol and the provenance as text.
+"""
 
 import io
 import json
@@ -27,7 +31,9 @@ def write_trials_mat(
     facts: Mapping[str, Any],
     answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
-    """Write numbers and booleans as columns (NaN for missing values), text as cells. Raises CannotWriteError."""
+    """Write `trials.mat` into the folder and return a tuple with its path. Numbers and booleans become column vectors
+    of double (NaN for a missing value), text becomes cell arrays. name: of the study; facts: its provenance. Raises
+    AlreadyThereError for an existing file, and CannotWriteError."""
     from scipy.io import savemat
 
     written = io.BytesIO()
@@ -43,14 +49,15 @@ def write_trials_mat(
             "provenance": json.dumps(dict(facts), ensure_ascii=False),
         },
         oned_as="column",
-        long_field_names=True,  # 63 characters; the key of a question alone may have 40
+        long_field_names=True,  # up to 63 characters, not 31: the key of a question may have 40
     )
     write_atomically(folder / NAME, written.getvalue(), overwrite=False)
     return (folder / NAME,)
 
 
 def _answers(table: AnswerTable) -> dict[str, Any]:
-    """A structure of cells, a row per session; nothing where no question is asked."""
+    """Variables `answers` (cell arrays with a row per session) and `questions` (descriptions); none if the table has no
+    columns."""
     if not table.columns:
         return {}
     rows = [(subject, session, *answers) for subject, session, answers in table.rows]
@@ -62,6 +69,7 @@ def _answers(table: AnswerTable) -> dict[str, Any]:
 
 
 def _column(values: Sequence[Any]) -> Any:
+    """(n,) array of float, None as NaN; of cells if any value is text, None as empty text."""
     plain = [value.value if isinstance(value, Enum) else value for value in values]
     if any(isinstance(value, str) for value in plain):
         return _cells(["" if value is None else value for value in plain])
@@ -69,6 +77,7 @@ def _column(values: Sequence[Any]) -> Any:
 
 
 def _cells(values: Sequence[str]) -> Any:
+    """(n,) array of objects, which scipy writes as a MATLAB cell array."""
     cells = np.empty(len(values), dtype=object)
     cells[:] = values
     return cells

@@ -1,6 +1,7 @@
-"""The data folder: one folder per session, and what lies in it.
+"""The data folder: one folder per session, and the files in it.
 
-`archive` (where sessions lie) -> `session_lock` -> `event_log` (append, fsync, then act) -> `log_seal`,
-`session_summary`, `trial_recordings`; `live_file` and `request_inbox` while a session runs; `withdrawal_files` and
-`written_elsewhere` for erasing it. Begin at `event_log.py`.
+`archive` (paths of the sessions) -> `session_lock` (a single writer) -> `event_log` (append, fsync, then act) ->
+`log_seal`, `session_summary`, `trial_recordings` (derived from the log, or written with it). While a session runs:
+`live_file`, `request_inbox`, `log_writer`. To erase a session: `withdrawal_files`, `written_elsewhere`. Begin at
+`event_log.py`.
 """

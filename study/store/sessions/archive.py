@@ -1,4 +1,8 @@
-"""Session folders: one each in the data folder, named by participant code and number."""
+"""Folders of sessions within the data folder: naming, creation, search, and paths of the files in them.
+
+A folder is named by participant code and session number, as in `P01_001`. Folders of withdrawn sessions remain, with a
+tombstone in place of the data, so that their numbers are not used again.
+"""
 
 import contextlib
 import re
@@ -12,9 +16,10 @@ from study.store.disk.privacy import PRIVATE_FOLDER, close_data_folder, make_fol
 from study.store.sessions.event_log import LOG_NAME
 
 FOLDER = re.compile(r"(?P<subject>[A-Za-z0-9]{1,16})_(?P<number>\d{3,})")
-"""Name of a session's folder: participant code and number."""
+"""Pattern of a folder's name: participant code (1 to 16 letters or digits), underscore, number of three digits or
+more."""
 TOMBSTONE_NAME = "withdrawn.json"
-"""File that stays in the folder of a withdrawn participant."""
+"""File that replaces the data in each session folder of a withdrawn participant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,17 +50,18 @@ class SessionFolder:
 
     @property
     def tombstone(self) -> Path:
-        """Path of the tombstone, whether it is there or not."""
+        """Path of the tombstone; the file exists only after a withdrawal."""
         return self.path / TOMBSTONE_NAME
 
     @property
     def withdrawal(self) -> Path:
-        """Exists while the erasing of this participant's sessions is unfinished."""
+        """Path of the withdrawal record, which exists while the erasing of this participant's sessions is
+        unfinished."""
         return withdrawal_file(self.path.parent, self.subject)
 
     @property
     def withdrawn(self) -> bool:
-        """Whether the session was withdrawn, or its withdrawal was begun."""
+        """Whether the session was withdrawn, or its withdrawal has begun."""
         return self.tombstone.exists() or self.withdrawal.exists()
 
 
@@ -65,7 +71,7 @@ def withdrawal_file(data: Path, subject: str) -> Path:
 
 
 class SessionWithdrawnError(StudyError):
-    """The session was withdrawn: its data must not be used, even if not all of them are erased yet."""
+    """The session was withdrawn. Its data must not be used, even if some of them are not erased yet."""
 
     def __init__(self, folder: SessionFolder) -> None:
         super().__init__(
@@ -76,8 +82,8 @@ class SessionWithdrawnError(StudyError):
 
 
 def check_subject(code: str) -> str:
-    """The participant code, if valid: letters and digits, nothing that could be a name with an address. Raises
-    WrongUseError."""
+    """Return the participant code if it is valid (`is_code`). Raises WrongUseError otherwise, so that names and e-mail
+    addresses do not become names of folders."""
     if not is_code(code):
         raise WrongUseError(
             "This is no participant code",
@@ -88,7 +94,8 @@ def check_subject(code: str) -> str:
 
 
 def new_session_folder(data: Path, subject: str) -> SessionFolder:
-    """Create the participant's next folder. Never touches an existing one, also when two programs race."""
+    """Create the participant's next session folder. An existing folder is never used, even if two programs create one
+    at the same time. Raises WrongUseError for an invalid code, StudyError where the folder cannot be created."""
     check_subject(subject)
     try:
         made = not data.exists()
@@ -105,7 +112,7 @@ def new_session_folder(data: Path, subject: str) -> SessionFolder:
             for folder in (path, data):
                 sync_folder(folder)
             if made:
-                with contextlib.suppress(OSError):  # not every parent may be read
+                with contextlib.suppress(OSError):  # the parent folder may not be readable
                     sync_folder(data.absolute().parent)
             return SessionFolder(path)
     except OSError as problem:
@@ -125,13 +132,14 @@ def session_folders(data: Path) -> tuple[SessionFolder, ...]:
 
 
 def folder_number(name: str) -> int:
-    """Number of a session in its folder's name."""
+    """Session number in a folder's name; 0 if it is not the name of a session folder."""
     match = FOLDER.fullmatch(name)
     return int(match["number"]) if match else 0
 
 
 def find_session(session: str, data: Path) -> SessionFolder:
-    """A session by its folder or, within `data`, by its name. Raises StudyError."""
+    """The session with this folder or, within `data`, this name. Raises SessionWithdrawnError, and WrongUseError where
+    there is none with a log."""
     for path in (Path(session), data / session):
         folder = SessionFolder(path.resolve())
         if folder.withdrawn:

@@ -1,4 +1,8 @@
-"""`live.json`: live state of a running session for its viewers. Replaced atomically several times a second."""
+"""Read and write `live.json`: the present state of a running session, for programs that display it.
+
+The session replaces the file atomically a few times a second, so that a reader never sees half of it. The fields are
+those of `study.session.watching.live.Live`. No result depends on the file: errors of reading and writing are ignored.
+"""
 
 import json
 import math
@@ -14,18 +18,19 @@ from study.store.disk.privacy import write_private
 from study.store.disk.strict_json import load_json
 
 LIVE_NAME = "live.json"
+"""Name of the file in the session's folder."""
 LIVE_FORMAT = "hapteq-live"
 LIVE_VERSION = 1
 
 _ACTIVITIES = get_args(Activity)
-"""All activities that a reader accepts."""
+"""Activities that a reader accepts."""
 _LARGEST_BYTES = 1 << 16
-"""Largest file that is read; ours have about a kilobyte."""
+"""Largest file that is read, in bytes; a file written by hapteq has about 1 kB."""
 
 
 def write_live(folder: Path, live: Live) -> None:
-    """Write the live values, at most about four times a second. Never raises: a session must not end because it cannot
-    be watched. One writer: the holder of the session's lock."""
+    """Replace the live state; values that are not finite become null. An OSError is ignored, because a session must not
+    end only because its state cannot be displayed. Only the holder of the session's lock may call it."""
     values = {name: _finite(value) for name, value in asdict(live).items()}
     text = json.dumps({"format": LIVE_FORMAT, "version": LIVE_VERSION, **values}, allow_nan=False)
     part = folder / f".{LIVE_NAME}.part"
@@ -36,13 +41,13 @@ def write_live(folder: Path, live: Live) -> None:
 
 
 def remove_live(folder: Path) -> None:
-    """Remove the file of an earlier sitting. Never raises."""
+    """Remove the file of an earlier sitting, if there is one. An OSError is ignored."""
     with suppress(OSError):
         (folder / LIVE_NAME).unlink()
 
 
 def read_live(folder: Path) -> Live | None:
-    """The live state; None if there is no usable one. Never raises."""
+    """The live state; None if the file is missing, unreadable, or not of this format and version. Never raises."""
     try:
         document = load_json(read_regular(folder / LIVE_NAME, _LARGEST_BYTES))
     except (OSError, ValueError):
@@ -55,6 +60,8 @@ def read_live(folder: Path) -> Live | None:
 
 
 def _fits(values: dict[str, Any]) -> bool:
+    """Whether the values have exactly the fields of `Live`, with valid types, times and activity."""
+    # Files of older versions lack these two fields, which then have their defaults.
     values = {"monotonic_s": None, "telemetry": "", **values}
     number = (int, float)
     kinds: dict[str, tuple[type, ...]] = {
@@ -73,6 +80,7 @@ def _fits(values: dict[str, Any]) -> bool:
     return (
         values.keys() == kinds.keys()
         and all(isinstance(value, kinds[name]) for name, value in values.items())
+        # JSON distinguishes true from 1, but isinstance(True, int) holds in Python.
         and all(kinds[name] == (bool,) or not isinstance(value, bool) for name, value in values.items())
         and values["activity"] in _ACTIVITIES
         and all(_is_time(values[name]) for name in ("utc", "since_utc"))
@@ -80,6 +88,7 @@ def _fits(values: dict[str, Any]) -> bool:
 
 
 def _is_time(text: str) -> bool:
+    """Whether the text is a valid UTC time."""
     try:
         return bool(utc_time(text))
     except ValueError:
@@ -87,4 +96,5 @@ def _is_time(text: str) -> bool:
 
 
 def _finite(value: Any) -> Any:
+    """The value, or None for NaN and infinity, which JSON does not have."""
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,4 +1,7 @@
-"""Whether a log is being written right now, by the operating system's lock, which ends with its holder."""
+"""Detect whether a process is writing a session's log, by the lock (flock) that the writer holds on the file.
+
+The operating system releases the lock when its holder ends, so that a crashed program does not count as a writer.
+"""
 
 from pathlib import Path
 
@@ -6,14 +9,15 @@ from study.regular_file import open_regular
 
 
 def is_log_locked(log: Path) -> bool | None:
-    """Whether a process holds the log's lock; None if unknown (no such locks here, no such log). Probing holds the lock
-    for some microseconds, in which a writer would be refused: probe rarely."""
+    """Whether a process holds the log's lock; None if this cannot be known: a system without flock (Windows), or a log
+    that is missing or unreadable. The probe itself holds a shared lock for an instant, during which a new writer would
+    be refused; therefore call it rarely."""
     try:
         import fcntl
     except ImportError:  # Windows
         return None
     try:
-        with open_regular(log) as file:
+        with open_regular(log) as file:  # closing the file releases the lock
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return True

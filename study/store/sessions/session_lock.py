@@ -1,4 +1,8 @@
-"""One writer per session: a lock that the operating system releases when its holder ends."""
+"""Locks that give a session a single writer, and that serialise the assignment of participant numbers.
+
+Both are locks of the operating system on a file, which it releases when the process that holds them ends: a crash
+leaves no lock that must be removed by hand.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,16 +14,18 @@ from study.errors import StudyError
 from study.store.disk.privacy import PRIVATE_FILE
 
 LOCK_NAME = "session.lock"
-"""Lock file in the session's folder."""
+"""Lock file in the session's folder, held while a program writes to the session."""
 PLACES_NAME = ".places.lock"
-"""Lock file in the data folder, held while a participant number is taken."""
+"""Lock file in the data folder, held while a participant number (a place in the balanced order) is assigned."""
 PATIENCE_S = 20.0
-"""Taking a place reads the first lines of all sessions in the folder."""
+"""Longest wait for that lock (s). It must exceed the duration of an assignment, which reads the first lines of all
+sessions in the folder."""
 
 
 @contextmanager
 def hold_session_lock(folder: Path) -> Iterator[None]:
-    """Hold the session's lock. Raises StudyError at once if another program holds it."""
+    """Hold the session's lock. Raises StudyError, without waiting, if another program holds it or the folder is not
+    writable."""
     lock = FileLock(folder / LOCK_NAME, mode=PRIVATE_FILE)
     try:
         lock.acquire(timeout=0)
@@ -45,7 +51,8 @@ def hold_session_lock(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def hold_places_lock(data: Path) -> Iterator[None]:
-    """Hold the right to take a place in the balanced order; waits for others. Raises StudyError after PATIENCE_S."""
+    """Hold the lock under which a place in the balanced order of conditions is assigned. Waits while another program
+    holds it; raises StudyError after `PATIENCE_S`."""
     lock = FileLock(data / PLACES_NAME, mode=PRIVATE_FILE)
     try:
         lock.acquire(timeout=PATIENCE_S)

@@ -1,4 +1,8 @@
-"""`session.json`: summary of a session's log for readers that do not fold it; derived from the log."""
+"""Read `session.json`, the summary of a session, for readers that do not evaluate the whole log.
+
+The summary is derived from the log. It states what the log contained when it was written, and so reveals a log whose
+end was lost later.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -7,11 +11,12 @@ from study.errors import StudyError
 from study.store.disk.json_document import read_json
 
 SUMMARY_NAME = "session.json"
+"""Name of the file in the session's folder."""
 SUMMARY_FORMAT, SUMMARY_VERSION = "hapteq-session-summary", 1
 
 
 def read_summary(folder: Path) -> dict[str, Any] | None:
-    """The summary without provenance; None if there is no readable one."""
+    """The summary without its provenance; None if the file is missing, unreadable or of another format."""
     try:
         summary = read_json(folder / SUMMARY_NAME, SUMMARY_FORMAT, SUMMARY_VERSION)
     except StudyError:
@@ -21,7 +26,8 @@ def read_summary(folder: Path) -> dict[str, Any] | None:
 
 
 def read_closed_and_presentations(summary: dict[str, Any] | None) -> tuple[bool, int]:
-    """Whether the session was closed when the summary was written, and the number of presentations in its log."""
+    """Whether the session was closed when the summary was written, and the number of presentations that its log had
+    then. False and 0 without a summary."""
     if summary is None:
         return False, 0
     presentations = summary.get("presentations")

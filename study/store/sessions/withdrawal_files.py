@@ -1,7 +1,8 @@
-"""Records of a withdrawal: first the intent, then a tombstone for each session.
+"""Files that document a withdrawal of consent: the intent, written before any erasing, and a tombstone per session.
 
-The intent is one file in the data folder. While it exists, erasing is unfinished, and no session of the participant
-counts as data, with all that remains of it.
+The intent is a single file in the data folder, `<code>.withdrawal.json`, with all that will be erased, so that an
+interrupted withdrawal can be completed. While it exists, no session of the participant may be used as data. A
+tombstone, `withdrawn.json`, replaces the contents of a session folder and holds no measured value.
 """
 
 from collections.abc import Mapping
@@ -21,33 +22,39 @@ WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION = "hapteq-withdrawal", 1
 
 @dataclass(frozen=True, slots=True)
 class SessionParticipant:
-    """The participant of a session, as its folder names them: nothing measured."""
+    """Facts on a session that its tombstone keeps: name of the protocol and place in its balanced order. Nothing
+    measured."""
 
     protocol: str
     simulated: bool
+    """Whether a simulated participant gave the answers."""
     number: int | None
-    """Place in the balanced order; None if none was taken."""
+    """Place in the balanced order, as a participant number; None if none was assigned."""
 
 
 @dataclass(frozen=True, slots=True)
 class WithdrawalIntent:
-    """What is about to be erased, determined before any erasing."""
+    """What a withdrawal erases, determined before anything is erased."""
 
     subject: str
+    """Participant code."""
     withdrawn_utc: str
+    """UTC time of the withdrawal, kept when an interrupted withdrawal is continued."""
     sessions: Mapping[str, SessionParticipant | None]
+    """Facts for the tombstone, by the name of the session; None where the log does not state them."""
     derived: tuple[str, ...]
-    """Files and folders beside the sessions, relative to the data folder."""
+    """Analyses and unfinished files with the participant's data, as paths relative to the data folder."""
 
 
 def write_intent(data: Path, intent: WithdrawalIntent) -> None:
-    """Write the intent; on return it is on the disk."""
+    """Write the intent and sync it to the disk. Raises CannotWriteError."""
     path = withdrawal_file(data, intent.subject)
     write_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION, asdict(intent), overwrite=True)
 
 
 def read_intent(data: Path, subject: str) -> WithdrawalIntent | None:
-    """The intent; None if there is no usable one: its content is then determined again. Never raises."""
+    """The intent; None if the file is missing or invalid, and its content must be determined again. Names that are not
+    sessions of the participant, or that lead out of the data folder, are dropped. Never raises."""
     path = withdrawal_file(data, subject)
     if not is_real_file(path):
         return None
@@ -63,14 +70,15 @@ def read_intent(data: Path, subject: str) -> WithdrawalIntent | None:
 
 
 def write_tombstone(folder: SessionFolder, withdrawn_utc: str, begun: SessionParticipant | None) -> None:
-    """Replace the session's contents. An existing tombstone is kept."""
+    """Write the tombstone into the session's folder; an existing tombstone is kept. begun: facts on the session, if
+    they are known. Raises CannotWriteError."""
     if not is_real_file(folder.tombstone):
         left = {"session": folder.name, "withdrawn_utc": withdrawn_utc, "begun": asdict(begun) if begun else None}
         write_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION, left, overwrite=True)
 
 
 def read_tombstone(folder: SessionFolder) -> dict[str, Any]:
-    """The tombstone; empty if there is no readable one. Never raises."""
+    """Content of the tombstone; empty if it is missing or unreadable. Never raises."""
     try:
         return read_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION)
     except StudyError:
@@ -78,12 +86,13 @@ def read_tombstone(folder: SessionFolder) -> dict[str, Any]:
 
 
 def read_begun(folder: SessionFolder) -> SessionParticipant | None:
-    """The participant facts in a tombstone."""
+    """Facts on the session in its tombstone; None without valid ones."""
     return _parse_begun(read_tombstone(folder).get("begun"))
 
 
 def list_remaining(folder: SessionFolder) -> tuple[str, ...]:
-    """What remains in the folder of a withdrawn session; folders end in a slash. Never raises."""
+    """Names in the folder of a withdrawn session, except tombstone and lock; names of folders end in a slash. Empty if
+    the folder cannot be read."""
     try:
         with open_folder(folder.path) as place:
             names = [name for name in place.names() if name not in (folder.tombstone.name, LOCK_NAME)]
@@ -93,8 +102,8 @@ def list_remaining(folder: SessionFolder) -> tuple[str, ...]:
 
 
 def how_to_finish(folder: SessionFolder) -> str:
-    """Sentence on what remains of an incomplete withdrawal, and the command that continues it; empty if it is
-    complete."""
+    """Text for the user on an incomplete withdrawal: the files that are still there, and the command that continues it.
+    Empty if the withdrawal is complete."""
     left = list_remaining(folder)
     if not left and folder.tombstone.exists() and not folder.withdrawal.exists():
         return ""
@@ -103,6 +112,7 @@ def how_to_finish(folder: SessionFolder) -> str:
 
 
 def _parse_begun(left: Any) -> SessionParticipant | None:
+    """Facts on a session from JSON; None if they are missing or have other fields."""
     try:
         return SessionParticipant(**left) if left else None
     except TypeError:
@@ -110,12 +120,15 @@ def _parse_begun(left: Any) -> SessionParticipant | None:
 
 
 def _is_of_subject(name: Any, subject: str) -> bool:
+    """Whether it is the name of a session folder of this participant."""
     match = FOLDER.fullmatch(str(name))
     return match is not None and match["subject"] == subject
 
 
 def _is_plain_name(name: str) -> bool:
+    """Whether a path stays within the data folder and outside all session folders, so that it may be erased."""
     path = PurePosixPath(name)
     if not path.parts or path.is_absolute() or ".." in path.parts:
         return False
-    return FOLDER.fullmatch(path.parts[0]) is None  # what is in a session goes with it, or is another's
+    # Files in a session folder are erased with that folder, or belong to another participant.
+    return FOLDER.fullmatch(path.parts[0]) is None

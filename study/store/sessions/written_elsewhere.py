@@ -1,4 +1,8 @@
-"""Folders outside a data folder that contain its participants' numbers: noted, so that a withdrawal can name them."""
+"""List of folders with results of a study that a withdrawal does not search, so that it can name them to the user.
+
+Analyses and exports may be written to any folder (`--out`). A withdrawal erases only within the data folder; each other
+folder is noted in a text file there when it is written.
+"""
 
 import os
 from contextlib import suppress
@@ -11,13 +15,15 @@ from study.store.disk.real_folder import is_real_file
 from study.store.sessions.archive import FOLDER
 
 WRITTEN_ELSEWHERE = "written_elsewhere.txt"
-"""File in the data folder with one path a line."""
+"""Name of the file in the data folder; one absolute path per line."""
 
 
 def note_written(source: Path, out: Path, always: bool = False) -> None:
-    """Note the absolute path of `out` if a withdrawal would not find it; always: it finds none of these.
+    """Note the absolute path of `out`, unless it is noted already or a withdrawal would search it: the data folder, a
+    folder directly in it, or any folder within a session. A data folder that cannot be written to stays as it is.
 
-    source: a data folder, or a session's in it. Read-only data are left unchanged.
+    source: the data folder, or a session folder in it. always: note `out` wherever it is, for
+    an export, which a withdrawal does not find.
     """
     out, source = out.resolve(), source.resolve()
     data = source.parent if FOLDER.fullmatch(source.name) else source
@@ -27,12 +33,13 @@ def note_written(source: Path, out: Path, always: bool = False) -> None:
     if found or out in known:
         return
     text = "".join(f"{path}\n" for path in (*known, out))
-    with suppress(CannotWriteError):  # names as the system has them, which need not be UTF-8
+    with suppress(CannotWriteError):
+        # fsencode keeps the bytes of a name as the system has them: they need not be UTF-8.
         write_atomically(data / WRITTEN_ELSEWHERE, os.fsencode(text), overwrite=True)
 
 
 def folders_written_elsewhere(data: Path) -> tuple[Path, ...]:
-    """The noted folders; empty if nothing was noted, or the note cannot be read."""
+    """The noted folders, in the order in which they were noted; empty if there are none or the list cannot be read."""
     note = data / WRITTEN_ELSEWHERE
     if not is_real_file(note):
         return ()

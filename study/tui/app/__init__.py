@@ -1,5 +1,6 @@
-"""The application: a process that draws and reads keys, and leaves all work to the engine.
+"""The application: the process that draws screens and reads keys, and leaves all other work to the engine process.
 
-`app_start` (options of the command line) -> `app` -> `engine_line` (messages out and in) -> `sitting_screens` (what the
-engine asks now) or `archive_screens` (start, past sessions) -> `outcomes`. Begin at `app.py`.
+`app_start` (options of the command line) -> `app` -> `engine_line` (messages to and from the engine) ->
+`sitting_screens` (during a sitting) or `archive_screens` (start screen, past sessions, diagnoses) -> `outcomes` (end of
+a sitting). `app_commands` is the command palette, `load_screens` imports screens in advance. Begin at `app.py`.
 """

@@ -1,4 +1,7 @@
-"""The command palette: every action of the screen, with its key and its command-line equivalent."""
+"""The command palette: all actions of the present screen, each with its key and its command-line equivalent.
+
+Thus an action can be found by its name, and a user learns how to do the same without the screen.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,7 @@ EQUIVALENT_LAWS = {
     "note(True)": "hapteq note --adverse SESSION TEXT",
     "quit": "Ctrl-C in line mode",
 }
-"""Command-line equivalent of each action."""
+"""Command-line equivalent of an action, by the name of the action in its binding."""
 
 TITLES = {
     "let_go": "Take the force off and leave",
@@ -44,11 +47,12 @@ TITLES = {
     "heard(2)": "",
     "command_palette": "",
 }
-"""Titles of actions whose bindings are too short, or not in the footer; an empty one hides the action."""
+"""Titles of actions whose descriptions in the footer are too short, or that the footer does not show. An empty title
+hides the action."""
 
 
 def commands(app: App[Any], screen: Screen[Any]) -> Iterator[SystemCommand]:
-    """Actions available on this screen now."""
+    """The enabled actions of this screen and of the application, each once, as entries of the palette."""
     listed = set()
     for active in screen.active_bindings.values():
         binding = active.binding

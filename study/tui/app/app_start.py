@@ -1,4 +1,7 @@
-"""Options that the command line gives to the application. Light to import."""
+"""Options that the command line passes to the application.
+
+The module imports nothing heavy, so that the first frame appears soon.
+"""
 
 from dataclasses import dataclass
 
@@ -8,16 +11,19 @@ from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 
 @dataclass(frozen=True, slots=True)
 class AppStart:
-    """Options of the command line: data folder, device, keys, and what is offered first."""
+    """Options of the command line: data folder, device, answer keys, and what the start screen preselects."""
 
     data: str
+    """Path of the data folder."""
     device: str
+    """Name of the device."""
     keys: AnswerKeys = DIGITS
+    """Keys that answer 1 and 2."""
     first: Begin | Resume | None = None
     """Start directly with this sitting; None shows the start screen."""
     protocol: str = ""
-    """First choice of the start screen; empty for none."""
+    """Protocol that the start screen lists first, by name or path; empty for none."""
     seed: int | None = None
-    """Seed of every new session; None draws one each time."""
+    """Seed of every new session; None draws a new seed for each."""
     model: str = ""
-    """Identified model that equalizes the stimuli of every new session; empty for none."""
+    """File of the identified model that equalizes the stimuli of every new session; empty for none."""

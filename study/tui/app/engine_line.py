@@ -1,4 +1,8 @@
-"""Connection of the application to the engine: messages out, messages in as Textual messages, and a heartbeat."""
+"""Connection of the application to the engine process.
+
+It sends commands and a regular heartbeat, and delivers the engine's messages as events of Textual, so that they are
+handled by the event loop. Without a heartbeat the engine ends a running trial (`remote_display`).
+"""
 
 from __future__ import annotations
 
@@ -12,11 +16,11 @@ from study.tui.engine.from_engine import Failed, Finished, FromEngine
 from study.tui.engine.to_engine import Begin, Heartbeat, Resume, ToEngine
 
 HEARTBEAT_S = 0.1
-"""Interval of the application's sign of life to the engine (s)."""
+"""Interval of the heartbeat (s)."""
 
 
 class EngineMessage(Message):
-    """A message of the engine as an event of the application."""
+    """A message from the engine, wrapped as an event of Textual."""
 
     def __init__(self, message: FromEngine) -> None:
         super().__init__()
@@ -24,26 +28,28 @@ class EngineMessage(Message):
 
 
 class EngineLine:
-    """The application's connection to the engine: sends commands and heartbeats, delivers messages as events."""
+    """Sends commands and heartbeats to the engine, and posts its messages to the application as `EngineMessage`."""
 
     def __init__(self, app: App[Any]) -> None:
         self._app = app
         self._engine = EngineClient(self._deliver)
         self.last_end: Finished | Failed | None = None
-        """Also one that comes when the application is leaving already."""
+        """How the last sitting ended; None after the start of the next. Stored here, because an end that comes while
+        the application closes is no longer handled as an event."""
 
     @property
     def pid(self) -> int | None:
-        """Process id of the engine."""
+        """Process identifier of the engine; None before it has started."""
         return self._engine.pid
 
     def start(self) -> None:
-        """Returns at once. The heartbeat comes from the event loop, so it stops when that hangs or is suspended."""
+        """Start the engine and the heartbeat, and return at once. The event loop sends the heartbeat, which therefore
+        stops when the loop hangs or the application is suspended."""
         self._engine.start()
         self._app.set_interval(HEARTBEAT_S, self._beat)
 
     def send(self, message: ToEngine) -> None:
-        """Returns at once. Starts another engine if the last one died."""
+        """Send a message and return at once. Starts a new engine first if the present engine has died."""
         if self._engine.dead:
             self._engine = EngineClient(self._deliver)
             self._engine.start()
@@ -52,7 +58,7 @@ class EngineLine:
         self._engine.send(message)
 
     def close(self) -> None:
-        """Wait until the engine has released the force and ended."""
+        """Close the pipe and wait until the engine has released the force and ended."""
         self._engine.close()
 
     def _beat(self) -> None:
@@ -60,6 +66,7 @@ class EngineLine:
             self._engine.send(Heartbeat())
 
     def _deliver(self, message: FromEngine) -> None:
+        """Called from a thread of the client; `post_message` may be called from any thread."""
         if isinstance(message, Finished | Failed):
             self.last_end = message
         self._app.post_message(EngineMessage(message))

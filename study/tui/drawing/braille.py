@@ -1,19 +1,24 @@
-"""Canvas of braille dots: 2 x 4 per character cell, nearly square, in any UTF-8 terminal."""
+"""Raster graphics in a UTF-8 terminal: a canvas of braille characters (from U+2800), each with 2 x 4 dots.
+
+Lines are sampled at each dot, filled shapes are convex polygons drawn row by row (scan lines). The dots are nearly
+square, because a character cell is about twice as high as wide. Coordinates are in dots.
+"""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
-"""Bit of the dot in row r, column c of a cell, in Unicode's order."""
+"""Bit of the dot in row r and column c of a cell, as `_DOTS[r][c]`: the offset of its character from U+2800."""
 
 Point = tuple[float, float]
-"""x and y in dots, from the centre of the upper left dot."""
+"""x (to the right) and y (downwards) in dots, from the centre of the upper left dot."""
 
 
 @dataclass(slots=True)
 class Canvas:
-    """Dots with x to the right and y downwards, from the upper left corner."""
+    """A raster of dots that are set or not, of `columns` x `rows` character cells; empty at first. x points to the
+    right and y downwards."""
 
     columns: int
     rows: int
@@ -24,12 +29,12 @@ class Canvas:
 
     @property
     def width(self) -> int:
-        """Dots in a row."""
+        """Number of dots in a row."""
         return 2 * self.columns
 
     @property
     def height(self) -> int:
-        """Rows of dots."""
+        """Number of rows of dots."""
         return 4 * self.rows
 
     @property
@@ -38,12 +43,12 @@ class Canvas:
         return (self.width - 1) / 2, (self.height - 1) / 2
 
     def dot(self, x: int, y: int) -> None:
-        """Dots outside the canvas are dropped."""
+        """Set a dot; outside the canvas, nothing happens."""
         if 0 <= x < self.width and 0 <= y < self.height:
             self._cells[(y // 4) * self.columns + x // 2] |= _DOTS[y % 4][x % 2]
 
     def line(self, start: Point, end: Point, dashed: bool = False) -> None:
-        """A line of one dot's width, both ends included. dashed: five dots of each eight."""
+        """Draw a line of the width of one dot, both ends included. dashed: set only five of every eight dots."""
         steps = max(1, round(max(abs(end[0] - start[0]), abs(end[1] - start[1]))))
         for i in range(steps + 1):
             if dashed and i % 8 >= 5:
@@ -53,7 +58,7 @@ class Canvas:
             self.dot(round(x), round(y))
 
     def stroke(self, start: Point, end: Point, thickness: float) -> None:
-        """A straight bar with square ends."""
+        """Draw a straight bar of this thickness with square ends; nothing if its length is 0."""
         length = math.dist(start, end)
         if length == 0:
             return
@@ -68,19 +73,19 @@ class Canvas:
         )
 
     def circle(self, centre: Point, radius: float) -> None:
-        """A circle of one dot's width."""
+        """Draw the outline of a circle, one dot wide."""
         steps = max(8, math.ceil(2 * math.pi * radius))
         for i in range(steps):
             turn = 2 * math.pi * i / steps
             self.dot(round(centre[0] + radius * math.cos(turn)), round(centre[1] + radius * math.sin(turn)))
 
     def disc(self, centre: Point, radius: float) -> None:
-        """A filled circle, as a polygon of 24 corners."""
+        """Draw a filled circle, approximated by a polygon of 24 corners."""
         turns = [2 * math.pi * i / 24 for i in range(24)]
         self.fill([(centre[0] + radius * math.cos(turn), centre[1] + radius * math.sin(turn)) for turn in turns])
 
     def fill(self, corners: Sequence[Point]) -> None:
-        """Fill a convex polygon, outline included, row by row."""
+        """Fill a convex polygon, outline included, row by row between the outermost crossings with its edges."""
         top = max(0, math.ceil(min(y for _, y in corners)))
         bottom = min(self.height - 1, math.floor(max(y for _, y in corners)))
         sides = list(zip(corners, [*corners[1:], corners[0]], strict=True))
@@ -99,5 +104,5 @@ class Canvas:
 
 
 def _edge_crossing_x(a: Point, b: Point, y: float) -> float:
-    """x at which the edge from a to b crosses the height y."""
+    """x at which the edge from a to b crosses the row y; for a horizontal edge, x of its start."""
     return a[0] if a[1] == b[1] else a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])

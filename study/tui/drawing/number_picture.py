@@ -1,4 +1,4 @@
-"""A large 1 or 2, for tasks without a direction."""
+"""Draw a large digit 1 or 2 with braille characters, for trials whose answer is an interval instead of a direction."""
 
 from functools import lru_cache
 from itertools import pairwise
@@ -9,12 +9,13 @@ _STROKES: dict[int, tuple[Point, ...]] = {
     1: ((-0.28, 0.62), (0.05, 1.0), (0.05, -1.0), (-0.32, -1.0), (0.42, -1.0)),
     2: ((-0.5, 0.5), (-0.38, 0.85), (0.0, 1.0), (0.38, 0.85), (0.5, 0.5), (0.38, 0.1), (-0.5, -1.0), (0.52, -1.0)),
 }
-"""Right and up from the middle, in half heights."""
+"""Corners of the polyline of each digit: (right, up) from its centre, in units of half its height."""
 
 
 @lru_cache(maxsize=16)
 def large_number(number: int, columns: int, rows: int) -> tuple[str, ...]:
-    """The digit 1 or 2 as large as fits, as lines of braille characters."""
+    """The digit 1 or 2 as `rows` lines of `columns` braille characters, scaled to the smaller side. Raises KeyError for
+    another number."""
     canvas = Canvas(columns, rows)
     x, y = canvas.middle
     thick = max(2.5, y / 5)

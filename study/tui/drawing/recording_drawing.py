@@ -1,4 +1,7 @@
-"""Channels of a recording in braille lines: time series and spectra."""
+"""Draw the channels of a recording with braille characters: time series and amplitude spectra.
+
+Each channel takes two lines of text, so that a recording can be judged in a terminal before any plot is made.
+"""
 
 import itertools
 from collections.abc import Iterable
@@ -11,12 +14,14 @@ from equalizer.signals.signal import FloatArray
 from study.tui.drawing.braille import Canvas
 
 LABEL, COLUMNS, ROWS = 24, 54, 2
+"""Width of the label, and width and height of the drawing, in characters."""
 _DECADES = 4.0
-"""Range of a spectrum's amplitude below its maximum."""
+"""Range of amplitudes that a spectrum shows, in decades below its maximum."""
 
 
 def time_series_lines(channel: Channel) -> Iterable[str]:
-    """Range from lowest to highest sample in each column of dots, with both extremes beside it."""
+    """Draw a channel over time: each column of dots spans the lowest to the highest of its samples. The extremes of the
+    whole channel are written at the right, with their unit. Missing samples leave gaps."""
     known = channel.known
     if not known.size:
         yield f"{_channel_label(channel)} {'':{COLUMNS}} no samples"
@@ -34,6 +39,7 @@ def time_series_lines(channel: Channel) -> Iterable[str]:
 
 
 def _columns(samples: FloatArray, columns: int) -> list[tuple[float, float]]:
+    """Lowest and highest finite sample in each of `columns` equal parts of the channel; NaN for a part without one."""
     edges = np.linspace(0, len(samples), columns + 1).astype(int)
     found = []
     for start, stop in itertools.pairwise(edges):
@@ -44,7 +50,8 @@ def _columns(samples: FloatArray, columns: int) -> list[tuple[float, float]]:
 
 
 def spectrum_lines(found: Overview) -> Iterable[str]:
-    """Amplitude spectra of commands and responses, both axes logarithmic."""
+    """Draw the amplitude spectral densities of command and response channels, the square roots of their power spectral
+    densities, both axes logarithmic. Nothing is drawn without spectra; channels without power are left out."""
     if found.spectra is None:
         return
     frequency_hz = found.spectra.frequency_hz
@@ -55,8 +62,10 @@ def spectrum_lines(found: Overview) -> Iterable[str]:
         canvas = Canvas(COLUMNS, ROWS)
         edges = np.geomspace(frequency_hz[0], frequency_hz[-1] * 1.001, canvas.width + 1)
         for x, (start, stop) in enumerate(itertools.pairwise(edges)):
+            # The largest line within the column; where low frequencies have none, interpolate between lines.
             inside = power[(frequency_hz >= start) & (frequency_hz < stop)]
             size = float(inside.max()) if inside.size else float(np.interp(start, frequency_hz, power))
+            # Distance below the maximum over the range; 0.5 log10 of a power ratio is log10 of the amplitude ratio.
             down = -0.5 * np.log10(max(size / power.max(), 1e-99)) / _DECADES
             if down <= 1:
                 canvas.line((x, round(down * (canvas.height - 1))), (x, canvas.height - 1))
@@ -67,5 +76,6 @@ def spectrum_lines(found: Overview) -> Iterable[str]:
 
 
 def _channel_label(channel: Channel) -> str:
+    """Role and name of a channel, cut and padded to `LABEL` characters."""
     name = f"{channel.role} {channel.name}"
     return f"{name[: LABEL - 1]:{LABEL}}"

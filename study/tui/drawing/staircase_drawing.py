@@ -1,4 +1,8 @@
-"""A staircase as lines of text: level over trials on a logarithmic scale, in braille dots with marks."""
+"""Draw an adaptive staircase as lines of text: force level (N, logarithmic scale) over the number of the trial.
+
+Braille dots draw the level, the cap (dashed) and the threshold (dotted); a mark at each trial shows whether the answer
+was right, and whether the staircase reversed there.
+"""
 
 import itertools
 import math
@@ -7,23 +11,26 @@ from study.session.views.archive_views import Staircase
 from study.tui.drawing.braille import Canvas
 
 RIGHT, WRONG, PEAK, VALLEY = "○", "×", "▼", "▲"
+"""Marks of a right and a wrong answer, and of an upper and a lower reversal."""
 LEGEND = f"{RIGHT} right  {WRONG} wrong  {PEAK} peak  {VALLEY} valley  ┄ cap  ··· threshold"
 """Meaning of the marks, in one line."""
 
 LABEL_COLUMNS = 8
-"""Columns of the axis's labels, the space behind them included."""
+"""Width of the labels of the level axis in characters, including the space after them."""
 _LEAST_RANGE = 4.0
-"""Smallest ratio of the cap to the lowest drawn level: small movements must not look large."""
+"""Smallest ratio of the cap to the lowest level of the axis, so that small changes of the level do not look large."""
 _DOTS_PER_TRIAL = 4.0
-"""Upper limit, so that short runs stay short and runs can be compared."""
+"""Largest horizontal distance between trials, in dots, so that runs of different length are drawn to the same scale
+where they fit."""
 _DOTTED = 4
-"""Dots of the canvas from one dot of the threshold's line to the next."""
+"""Distance between the dots of the threshold line, in dots of the canvas."""
 _FIRST = (RIGHT, WRONG, VALLEY, PEAK)
-"""Where several marks share a cell, the last of these is shown."""
+"""Marks by rising priority: of several trials in a character cell, the mark with the highest priority is shown."""
 
 
 def staircase_lines(staircase: Staircase, columns: int, rows: int) -> tuple[str, ...]:
-    """Draw the staircase in as many lines as `rows`, at most `columns` wide; the last one counts the trials."""
+    """Draw the staircase in `rows` lines of at most `columns` characters; the last line is the axis of trials. A single
+    sentence if there is too little room or no answer."""
     if columns < LABEL_COLUMNS + 8 or rows < 4:
         return ("No room to draw.",)
     if not staircase.levels_n:
@@ -33,6 +40,7 @@ def staircase_lines(staircase: Staircase, columns: int, rows: int) -> tuple[str,
     pitch = min(_DOTS_PER_TRIAL, (canvas.width - 2) / max(1, len(staircase.levels_n) - 1))
 
     def height(level_n: float) -> float:
+        """y in dots of a level: 1 at the cap, two less than the height of the canvas at the lowest level."""
         return 1 + (canvas.height - 3) * math.log(staircase.cap_n / level_n) / math.log(staircase.cap_n / lowest_n)
 
     canvas.line((0, height(staircase.cap_n)), (canvas.width - 1, height(staircase.cap_n)), dashed=True)
@@ -52,7 +60,7 @@ def staircase_lines(staircase: Staircase, columns: int, rows: int) -> tuple[str,
 
 
 def summary(staircase: Staircase) -> str:
-    """The run in a sentence."""
+    """The run in one sentence: trials, right answers, reversals, and the threshold (N) if there is one."""
     turns = sum(staircase.reversals)
     right = sum(staircase.correct)
     counted = f"{len(staircase.levels_n)} trials, {right} right, {turns} reversals"
@@ -62,6 +70,7 @@ def summary(staircase: Staircase) -> str:
 
 
 def _with_marks(lines: list[str], dots: list[tuple[float, float]], staircase: Staircase) -> list[str]:
+    """The lines with the mark of each trial in the character cell of its dot (x, y)."""
     cells = [list(line) for line in lines]
     shown: dict[tuple[int, int], str] = {}
     for place, (x, y) in enumerate(dots):
@@ -73,17 +82,20 @@ def _with_marks(lines: list[str], dots: list[tuple[float, float]], staircase: St
 
 
 def _mark(correct: bool, reversal: bool) -> str:
-    """A reversal after a right answer is a peak, after a wrong one a valley."""
+    """Mark of a trial. A reversal at a right answer is a peak, because the level falls from there; at a wrong answer it
+    is a valley."""
     if reversal:
         return PEAK if correct else VALLEY
     return RIGHT if correct else WRONG
 
 
 def _label(level_n: float | None) -> str:
+    """A level with its unit; empty for None."""
     return "" if level_n is None else f"{level_n:.3g} N"
 
 
 def _trials(trials: int, last_column: int) -> str:
+    """The axis of trials: 1 under the first trial, and the number of the last, ending at its column."""
     end = f"trial {trials}" if trials > 1 else ""
     gap = max(1, last_column + 1 - len("1") - len(end))
     return f"{'':{LABEL_COLUMNS}}1{'':{gap}}{end}".rstrip()

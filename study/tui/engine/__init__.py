@@ -1,7 +1,7 @@
-"""The engine process and the pipe to it, so that slow work never blocks the screen.
+"""The engine process, which runs sessions and analyses, and the pipe to it: slow work never blocks the screen.
 
-At the screen: `client` starts the process (`child_process`) and reads its messages. Through the pipe, values only:
-`to_engine` and `from_engine`. In the process: `engine` -> `screen_link` (its end of the pipe) -> `engine_commands`
-(what is done for the screen), with `remote_display` as the display of a running session. `watch_feed` is a process of
-its own for the experimenter's view. Begin at `engine_commands.py`.
+In the screen's process, `client` starts the engine (`child_process`) and reads its messages. The pipe carries values:
+`to_engine` and `from_engine`. In the engine's process: `engine` -> `screen_link` (its end of the pipe) ->
+`engine_commands` (performs commands), with `remote_display` as the display of a running session. `watch_feed` starts a
+separate process for the experimenter's view. Begin at `engine_commands.py`.
 """

@@ -1,7 +1,8 @@
-"""The engine: the process in which sessions, the device, the disk and analyses run, so that none blocks the screen.
+"""The main program of the engine: the process that runs sessions, drives the device, writes to disk and analyses.
 
-It lives as long as its pipe. When the screen is gone for any reason, the device is released, the log records that the
-session was interrupted, and this process ends.
+A separate process is used so that none of this can block the screen. It runs as long as the pipe to the screen exists.
+When the screen's process ends for any reason, the device is released, the log records that the session was
+interrupted, and the engine ends.
 """
 
 import faulthandler
@@ -25,22 +26,23 @@ if TYPE_CHECKING:
     from study.tui.engine.engine_commands import EngineCommands
 
 NEEDED_FOR_A_SESSION = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.sessions.trial_recordings")
-"""Imported while the participant's code is typed, so that a session starts quickly."""
+"""Modules that are imported while the user types the participant's code, so that a session starts quickly."""
 
 NEEDED_AT_THE_END = ("study.workflows.results.analyze_data",)
-"""Statistics and plots: imported afterwards if there is time, so that results come quickly."""
+"""Modules of statistics and plots, imported next if no command waits, so that results appear quickly."""
 
 LAST_RESORT_S = 5.0
-"""The device was stopped long before."""
+"""Time (s) from the loss of the screen to the forced end of this process. The device was stopped before."""
 
 INTERRUPTED = StudyError(
     "Interrupted", "No force is on.", "Begin again, or leave.", "Every answer that was given is on disk."
 )
-"""Error of a command that the user let go of."""
+"""Error that is reported for a command that the user interrupted."""
 
 
 class Engine:
-    """Performs the screen's commands one after another until the screen is gone; signals interrupt the current one."""
+    """Performs the commands of the screen one after another, until the screen's process has ended. SIGINT interrupts
+    the current command, SIGTERM ends the engine."""
 
     def __init__(self, connection: Connection) -> None:
         self._busy = False
@@ -50,7 +52,7 @@ class Engine:
             signal.signal(getattr(signal, name), self._on_signal)
 
     def work(self) -> None:
-        """Perform commands until the screen is gone."""
+        """Perform commands until the screen's process has ended."""
         self._link.start()
         while not self._link.ended:
             try:
@@ -58,7 +60,7 @@ class Engine:
                 if command is None:
                     return
                 self._perform(command)
-            except KeyboardInterrupt:  # it came when there was nothing left to interrupt
+            except KeyboardInterrupt:  # the interrupt came just after a command had ended
                 if not self._link.ended:
                     self._fail(INTERRUPTED, ExitCode.INTERRUPTED)
 
@@ -68,11 +70,13 @@ class Engine:
         return self._link.next_command()
 
     def _warm_up(self) -> None:
+        """Import modules in advance, as long as no command waits."""
         for name in ("study.tui.engine.engine_commands", *NEEDED_FOR_A_SESSION, *NEEDED_AT_THE_END):
             if not self._link.command_waits:
                 import_module(name)
 
     def _perform(self, command: Command) -> None:
+        """Perform a command; an error is sent to the screen as `Failed`."""
         commands = self._load_commands()
         try:
             self._busy = True
@@ -91,6 +95,7 @@ class Engine:
             self._busy = False
 
     def _load_commands(self) -> "EngineCommands":
+        """Import and create the commands at first use, because the import takes long."""
         if self._commands is None:
             from study.tui.engine.engine_commands import EngineCommands
 
@@ -98,34 +103,39 @@ class Engine:
         return self._commands
 
     def _fail(self, error: StudyError, exit_code: ExitCode) -> None:
+        """Send an error to the screen, with the path of the session that can be resumed, if there is one."""
         opened = self._commands.opened if self._commands is not None else None
-        # A participant who withdrew left nothing to go on with.
+        # A withdrawn session cannot be resumed.
         path = str(opened.path) if opened is not None and not opened.withdrawn else ""
         text = ErrorText(error.title, error.happened, error.saved, error.do_now, int(exit_code))
         self._link.send(Failed(text, path))
 
     def _interrupt(self) -> None:
-        """Called from the reading thread. A real signal, because only that wakes a main thread that sleeps or waits."""
+        """Interrupt the current command; called from the reading thread. A signal of the operating system is used,
+        because nothing else wakes a main thread that sleeps or waits."""
         main = threading.main_thread().ident
         if self._busy and main is not None:
             signal.pthread_kill(main, signal.SIGINT)
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        """Raise KeyboardInterrupt in the main thread if a command runs, or if the engine shall end."""
         if number == signal.SIGTERM:
             self._link.ended = True
         if self._busy or self._link.ended:
-            # Once: what cleans up after it must not be interrupted.
+            # Only once per command: the cleaning up that follows must not be interrupted.
             self._busy = False
             raise KeyboardInterrupt
 
 
 def _end_by_force() -> None:
-    """Kill the process if it has lost its screen and does not end: it hangs in a driver, or on a disk."""
+    """End the process `LAST_RESORT_S` after the loss of the screen. Reached only if the main thread hangs, in a driver
+    or on a disk; called in a daemon thread, which ends with the process otherwise."""
     time.sleep(LAST_RESORT_S)
     os._exit(1)
 
 
 def _bug_error(bug: Exception) -> StudyError:
+    """An unexpected exception as an error that the screen can show."""
     return StudyError(
         "Something in hapteq went wrong",
         f"{type(bug).__name__}: {bug}.",
@@ -135,6 +145,6 @@ def _bug_error(bug: Exception) -> StudyError:
 
 
 def run(descriptor: int) -> None:
-    """The main function of the process: `descriptor` is its end of the pipe."""
+    """Main function of the process. descriptor: file descriptor of its end of the pipe."""
     faulthandler.enable(sys.stderr)
     Engine(Connection(descriptor)).work()

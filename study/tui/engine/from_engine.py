@@ -1,4 +1,8 @@
-"""Messages from the engine to the screen. Values only, pickled over a pipe, light to import."""
+"""Messages from the engine process to the screen's process, sent pickled through the pipe.
+
+They are plain values, and the module imports nothing heavy, so that the first frame appears soon. `to_engine` holds
+the messages of the other direction.
+"""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -10,7 +14,7 @@ from study.session.views.views import HandleView
 
 
 class Call(Enum):
-    """Methods of the display port that wait for a reply."""
+    """Methods of the display port (`display.Display`) that need a screen and its reply; the values are their names."""
 
     FILL_IN = "fill_in"
     DEVICE_CHECKED = "device_checked"
@@ -28,16 +32,17 @@ class Call(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """Show this and send the reply. `shown` is what the display port names: a view or a sentence."""
+    """Request to show a screen and to send its reply. shown: the argument of the method of the display port."""
 
     number: int
+    """Number of the request, from 1 within a sitting; the reply has the same number."""
     call: Call
     shown: Any
 
 
 @dataclass(frozen=True, slots=True)
 class LookUpdate:
-    """Current handle position, while `Call.AWAIT_HANDLE` of this number waits."""
+    """Current position of the handle, during the request `Call.AWAIT_HANDLE` of this number."""
 
     number: int
     view: HandleView
@@ -45,21 +50,21 @@ class LookUpdate:
 
 @dataclass(frozen=True, slots=True)
 class Close:
-    """The reply of this number is no longer needed."""
+    """The request of this number has ended: no reply is needed, and its screen can be closed."""
 
     number: int
 
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """Whether an answer was right, where the protocol shows it."""
+    """Whether the last answer was right; sent only if the protocol gives feedback."""
 
     correct: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """A message that ends nothing."""
+    """A message to the user that ends neither the session nor a command."""
 
     sentence: str
 
@@ -73,35 +78,35 @@ class Home:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Content of a past session's screen."""
+    """Content of the screen of a past session."""
 
     view: SessionView
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """Content of a diagnosis' screen."""
+    """Content of the screen of a diagnosis."""
 
     view: DiagnosisView
 
 
 @dataclass(frozen=True, slots=True)
 class ParticipantWords:
-    """What the participant of the sitting reads, from here on."""
+    """Texts in the language of the sitting's protocol, for all screens of the participant that follow."""
 
     words: Words
 
 
 @dataclass(frozen=True, slots=True)
 class Preparing:
-    """A longer preparation, as a sentence."""
+    """A preparation that takes some time has begun; the sentence describes it."""
 
     sentence: str
 
 
 @dataclass(frozen=True, slots=True)
 class Working:
-    """Current step of longer work, and the share that is done."""
+    """Progress of a diagnosis: current step, and share of the work that is done (0 to 1)."""
 
     what: str
     share: float
@@ -109,22 +114,24 @@ class Working:
 
 @dataclass(frozen=True, slots=True)
 class LayDown:
-    """Lay the accelerometer down like this and send a `Reply`."""
+    """Request to the user in a calibration: lay the accelerometer down in this position, then send a `Reply`."""
 
     number: int
-    """From 1."""
+    """Number of the position, from 1; the reply has the same number."""
     position: str
+    """The position in words."""
     heard: tuple[float, float, float] | None
-    """Mean raw values in the position before."""
+    """Mean raw readings of the three axes in the previous position; None before the first."""
 
 
 @dataclass(frozen=True, slots=True)
 class Calibrated:
-    """All six positions are known."""
+    """The calibration is computed from all six positions, and not stored yet."""
 
     table: str
-    """Table of the lab's file, TOML."""
+    """The calibration as a TOML table for the lab's file."""
     file: str
+    """Path of the lab's file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,16 +143,17 @@ class SensorKept:
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """The session's log has its first line, and is locked."""
+    """The session and its device are open: its log has its first line and is locked."""
 
     session: str
-    """Name."""
+    """Name of the session, as in P01_001."""
     path: str
+    """Path of its folder."""
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorText:
-    """A StudyError in words; its exit code says of which kind."""
+    """The texts of a StudyError; fields as there. exit_code: that of the error, an `ExitCode`."""
 
     title: str
     happened: str
@@ -156,13 +164,15 @@ class ErrorText:
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """Results of a finished session, as the command line prints them."""
+    """Results of a session, as the command line prints them."""
 
     table: tuple[str, ...]
+    """Lines of the table of thresholds."""
     warnings: tuple[str, ...]
     report: str
+    """Path of the report."""
     document: str
-    """The same as one JSON document."""
+    """Thresholds, warnings and path of the report as JSON text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,25 +181,25 @@ class Finished:
 
     path: str
     answers: int
-    """On disk."""
+    """Number of answers on disk."""
     results: Results
 
 
 @dataclass(frozen=True, slots=True)
 class Withdrawn:
-    """A withdrawal that was asked for from the list of sessions is done."""
+    """A `Withdraw` command is complete."""
 
     sessions: tuple[str, ...]
-    """Names of those that were erased."""
+    """Names of the erased sessions."""
 
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """A command failed or was left: also for a sitting that was left."""
+    """A command failed or was interrupted, a sitting ended before its session was finished, or the engine failed."""
 
     error: ErrorText
     path: str = ""
-    """Path of the session that can be resumed, where one was opened."""
+    """Path of the opened session, which can be resumed; empty if there is none."""
 
 
 FromEngine = (

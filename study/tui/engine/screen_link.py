@@ -1,4 +1,8 @@
-"""The engine's end of the pipe: a thread that listens to the screen while the engine is busy with a session."""
+"""The engine's end of the pipe to the screen.
+
+A thread reads all messages while the main thread runs a session, so that Ctrl-C at the screen takes the force off at
+once. It sorts messages into commands, replies and requests, and detects that the screen's process has ended.
+"""
 
 import threading
 import time
@@ -13,30 +17,36 @@ from study.workflows.trial.requests_port import QueuedRequests
 
 
 class ScreenLink:
-    """interrupt: raises KeyboardInterrupt in the main thread if it is busy. gone: called last, when the screen is
-    gone. Both are called from the reading thread."""
+    """Sends messages to the screen and distributes those from it.
+
+    interrupt: raises KeyboardInterrupt in the main thread if a command runs. gone: called last, when the screen's
+    process has ended. Both are called from the reading thread.
+    """
 
     def __init__(self, connection: Connection, interrupt: Callable[[], None], gone: Callable[[], None]) -> None:
         self._commands: SimpleQueue[Command | None] = SimpleQueue()
         self._heard, self._taken, self._let_go_up_to = 0, 0, 0
-        """Commands, counted: one that is let go of may not have been begun, or not even taken."""
+        """Numbers of commands received, taken by the main thread, and received before the last interruption. They are
+        needed because an interrupted command may not have been begun or taken yet."""
         self.requests = QueuedRequests()
         self.stop_device: Callable[[], None] | None = None
-        """While a device is open: what takes its force away from any thread."""
+        """Takes the force of the device off, and may be called from any thread; None while no device is open."""
         self.ended = False
+        """Whether the screen's process has ended, or the engine shall end."""
         self._connection = connection
         self._interrupt = interrupt
         self._gone = gone
         self._replies: SimpleQueue[Reply] = SimpleQueue()
         self._sending = threading.Lock()
         self._heard_s = time.monotonic()
+        """Time of the last message (s, monotonic clock)."""
 
     def start(self) -> None:
-        """Listen to the screen in a thread, until it is gone."""
+        """Start the thread that reads messages until the screen's process has ended."""
         threading.Thread(target=self._listen, name="screen-link", daemon=True).start()
 
     def send(self, message: FromEngine) -> None:
-        """Raises KeyboardInterrupt if the screen is gone."""
+        """Send a message to the screen, from any thread. Raises KeyboardInterrupt if the screen's process has ended."""
         try:
             with self._sending:
                 self._connection.send(message)
@@ -45,24 +55,24 @@ class ScreenLink:
             raise KeyboardInterrupt from None
 
     def next_command(self) -> Command | None:
-        """Wait for the next command. None: the screen is gone."""
+        """Wait for the next command; None if the screen's process has ended."""
         command = self._commands.get()
         self._taken += 1
         return command
 
     @property
     def command_waits(self) -> bool:
-        """Whether a command has come that was not taken yet."""
+        """Whether a received command waits to be taken."""
         return not self._commands.empty()
 
     @property
     def taken_is_let_go(self) -> bool:
-        """Whether the user let go after the command that was taken last had been sent."""
+        """Whether the user interrupted (`LetGo`) after sending the command that was taken last."""
         return self._taken <= self._let_go_up_to
 
     def reply(self, patience_s: float) -> Reply | None:
-        """The next reply, of any number; None after the timeout. Raises KeyboardInterrupt if the screen is
-        gone."""
+        """The next reply, of any number; None if no reply came within `patience_s` (s). Raises KeyboardInterrupt if the
+        screen's process has ended."""
         if self.ended:
             raise KeyboardInterrupt
         try:
@@ -71,15 +81,16 @@ class ScreenLink:
             return None
 
     def forget_replies(self) -> None:
-        """Drop replies of an earlier sitting, whose requests had the same numbers."""
+        """Drop replies to an earlier sitting, whose requests had the same numbers."""
         while not self._replies.empty():
             self._replies.get()
 
     def silent_s(self) -> float:
-        """Seconds since the last sign of life of the screen."""
+        """Time since the last message of the screen (s)."""
         return time.monotonic() - self._heard_s
 
     def _listen(self) -> None:
+        """Read messages until the pipe is closed; then take the force off and end the engine. Runs in a thread."""
         try:
             while True:
                 self._handle_message(self._connection.recv())
@@ -96,7 +107,8 @@ class ScreenLink:
                 self._gone()
 
     def _handle_message(self, message: ToEngine) -> None:
-        # Each message was sent by a living screen; only heartbeats come all the time.
+        """Put a message into the queue of its kind, or act on it at once (`LetGo`)."""
+        # Any message shows that the screen is alive; heartbeats are only the regular ones.
         self._heard_s = time.monotonic()
         match message:
             case Heartbeat():
@@ -112,7 +124,8 @@ class ScreenLink:
                 self._commands.put(message)
 
     def _let_go(self) -> None:
-        """The main thread takes the force away too, but it may be waiting for a disk or a driver."""
+        """Interrupt the current command and take the force off. The interrupted main thread takes it off too, but it
+        may be waiting for a disk or a driver."""
         self._let_go_up_to = self._heard
         self._interrupt()
         if (stop := self.stop_device) is not None:

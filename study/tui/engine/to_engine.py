@@ -1,4 +1,8 @@
-"""Messages from the screen to the engine. Values only, pickled over a pipe, light to import."""
+"""Messages from the screen's process to the engine process, sent pickled through the pipe.
+
+They are plain values, and the module imports nothing heavy, so that the first frame appears soon. `from_engine` holds
+the messages of the other direction.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,17 +12,20 @@ from study.session.watching.requests import Request
 
 @dataclass(frozen=True, slots=True)
 class SessionOrder:
-    """A new session, as it is asked for."""
+    """Everything that determines a new session."""
 
     protocol: str
-    """A shipped protocol's name, or a file."""
+    """Name of a shipped protocol, or path of a protocol file."""
     device: str
+    """Name of the device."""
     subject: str
+    """Participant code."""
     data: str
+    """Path of the data folder."""
     seed: int | None = None
-    """None: drawn, and logged."""
+    """Seed of the session's random numbers; None: a seed is drawn. The seed is logged."""
     model: str = ""
-    """File of the identified model that equalizes the stimuli; empty where forces are commanded."""
+    """File of the identified model that equalizes the stimuli; empty if the protocol commands forces directly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +33,9 @@ class ShowHome:
     """Read the data folder for the start screen."""
 
     data: str
+    """Path of the data folder."""
     protocol: str = ""
-    """What is offered first; so are device and model."""
+    """Protocol that is listed first; empty for none. The same holds for device and model."""
     device: str = ""
     model: str = ""
 
@@ -37,6 +45,7 @@ class ShowSession:
     """Read a past session."""
 
     path: str
+    """Path of its folder."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +53,12 @@ class ShowDiagnosis:
     """Read a diagnosis."""
 
     path: str
+    """Path of its `diagnosis.json`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Begin:
-    """Begin a session."""
+    """Begin a new session."""
 
     order: SessionOrder
 
@@ -58,85 +68,94 @@ class Resume:
     """Resume a session after a crash or a pause."""
 
     session: str
-    """Folder, or its name in the data folder."""
+    """Path of its folder, or its name in the data folder."""
     device: str
     data: str
 
 
 @dataclass(frozen=True, slots=True)
 class Analyze:
-    """Write the tables and the report of one session, and show it."""
+    """Write the tables and the report of a session, and show the session."""
 
     session: str
+    """Path of its folder."""
 
 
 @dataclass(frozen=True, slots=True)
 class Withdraw:
-    """Erase all sessions of this session's participant. The sender has asked twice."""
+    """Erase all sessions of the participant of this session. The screen has asked the user for confirmation before."""
 
     session: str
+    """Path of its folder."""
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnose:
-    """Compare recordings with a model, write the results and show them. `LetGo` stops it."""
+    """Diagnose recordings against a model, write the results and show them. `LetGo` interrupts the diagnosis."""
 
     sources: tuple[str, ...]
-    """Files, or one session's folder."""
+    """Paths of recordings, or of one session folder."""
     model: str
-    """Empty: none is given."""
+    """Path of the model; empty if none is given."""
     out: str
-    """Empty: a new folder near what is diagnosed."""
+    """Path of the folder for the results; empty: a new folder in the session's folder, or next to the recording."""
     clean: tuple[str, ...] = ()
-    """Recordings of the device when it was in order."""
+    """Paths of recordings that were made while the device worked correctly, for comparison."""
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrateSensor:
-    """Six positions of the accelerometer: the engine asks for each by `LayDown`. `LetGo` stops it."""
+    """Calibrate the accelerometer under gravity in six positions; the engine requests each by `LayDown`. `LetGo`
+    interrupts the calibration."""
 
     port: str
+    """Name of the serial port."""
     baud: int
+    """Baud rate of the serial port."""
 
 
 @dataclass(frozen=True, slots=True)
 class KeepSensor:
-    """Put the table of a calibration into the lab's file."""
+    """Store a calibration in the lab's file."""
 
     table: str
+    """The calibration as a TOML table, as in `Calibrated`."""
 
 
 @dataclass(frozen=True, slots=True)
 class AskOtherSession:
-    """Ask a session that runs in another program."""
+    """Send a request to a session that runs in another program."""
 
     session: str
+    """Path of its folder."""
     request: Request
 
 
 @dataclass(frozen=True, slots=True)
 class Relay:
-    """Request to the running session, as from a second terminal: a note, a pause, a stop."""
+    """Send a request (a note, a pause or a stop) to the session that runs in this engine."""
 
     request: Request
 
 
 @dataclass(frozen=True, slots=True)
 class LetGo:
-    """Ctrl-C: force off at once, in any state of the engine. What it is doing ends; a session can be resumed."""
+    """Ctrl-C: take the force off at once, in any state of the engine, and interrupt the current command. An interrupted
+    session can be resumed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """The event loop of the screen is alive. Ten times a second."""
+    """Sign of life of the screen's event loop, ten times a second."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """Reply to the `Ask` or `LayDown` of the same number. Replies to a question that is over are ignored."""
+    """Reply to the `Ask` or `LayDown` of the same number. A reply to a request that has ended is ignored."""
 
     number: int
     value: Any
+    """Return value of the method of the display port."""
 
 
 Command = (
@@ -152,7 +171,7 @@ Command = (
     | KeepSensor
     | AskOtherSession
 )
-"""Commands that the engine performs one after another."""
+"""Messages that the engine performs one after another."""
 
 ToEngine = Command | Relay | LetGo | Heartbeat | Reply
 """Any message from the screen."""

@@ -1,4 +1,8 @@
-"""Views of a running session for a screen: a child process reads and folds the log, so that the screen never waits."""
+"""Source of the views of a running session, for the experimenter's screen.
+
+A child process reads the session's log at short intervals and sends a view each time; the screen takes the latest view
+without waiting for the disk.
+"""
 
 import contextlib
 import subprocess
@@ -9,14 +13,14 @@ from study.session.watching.watch_view import WatchView
 from study.tui.engine.child_process import start_child
 
 POLL_EVERY_S = 0.2
-"""Interval at which the log is read (s)."""
+"""Interval at which the child process reads the log (s)."""
 CLOSING_S = 2.0
 """Longest wait for the child process to end (s)."""
 
 
 class WatchFeed:
-    """Implements `study.tui.watch.watch_source.WatchSource`. The child ends with `close`, and when this process
-    dies."""
+    """Implements `study.tui.watch.watch_source.WatchSource`, whose docstrings apply. The child process ends with
+    `close`, and when this process ends."""
 
     def __init__(self, session_path: str) -> None:
         self._connection, self._child = start_child("study.tui.engine.watch_feed", "feed", session_path)
@@ -35,11 +39,11 @@ class WatchFeed:
 
     @property
     def child_pid(self) -> int:
-        """Number of the process that reads the log."""
+        """Process identifier of the child process."""
         return self._child.pid
 
     def close(self) -> None:
-        """End the child, and kill it where it does not end within `CLOSING_S`. May be called again."""
+        """End the child process; kill it if it has not ended after `CLOSING_S`. Further calls do nothing."""
         if self._closing:
             return
         self._closing = True
@@ -54,7 +58,7 @@ class WatchFeed:
         self._connection.close()
 
     def _read(self) -> None:
-        """Runs in a thread: takes what the child sends, until it is gone."""
+        """Store the views and problems that the child process sends, until it ends. Runs in a thread."""
         while True:
             try:
                 received = self._connection.recv()
@@ -69,7 +73,8 @@ class WatchFeed:
 
 
 def feed(descriptor: int, session_path: str) -> None:
-    """Main function of the child. It imports here, because the screen's process must load none of this."""
+    """Main function of the child process. descriptor: file descriptor of its end of the pipe. The imports are in here,
+    because the screen's process, which imports this module too, must not load them."""
     from pathlib import Path
 
     from study.devices.clock import RealClock
@@ -78,7 +83,7 @@ def feed(descriptor: int, session_path: str) -> None:
 
     connection = Connection(descriptor)
     clock, follower = RealClock(), follow(Path(session_path))
-    # Anything that can be read here means the end: a word to close, or a parent that is gone.
+    # Anything to read means the end: the message of `close`, or the end of the pipe when the parent has ended.
     while not connection.poll(POLL_EVERY_S):
         try:
             view = follower.look(clock.utc())
@@ -90,6 +95,7 @@ def feed(descriptor: int, session_path: str) -> None:
 
 
 def _send_view(connection: Connection, what: WatchView | str) -> bool:
+    """Send a view, or a problem as a sentence. False if the parent process has ended."""
     try:
         connection.send(what)
     except OSError:

@@ -1,4 +1,4 @@
-"""Keys that answer 1 and 2 beside the digits themselves, as `--keys f,j` names them."""
+"""Keys that answer 1 and 2 in addition to the digits themselves, as chosen by the option `--keys f,j`."""
 
 from dataclasses import dataclass
 
@@ -6,36 +6,37 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.errors import WrongUseError
 
 RESERVED = "pqrn?"
-"""Pause, leave, repeat, note, help: always available during a trial."""
+"""Keys that have another meaning in every trial: p pause, q leave, r repeat, n note, ? help."""
 
 
 @dataclass(frozen=True, slots=True)
 class AnswerKeys:
-    """The keys that answer 1 and 2."""
+    """The keys that answer 1 and 2, as lower-case characters."""
 
     first: str = "1"
     second: str = "2"
 
     def answer(self, typed: str) -> int | None:
-        """1 or 2; None for other keys. The digits are always valid; case is ignored."""
+        """The answer 1 or 2 of a typed character; None for any other. The digits are always valid; case is ignored."""
         key = typed.casefold()
         if key in ("1", self.first):
             return 1
         return 2 if key in ("2", self.second) else None
 
     def choice(self, words: Words = ENGLISH_WORDS) -> str:
-        """Keys in a prompt, such as "f for 1, j for 2"; "1 or 2" by default."""
+        """Text on the keys for a prompt, such as "f for 1, j for 2"; "1 or 2" for the digits."""
         if (self.first, self.second) == ("1", "2"):
             return words["keys_digits"]
         return words.fill("keys_named", {"first": self.first, "second": self.second})
 
 
 DIGITS = AnswerKeys()
-"""The digits alone."""
+"""Answers by the digits only."""
 
 
 def parse_keys(text: str) -> AnswerKeys:
-    """Parse two keys such as "f,j": the key for 1, then the key for 2. Raises WrongUseError."""
+    """Parse two keys such as "f,j": the key for 1, then the key for 2. Raises WrongUseError unless they are two
+    different printable characters that are not reserved and do not exchange the digits."""
     keys = [part.strip().casefold() for part in text.split(",")]
     if len(keys) != 2:
         raise _refusal(f"'{text}' names {len(keys)} of them")
@@ -53,6 +54,7 @@ def parse_keys(text: str) -> AnswerKeys:
 
 
 def _refusal(why: str) -> WrongUseError:
+    """The error for invalid keys. why: the reason, a sentence without capital letter and full stop."""
     return WrongUseError(
         "These answer keys cannot be used",
         f"{why[0].upper()}{why[1:]}.",

@@ -1,9 +1,10 @@
-"""Key names as printed on a keyboard: F5 and Esc, in the footer and in every text."""
+"""Names of keys as printed on a keyboard, such as F5 and Esc, for the footer and for texts."""
 
 import re
 
 
 def key_name(shown: str) -> str:
-    """The key's name as printed on a keyboard. shown: Textual's name, such as f5, shift+f4, esc, ^p."""
+    """The name of a key or key combination, such as Shift+F4. shown: Textual's name, such as f5, shift+f4, esc or ^p.
+    Function keys and words are capitalised; single characters are unchanged."""
     parts = shown.split("+") if len(shown) > 1 else [shown]
     return "+".join(part.capitalize() if re.fullmatch(r"f\d+|[a-z]{2,}", part) else part for part in parts)

@@ -1,4 +1,8 @@
-"""Detect key presses among key events. A terminal reports no releases: a held key is a series of equal events."""
+"""Detect presses of the answer keys among the key events of a terminal.
+
+A terminal does not report releases, and a held key repeats: it is a series of equal events. A key that has been
+held since before a question must not answer it. Therefore repetitions are recognised by the time between events.
+"""
 
 import sys
 import time
@@ -6,20 +10,21 @@ import time
 from textual.events import Key
 
 QUIET_S = 0.2
-"""Held keys repeat every 25 to 100 ms."""
+"""Smallest time between two presses (s), above the repetition interval of held keys, 25 to 100 ms."""
 FIRST_REPEAT_S = 0.7
-"""Before the first repetition keyboards wait longer: 0.25 to 0.66 s."""
+"""Longest delay from the press of a key to its first repetition (s); keyboards wait 0.25 to 0.66 s."""
 
 
 class KeyPresses:
-    """Presses of the answer keys; several keys of one answer count as one."""
+    """Detector of presses. The keys of an answer (its digit and its letter) count as the same key."""
 
     def __init__(self) -> None:
         self._last_s: dict[int, float] = {}
 
     def is_press(self, answer: int, at_s: float, armed_s: float) -> bool:
-        """Whether an event is a press. False: the key may still be held since before `armed_s`, or answers come
-        faster than a person can intend. Every event must be passed, also while nothing is asked."""
+        """Whether an event is a press that may answer. False if it comes within `QUIET_S` of the event before, or may
+        be the first repetition of a key that was pressed before `armed_s`. at_s: time of the event (s); armed_s: time
+        from which answers count (s). Every event must be passed, also while no question is shown."""
         last_s = max(self._last_s.values(), default=float("-inf"))
         same_s = self._last_s.get(answer, float("-inf"))
         self._last_s[answer] = at_s
@@ -28,8 +33,8 @@ class KeyPresses:
 
 
 def arrival_s(event: Key) -> float:
-    """When the key was read, on the clock of `time.monotonic`: Textual stamps it in the reading thread. The stamp
-    stays valid if handling is delayed."""
+    """Time at which the key was read (s), on the clock of `time.monotonic`. Textual stores it in its reading thread, so
+    that a delay of the event loop does not change it."""
     now_s = time.monotonic()
-    # On Windows the stamp is another clock's.
+    # On Windows, the event's time comes from another clock and cannot be compared.
     return event.time if sys.platform != "win32" and event.time <= now_s else now_s

@@ -1,7 +1,7 @@
-"""Serialise keys, clicks and pastes: each is handed on when the effects of the previous one are complete.
+"""Serialise keys, clicks and pastes: each is handled only when the effects of the previous event are complete.
 
 Textual delivers a key to the widget that has the focus when the key is handled. Tab, or Enter in a field, moves the
-focus only some messages later: of keys that arrive together, later ones would otherwise go to the previous field.
+focus only some messages later, so that of keys that arrive together, the later ones would reach the previous field.
 """
 
 import asyncio
@@ -17,15 +17,16 @@ from textual.message_pump import MessagePump
 from study.tui.keys.key_presses import arrival_s
 
 AT_ONCE = ("ctrl+c", "ctrl+q", "ctrl+z")
-"""Remove the force, or suspend: never queued."""
+"""Keys that are never queued: Ctrl-C and Ctrl-Q take the force off, Ctrl-Z suspends the program."""
 ROUNDS = 3
-"""Rounds of the event loop until a key has had its effect: the key, the message that it becomes, its handler."""
+"""Passes through the message queues until the effects of a key are complete: the key, the message that it causes, and
+the message's handler."""
 LONGEST_WAIT_S = 1.0
-"""Longest wait for the effects of a key: a widget that is busy for longer does not delay further keys."""
+"""Longest wait for the effects of a key (s). A widget that is busy for longer does not delay further keys."""
 
 
 class KeysInOrder:
-    """A queue in front of an application's handling of events. hand_on: that handling."""
+    """A queue in front of the event handling of an application. hand_on: handles an event, `App.on_event`."""
 
     def __init__(self, app: App[Any], hand_on: Callable[[Event], Awaitable[None]]) -> None:
         self._app = app
@@ -36,17 +37,19 @@ class KeysInOrder:
 
     @property
     def at_work(self) -> bool:
-        """Whether the effects of a key are not complete yet."""
+        """Whether the effects of an event are still incomplete."""
         return self._settling is not None
 
     def forget_earlier(self) -> None:
-        """Ignore keys that were pressed before now: a new question is shown, and they were meant for the last one."""
+        """Ignore keys that were pressed before now: they were meant for the screen before the one that is shown now."""
         self._ignored_until_s = time.monotonic()
 
     async def take(self, event: Event) -> None:
-        """Handle every event of the application, in its message loop."""
+        """Take an event of the application: queue it if it is typed, else handle it at once. Called in the message
+        loop."""
         if isinstance(event, Key) and event.key not in AT_ONCE and arrival_s(event) < self._ignored_until_s:
-            return  # also where it comes back from a widget: its bindings would be those of another screen
+            # This includes a key that returns from a widget: it would now meet the bindings of another screen.
+            return
         if not _is_typed(event):
             await self._hand_on(event)
             return
@@ -55,6 +58,7 @@ class KeysInOrder:
             await self._next()
 
     async def _next(self) -> None:
+        """Handle the next event of the queue that is not ignored, and begin to wait for its effects."""
         self._settling = None
         if self._waiting:
             event = self._waiting.popleft()
@@ -66,6 +70,8 @@ class KeysInOrder:
             self._settling = asyncio.create_task(self._settle(before))
 
     async def _settle(self, before: list[MessagePump]) -> None:
+        """Wait for the effects of an event, at most `LONGEST_WAIT_S`, then continue with the next. before: the chain of
+        widgets that received it; the focus may have moved since."""
         try:
             async with asyncio.timeout(LONGEST_WAIT_S):
                 await _pass_through(before)
@@ -76,20 +82,22 @@ class KeysInOrder:
         self._app.call_later(self._next)
 
     def _with_the_keyboard(self) -> list[MessagePump]:
-        """The chain of widgets from the one that has the keyboard up to the application."""
+        """The chain of nodes from the focused widget, or the screen, up to the application."""
         if not self._app.screen_stack:
             return [self._app]
         return list((self._app.focused or self._app.screen).ancestors_with_self)
 
 
 def _is_typed(event: Event) -> bool:
+    """Whether the event is input of the user that must be serialised and was not forwarded to a widget before."""
     if isinstance(event, Key):
         return not event.is_forwarded and event.key not in AT_ONCE
     return isinstance(event, (MouseDown, MouseUp, Paste)) and not event.is_forwarded
 
 
 async def _pass_through(nodes: list[MessagePump]) -> None:
-    """Wait until each node has processed its queue, so that what it passed on is queued at the next."""
+    """Wait until each node has processed its message queue, one after another; messages that a node passes on are then
+    in the queue of the next."""
     for node in nodes:
         handled = asyncio.Event()
         if node.call_later(handled.set):

@@ -1,4 +1,7 @@
-"""Dialogue of line mode: sentences out, lines in."""
+"""Dialogue of line mode: writes sentences to the terminal and waits for typed lines.
+
+While it waits, it calls the sign of life of the session, which keeps the device running and may end the wait.
+"""
 
 import textwrap
 from dataclasses import dataclass
@@ -11,9 +14,9 @@ from study.tui.line_mode.line_input import LineInput
 from study.workflows.trial.display import SignOfLife
 
 GLANCE_S = 0.05
-"""Interval of the signs of life: half of what the port allows."""
+"""Interval of the signs of life (s): half of the 0.1 s that the display port allows (`display.SignOfLife`)."""
 LINE_WIDTH = 78
-"""Characters per line: two less than the narrowest usual terminal."""
+"""Characters per line: two less than the 80 columns of the narrowest usual terminal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +25,7 @@ class Line:
 
     text: str
     at_s: float
-    """Clock time at which it arrived."""
+    """Time at which the line was read (s), on the session's clock."""
 
     @property
     def word(self) -> str:
@@ -31,11 +34,11 @@ class Line:
 
 
 class WaitOver(Enum):
-    """Why no line came."""
+    """Why a wait ended without a line."""
 
     INPUT_ENDED = "the input ended"
     CUT_SHORT = "the stimulus ended early"
-    """Ended by a request that the sign of life received."""
+    """The sign of life returned False: a fault, a request or a button of the device ended the wait."""
     TIME_LIMIT = "no answer within the time limit"
 
 
@@ -51,30 +54,31 @@ class Conversation:
     def say(self, *sentences: str) -> None:
         """Write each sentence on a line of its own, wrapped at `LINE_WIDTH` between words."""
         for text in sentences:
-            # A drawing's lines are short enough; sentences break between words.
+            # Lines of a drawing are never longer, so that only sentences are wrapped.
             lines = textwrap.wrap(text, LINE_WIDTH) if len(text) > LINE_WIDTH else [text]
             self._out.write("\n".join(lines) + "\n")
         self._out.flush()
 
     def speak(self, *keys: str) -> None:
-        """Texts by their keys."""
+        """Write the texts with these keys, each on a line of its own."""
         self.say(*(self.words[key] for key in keys))
 
     def refuse(self, key: str, line: Line) -> None:
-        """Say that a line was not understood."""
+        """Write that a line was not understood. key: of the text, which quotes the line."""
         self.say(self.words.fill(key, {"typed": shown(line, self.words)}))
 
     def prompt(self, text: str) -> None:
-        """Write a text without a line end: the answer is typed behind it."""
+        """Write a text without a line end, so that the answer is typed after it."""
         self._out.write(text)
         self._out.flush()
 
     def forget(self) -> None:
-        """Drop lines typed too early."""
+        """Drop lines that were typed before the question; lines of a pipe are kept."""
         self._lines.forget()
 
     def wait(self, sign_of_life: SignOfLife, until_s: float = float("inf")) -> Line | WaitOver:
-        """The next line, or why none came. A line that arrives with the end of the stimulus is too late."""
+        """Wait for the next line; return it, or why none came. until_s: end of the wait on the session's clock (s). If
+        the sign of life ends the wait, a line that arrives at the same time does not count."""
         while True:
             try:
                 text = self._lines.read(GLANCE_S)
@@ -89,21 +93,23 @@ class Conversation:
                 return WaitOver.TIME_LIMIT
 
     def answer(self) -> Line:
-        """The next line while nothing is played. Raises KeyboardInterrupt if no line can come any more."""
+        """Wait for the next line while no stimulus is played. Raises KeyboardInterrupt at the end of the input."""
         reply = self.wait(_keep_waiting)
         if isinstance(reply, WaitOver):
             raise KeyboardInterrupt
         return reply
 
     def answer_or_leave(self) -> Line:
-        """Read an answer; the line "q" leaves."""
+        """Wait for the next line while no stimulus is played. Raises KeyboardInterrupt for "q" and at the end of the
+        input."""
         line = self.answer()
         if line.word == "q":
             raise KeyboardInterrupt
         return line
 
     def poll_line(self) -> Line | None:
-        """A line typed meanwhile, without waiting. Never from a pipe, whose lines are meant for later questions."""
+        """A line that was typed already, without waiting; None without one. Always None for a pipe, whose lines are
+        meant for later questions. Raises KeyboardInterrupt at the end of the input."""
         if not self._lines.interactive:
             return None
         try:
@@ -113,20 +119,21 @@ class Conversation:
         return None if text is None else Line(text, self.clock.now_s())
 
     def input_is_over(self) -> bool:
-        """Whether the input has ended with no line left."""
+        """Whether the input has ended and all its lines were read."""
         return self._lines.has_ended()
 
 
 def printable(text: str) -> str:
-    """The text without control characters, such as those of arrow keys."""
+    """The text without control characters, such as those of arrow keys, and without surrounding blanks."""
     return "".join(c for c in text if c.isprintable()).strip()
 
 
 def shown(line: Line, words: Words = ENGLISH_WORDS) -> str:
-    """The typed line as a sentence may quote it."""
+    """The typed line as quoted in a sentence, with at most 20 characters; words for an empty line."""
     plain = printable(line.text)[:20]
     return f"'{plain}'" if plain else words["line_enter_alone"]
 
 
 def _keep_waiting() -> bool:
+    """Sign of life while no device runs: never ends the wait."""
     return True

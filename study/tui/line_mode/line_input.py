@@ -1,4 +1,7 @@
-"""Read lines from a terminal or a pipe with a timeout, so that a waiting program can do something meanwhile."""
+"""Read lines from a terminal or a pipe with a timeout, so that a waiting program can keep the device alive.
+
+The file descriptor is read directly (`select`, `os.read`), because buffered input of Python knows no timeout.
+"""
 
 import os
 import select
@@ -6,7 +9,7 @@ import sys
 
 
 class LineInput:
-    """Reads standard input directly. `read` returns None if nothing came in time; raises EOFError at its end."""
+    """Reads lines from a file descriptor; by default from standard input. `interactive`: whether it is a terminal."""
 
     def __init__(self, descriptor: int | None = None) -> None:
         self._descriptor = sys.stdin.fileno() if descriptor is None else descriptor
@@ -15,8 +18,8 @@ class LineInput:
         self.interactive = os.isatty(self._descriptor)
 
     def read(self, timeout_s: float) -> str | None:
-        """The next line without its end; None if there is none within timeout_s. Raises EOFError at the end of the
-        input."""
+        """The next line, decoded as UTF-8, without surrounding blanks; None if no whole line comes within `timeout_s`
+        (s). Raises EOFError at the end of the input."""
         line = self._take_line()
         if line is not None:
             return line
@@ -28,7 +31,7 @@ class LineInput:
         return self._take_line()
 
     def has_ended(self) -> bool:
-        """Whether no line is left and none can come. Consumes nothing."""
+        """Whether the input has ended and no line is left. Does not wait, and consumes no line."""
         while b"\n" not in self._pending and not self._over:
             if not select.select([self._descriptor], [], [], 0.0)[0]:
                 return False
@@ -36,7 +39,7 @@ class LineInput:
         return b"\n" not in self._pending
 
     def forget(self) -> None:
-        """Drop lines that a person typed too early. Lines of a pipe are kept."""
+        """Drop lines that were typed at a terminal before now. Lines of a pipe are kept."""
         if not self.interactive:
             return
         import termios
@@ -45,13 +48,14 @@ class LineInput:
         self._pending = b""
 
     def _read_available(self) -> bool:
-        """Read what is there. False at the end of the input."""
+        """Read the available bytes into the buffer. False at the end of the input."""
         data = os.read(self._descriptor, 4096)
         self._over = not data
         self._pending += data
         return not self._over
 
     def _take_line(self) -> str | None:
+        """Remove the first whole line from the buffer; None if there is none."""
         line, newline, rest = self._pending.partition(b"\n")
         if not newline:
             return None

@@ -1,4 +1,8 @@
-"""Line mode: the participant's part in plain sentences, for any terminal, a screen reader, or a pipe of answers."""
+"""Line mode: the display of a session in plain sentences, for any terminal, a screen reader, or answers from a pipe.
+
+`PlainDisplay` implements the display port by the functions of `plain_forms`, `plain_demo`, `plain_question` and
+`plain_pause`, which share a `Conversation`.
+"""
 
 from collections.abc import Callable
 from typing import TextIO
@@ -32,7 +36,10 @@ from study.workflows.trial.display import SignOfLife
 
 
 class PlainDisplay:
-    """note: takes notes and adverse events typed during a pause; if None, none are offered."""
+    """The display port (`study.workflows.trial.display.Display`) in lines of text; the docstrings of `Display` apply.
+
+    note: stores a note or an adverse event that is typed during a pause; if None, the pause offers no notes.
+    """
 
     def __init__(
         self,
@@ -49,6 +56,7 @@ class PlainDisplay:
         self._note = note
         self._demo_shown = False
         self._run_told: tuple[str, int] | None = None
+        """Run whose progress was written last, so that it is written once per run."""
 
     def fill_in(self, form: Form) -> FormReply:
         return plain_forms.fill_in(form, self._talk)

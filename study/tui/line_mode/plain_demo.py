@@ -1,4 +1,4 @@
-"""Line mode: the demonstration, and waiting while something plays or the handle is moved back."""
+"""Line mode: the demonstration menu, and the waits while a stimulus plays or the handle is moved to its place."""
 
 from collections.abc import Callable
 
@@ -13,16 +13,17 @@ from study.tui.trial_words import felt_so_far
 from study.workflows.trial.display import SignOfLife
 
 SAY_AGAIN_S = 1.0
-"""A screen reader that hears more than a sentence a second never finishes one."""
+"""Shortest interval between two sentences on the handle (s), so that a screen reader can finish each sentence."""
 
 CUT_SHORT = Unanswered(WaitOver.CUT_SHORT.value, leave=False)
-"""Reply where a sign of life ended the wait."""
+"""Reply if the sign of life ended the wait."""
 INPUT_ENDED = Unanswered(WaitOver.INPUT_ENDED.value, leave=True)
 """Reply at the end of the input."""
 
 
 def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> DemoChoice:
-    """Ask which direction of which vibration to play. Raises KeyboardInterrupt when the participant leaves."""
+    """Let the participant choose a vibration (n, b) and a direction to play; Enter ends the demonstration. Raises
+    KeyboardInterrupt when the participant leaves, or at the end of the input."""
     talk.forget()
     vibration = menu.vibration
     talk.say("", _place_text(menu, vibration, talk.words))
@@ -46,9 +47,10 @@ def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_li
 
 
 def show_playing(notice: PlayingNotice, talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
-    """Wait for the end. Keys typed meanwhile are no answers: only p and q are accepted."""
+    """Wait `notice.seconds` while a stimulus plays. Of typed lines only p (pause) and q (leave) have an effect. None at
+    the end; otherwise why the wait ended early."""
     talk.forget()
-    if notice.title:  # a gap between two intervals has none
+    if notice.title:  # the gap between two intervals has no title
         along = "" if notice.picture is None else f" ({ends(notice.picture, notice.number, talk.words)})"
         talk.say(f"{talk.words.fact(notice.title)}{along}")
     until_s = talk.clock.now_s() + notice.seconds
@@ -60,7 +62,8 @@ def show_playing(notice: PlayingNotice, talk: Conversation, sign_of_life: SignOf
 
 
 def await_handle(look: Callable[[], HandleView], talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
-    """Wait until the handle is at its place, saying how far it is. None once it is; otherwise why the wait ended."""
+    """Wait until the handle is in its place, and write how far it is from there. None when the handle is in its place;
+    otherwise why the wait ended early."""
     talk.forget()
     last_sentence, said_at_s = "", float("-inf")
     while not (view := look()).ready:
@@ -75,6 +78,7 @@ def await_handle(look: Callable[[], HandleView], talk: Conversation, sign_of_lif
 
 
 def _glance(talk: Conversation, sign_of_life: SignOfLife, seconds: float) -> Unanswered | None:
+    """Wait for `seconds` (s), give a sign of life, and check for a typed p or q. None if the wait may continue."""
     talk.clock.sleep(seconds)
     if not sign_of_life():
         return CUT_SHORT
@@ -83,7 +87,7 @@ def _glance(talk: Conversation, sign_of_life: SignOfLife, seconds: float) -> Una
 
 
 def _step_vibration(menu: DemoMenu, vibration: int, step: int, words: Words) -> tuple[int, str]:
-    """The new vibration number and a sentence; unchanged at either end."""
+    """Number of the next (step 1) or previous (-1) vibration, unchanged at either end, and a sentence on it."""
     turned = vibration + step
     if turned < 1:
         return vibration, words["line_demo_first"]
@@ -93,6 +97,7 @@ def _step_vibration(menu: DemoMenu, vibration: int, step: int, words: Words) -> 
 
 
 def _place_text(menu: DemoMenu, vibration: int, words: Words) -> str:
+    """Which vibration is chosen, which of its directions were felt, and whether the device is simulated."""
     place = words.fill("line_demo_place", {"vibration": vibration, "vibrations": menu.vibrations})
     moves = "" if menu.handle_moves else f" {words['simulation']}"
     return f"{place} {felt_so_far(menu, vibration, words)}{moves}"

@@ -1,4 +1,4 @@
-"""Line mode: forms and the device check, one question after another."""
+"""Line mode: forms, one question after another, and the device check."""
 
 from protocols.wording.words import Words
 from study.session.views.form_entry import CHECKED
@@ -8,11 +8,12 @@ from study.tui.line_mode.conversation import Conversation, Line, printable, show
 from study.tui.trial_words import limits_words, origin
 
 BACK = "b"
-"""Word that goes back to the question before, in every language."""
+"""Line that returns to the previous question, the same in every language."""
 
 
 def fill_in(form: Form, talk: Conversation) -> FormReply:
-    """Ask all fields of a form, one after another; `b` goes back by one."""
+    """Ask all fields of a form, one after another; `b` returns to the previous field. In the forms of `CHECKED`
+    (consent, exclusion), changed answers must be confirmed. Raises KeyboardInterrupt when the participant leaves."""
     talk.forget()
     words = talk.words
     talk.say("", form.title, *filter(None, (form.introduction, origin(form, words))))
@@ -35,7 +36,7 @@ def fill_in(form: Form, talk: Conversation) -> FormReply:
 
 
 def _confirm_changes(form: Form, answers: dict[str, str], talk: Conversation) -> bool:
-    """Whether changed answers are confirmed; otherwise the form is asked again."""
+    """Show all answers after a change. True if they are confirmed; False if the form shall be asked again."""
     talk.forget()
     text = ", ".join(f"{number} {answers[field.key]}" for number, field in enumerate(form.fields, start=1))
     words = talk.words
@@ -50,7 +51,7 @@ def _confirm_changes(form: Form, answers: dict[str, str], talk: Conversation) ->
 
 
 def device_checked(report: DeviceReport, talk: Conversation) -> bool:
-    """Print the findings of the device check. True: go on; False: check again."""
+    """Write the findings of the device check. True: continue; False: check again."""
     talk.forget()
     words = talk.words
     moves = f" {words['simulation']}" if report.simulated else ""
@@ -72,7 +73,8 @@ def device_checked(report: DeviceReport, talk: Conversation) -> bool:
 
 
 def _ask_field(field: FormField, place: tuple[int, int], talk: Conversation) -> str | None:
-    """The answer; None: back to the previous question."""
+    """Ask a field until its answer is valid; None: return to the previous field. place: number of the field, and of all
+    fields."""
     numbered = bool(field.choices) and not any(choice.isdigit() for choice in field.choices)
     words = talk.words
     asked = {"number": place[0], "all": place[1], "question": field.label}
@@ -89,12 +91,13 @@ def _ask_field(field: FormField, place: tuple[int, int], talk: Conversation) -> 
             raise KeyboardInterrupt
         if line.word == BACK:
             return None
-        talk.forget()  # typed ahead for the questions after this one
+        talk.forget()  # lines that were typed in advance belong to later questions
         talk.say(_refusal(field, line, numbered, words))
 
 
 def _parse_answer(field: FormField, line: Line, numbered: bool) -> str | None:
-    """The answer; None if the line is not an answer to this question."""
+    """The answer in a line; None if the line is no valid answer to this field. numbered: choices may be given by
+    number."""
     text = printable(line.text)
     if not text:
         return None if field.needed else ""
@@ -104,17 +107,19 @@ def _parse_answer(field: FormField, line: Line, numbered: bool) -> str | None:
     if numbered and text.isdecimal() and 1 <= int(text) <= len(field.choices):
         return field.choices[int(text) - 1]
     meant = [choice for choice in field.choices if choice.casefold() == text.casefold()]
-    # As on the screen, a beginning will do that only one choice has: y for yes.
+    # As on the screen, the first letters of a choice suffice if no other choice has them: y for yes.
     meant = meant or [choice for choice in field.choices if choice.casefold().startswith(text.casefold())]
     return meant[0] if len(meant) == 1 else None
 
 
 def _prompt(field: FormField, numbered: bool, words: Words) -> str:
+    """The prompt of a field: for a number or an answer, and whether it may be left empty."""
     what = "line_form_number" if numbered else "line_form_answer"
     return words[what if field.needed else f"{what}_or_none"]
 
 
 def _refusal(field: FormField, line: Line, numbered: bool, words: Words) -> str:
+    """Text on a line that is no valid answer: the limits or the choices of the field."""
     typed = shown(line, words)
     if field.limits is not None:
         return words.fill("line_form_limits", {"typed": typed, "wanted": limits_words(field.limits, words)})

@@ -1,4 +1,7 @@
-"""Line mode: rests and pauses, with nothing played, and notes for the log."""
+"""Line mode: enforced rests, and pauses with the choices to continue, to leave, to withdraw or to write a note.
+
+No stimulus is played meanwhile.
+"""
 
 from collections.abc import Callable
 
@@ -10,11 +13,12 @@ from study.tui.trial_words import progress_sentence
 from study.workflows.trial.display import SignOfLife
 
 COUNT_EVERY_S = 10.0
-"""Interval at which the remaining time is printed (s)."""
+"""Interval at which the remaining time is written (s)."""
 
 
 def rest(notice: RestNotice, talk: Conversation, sign_of_life: SignOfLife) -> float:
-    """Count down an enforced rest. Returns its duration (s). Raises KeyboardInterrupt when the participant leaves."""
+    """Count down an enforced rest, then wait for Enter. Returns the time rested (s). Raises KeyboardInterrupt when the
+    participant leaves, or at the end of the input."""
     words = talk.words
     rested = words.fill("line_rest", {"seconds": f"{notice.seconds:.0f}"})
     talk.say("", f"{rested} {words.counted('runs_left', notice.runs_left)}")
@@ -33,7 +37,8 @@ def rest(notice: RestNotice, talk: Conversation, sign_of_life: SignOfLife) -> fl
 def pause(
     notice: PauseNotice, talk: Conversation, note: Callable[[NoteAsked], None] | None, sign_of_life: SignOfLife
 ) -> AfterPause:
-    """Wait in a pause until the participant decides how to continue. note: writes a note into the log."""
+    """Wait in a pause until the participant decides how to continue; LEAVE if the sign of life ends the wait. note:
+    stores a note in the log; None offers no notes. Raises KeyboardInterrupt at the end of the input."""
     talk.forget()
     words = talk.words
     paused = words.fill("line_pause", {"reason": words.fact(notice.reason)})
@@ -63,10 +68,12 @@ def pause(
 
 
 def _choices(notes: bool, words: Words) -> str:
+    """The keys of a pause. notes: whether notes are offered."""
     return " ".join(words[key] for key in ("line_pause_keys", *(["line_pause_notes"] if notes else [])))
 
 
 def _withdraws(talk: Conversation) -> bool:
+    """Whether the participant confirms the withdrawal of consent by typing a word."""
     word = talk.words["withdraw_word"]
     talk.speak("withdraw_all")
     talk.prompt(talk.words.fill("line_withdraw", {"word": word}))
@@ -77,6 +84,7 @@ def _withdraws(talk: Conversation) -> bool:
 
 
 def _take_note(adverse: bool, talk: Conversation, note: Callable[[NoteAsked], None]) -> None:
+    """Ask for the text of a note, or of an adverse event, and store it; an empty line stores nothing."""
     talk.prompt(talk.words["line_happened" if adverse else "line_note"])
     text = printable(talk.answer().text)
     if not text:
@@ -87,9 +95,10 @@ def _take_note(adverse: bool, talk: Conversation, note: Callable[[NoteAsked], No
 
 
 def _count_down(until_s: float, talk: Conversation, sign_of_life: SignOfLife) -> bool:
-    """Announce the remaining time every ten seconds. False if the sign of life ended the wait."""
+    """Write the remaining time every `COUNT_EVERY_S`, until `until_s` on the session's clock (s). False if the sign of
+    life ended the wait."""
     say_at_s = float("-inf")
-    while (left_s := until_s - talk.clock.now_s()) > 1e-9:
+    while (left_s := until_s - talk.clock.now_s()) > 1e-9:  # tolerance for rounding of clock times
         now_s = talk.clock.now_s()
         if left_s > COUNT_EVERY_S and now_s >= say_at_s:
             talk.say(f"{left_s:.0f} s")

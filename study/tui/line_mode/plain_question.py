@@ -1,4 +1,4 @@
-"""Line mode: one trial with its question and instructions."""
+"""Line mode: the instructions, the question of a trial and its reply, and the result of a practice."""
 
 from protocols.trial import VoidCause
 from protocols.wording.words import Words
@@ -20,21 +20,22 @@ from study.tui.trial_words import heading, plan
 from study.workflows.trial.display import SignOfLife
 
 LEFT = Unanswered("the participant left", leave=True)
-"""Reply of a participant who types q."""
+"""Reply for the line q: the participant leaves the sitting."""
 
 
 def keys_sentence(keys: AnswerKeys, words: Words) -> str:
-    """Which keys answer 1 and 2."""
+    """Sentence on the keys that answer 1 and 2."""
     return words.fill("line_keys", {"keys": keys.choice(words)})
 
 
 def picture_lines(picture: DirectionPicture, words: Words) -> tuple[str, ...]:
-    """The drawing, and both directions in words."""
+    """Lines of the drawing of the two directions, and a sentence on each."""
     return (*draw_directions(picture), sentence(picture, 1, words), sentence(picture, 2, words))
 
 
 def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
-    """Print title, instructions and plan of a sitting, and wait for Enter."""
+    """Write title, instructions and plan of a sitting, and wait for Enter. Raises KeyboardInterrupt when the
+    participant leaves."""
     words = talk.words
     talk.forget()
     talk.say(notice.title, "")
@@ -56,7 +57,8 @@ def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
 
 
 def ask(question: Question, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
-    """Ask the question of a trial until there is a reply, the time is over or the stimulus has ended."""
+    """Ask the question of a trial until there is a reply, the time limit is over, or the stimulus ended early. Other
+    lines are refused, and the question is asked again."""
     words, choice = talk.words, {"keys": keys.choice(talk.words)}
     talk.forget()
     talk.say("", heading(question, words))
@@ -84,13 +86,14 @@ def ask(question: Question, talk: Conversation, keys: AnswerKeys, sign_of_life: 
 
 
 def _explanation(question: Question, words: Words) -> tuple[str, ...]:
+    """Help on the question: the task of intervals, or both directions."""
     if question.task is Task.INTERVAL:
         return (words["line_intervals"],)
     return picture_lines(question.picture, words)
 
 
 def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
-    """The reply of a typed line; None if the line is not a reply."""
+    """The reply in a typed line: an answer, or q (leave), p (pause), r (repeat); None for any other line."""
     answer = keys.answer(line.text)
     if answer is not None:
         return Answered(answer, line.at_s)
@@ -98,7 +101,7 @@ def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
 
 
 def practice_over(result: PracticeResult, talk: Conversation) -> None:
-    """Print the result of a practice, and wait for Enter."""
+    """Write the result of a practice, and wait for Enter. Raises KeyboardInterrupt when the participant leaves."""
     talk.forget()
     talk.say("", talk.words.fill("line_practice", {"right": result.right, "asked": result.of}))
     talk.speak("practice_enough" if result.passed else "practice_hard", "enter_goes_on")

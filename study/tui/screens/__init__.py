@@ -1,8 +1,8 @@
-"""Whole screens: each turns a view into cells and keys into a reply, without rules. One screen a file.
+"""Screens of the user interface, one per file: each draws a view and turns keys into a reply; rules are elsewhere.
 
 In the order of a sitting: `home`, `preparing`, `form`, `device_check`, `instructions`, `demo`, `handle`, `trial`,
-`playing`, `await_return`, `practice_over`, `rest`, `pause`, `goodbye`, `outcome`. Of past sessions and diagnoses:
-`browse`, `session`, `diagnose_form`, `diagnosing`, `diagnosis`. Questions before something final: `confirm_*`,
-`withdraw_prompt`. `note` and `note_prompt` write to the log, `watch_*` belongs to the experimenter's view, `sensor` to
-the accelerometer. Begin at `trial.py`.
+`playing`, `await_return`, `practice_over`, `rest`, `pause`, `goodbye`, `outcome`. Past sessions and diagnoses:
+`browse`, `session`, `diagnose_form`, `diagnosing`, `diagnosis`. Confirmations: `confirm_*`, `withdraw_prompt`. Notes
+for the log: `note`, `note_prompt`. `watch_*` belong to the experimenter's view, `sensor` calibrates the accelerometer,
+`help` shows the help of any screen. Begin at `trial.py`.
 """

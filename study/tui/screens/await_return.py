@@ -1,4 +1,4 @@
-"""After a void trial: nothing is played until the participant is back."""
+"""Screen after a void trial: it gives the reason, and no stimulus is played until the participant presses Enter."""
 
 from typing import ClassVar
 
@@ -15,7 +15,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class AwaitReturnScreen(TranslatedScreen[None]):
-    """Says why the trial is void and that nothing is lost, and waits for Enter; nothing is played meanwhile."""
+    """Shows why the trial is void and that no answer is lost; Enter continues. reason: cause of the void trial, as in
+    the log."""
 
     PAGE = "help_void"
     DEFAULT_CSS = "AwaitReturnScreen { align: center middle; }"

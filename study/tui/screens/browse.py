@@ -1,4 +1,4 @@
-"""Pick a session or a diagnosis from anywhere on the disk."""
+"""File dialog that opens a session or a diagnosis from any folder, also outside the data folder."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -17,6 +17,7 @@ from study.tui.home_messages import CommandWanted
 from study.tui.screens.help import HelpScreen
 
 LOG, DIAGNOSIS = "events.jsonl", "diagnosis.json"
+"""Names of the files that can be opened: the log of a session, and the document of a diagnosis."""
 
 HELP = """\
 # Open
@@ -31,19 +32,20 @@ In a terminal: `hapteq show PATH`.
 
 
 class HapteqFiles(DirectoryTree):
-    """Folders, event logs of sessions and documents of diagnoses; other files are not listed."""
+    """Tree of folders that lists only event logs of sessions and documents of diagnoses; hidden files are left out."""
 
     def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
         return [path for path in paths if not path.name.startswith(".") and (_is_ours(path) or path.is_dir())]
 
 
 def _is_ours(path: Path) -> bool:
+    """Whether the name is that of a session's log or of a diagnosis."""
     return path.name == LOG or (path.suffix == ".json" and "diagnosis" in path.name)
 
 
 class BrowseScreen(ModalScreen[None]):
-    """A tree of folders and a field for a path, by which a session or a diagnosis is opened: Enter opens, Esc goes
-    back."""
+    """A field for a path and a tree of folders: Enter opens a session or a diagnosis, Esc returns. folder: where the
+    tree begins; the current folder if it does not exist."""
 
     HELP = HELP
     CSS = """
@@ -77,6 +79,7 @@ class BrowseScreen(ModalScreen[None]):
 
     @on(Input.Submitted, "#path")
     def _go_to_path(self, typed: Input.Submitted) -> None:
+        """Open a typed session folder or file; show any other folder in the tree."""
         path = Path(typed.value).expanduser()
         if path.is_dir() and (path / LOG).exists():
             self._open_path(path / LOG)
@@ -100,6 +103,7 @@ class BrowseScreen(ModalScreen[None]):
         dismiss_screen(self, None)
 
     def _open_path(self, path: Path) -> None:
+        """Ask the engine to read the session of a log, or any other file as a diagnosis, and close the dialog."""
         command = ShowSession(str(path.parent)) if path.name == LOG else ShowDiagnosis(str(path))
         self.app.post_message(CommandWanted(command))
         dismiss_screen(self, None)

@@ -1,4 +1,8 @@
-"""Confirmation before the experimenter's view opens where a participant may see it: a single key does not open it."""
+"""Confirmation before the experimenter's view opens on a screen that the participant may see.
+
+The view shows levels and which answers were right; a participant who has seen these is no longer a naive observer.
+Therefore the session's name must be typed: a single key that is pressed by mistake does not open the view.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +21,12 @@ from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 SHOWN_HERE = "The participant's screen showed the experimenter's view: levels, and which answers were right or wrong."
-"""Note in the log of a session whose own screen showed the view."""
+"""Note that is written to the log if the screen of the participant showed the view."""
 
 
 class ConfirmView(ModalScreen[bool]):
-    """Asks for the session's name before levels and answers are shown: Enter judges what was typed, Esc goes back.
-    Returns True if it was the name."""
+    """Dialog that asks for the session's name. Enter compares the typed text with the name and returns True if they are
+    equal; Esc returns False."""
 
     HELP = """\
 # The experimenter's view
@@ -73,7 +77,7 @@ class ConfirmView(ModalScreen[bool]):
 
 
 def confirm_view(app: App[Any], session: str, go_on: Callable[[], object]) -> None:
-    """Ask for confirmation. go_on: called once, when the session's name was typed."""
+    """Open the dialog. session: name to be typed. go_on: called once after the confirmation."""
 
     def act_on_decision(confirmed: bool | None) -> None:
         if confirmed:

@@ -1,4 +1,7 @@
-"""Confirmation of a withdrawal of consent during a sitting: a word must be typed."""
+"""Confirmation of a withdrawal of consent during a sitting: all data of the participant would be erased.
+
+A word must be typed, in the language of the protocol, so that no single key erases data.
+"""
 
 from typing import ClassVar
 
@@ -16,8 +19,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class ConfirmWithdrawal(TranslatedScreen[bool], ModalScreen[bool]):
-    """Asks a participant for a word before all data are erased: Enter judges what was typed, Esc keeps everything.
-    Returns True if it was the word."""
+    """Dialog that asks the participant for the word. Enter compares the typed text with it, without regard to case, and
+    returns True if they are equal; Esc returns False, and nothing is erased."""
 
     PAGE = "help_withdraw"
     DEFAULT_CSS = """

@@ -1,4 +1,8 @@
-"""View of one diagnosis: the verdict, named effects, rivals, and the numbers behind them."""
+"""Screen of a finished diagnosis: which physics a model of the device lacks.
+
+It shows the verdict, the identified effects, alternative explanations (candidates and rivals), the recording that is
+recommended next, and tables of errors before and after the effects are added. All texts come from `DiagnosisView`.
+"""
 
 from typing import ClassVar
 
@@ -37,8 +41,8 @@ In a terminal: `hapteq show diagnosis.json`.
 
 
 class DiagnosisScreen(Screen[None]):
-    """A finished diagnosis on one page, in two columns where the terminal is wide: verdict, effects, candidates,
-    rivals, next recording; errors and mismatches as tables. o opens the report, Esc goes back."""
+    """A diagnosis on one page, in two columns if the terminal has at least 120 columns: sentences, then tables. o opens
+    the report in the browser, if there is one; Esc returns to the start screen."""
 
     HELP = HELP
     CSS = """
@@ -98,6 +102,7 @@ class DiagnosisScreen(Screen[None]):
 
 
 def _compose_section(title: str, sentences: tuple[str, ...], none: str) -> ComposeResult:
+    """A title and its sentences as a list. none: text without sentences."""
     yield Static(title, classes="title", markup=False)
     bullets = Table.grid(padding=(0, 1, 0, 0))
     for sentence in sentences or (none,):
@@ -106,6 +111,7 @@ def _compose_section(title: str, sentences: tuple[str, ...], none: str) -> Compo
 
 
 def _table(title: str, rows: tuple[tuple[str, ...], ...], none: str) -> ComposeResult:
+    """A title and its table, of which the first row is the header. none: text without further rows."""
     yield Static(title, classes="title", markup=False)
     if len(rows) < 2:
         yield Static(none, markup=False)

@@ -1,4 +1,8 @@
-"""A form: consent, exclusion, set-up, debrief. It shows what is missing and judges nothing."""
+"""Screen of a form, such as consent, exclusion criteria, questionnaires or set-up.
+
+The rules of filling in (valid answers, movement of the cursor, changes to be confirmed) are in
+`study.session.views.form_entry`: each key turns a `FormEntry` into the next, and this screen draws the result.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -32,7 +36,7 @@ from study.tui.widgets.form_question import FormQuestion
 from study.tui.widgets.literal_text import LiteralText
 
 LONGEST_QUOTE = 48
-"""Longest label of a question that is quoted whole, in characters."""
+"""Longest quotation of a question or answer in a message, in characters; longer texts are cut."""
 KEYS = (
     ("1", "choice", "1 2 …", "Choose"),
     ("left", "choice", "← →", "Move"),
@@ -43,14 +47,15 @@ KEYS = (
     ("up", "", "↑", "Previous"),
     ("down", "", "↓", "Next"),
 )
-"""Footer entries: key, where it has this meaning (empty: everywhere), how it is shown, meaning."""
+"""Footer entries: key, kind of field where the entry applies (empty: everywhere), text of the key, description."""
 FOOTER_KEYS = frozenset(key for key, *_ in KEYS)
-"""All keys of the footer."""
+"""Keys that have a footer entry."""
 
 
 class FormScreen(TranslatedScreen[FormReply]):
-    """Shows a `FormEntry`: introduction, questions, and a button to go on; the keys are in `KEYS`. No widget in it has
-    the focus: keys, clicks and pastes come to the screen in order, and each is applied to the entry before the next."""
+    """Draws a `FormEntry`: introduction, questions, and the button Continue; the keys are in `KEYS`. Returns the reply.
+    No widget has the focus: the screen itself receives keys, clicks and pastes, and applies them in order of
+    arrival."""
 
     PAGE = "help_form"
     DEFAULT_CSS = """
@@ -71,7 +76,7 @@ class FormScreen(TranslatedScreen[FormReply]):
 
     @dataclass
     class Pointed(Message):
-        """What the mouse was clicked on."""
+        """A mouse click: the widget, and the index of the choice in it, if the click was on one."""
 
         widget: ChoiceRow | FormQuestion | Button
         choice: int | None = None
@@ -80,6 +85,7 @@ class FormScreen(TranslatedScreen[FormReply]):
         super().__init__(words)
         self._entry = blank_entry(form)
         self._alive: list[bool | None] = []
+        """Whether each entry of `KEYS` had an effect when the footer was last drawn."""
 
     def compose(self) -> ComposeResult:
         form = self._entry.form
@@ -100,7 +106,7 @@ class FormScreen(TranslatedScreen[FormReply]):
 
     @property
     def entry(self) -> FormEntry:
-        """What was entered so far, and where the cursor is."""
+        """Present state of the form: answers and position of the cursor."""
         return self._entry
 
     @property
@@ -111,7 +117,7 @@ class FormScreen(TranslatedScreen[FormReply]):
 
     def on_key(self, event: Key) -> None:
         taken = self._take(press(self._entry, event.key, event.character, self.stacked))
-        # A key without a meaning here would go on to its binding, which acts after the keys behind it.
+        # Otherwise the binding of a footer key would act on it, later than on the keys that follow.
         if taken or event.key in FOOTER_KEYS:
             event.stop()
             event.prevent_default()
@@ -128,7 +134,7 @@ class FormScreen(TranslatedScreen[FormReply]):
         sheet.scroll_relative(y=pages * sheet.size.height, animate=False)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """The footer shows only keys that have an effect here."""
+        """Enable a footer entry only if its key has an effect at the present field."""
         if action != "press":
             return True
         key, place = parameters
@@ -140,13 +146,14 @@ class FormScreen(TranslatedScreen[FormReply]):
         return place in ("", here) and any(after not in (None, self._entry) for after in pressed)
 
     def _forward_event(self, event: Event) -> None:
-        """Put a click with its target into the queue of the keys, so that order is kept."""
+        """Post a click as a message to the screen, so that it stays in order with the keys."""
         if isinstance(event, Click) and not event.is_forwarded and (pointed := self._locate_click(event)) is not None:
             self.post_message(pointed)
             return
         super()._forward_event(event)
 
     def _locate_click(self, click: Click) -> Pointed | None:
+        """The choice row, button or question under the pointer; None elsewhere."""
         try:
             widget, region = self.get_widget_at(click.screen_x, click.screen_y)
         except NoWidget:
@@ -168,7 +175,8 @@ class FormScreen(TranslatedScreen[FormReply]):
         self._take(to)
 
     def _take(self, entry: FormEntry | None) -> bool:
-        """Replace the entry (the only place that does). False: the key had no meaning."""
+        """Make this the present state, and draw it; dismiss the screen if the form was sent. Nothing else changes the
+        state. False for None: the key had no meaning."""
         if entry is None:
             return False
         before, self._entry = self._entry, entry
@@ -179,6 +187,7 @@ class FormScreen(TranslatedScreen[FormReply]):
         return True
 
     def _show(self, entry: FormEntry) -> None:
+        """Draw the state: answers, cursor, number of open questions, message and footer."""
         for index, question in enumerate(self.query(FormQuestion)):
             question.show(entry.given[index], at=index == entry.at)
         button = self.query_one(Button)
@@ -197,6 +206,7 @@ class FormScreen(TranslatedScreen[FormReply]):
 
 
 def _message(entry: FormEntry, all_answered: bool, words: Words) -> str:
+    """The line below the form: the first missing answer, or changed answers to be checked, or that it is complete."""
     if entry.open:
         left, field = len(entry.open) - 1, entry.form.fields[entry.open[0]]
         asked = _quote(field.label, words) if field.limits is None else limits_words(field.limits, words)
@@ -212,5 +222,6 @@ def _message(entry: FormEntry, all_answered: bool, words: Words) -> str:
 
 
 def _quote(label: str, words: Words) -> str:
+    """The text in quotation marks, cut to `LONGEST_QUOTE` characters."""
     short = label if len(label) <= LONGEST_QUOTE else f"{label[: LONGEST_QUOTE - 1].rstrip()}…"
     return words.fill("quoted", {"text": short})

@@ -1,4 +1,4 @@
-"""The end of a sitting, finished or not."""
+"""Last screen of a sitting: how it ended, and how many answers are saved."""
 
 from typing import ClassVar
 
@@ -16,7 +16,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class GoodbyeScreen(TranslatedScreen[None]):
-    """Thanks the participant, says how the sitting ended and how many answers are saved; Enter closes it."""
+    """Shows that the session is finished, that the sitting stopped and can be resumed, or that the person does not take
+    part; and the number of saved answers. Enter closes the screen."""
 
     PAGE = "help_goodbye"
     DEFAULT_CSS = "GoodbyeScreen { align: center middle; }"
@@ -50,4 +51,5 @@ class GoodbyeScreen(TranslatedScreen[None]):
 
 
 def _stops(reason: str, words: Words) -> str:
+    """Sentence on a sitting that stopped before the session was finished, with the reason if there is one."""
     return words.fill("end_stops_because", {"reason": words.fact(reason)}) if reason else words["end_stops"]

@@ -1,4 +1,4 @@
-"""Before a trial: the handle is moved to its place."""
+"""Screen before a trial: it shows where the handle is, and where the participant must move it."""
 
 from typing import ClassVar
 
@@ -16,8 +16,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class HandleScreen(TranslatedScreen[Unanswered | None]):
-    """Where the handle is and where it belongs; p pauses, q leaves. The application closes it when the handle is
-    there."""
+    """Draws the position of the handle and its target. p pauses, q leaves; the application closes the screen when the
+    handle is in its place."""
 
     PAGE = "help_handle"
     DEFAULT_CSS = """
@@ -45,9 +45,10 @@ class HandleScreen(TranslatedScreen[Unanswered | None]):
         self.update_view(self._view)
 
     def update_view(self, view: HandleView) -> None:
-        """Draw the handle's present position. Also before the first frame."""
+        """Draw a new position of the handle. May be called before the first frame; the position is then drawn with
+        it."""
         self._view = view
-        if self.query(HandleTarget):  # not yet, where it comes before the first frame
+        if self.query(HandleTarget):  # False before the first frame
             self.query_one(HandleTarget).view = view
             self.query_one("#sentence", LiteralText).update(self.words.fact(view.sentence))
 

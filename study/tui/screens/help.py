@@ -1,4 +1,4 @@
-"""Help for the screen below it."""
+"""Help on any screen, as a dialog above it. The text comes from that screen's attribute `HELP`."""
 
 from typing import ClassVar
 
@@ -14,7 +14,8 @@ from study.tui.translated_screen import TranslatedScreen
 
 
 class HelpScreen(TranslatedScreen[None], ModalScreen[None]):
-    """Shows a page of help (Markdown); Esc, F1, q or ? returns to the screen below."""
+    """Shows a help text in Markdown; Esc, F1, q or ? returns to the screen below. words: language of title and
+    footer."""
 
     CSS = """
     HelpScreen { align: center middle; }
@@ -30,7 +31,7 @@ class HelpScreen(TranslatedScreen[None], ModalScreen[None]):
         self._text = text
 
     def compose(self) -> ComposeResult:
-        from textual.widgets import Markdown  # takes its time, and the first frame needs none
+        from textual.widgets import Markdown  # a slow import, which the first frame does not need
 
         with VerticalScroll() as box:
             box.border_title = self.words["help_title"]

@@ -1,4 +1,7 @@
-"""The start screen: a new session, and past sessions. Shown before the list is loaded."""
+"""The start screen: a form to begin a new session, and the list of past sessions.
+
+It appears before the engine has read the list of sessions, which is filled in later (`HomeScreen.show`).
+"""
 
 from typing import ClassVar
 
@@ -19,7 +22,7 @@ from study.tui.widgets.new_session_form import NewSessionForm
 from study.tui.widgets.session_table import SessionTable
 
 LOOKING = "Looking for sessions…"
-"""Shown until the list of sessions is there."""
+"""Shown until the list of sessions is loaded."""
 
 EMPTY = """\
 No sessions here yet. To begin with:
@@ -55,7 +58,7 @@ GUIDE = """\
 ✕  withdrawn: the data were erased
 !  unreadable: Enter says why
 """
-"""Shown below the form where the terminal is wide."""
+"""Shown below the form if the terminal has at least 120 columns."""
 
 HELP = """\
 # The start
@@ -88,8 +91,9 @@ In a terminal: `hapteq study --subject P01`, `hapteq sessions`, `hapteq show SES
 
 
 class HomeScreen(Screen[None]):
-    """New-session form and list of past sessions. F2 and F3 go to form and list, F4 opens a file, F6 reads the list
-    anew, F7 calibrates the accelerometer, F8 diagnoses recordings. Actions are posted as messages."""
+    """Form of a new session, and list of past sessions. F2 and F3 move to form and list, F4 opens a file, F6 reads the
+    list again, F7 calibrates the accelerometer, F8 diagnoses recordings. Requests are posted as messages of
+    `study.tui.home_messages`. home: content; None if it is not loaded yet."""
 
     HELP = HELP
     CSS = """
@@ -143,12 +147,13 @@ class HomeScreen(Screen[None]):
             self._show(self._home)
 
     def show(self, home: HomeView) -> None:
-        """Show a view; what was typed and chosen is kept."""
+        """Show new content; the user's entries in the form are kept. May be called before the first frame."""
         self._home = home
         if self.query("#name"):
             self._show(home)
 
     def _show(self, home: HomeView) -> None:
+        """Fill form and list, or show the hints for an empty list."""
         self.query_one("#name", Static).update(f"hapteq   force-direction studies   data: {home.data}")
         self.query_one(NewSessionForm).show(home)
         some = bool(home.sessions)
@@ -159,7 +164,7 @@ class HomeScreen(Screen[None]):
         self.query_one("#detail", Static).update("")
         self.query_one("#detail").display = some
         table.show(home.sessions)
-        if some and self.query_one("#empty").has_focus:  # F3 came before the list
+        if some and self.query_one("#empty").has_focus:  # F3 was pressed before the list was loaded
             table.focus()
 
     @on(SessionTable.Looked)
@@ -167,7 +172,7 @@ class HomeScreen(Screen[None]):
         self.query_one("#detail", Static).update(describe(looked.line))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """The footer names the key to the other half of the screen."""
+        """Show F2 or F3 in the footer only while the focus is in the other half of the screen."""
         here = {"new": "#new", "past": "#past"}.get(action)
         return here is None or not self.query_one(here).has_focus_within
 

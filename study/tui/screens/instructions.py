@@ -1,4 +1,4 @@
-"""Instructions to the participant before the first trial."""
+"""Screen of the instructions that a participant reads before the first trial of a sitting."""
 
 from typing import ClassVar
 
@@ -19,8 +19,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class InstructionsScreen(TranslatedScreen[None]):
-    """Instructions before the first trial: how to hold the handle, the two directions, how to answer, the plan of the
-    sitting. Enter begins."""
+    """Shows how to hold the handle, the two directions, how to answer, and the plan of the sitting; with a device that
+    does not move, that the answers are only practice. Enter begins."""
 
     PAGE = "help_instructions"
     DEFAULT_CSS = """

@@ -1,4 +1,7 @@
-"""A pause: nothing is played until the participant decides how to continue. Notes are taken here."""
+"""Screen of a pause: no stimulus is played until the participant decides to continue, to leave or to withdraw.
+
+A note or an adverse event can be written into the log from here.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -25,13 +28,13 @@ CHOICES = {
     AfterPause.LEAVE: "pause_leave",
     AfterPause.WITHDRAW: "pause_withdraw",
 }
-"""Text of each decision, by its key in the words."""
+"""Key of the text of each decision in `Words`, in the order of the list."""
 
 
 class PauseScreen(TranslatedScreen[AfterPause]):
-    """Why there is a pause and how many answers are saved. The arrow keys and Enter choose: go on, leave, or withdraw;
-    n and e write a note and an adverse event. leaving: the participant asked to leave, so that choice is
-    highlighted."""
+    """Shows the reason of the pause and the number of saved answers. Arrow keys and Enter choose a decision, which is
+    returned; n writes a note, e an adverse event. leaving: the participant asked to leave, so that this choice is
+    highlighted at first."""
 
     PAGE = "help_pause"
     DEFAULT_CSS = """
@@ -49,7 +52,7 @@ class PauseScreen(TranslatedScreen[AfterPause]):
 
     @dataclass
     class NoteWritten(Message):
-        """A note for the log."""
+        """A note or an adverse event to be written into the log."""
 
         note: NoteAsked
 
@@ -87,12 +90,14 @@ class PauseScreen(TranslatedScreen[AfterPause]):
         self.app.push_screen(NoteScreen(adverse, words=self.words), self._take_note)
 
     def _withdraw(self, confirmed: bool | None) -> None:
+        """Return the decision to withdraw if it was confirmed; otherwise stay in the pause."""
         if confirmed:
             dismiss_screen(self, AfterPause.WITHDRAW)
         else:
             self.query_one("#message", LiteralText).update(self.words["nothing_erased"])
 
     def _take_note(self, note: NoteAsked | None) -> None:
+        """Post a written note; None if the dialog was cancelled."""
         if note is None:
             self.query_one("#message", LiteralText).update(self.words["nothing_written"])
             return

@@ -1,4 +1,4 @@
-"""While a stimulus of fixed length plays, without a question."""
+"""Screen while a stimulus of fixed duration plays without a question: an interval, a demonstration, or a probe."""
 
 from typing import ClassVar
 
@@ -17,8 +17,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class PlayingScreen(TranslatedScreen[Unanswered | None]):
-    """Which interval plays, or that a probe does; p pauses, q leaves. The application closes it when the time is
-    over."""
+    """Highlights the direction or interval that plays, or names the probe. p pauses, q leaves; the application closes
+    the screen at the end of the stimulus."""
 
     PAGE = "help_playing"
     DEFAULT_CSS = """
@@ -39,14 +39,14 @@ class PlayingScreen(TranslatedScreen[Unanswered | None]):
     def compose(self) -> ComposeResult:
         notice, words = self._notice, self.words
         yield LiteralText(words.fact(notice.title), id="title")
-        if notice.title and not notice.number:  # a probe: nothing will be asked about it
+        if notice.title and not notice.number:  # a probe, after which no question is asked
             yield LiteralText(words["playing_no_key"], id="message")
             yield Footer(show_command_palette=False)
             return
         with Horizontal(id="answers"):
             for number in (1, 2):
                 panel = DirectionPanel(number, notice.picture, words)
-                # Between two intervals there is nothing to feel, and no title.
+                # The gap between two intervals has no title, and nothing is highlighted.
                 panel.mark = "now" if notice.title and number == notice.number else ""
                 yield panel
         yield LiteralText(words["playing_only_feel" if notice.title else "playing_gap"], id="message")

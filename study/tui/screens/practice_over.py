@@ -1,4 +1,4 @@
-"""Result of a short practice."""
+"""Screen after a short practice run: number of correct answers, and whether the criterion of the practice was met."""
 
 from typing import ClassVar
 
@@ -15,7 +15,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class PracticeOverScreen(TranslatedScreen[None]):
-    """How many answers of a practice were right, and whether that is enough; Enter continues."""
+    """Shows how many of the last answers were right, and whether that is enough; Enter closes it. Returns nothing."""
 
     PAGE = "help_practice"
     DEFAULT_CSS = "PracticeOverScreen { align: center middle; }"

@@ -1,4 +1,7 @@
-"""An enforced rest: the remaining time, and what is left to do."""
+"""Screen of an enforced rest between runs: the remaining time, the number of runs left and the progress of the session.
+
+The rest cannot be shortened: Enter has no effect before its end.
+"""
 
 import math
 import time
@@ -17,7 +20,7 @@ from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 TICK_S = 0.2
-"""Interval at which the remaining time is drawn (s)."""
+"""Interval (s) at which the remaining time is redrawn."""
 
 
 class RestScreen(TranslatedScreen[float]):

@@ -1,4 +1,8 @@
-"""The trial: two directions, two keys. Nothing on it depends on level, frequency or correctness."""
+"""Screen of a trial: a two-alternative forced choice between two directions, or two intervals, by the keys 1 and 2.
+
+Nothing on it depends on level or frequency. Whether an answer was right is shown only where the protocol gives
+feedback.
+"""
 
 import time
 from dataclasses import dataclass
@@ -24,24 +28,26 @@ from study.tui.widgets.literal_text import LiteralText
 from study.tui.widgets.session_bar import SessionBar
 
 ASKED = {Task.DIRECTION: "asked_direction", Task.INTERVAL: "asked_interval"}
-"""Key of the question's text, by the task."""
+"""Key of the question's text, by task."""
 REPLIES = {"pause": PAUSE, "leave": LEAVING, "repeat": REPEAT}
-"""Replies by the name in the binding."""
+"""Replies other than an answer, by the argument of their key binding."""
 AFTER = {
     PAUSE: "pause_let_go",
     LEAVING: "pause_let_go",
     TIME_OVER: "time_over",
 }
-"""Key of the text that is shown after a reply; after REPEAT the number of repeats left is shown."""
+"""Key of the text shown after a reply. REPEAT has none: its text states the number of repeats left."""
 WANTED_FOR_S = 3.0
-"""A pause asked for between two trials begins with the next one within this time."""
+"""A request to pause or leave made between two questions is kept for this time (s): the next question, if it comes
+within it, is answered with the request at once."""
 NUM_LOCK = {"end", "down", "kp_begin"}
-"""Keys that a number pad's 1 and 2 send while Num Lock is off."""
+"""Names of the keys that a numeric keypad sends while Num Lock is off, in place of digits."""
 
 
 class TrialScreen(TranslatedScreen[None]):
-    """The question, both answers, and how far the session is. 1 and 2 (and further answer keys) answer, p pauses, r
-    asks for the trial again, q leaves. One per sitting: armed for each question, inactive in between."""
+    """Shows the question, both answers, and the progress of the session. 1 and 2 (and further answer keys) answer, p
+    pauses, r asks for the trial again, q leaves. The same screen serves a whole sitting: it is armed for each question
+    and takes no reply in between."""
 
     PAGE = "help_trial"
     DEFAULT_CSS = """
@@ -62,7 +68,7 @@ class TrialScreen(TranslatedScreen[None]):
 
     @dataclass
     class Replied(Message):
-        """The reply of the participant. Posted once for each arming."""
+        """The participant's reply. Posted at most once for each call of `arm`."""
 
         reply: Reply
 
@@ -78,7 +84,7 @@ class TrialScreen(TranslatedScreen[None]):
         self._trouble = ""
         self._trouble_is_old = False
         self._verdict: bool | None = None
-        """Whether the last answer was right, where that is told."""
+        """Whether the last answer was right; None without feedback."""
         self._wanted: tuple[Unanswered, float] | None = None
 
     def compose(self) -> ComposeResult:
@@ -95,12 +101,12 @@ class TrialScreen(TranslatedScreen[None]):
         self._show()
 
     def arm(self, question: Question) -> None:
-        """Accept one reply from now on."""
+        """Show a question and accept one reply to it. Starts its time limit (s), where it has one."""
         self._drop_limit()
         if self._question is not None and run_key(question) != run_key(self._question):
-            self._verdict = None  # of practice: nothing is told about the answers that come now
+            self._verdict = None  # another kind of run begins, which may give no feedback
         self._question, self._repeats_left, self._taken = question, question.repeats_left, 0
-        # Its own trial ends a moment after the answer: it could not be read if it went with it.
+        # Feedback is repeated with the next question: the trial that it belongs to ends too soon to read it.
         last, self._verdict = self._verdict, None
         if self._trouble_is_old:
             self.show_trouble("")
@@ -114,26 +120,26 @@ class TrialScreen(TranslatedScreen[None]):
         self._wanted = None
 
     def disarm(self) -> None:
-        """Accept no reply any more."""
+        """Accept no further reply until `arm` is called again."""
         self._armed_s = None
         self._drop_limit()
         if not self._taken:
             self._show_message(self.words["wait"])
 
     def show_saved(self) -> None:
-        """Show that the answer is on the disk."""
+        """Show that the answer was written to the log on disk."""
         if self._taken:
             self._show_mark("saved")
             saved = f"{self.words.fill('answer_saved', {'answer': self._taken})} {self.words['wait']}"
             self._show_message(self._verdict_sentence() or saved)
 
     def show_feedback(self, correct: bool) -> None:
-        """Shown now, and with the next question."""
+        """Show whether the answer was right, now and again with the next question."""
         self._verdict = correct
         self._show_message(self._verdict_sentence())
 
     def show_trouble(self, sentence: str) -> None:
-        """Shown until the next trial is over, so that there is time to read it."""
+        """Show a problem below the answers. It stays during the next trial, so that there is time to read it."""
         self._trouble = sentence
         self._trouble_is_old = False
         if self._composed:
@@ -164,9 +170,11 @@ class TrialScreen(TranslatedScreen[None]):
             self._show_message(self.words["pause_comes"])
 
     def action_heard(self, answer: int) -> None:
-        """Gives the footer its entry; the answers are handled in `on_key`."""
+        """Does nothing: the binding only gives the footer its entry. Answers are handled in `on_key`."""
 
     def _take(self, answer: int, at_s: float) -> None:
+        """Post an answer (1 or 2), unless the key is held down or arrived before the question. at_s: arrival of the key
+        (s, monotonic clock)."""
         armed_s = self._armed_s
         is_press = self._presses.is_press(answer, at_s, float("inf") if armed_s is None else armed_s)
         if armed_s is None or at_s < armed_s:
@@ -197,6 +205,7 @@ class TrialScreen(TranslatedScreen[None]):
             self._limit = None
 
     def _refuse(self, event: Key) -> None:
+        """Say why a key that is no reply has no effect; keys without a character are ignored."""
         if event.key in NUM_LOCK:
             self._show_message(self.words["num_lock"])
         elif event.is_printable or event.key == "enter":
@@ -208,7 +217,7 @@ class TrialScreen(TranslatedScreen[None]):
         return "" if self._verdict is None else self.words["right" if self._verdict else "wrong"]
 
     def _show(self, last: str = "") -> None:
-        """Redraw everything: only the feedback of the last trial remains visible."""
+        """Redraw the screen for the current question. last: feedback on the previous answer, put before the message."""
         if not self._composed:
             return
         self.query_one("#trouble", LiteralText).update(self._trouble)
@@ -226,7 +235,7 @@ class TrialScreen(TranslatedScreen[None]):
 
     @property
     def _composed(self) -> bool:
-        """Whether it has been drawn; it may be armed before its first frame."""
+        """Whether the widgets exist; the screen may be armed before its first frame."""
         return bool(self.query("#message"))
 
     def _show_mark(self, mark: Mark) -> None:

@@ -1,4 +1,9 @@
-"""Layout of the experimenter's view: two columns in a narrow terminal, three in a wide one."""
+"""Style sheet of the experimenter's view: two columns in a narrow terminal, three in a wide terminal.
+
+The classes `-narrow` and `-wide` depend on the width of the terminal. The key for details sets the class `details`,
+which shows the third column, in a narrow terminal in place of the other two; in a wide terminal, where it is shown
+already, `details` hides it.
+"""
 
 STYLE = """
 WatchScreen #standing, WatchScreen #guide { height: 1; padding: 0 1; }
@@ -24,4 +29,4 @@ WatchScreen.-wide #right { width: 34; }
 WatchScreen.-wide #trials { height: 14; }
 WatchScreen.-wide.details #aside { display: none; }
 """
-"""Layout and colours of the experimenter's view, in Textual's CSS."""
+"""Layout and colours, in Textual's CSS. Widths and heights are in character cells."""

@@ -1,4 +1,7 @@
-"""Confirmation of a withdrawal by typing the code: a single key does not erase a participant."""
+"""Confirmation of a participant's withdrawal: the code must be typed, so that no single key erases data.
+
+Only asks: the data are erased by the caller, if the prompt returns True.
+"""
 
 from typing import ClassVar
 
@@ -27,8 +30,8 @@ In a terminal: `hapteq withdraw SESSION`.
 
 
 class WithdrawPrompt(ModalScreen[bool]):
-    """Asks for the participant's code before all sessions of it are erased: Enter judges what was typed, Esc keeps
-    everything. Returns True if it was the code."""
+    """Asks for the participant's code before all sessions with that code are erased: Enter compares the text with the
+    code, Esc keeps everything. Returns True if the code was typed, False after Esc."""
 
     HELP = HELP
     CSS = """
@@ -41,7 +44,7 @@ class WithdrawPrompt(ModalScreen[bool]):
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Keep everything", key_display="Esc"),
-        Binding("f1", "help", "Help"),  # the application's own keys do not reach through a modal screen
+        Binding("f1", "help", "Help"),  # a modal screen does not receive the application's own bindings
     ]
 
     def __init__(self, subject: str) -> None:

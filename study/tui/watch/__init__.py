@@ -1,6 +1,6 @@
-"""The experimenter's view of a running session, as a screen and as lines.
+"""The experimenter's view of a running session, as a screen and as lines of text. It only reads the session.
 
-`watch_source` (the port) -> `watch_words` -> `watch_screen` with `watch_panels` and `level_history`, shown by
-`watch_app` (a second terminal) or `watch_in_app` (the application itself); `watch_lines` for `--plain`. Begin at
-`watch_screen.py`.
+Views pass from `watch_source` (port that provides them) -> `watch_words` (texts) -> `watch_panels`, `level_history`
+(panels, staircase) -> `watch_screen`, which is opened by `watch_app` (in a second terminal) or `watch_in_app` (in the
+application itself). `watch_lines` prints the same texts as lines (`hapteq watch --plain`). Begin at `watch_screen.py`.
 """

@@ -1,4 +1,7 @@
-"""The staircase of one run while it grows: level over trials on a logarithmic scale, in braille dots."""
+"""Plot of the staircase of the current run: level (N, logarithmic) over trials, drawn in braille dots.
+
+For the experimenter's view only: levels and correctness must not be shown to the participant.
+"""
 
 import itertools
 import math
@@ -12,25 +15,25 @@ from study.tui.drawing.braille import Canvas
 from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG
 
 LEAST_RANGE = 4.0
-"""Smallest ratio of the cap to the lowest drawn level: small movements must not look large."""
+"""Smallest ratio of the cap to the lowest level of the axis, so that small steps do not look large."""
 DOTS_PER_TRIAL = 4.0
-"""Upper limit; many trials are drawn closer together."""
+"""Largest horizontal distance of two trials, in braille dots; with many trials it is smaller."""
 
 MUTED = "$foreground 65%"
 """Style of labels and legend."""
 NEXT = "?"
 """Mark of the next level."""
 LEGEND = f"{RIGHT} right {WRONG} wrong {PEAK}{VALLEY} reversal {NEXT}next ┄cap"
-"""Meaning of the marks, in one line."""
+"""Meaning of the marks, on a single line."""
 
 _STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error", NEXT: "bold"}
 """Style of each mark."""
 _FIRST = {WRONG: 1, RIGHT: 0, PEAK: 2, VALLEY: 2, NEXT: 3}
-"""Where several marks share a cell, the highest is shown."""
+"""Priority of the marks: where several fall into the same cell, that with the highest number is drawn."""
 
 
 class LevelHistory(Widget):
-    """Draws a staircase in all the room that it gets: level over trials, answers and reversals as marks, the next
+    """Draws a staircase in the whole area of the widget: level over trials, answers and reversals as marks, the next
     level, the cap as a dashed line."""
 
     def __init__(self, *, id: str | None = None) -> None:
@@ -40,8 +43,8 @@ class LevelHistory(Widget):
         self._cap_n = 1.0
 
     def show(self, points: tuple[StaircasePoint, ...], next_n: float | None, cap_n: float) -> None:
-        """next_n: level of the next trial (N), None where it is not known; cap_n: the cap (N). Drawn anew only where
-        something changed."""
+        """Show a staircase; redraws only if something changed. next_n: level of the next trial (N), None where it is
+        not known; cap_n: largest level (N)."""
         if (points, next_n, cap_n) != (self._points, self._next_n, self._cap_n):
             self._points, self._next_n, self._cap_n = points, next_n, cap_n
             self.refresh()
@@ -56,7 +59,8 @@ class LevelHistory(Widget):
 def level_history(
     points: Sequence[StaircasePoint], next_n: float | None, cap_n: float, size: tuple[int, int]
 ) -> Content:
-    """The staircase with its marks, levels and legend as lines. size: columns and rows, labels and legend included."""
+    """The staircase with marks, labels of levels (N) and legend, as text. size: columns and rows in character cells,
+    labels and legend included."""
     columns, rows = size[0] - LABEL_COLUMNS, size[1] - 1
     levels = [point.level_n for point in points] + ([next_n] if next_n is not None else [])
     lowest_n = min([cap_n / LEAST_RANGE, *(0.85 * level for level in levels)])
@@ -64,6 +68,7 @@ def level_history(
     pitch = min(DOTS_PER_TRIAL, (canvas.width - 2) / max(1, len(levels) - 1))
 
     def dot(place: int, level_n: float) -> tuple[float, float]:
+        """Position of a level in dots: the cap is at the top, the lowest level at the bottom."""
         share = math.log(cap_n / level_n) / math.log(cap_n / lowest_n)
         return place * pitch, 1 + share * (canvas.height - 3)
 
@@ -85,7 +90,7 @@ def level_history(
 
 
 def _point_mark(point: StaircasePoint) -> str:
-    """A reversal after a right answer is a peak, after a wrong one a valley."""
+    """Mark of a trial. A reversal after a right answer is a peak of the staircase, after a wrong answer a valley."""
     if point.reversal:
         return PEAK if point.correct else VALLEY
     return RIGHT if point.correct else WRONG

@@ -1,4 +1,7 @@
-"""`hapteq watch` as an application of its own: one screen, in a second terminal."""
+"""Application of `hapteq watch`: the experimenter's view of a running session in a second terminal.
+
+The view itself is `watch_screen.WatchScreen`; this application adds themes, key handling and its end.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,8 @@ from study.tui.watch.watch_source import WatchSource
 
 
 class WatchApp(App[None]):
-    """The experimenter's view in a terminal of its own. F9 changes the colours; the other keys are the screen's."""
+    """Shows the experimenter's view until it is left. The key t changes the theme; all other keys belong to the
+    screen."""
 
     TITLE = "hapteq watch"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("t", "next_theme", "Theme", show=False)]
@@ -32,7 +36,8 @@ class WatchApp(App[None]):
         theme: str = DARK.name,
         clock_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        """ask: hands a request to the session; raises StudyError where it cannot. clock_s: time of alarms, seconds."""
+        """source: provides the views. ask: passes a request on to the session; raises StudyError where that fails.
+        theme: name of the first theme. clock_s: monotonic time (s), for the repetition of alarms."""
         super().__init__()
         self._source = source
         self._ask = ask

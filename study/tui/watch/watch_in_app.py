@@ -1,4 +1,7 @@
-"""The experimenter's view inside the application. A separate process feeds it, so that no session is delayed."""
+"""Opens and closes the experimenter's view inside the application that runs or lists sessions.
+
+A separate process (`WatchFeed`) reads the log for the view, so that reading never delays a running session.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,8 @@ if TYPE_CHECKING:
 
 
 class Watching:
-    """One view at a time."""
+    """Opens and closes the experimenter's view of a session; at most one view is open at a time. ask: passes a request
+    on to the session."""
 
     def __init__(self, app: App[Any]) -> None:
         self._app = app
@@ -26,8 +30,8 @@ class Watching:
         self._starting = False
 
     def open_here(self, path: str, ask: Callable[[Request], object]) -> None:
-        """Open on the participant's own screen: confirmed by the session's name, and logged before it opens. The
-        same key closes it."""
+        """Open the view on the participant's own screen, after confirmation by the session's name; a note in the log
+        says so before the view opens. If the view is already on top, close it."""
         if self._screen is not None and self._app.screen is self._screen:
             self.close()
             return
@@ -40,13 +44,14 @@ class Watching:
         confirm_view(self._app, Path(path).name, go_on)
 
     def confirm(self, path: str, ask: Callable[[Request], object]) -> None:
-        """Open the view of a session at another screen, after confirmation."""
+        """Open the view of a session that runs elsewhere, after confirmation by its name; nothing is logged."""
         from study.tui.screens.confirm_view import confirm_view
 
         confirm_view(self._app, Path(path).name, lambda: self.open(path, ask))
 
     def open(self, path: str, ask: Callable[[Request], object]) -> None:
-        """Returns at once: the feed is started in a thread, because starting a process takes time."""
+        """Open the view without confirmation, unless it is open or being opened. Returns at once: the process is
+        started in a thread, because that takes time. A failure is shown as a notification."""
         if self._starting or (self._screen is not None and self._screen in self._app.screen_stack):
             return
         self._starting = True
@@ -64,14 +69,14 @@ class Watching:
         threading.Thread(target=start, name="watch-start", daemon=True).start()
 
     def close(self) -> None:
-        """Leave the view; the session continues."""
+        """Close the view and end the process that reads for it; the session continues."""
         screen, self._screen = self._screen, None
         while screen is not None and screen in self._app.screen_stack:
             self._app.pop_screen()
         self.end()
 
     def end(self) -> None:
-        """End the reading process in a thread, because waiting would block the drawing."""
+        """End the process that reads for the view, in a thread, because waiting for it would block the screen."""
         feed, self._feed = self._feed, None
         if feed is not None:
             threading.Thread(target=feed.close, name="watch-end", daemon=True).start()

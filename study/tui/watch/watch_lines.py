@@ -51,7 +51,8 @@ def changes(before: WatchView | None, now: WatchView) -> list[str]:
 
 
 def status(view: WatchView) -> list[str]:
-    """The whole view, a labelled line for each of its parts: of the last trials and notes, three each."""
+    """The whole view: a labelled line for each of its parts, with the three latest trials and the three latest
+    notes."""
     lines = [
         f"{SYMBOLS[view.standing]} {view.standing.upper()} {view.session}: {describe_activity(view)}",
         f"Protocol   {view.protocol}; {view.answers} answers",

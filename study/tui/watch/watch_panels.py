@@ -1,4 +1,7 @@
-"""Panels of the experimenter's view as text: runs, last trials, exposure and device, details."""
+"""Panels of the experimenter's view as styled text: status, alarms, runs, last trials, exposure and device, details.
+
+Pure functions from a `WatchView` to text; numbers of runs and trials, which count from 0 in a view, are shown from 1.
+"""
 
 from collections.abc import Sequence
 
@@ -28,7 +31,7 @@ Piece = Content | str | tuple[str, str]
 """A part of a line: text, text with its style, or content."""
 
 MUTED = "$foreground 65%"
-"""Style of what is less important."""
+"""Style of headers, labels and less important text."""
 _STANDING_STYLES = {
     "running": "bold $text-success",
     "paused": "bold $text-warning",
@@ -39,13 +42,13 @@ _STANDING_STYLES = {
     "refused": MUTED,
     "excluded": MUTED,
 }
-"""Style of each standing."""
+"""Style of each status of a session."""
 _RUN_SYMBOLS: dict[RunStatus, str] = {"done": "✓", "present": "▶", "to come": " "}
-"""A character for the state of a run."""
+"""Symbol of the state of a run, a single character."""
 _VERDICT_STYLES = {"right": "$text-success", "wrong": "$text-error", "LAPSE": "bold $text-error"}
 """Style of a trial's result."""
 BAR_CELLS = 6
-"""Characters of a bar."""
+"""Length of a bar in character cells."""
 
 
 def describe_standing(view: WatchView) -> Content:
@@ -67,14 +70,16 @@ def alarm_lines(unseen: Sequence[Alarm], seen: Sequence[Alarm]) -> Content:
 
 
 def runs_lines(view: WatchView, rows: int) -> Content:
-    """Lines on as many runs as there are rows, the current run among them."""
+    """Table of the runs: frequency (Hz), reversals and number of trials. It shows as many runs as fit into `rows` lines
+    with the header, the current run among them."""
     lines = [Content.styled("  run            Hz  rev.  n", MUTED)]
     lines += [_run_line(view, run) for run in _around_the_present(view.runs, rows - 1)]
     return Content("\n").join(lines)
 
 
 def trials_lines(view: WatchView, rows: int, columns: int) -> Content:
-    """A table of the latest trials; the open one without its direction."""
+    """Table of the latest trials, newest first: level (N), direction and answer, response time (s), acceleration (m/s²)
+    along the direction and across it. The open trial is listed without its direction. rows, columns: room, in cells."""
     header = "trial     N shown said           s m/s²  off"
     lines = [Content.styled(f"{header}  remark" if columns > len(header) + 10 else header, MUTED)]
     trial = view.open_trial
@@ -89,7 +94,8 @@ def trials_lines(view: WatchView, rows: int, columns: int) -> Content:
 
 
 def gauges(view: WatchView) -> Content:
-    """Time and dose as bars with numbers; catch trials, handle, sensor and device in words."""
+    """Elapsed time (min) and vibration dose A(8) (m/s²) as bars with numbers; catch trials, handle, sensor, device and
+    drift in words."""
     exposure = view.exposure
     rows: list[tuple[str, Content]] = [
         ("Time", _bar(exposure.time_share, time_words(exposure))),
@@ -106,7 +112,7 @@ def gauges(view: WatchView) -> Content:
 
 
 def details(view: WatchView) -> Content:
-    """Participant, forms, practice, drift and notes as text."""
+    """Participant, device, forms, practice, drift and notes as text, in sections."""
     who = f"simulated '{view.observer}'" if view.observer else "a person"
     answers = "1 answer" if view.answers == 1 else f"{view.answers} answers"
     parts: list[Piece] = [
@@ -134,6 +140,8 @@ def _outcome_words(passed: bool) -> str:
 
 
 def _around_the_present(runs: tuple[WatchedRun, ...], rows: int) -> tuple[WatchedRun, ...]:
+    """At most `rows` consecutive runs, with the current run near their middle; the last runs where there is no current
+    run."""
     present = next((place for place, run in enumerate(runs) if run.status == "present"), len(runs) - 1)
     first = max(0, min(present - rows // 2, len(runs) - rows))
     return runs[first : first + max(1, rows)]
@@ -146,6 +154,8 @@ def _run_line(view: WatchView, run: WatchedRun) -> Content:
 
 
 def _trial_line(trial: ClosedTrial, columns: int) -> Content:
+    """A row of the table of trials. The remark is shortened to the room that is left; with less than 8 columns a "!"
+    stands for it. A "+" after the number marks each repetition, up to two."""
     word = verdict(trial)
     number = f"{trial.trial + 1}{'+' * min(trial.attempt, 2)}"
     left = f"{number:>5} {trial.level_n:5.3g} {_or_dash(trial.shown, 5)} {_or_dash(trial.answer, 4)} "
@@ -172,6 +182,7 @@ def _number(value: float | None, width: int) -> str:
 
 
 def _bar(share: float, words: str) -> Content:
+    """A bar for a share of a limit, with words: in the style of a warning from 0.8, of an error from 1."""
     filled = round(min(1.0, share) * BAR_CELLS)
     style = "bold $text-error" if share >= 1 else "bold $text-warning" if share >= 0.8 else ""
     return Content.assemble(("█" * filled, style), ("░" * (BAR_CELLS - filled), MUTED), (f" {words}", style))

@@ -1,4 +1,7 @@
-"""The port that provides views to the experimenter's screen."""
+"""Port between the experimenter's screen and the source of its views of a running session.
+
+The screen depends on this protocol alone, so that tests can give it views without a session.
+"""
 
 from typing import Protocol
 
@@ -6,13 +9,14 @@ from study.session.watching.watch_view import WatchView
 
 
 class WatchSource(Protocol):
-    """Source of views; implemented by `study.tui.engine.watch_feed.WatchFeed`."""
+    """Source of views of a session; implemented by `study.tui.engine.watch_feed.WatchFeed`."""
 
     def latest(self) -> WatchView | None:
-        """The latest view, without blocking: called ten times a second by the event loop."""
+        """The latest view, None before the first. Must not block: the screen's event loop calls it ten times a
+        second."""
         ...
 
     @property
     def problem(self) -> str:
-        """Why no views come any more, a sentence; empty otherwise."""
+        """Sentence that says why no further views come; empty while they come."""
         ...

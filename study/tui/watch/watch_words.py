@@ -1,4 +1,7 @@
-"""Texts of the experimenter's view, shared by the screen and `hapteq watch --plain`."""
+"""Texts of the experimenter's view, shared by its screen (`watch_panels`) and `hapteq watch --plain` (`watch_lines`).
+
+Each function turns a value of a `WatchView` into words or a number with its unit.
+"""
 
 from study.local_clock import machine_zone
 from study.session.views.local_time import local_parts
@@ -14,23 +17,24 @@ SYMBOLS: dict[Standing, str] = {
     "refused": "○",
     "excluded": "○",
 }
-"""A character for each standing."""
+"""Symbol of each status of a session, a single character."""
 
 
 NOT_MEASURED_MARK = "n.m."
-"""In a table, in place of an acceleration that was not measured."""
+"""Stands in a table for an acceleration that was not measured."""
 NOT_MEASURED = "answered too early to measure; counts"
 """Legend of the mark, short enough for a terminal of 80 columns."""
 
 
 def clock_time(utc: str) -> str:
-    """Local time without the date: "14:05:10 +01:00"; empty if there is no time."""
+    """Local time of a UTC time stamp, without the date: "14:05:10 +01:00"; without an offset, the first part as
+    `local_parts` gives it."""
     date, time, offset = local_parts(utc, machine_zone)
     return f"{time} {offset}" if offset else date
 
 
 def duration(seconds: float) -> str:
-    """A time in words, rounded down: "4 s", "2 min 05 s", "1 h 02 min"."""
+    """A duration in words, rounded down: "4 s", "2 min 05 s", "1 h 02 min"."""
     whole = int(seconds)
     if whole < 60:
         return f"{whole} s"
@@ -41,7 +45,8 @@ def duration(seconds: float) -> str:
 
 
 def describe_activity(view: WatchView) -> str:
-    """What happens now, in words: "trial 12 of test run 2, 35 Hz: waiting for the answer, 4 s"."""
+    """What happens now, in words, such as "trial 12 at 0.5 N: waiting for the answer, 4 s"; the reason, where the
+    session does not run."""
     if view.reason:
         return view.reason
     trial, run = view.open_trial, view.present_run
@@ -60,12 +65,12 @@ def run_name(view: WatchView, run: WatchedRun) -> str:
 
 
 def reversals(run: WatchedRun) -> str:
-    """Reversals of a run so far, of those that end it."""
+    """Number of reversals so far and number that ends the run, such as "3/8"; a dash for a run without reversals."""
     return f"{run.reversals}/{run.reversals_needed}" if run.reversals_needed else "–"
 
 
 def staircase_title(view: WatchView) -> str:
-    """Title of the drawn staircase: run, frequency, reversals, next level."""
+    """Title of the drawn staircase: run, frequency (Hz), reversals, next level (N)."""
     shown = next((run for run in view.runs if run.run == view.shown_run), None)
     if shown is None:
         return "Staircase: nothing answered yet"
@@ -75,7 +80,8 @@ def staircase_title(view: WatchView) -> str:
 
 
 def verdict(trial: ClosedTrial) -> str:
-    """How a trial ended: right, wrong, void, or not known yet; a catch trial answered wrongly is a lapse."""
+    """Result of a trial: right, wrong, void, or "…" while it is not known; a catch trial answered wrongly is a
+    lapse."""
     if trial.status == "spoiled":
         return "void"
     if trial.correct is None:
@@ -91,23 +97,23 @@ def not_measured(trial: ClosedTrial) -> bool:
 
 
 def time_words(exposure: Exposure) -> str:
-    """Elapsed time of its limit."""
+    """Elapsed time of the sitting and its limit (min)."""
     return f"{exposure.elapsed_min:.0f} of {exposure.limit_min:g} min"
 
 
 def dose_words(exposure: Exposure) -> str:
-    """Vibration dose A(8) of its limit."""
+    """Vibration dose A(8) and its limit (m/s²)."""
     return f"{exposure.dose_a8_mps2:.2f} of {exposure.dose_limit_mps2:g} m/s²"
 
 
 def catch_words(view: WatchView) -> str:
-    """Lapses among the catch trials given."""
+    """Number of lapses, and of catch trials given."""
     lapses = f"{view.catch_lapses} {'lapse' if view.catch_lapses == 1 else 'lapses'}"
     return f"{lapses} in {view.catch_given}" if view.catch_given else "none so far"
 
 
 def handle_words(view: WatchView) -> str:
-    """Distance of the handle from its place."""
+    """Distance of the handle from its place (mm), and the distance within which a trial may start."""
     live = view.live
     if live is None or live.offset_mm is None:
         return "not read now"
@@ -118,7 +124,7 @@ def handle_words(view: WatchView) -> str:
 
 
 def sensor_words(view: WatchView) -> str:
-    """Reading of the accelerometer."""
+    """Reading of the accelerometer (m/s²), and whether it clips."""
     live = view.live
     if live is None or live.acceleration_mps2 is None:
         return "not read now"
@@ -127,7 +133,7 @@ def sensor_words(view: WatchView) -> str:
 
 
 def device_words(view: WatchView) -> str:
-    """Fault and late ticks of the device."""
+    """Fault of the device, or the number of ticks that its loop missed."""
     if view.live is None:
         return "not read now"
     if view.live.fault:

@@ -1,6 +1,6 @@
-"""Parts of screens: each turns values into cells, without rules.
+"""Widgets from which the screens are composed: each draws values and reports input, and decides nothing about a study.
 
-Of a trial: `session_bar`, `direction_panel`, `handle_target`. Of forms: `form_question` with `choice_row`,
-`new_session_form`. Of past sessions: `session_table`, `staircase_plot`. Of any screen: `card`, `long_text`,
-`text_table`, `literal_text`. Begin at `direction_panel.py`.
+For a trial: `session_bar`, `direction_panel`, `handle_target`. For forms: `form_question` with `choice_row`. For the
+start screen: `new_session_form`, `session_table`. For a past session: `staircase_plot`. For any screen: `card`,
+`long_text`, `text_table`, `literal_text`. Begin at `direction_panel.py`.
 """

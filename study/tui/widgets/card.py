@@ -1,10 +1,11 @@
-"""Frames for text: a card for a little, a sheet that scrolls for more. Limited to a readable width."""
+"""Containers for text with lines of a readable width: a framed card for short text, a scrolling sheet for long
+text."""
 
 from textual.containers import Vertical, VerticalScroll
 
 
 class Card(Vertical):
-    """Centred by the screen's alignment."""
+    """A framed box with a title, as high as its content. The screen's alignment places it."""
 
     DEFAULT_CSS = """
     Card {
@@ -21,7 +22,7 @@ class Card(Vertical):
 
 
 class Sheet(VerticalScroll):
-    """Text that scrolls, for more than a screenful."""
+    """A column that scrolls, for text that is longer than the screen."""
 
     DEFAULT_CSS = """
     Sheet {

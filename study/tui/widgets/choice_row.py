@@ -1,4 +1,4 @@
-"""Exactly one of a few choices, side by side if they fit, otherwise listed vertically."""
+"""Selection of a single choice among a few (radio buttons), side by side if they fit, otherwise listed vertically."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -14,7 +14,7 @@ from textual.widget import Widget
 from study.session.views.form_entry import find_choice, move_mark
 
 GAP = 3
-"""Characters between two choices in a row."""
+"""Character cells between two choices that are side by side."""
 
 
 class ChoiceRow(Widget, can_focus=True):
@@ -36,26 +36,29 @@ class ChoiceRow(Widget, can_focus=True):
     ]
 
     cursor: reactive[int | None] = reactive[int | None](None)
+    """Index of the choice under the cursor, from 0; None: no choice."""
     chosen: reactive[int | None] = reactive[int | None](None)
+    """Index of the selected choice, from 0; None: no choice."""
     at: reactive[bool] = reactive(False)
-    """Whether the cursor of a form is here, whose screen has the keyboard."""
+    """Whether the cursor of a form is on this row: then the row shows its cursor although the form's screen has the
+    focus."""
 
     @dataclass
     class Chosen(Message):
-        """A choice was made, be it the same one again."""
+        """A choice was made; also posted when the same choice is made again."""
 
         row: "ChoiceRow"
 
     @dataclass
     class Left(Message):
-        """Enter was pressed on a choice."""
+        """Enter was pressed with a choice selected: the next question follows."""
 
         row: "ChoiceRow"
 
     def __init__(self, choices: tuple[str, ...], chosen: int | None = None, id: str | None = None) -> None:
         super().__init__(id=id)
         self._choices = choices
-        # Where the choices are numbers themselves, a digit means the choice of that name.
+        # Choices are numbered unless one of them is itself a number: then a digit selects the choice of that name.
         self._numbered = not any(choice.isdigit() for choice in choices)
         self.set_reactive(ChoiceRow.chosen, chosen)
         self.set_reactive(ChoiceRow.cursor, chosen)
@@ -78,7 +81,7 @@ class ChoiceRow(Widget, can_focus=True):
             self._choose(index)
 
     def choice_at(self, x: int, y: int) -> int | None:
-        """The choice drawn in a cell; None between them."""
+        """Index of the choice drawn in the cell at column x and row y; None between choices."""
         for index, (left, row) in enumerate(self._places(self.size.width)):
             if row == y and left <= x < left + len(self._label(index)):
                 return index
@@ -126,14 +129,15 @@ class ChoiceRow(Widget, can_focus=True):
         return f" {number}{'●' if index == self.chosen else '○'} {self._choices[index]} "
 
     def _places(self, width: int) -> list[tuple[int, int]]:
-        """Column and row of each choice."""
+        """Column and row of each choice at this width, in cells."""
         lengths = [len(self._label(index)) for index in range(len(self._choices))]
         if sum(lengths) + GAP * (len(lengths) - 1) > width:
             return [(0, index) for index in range(len(lengths))]
         return [(sum(lengths[:index]) + GAP * index, 0) for index in range(len(lengths))]
 
     def _move_within(self, step: int) -> bool:
-        """Up and Down move through vertically listed choices, and beyond their ends to the next question."""
+        """Move the cursor through vertically listed choices. Returns False beyond their ends and for choices side by
+        side: then the key is left to the form, which goes to another question."""
         there = move_mark(self.cursor, step, len(self._choices), stay=False) if self.stacked else None
         if there is None:
             return False

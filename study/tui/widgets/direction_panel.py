@@ -1,4 +1,7 @@
-"""One of the two answers: its number, its direction as a large segment, and in words."""
+"""Panel of one of the two answers of a trial: its number, its direction as a thick line, and its description in words.
+
+Number, words and the heavier frame carry the same information as the colour, so that colour is not needed.
+"""
 
 import textwrap
 from typing import Literal
@@ -18,15 +21,17 @@ from study.tui.drawing.number_picture import large_number
 NUMBERS = {1: ("╺┓ ", " ┃ ", "╺┻╸"), 2: ("┏━┓", "┏━┛", "┗━╸")}
 """Large digits, three lines each."""
 BESIDE = 5
-"""Columns left of the drawing for the number; the same number stays free on the right."""
+"""Columns kept free for the number, left of the drawing, and as many on its right."""
 
 Mark = Literal["", "taken", "saved", "now", "felt"]
-"""What happened to this answer: it was taken, is on the disk, is played now, or was felt."""
+"""State of this answer: "" (none), taken (accepted), saved (on disk), now (being played), felt (in the
+demonstration)."""
 
 
 class DirectionPanel(Widget):
-    """Draws a large digit, the direction as a thick line in its colour, and its words. picture None: an interval, which
-    has no direction. The mark is a word in the frame, and a heavier frame."""
+    """Draws a large digit, the direction as a thick line in its colour, and its description. picture: None for an
+    interval, which has no direction; then only the number is drawn. mark: shown as a word in the frame; taken, saved
+    and now also by a heavier frame."""
 
     DEFAULT_CSS = """
     DirectionPanel {
@@ -73,7 +78,7 @@ class DirectionPanel(Widget):
         return Strip([Segment(text.ljust(width)[:width], coloured)], width)
 
     def _make_drawing(self) -> tuple[tuple[str, ...], int]:
-        """The rows, and the number of free columns to their left."""
+        """Rows of the drawing, and the number of free columns to their left."""
         room = _room(Size(self.size.width, self.size.height - len(self._lines())))
         if self.picture is None:
             drawing = large_number(self.number, room.width, room.height)
@@ -82,7 +87,8 @@ class DirectionPanel(Widget):
         return drawing, (self.size.width - room.width) // 2
 
     def _lines(self) -> list[str]:
-        """The words in as many lines as they need, for a cut word may be the one that tells the directions apart."""
+        """The description, wrapped into as many lines as it needs: it is never cut, because the missing word could be
+        the one in which the two directions differ."""
         return textwrap.wrap(self._direction_text(), max(1, self.size.width), break_on_hyphens=False) or [""]
 
     def _direction_text(self) -> str:
@@ -92,6 +98,7 @@ class DirectionPanel(Widget):
 
 
 def _room(size: Size) -> Size:
-    """A visually square area within it: cells are twice as high as wide."""
+    """Largest area within `size`, less the columns of the numbers, that looks square: cells are taken as twice as high
+    as wide."""
     rows = max(1, min(size.height, (size.width - 2 * BESIDE) // 2))
     return Size(2 * rows, rows)

@@ -1,4 +1,4 @@
-"""One field of a form: the question and its answer. Display only: the form's screen has the focus."""
+"""Widget of one field of a form: the question and its answer. Display only: the form's screen handles the keys."""
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -14,7 +14,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class FormQuestion(Vertical):
-    """The numbered question, and below it its choices or what was written."""
+    """The numbered question, and below it the choices or the text entered so far."""
 
     DEFAULT_CSS = """
     FormQuestion {
@@ -45,9 +45,10 @@ class FormQuestion(Vertical):
         return bool(self.field.choices) and self.query_one(ChoiceRow).stacked
 
     def show(self, given: FieldEntry, at: bool) -> None:
-        """at: the cursor of the form is here."""
+        """Show the state of the answer. at: whether the cursor of the form is on this question, which is then scrolled
+        into view."""
         if at and not self.has_class("-at"):
-            # The question itself must be seen too, not only where it is answered.
+            # Scrolls to the whole widget: the question must be visible, not only its answer.
             self.scroll_visible(animate=False)
         self.set_class(at, "-at")
         if self.field.choices:
@@ -58,6 +59,7 @@ class FormQuestion(Vertical):
             self.query_one(".written", Static).update(self._answer_text(given, at))
 
     def _answer_text(self, given: FieldEntry, at: bool) -> Text:
+        """The entered text, or a hint (with the range of a number) while nothing is entered; `at` shows the cursor."""
         if not given.answer:
             hint = self._texts["form_type" if self.field.needed else "form_type_or_not"]
             if self.field.limits is not None:

@@ -1,4 +1,8 @@
-"""Position of the handle, and the circle in which a trial may start."""
+"""Widget that shows the position of the handle relative to the circle within which a trial may start.
+
+The circle is drawn with 40 % of the available radius, so that a handle outside it is shown at its place up to almost
+2.5 times the radius.
+"""
 
 import math
 
@@ -13,14 +17,15 @@ from study.tui.drawing.braille import Canvas
 
 
 class HandleTarget(Widget):
-    """Draws the circle in which a trial may start, a cross in its centre, and the handle as a disc. Right and up as in
-    the picture. A handle far away is drawn at the edge."""
+    """Draws the circle within which a trial may start, a cross in its centre, and the handle as a disc. Right and up
+    are those of the picture of the directions. A handle that is too far away is drawn at the edge, in its direction."""
 
     DEFAULT_CSS = """
     HandleTarget { height: 1fr; min-height: 5; }
     """
 
     view: reactive[HandleView | None] = reactive[HandleView | None](None)
+    """Position of the handle; None: nothing is drawn."""
 
     def render_line(self, y: int) -> Strip:
         width, height = self.size
@@ -36,6 +41,7 @@ BOLD = Style(bold=True)
 
 
 def _draw_target(view: HandleView, columns: int, rows: int) -> list[str]:
+    """The drawing as lines of braille characters. columns, rows: size in cells."""
     canvas = Canvas(columns, rows)
     x, y = canvas.middle
     edge = min(x, y)

@@ -1,4 +1,4 @@
-"""Many lines of text to scroll: only visible ones are drawn, and long ones wrap between words."""
+"""Scrolling view of many lines of text: only visible lines are drawn, and long lines are wrapped between words."""
 
 import re
 import textwrap
@@ -9,7 +9,8 @@ from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 _LEAD = re.compile(r".{1,16}?\s{2,}")
-"""A time or name before the text: continuation lines are aligned with the text."""
+"""A time or name at the start of a line, followed by two spaces or more: continuation lines are indented by its
+length."""
 
 
 class LongText(ScrollView, can_focus=True):
@@ -39,6 +40,7 @@ class LongText(ScrollView, can_focus=True):
         return Strip([Segment(text, self.rich_style)]).adjust_cell_length(width, self.rich_style)
 
     def _break(self, width: int) -> None:
+        """Wrap all lines to `width` cells, unless they are wrapped to it already."""
         if width <= 0 or width == self._width:
             return
         self._width = width
@@ -48,6 +50,7 @@ class LongText(ScrollView, can_focus=True):
 
 
 def _parts(line: str, width: int) -> list[str]:
+    """A line wrapped to `width` characters, continuation lines indented; not indented by half the width or more."""
     if len(line) <= width:
         return [line]
     lead = _LEAD.match(line)

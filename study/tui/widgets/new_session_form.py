@@ -1,4 +1,8 @@
-"""The form that begins a session: participant, protocol, device. Problems are shown while typing."""
+"""Form of the start screen that begins a session: participant, protocol, device, and a model where one is needed.
+
+Problems are shown while typing. They are found from the list of sessions on the screen; the program that begins a
+session checks again.
+"""
 
 from typing import ClassVar
 
@@ -13,14 +17,14 @@ from study.session.views.participant_codes import code_problem, is_code, next_co
 from study.tui.home_messages import BeginWanted
 
 SIMULATED = "simulated"
-"""Device beside whose name the list says that nothing moves."""
+"""Name of the simulated device; the list of devices adds that nothing moves."""
 NOTHING_YET = [("…", "")]
-"""Before the choices are known; cannot be selected."""
+"""Entry of a list whose choices are not known yet; the list is disabled."""
 
 
 class NewSessionForm(Vertical):
-    """Fields of a new session: participant, protocol, device, and a model where the protocol needs one. F5 or the
-    button posts the request to begin, once all are valid; a line below says what is not."""
+    """Fields of a new session. F5 or the button posts `BeginWanted` if all fields are valid; otherwise a line below
+    names the problem, and the field of the code or of the protocol gets the focus."""
 
     DEFAULT_CSS = """
     NewSessionForm { height: auto; border: round $primary; padding: 0 1; }
@@ -58,7 +62,7 @@ class NewSessionForm(Vertical):
         yield Button("Begin (F5)", variant="primary", compact=True, id="begin", disabled=True)
 
     def show(self, home: HomeView) -> None:
-        """Show the choices; earlier selections are kept if still available."""
+        """Show the choices of `home`; earlier selections are kept where they are still available."""
         self._home = home
         self._set_options("#protocol", [(_protocol_prompt(p.name, p.locked), p.name) for p in home.protocols])
         self._set_options("#device", [(_device_prompt(name), name) for name in home.devices])
@@ -120,11 +124,12 @@ class NewSessionForm(Vertical):
         return self.query_one("#code", Input).value.strip()
 
     def _find_standing_problem(self, code: str) -> str:
-        """What the list already says against a code; the program that begins a session checks again."""
+        """Problem of a code that the list of sessions shows: its participant withdrew. Empty if there is none."""
         return next((f"{code} withdrew: this code is not given again." for line in self._sessions(code)
                      if line.standing == "withdrawn"), "")  # fmt: skip
 
     def _notice(self, code: str) -> str:
+        """Remark on a valid code that is in use: an unfinished session of this protocol, or other sessions."""
         lines, protocol = self._sessions(code), self._read_selected("#protocol")
         for line in lines:
             if line.standing == "unfinished" and line.protocol == _name(protocol, self._home):
@@ -176,5 +181,6 @@ def _file_name(path: str) -> str:
 
 
 def _name(protocol: str, home: HomeView | None) -> str:
-    """A file is usually named after its protocol; otherwise the notice is not shown."""
+    """Name of a protocol that is given by name or path. Assumes that a file is named after its protocol; for other
+    files the notice about an unfinished session is not shown."""
     return protocol.replace("\\", "/").rpartition("/")[2].removesuffix(".toml")

@@ -1,4 +1,7 @@
-"""Past sessions, latest first: one row each, with actions as keys."""
+"""Table of the sessions of a data folder, a row for each, with keys to open, resume or watch a session.
+
+Long lists are added in parts, and columns are dropped in narrow terminals.
+"""
 
 from collections.abc import Mapping
 from textwrap import wrap
@@ -26,20 +29,20 @@ _NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = (
     "Protocol",
 )
 _FIXED = {_STANDING: 12, _RUNS: 5, _ANSWERS: 7}
-"""Widths in cells, so that little has to be measured in a long list. The protocol gets the remaining width, and
-wraps."""
+"""Fixed column widths in cells: measuring every entry of a long list would take time. The protocol gets the remaining
+width, and is wrapped."""
 _LEAST_PROTOCOL, _PADDING = 10, 2
-"""Characters: least width of the protocol's column, and padding of a cell."""
+"""Least width of the protocol's column, and padding of a cell, in character cells."""
 
 AT_ONCE = 60
-"""Rows added at once: more than any terminal shows."""
+"""Number of rows that are added at once; more than a terminal usually shows."""
 _BREATH_S = 0.01
-"""Pause between two batches of rows (s), in which keys are handled."""
+"""Pause (s) between two batches of rows, in which keys are handled."""
 
 
 class SessionTable(DataTable[Content | str]):
-    """Rows of past sessions: Enter opens one, r resumes, w watches. Rows are created in parts: the table draws only
-    visible ones."""
+    """Rows of sessions in the order given: Enter opens a session, r resumes an unfinished one, w watches a running one.
+    Each key posts a message."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("enter", "select_cursor", "Open"),
@@ -62,7 +65,7 @@ class SessionTable(DataTable[Content | str]):
         self._fitted_to = 0
 
     def show(self, lines: tuple[SessionLine, ...]) -> None:
-        """Show the sessions; the cursor stays on its session if that is still listed."""
+        """Replace the sessions; the cursor stays on its session if that is still listed."""
         chosen = self._chosen
         self._lines = lines
         offset, self._begun = local_column([line.begun_utc for line in lines], machine_zone)
@@ -78,8 +81,8 @@ class SessionTable(DataTable[Content | str]):
             self.show(self._lines)
 
     def _fit_columns(self, begun: str) -> dict[str, int]:
-        """Column widths by title. Answers, then runs, are dropped in favour of the protocol: the sentence below the
-        list contains them."""
+        """Column widths (cells) by title. Where the protocol has too little room, the column of answers, then that of
+        runs, is left out: the sentence below the list states both. begun: title of the column of times."""
         self._fitted_to = self.size.width
         names, protocols = ([getattr(line, which) for line in self._lines] for which in ("name", "protocol"))
         widths = {_NAME: max(map(len, (_NAME, *names))), _STANDING: _FIXED[_STANDING]}
@@ -91,18 +94,19 @@ class SessionTable(DataTable[Content | str]):
         return widths | {_PROTOCOL: min(wanted, max(_LEAST_PROTOCOL, self._room(widths)))}
 
     def _room(self, widths: Mapping[str, int]) -> int:
-        """Width left for the protocol beside the other columns and the scroll bar."""
+        """Width (cells) that the given columns and the scroll bar leave for the protocol."""
         bar = self.styles.scrollbar_size_vertical if len(self._lines) >= self.size.height else 0
         return self.size.width - bar - sum(widths.values()) - _PADDING * (len(widths) + 1)
 
     def _add_more(self, lines: tuple[SessionLine, ...], chosen: str) -> None:
-        """Add a long list in parts, so that keys are handled in between."""
+        """Add the next rows, and the remaining ones after a pause, so that keys are handled in between. chosen: name of
+        the session to put the cursor on; empty for none."""
         if lines is not self._lines:
-            return  # a newer list came meanwhile
+            return  # the list was replaced since this call was scheduled
         have = self.row_count
         part = lines[have : have + AT_ONCE]
         for place, line in enumerate(part, start=have):
-            protocol = wrap(line.protocol, self._widths[_PROTOCOL])  # the table itself would cut it
+            protocol = wrap(line.protocol, self._widths[_PROTOCOL])  # the table would cut it instead of wrapping it
             self.add_row(*self._row(line, self._begun[place], "\n".join(protocol)), height=max(1, len(protocol)))
             if line.name == chosen:
                 self.move_cursor(row=place)

@@ -1,4 +1,7 @@
-"""One staircase: its title, its picture in the available space, and the run in a sentence."""
+"""Widget with the staircase of a run of a past session: title, plot, and a sentence that summarises the run.
+
+The staircase of a running session is drawn by `study.tui.watch.level_history`.
+"""
 
 import itertools
 
@@ -11,13 +14,13 @@ from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALL
 _STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error"}
 """Style of each mark."""
 MUTED = "$foreground 65%"
-"""Style of labels and of the sentence below."""
+"""Style of labels and of the summary."""
 _BESIDES = 2
-"""Lines for title and sentence."""
+"""Number of lines of title and summary, which the plot leaves free."""
 
 
 class StaircasePlot(Widget):
-    """Draws the title of a run, its staircase in the room that is left, and the run in a sentence."""
+    """Draws the title of a run, its staircase in the remaining height of the widget, and its summary."""
 
     DEFAULT_CSS = "StaircasePlot { height: 14; }"
 
@@ -38,7 +41,8 @@ class StaircasePlot(Widget):
 
 
 def _apply_styles(line: str) -> Content:
-    """Style runs of equal marks as one piece: fewer pieces are drawn faster."""
+    """A line of the plot with the styles of its marks. Neighbouring characters of equal style form one piece, because
+    fewer pieces are drawn faster."""
     parts: list[Content | str | tuple[str, str]] = [(line[:LABEL_COLUMNS], MUTED)]
     for style, characters in itertools.groupby(line[LABEL_COLUMNS:], key=_STYLES.get):
         text = "".join(characters)

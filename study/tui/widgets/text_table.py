@@ -1,4 +1,4 @@
-"""A read-only table: bold header, as wide as needed, to be placed in a scrollable container."""
+"""Read-only table as text: bold header, aligned columns, as wide as its content; the container must scroll."""
 
 from textual.content import Content
 from textual.widgets import Static
@@ -7,7 +7,7 @@ from study.tui.text_rows import Rows, align_rows
 
 
 class TextTable(Static):
-    """Rows with aligned columns, as text."""
+    """A table of text. rows: the first is the header; no rows give an empty line."""
 
     DEFAULT_CSS = "TextTable { width: auto; height: auto; }"
 

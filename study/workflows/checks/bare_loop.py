@@ -1,7 +1,8 @@
-"""A bare C loop, timed beside a device's loop: what this computer allows at best, under the same load.
+"""Reference for the timing of a device's loop: an empty real-time loop in C (`bare_loop.c`), run at the same time.
 
-Compiled anew each time, by the system's compiler or the one of the extra `compiler`; without a compiler or POSIX
-clocks, the report says that nothing was compared.
+It shows how many late ticks this computer causes at best under the same load. The program is compiled for each
+measurement, by the system's compiler or that of the extra `compiler`; without a compiler, and on Windows, the report
+says that nothing was compared.
 """
 
 import contextlib
@@ -18,44 +19,48 @@ from pathlib import Path
 from study.session.views.views import DeviceFinding
 
 SOURCE = Path(__file__).with_name("bare_loop.c")
-"""The loop, compiled when it is measured."""
+"""Source of the loop, compiled for each measurement."""
 COMPILERS = ("cc", "gcc", "clang")
-"""C compilers that are looked for, in this order."""
+"""C compilers that are searched for in the path, in this order."""
 PRIORITY = 40
-"""Real-time priority, as that of a device's loop."""
+"""Real-time priority (SCHED_FIFO) of the C loop, if one is requested; that of a device's loop."""
 
 WORSE_BY = 1.5
-"""Accepted ratio of the late ticks of the device's loop, which runs the safety layer, to those of a bare loop."""
+"""Accepted ratio of the late ticks of the device's loop, which has more work (safety layer), to those of the C loop.
+Heuristic."""
 CHANCE = 3.0
-"""Standard errors of the two counts, as of independent events, within which a difference counts as chance."""
+"""Number of standard errors within which a difference of the two counts is taken as chance, with late ticks as
+independent events (Poisson)."""
 
 COMPILING_S = 120.0
-"""Longest compilation of the C loop (s)."""
+"""Time limit of the compilation (s)."""
 OVERTIME_S = 30.0
-"""Longest delay of the C loop's end beyond its duration (s)."""
+"""Time (s) beyond the duration of the C loop after which it is taken to have failed."""
 NAME = "Bare C loop"
-"""Title of the finding."""
+"""Name of the finding."""
 ADVICE = (
     "The computer can do better than this loop did: close other programs, measure again, and report it if it stays."
 )
+"""Advice where the device's loop has too many late ticks."""
 
 
 @dataclass(frozen=True, slots=True)
 class BareLoop:
-    """Result of a timed loop in C, with which the device's loop is compared."""
+    """Timing of the C loop, with which the device's loop is compared."""
 
     ticks: int
     late_ticks: int
     """Ticks whose work ended after the next was due, missed ones included."""
     latest_s: float
+    """Largest delay of a tick's end after the time at which the tick was due (s)."""
     raised_priority: bool
-    """Whether it got the real-time priority that was requested."""
+    """Whether the system granted real-time priority."""
 
 
 @dataclass(slots=True)
 class BareRun:
-    """A bare loop that runs, or has run, beside the device's. result: None until the loop has ended; why: reason if
-    there is none."""
+    """A C loop that runs, or has run, at the same time as the device's loop. result: None until it has ended, or if it
+    failed; why: the reason, if it failed."""
 
     result: BareLoop | None = None
     why: str = ""
@@ -63,8 +68,11 @@ class BareRun:
 
 @contextlib.contextmanager
 def run_bare_loop_beside(seconds: float, rate_hz: float, raised_priority: bool) -> Iterator[BareRun]:
-    """Run a bare loop during the block or, where that is shorter, to its own end; the result is available after the
-    block."""
+    """Run the C loop while the block is executed; after the block its end is awaited, and the result is available.
+
+    seconds: its duration; rate_hz: its rate; raised_priority: whether real-time priority is requested. A missing
+    compiler or a failed start raises nothing: `BareRun.why` says so.
+    """
     run = BareRun()
     with tempfile.TemporaryDirectory() as folder:
         program = _compile(Path(folder), run)
@@ -87,6 +95,7 @@ def run_bare_loop_beside(seconds: float, rate_hz: float, raised_priority: bool) 
 
 
 def _read(process: "subprocess.Popen[bytes]", seconds: float, run: BareRun) -> None:
+    """Wait for the end of the C loop and read the four numbers that it prints."""
     try:
         output, _ = process.communicate(timeout=seconds + OVERTIME_S)
         ticks, late, latest_s, granted = output.split()
@@ -96,8 +105,8 @@ def _read(process: "subprocess.Popen[bytes]", seconds: float, run: BareRun) -> N
 
 
 def judge_beside(late_ticks: int, ticks: int, run: BareRun) -> DeviceFinding:
-    """Compare the late ticks of the device's loop with those of the bare loop. late_ticks: of the loop beside it,
-    missed ones included."""
+    """Compare the late ticks of the device's loop with those of the C loop. late_ticks, ticks: of the device's loop,
+    missed ticks included. Too many late ticks are a warning, not an obstacle."""
     if run.result is None:
         return DeviceFinding(NAME, f"not compared: {run.why}", fine=True)
     bare = run.result
@@ -112,12 +121,17 @@ def judge_beside(late_ticks: int, ticks: int, run: BareRun) -> DeviceFinding:
 
 
 def _most_late(expected: float) -> int:
-    """The largest count within CHANCE standard errors of `expected`, which is WORSE_BY times another count."""
+    """Largest count n that is compatible with `expected` = r k, where r = WORSE_BY and k is a count too.
+
+    n is the larger root of (n - r k)² = CHANCE² (n + r² k): the variance of a Poisson count is estimated by the count
+    itself, and that of r k by r² k = r expected.
+    """
     spread = math.sqrt((1.0 + WORSE_BY) * expected + CHANCE**2 / 4.0)
     return math.floor(expected + CHANCE**2 / 2.0 + CHANCE * spread)
 
 
 def _compile(folder: Path, run: BareRun) -> Path | None:
+    """Path of the compiled program; None, with the reason in `run.why`, if it could not be compiled."""
     compiler = _compiler()
     if sys.platform == "win32" or compiler is None:
         run.why = "no C compiler is here (pip install '.[compiler]')" if compiler is None else "not on Windows"
@@ -137,6 +151,7 @@ def _compile(folder: Path, run: BareRun) -> Path | None:
 
 
 def _compiler() -> list[str] | None:
+    """Command of a C compiler; the Python package `ziglang` contains one."""
     found = next((path for name in COMPILERS if (path := shutil.which(name))), None)
     if found is not None:
         return [found]

@@ -1,4 +1,8 @@
-"""Check whether a device is fit for a sitting: read it for half a second without commanding anything."""
+"""Check whether a device is fit for a sitting: kind, answers, position, accelerometer, sample rate and largest force.
+
+The device is read for half a second (`LOOKS` readings) without any command. Limits without a stated source are
+heuristic.
+"""
 
 import math
 
@@ -12,27 +16,29 @@ from study.session.stimulus.limits import forces_in_words
 from study.session.views.views import DeviceFinding, DeviceReport
 
 LOOKS = 50
-"""Readings taken."""
+"""Number of readings."""
 EVERY_S = 0.01
-"""Interval between them (s)."""
+"""Interval between two readings (s)."""
 
 ENOUGH = 0.9
-"""Fraction of the reads that must succeed: a busy computer is late now and then."""
+"""Fraction of the readings that must succeed; not all, because a busy computer is late now and then."""
 
 FAR_MM = 20.0
-"""Offset at which the centring spring of the shipped protocols pulls with a few newtons."""
+"""Largest accepted distance (mm) of the handle from its place: there the centring spring of the shipped protocols pulls
+with a few newtons."""
 
 NOISY_MPS2 = 1.0
-"""An accelerometer at rest has about 0.1 m/s² (its noise over 500 Hz); a trembling hand on the handle, up to 0.5."""
+"""Largest accepted acceleration at rest (m/s², rms over the three axes). The noise of an accelerometer over 500 Hz is
+about 0.1 m/s²; a trembling hand on the handle gives up to 0.5."""
 
 RATE_HZ = 1000.0
-"""Rate of the loop for which stimuli are made (Hz)."""
+"""Sample rate of the device's loop for which stimuli are made (Hz)."""
 
 MM_PER_M = 1000.0
 
 
 CENTRE_M = (0.0, 0.0, 0.0)
-"""Where the handle belongs without a place of its own (m)."""
+"""Place of the handle where none is given: the origin of the device's coordinates (m)."""
 
 
 def check_device(
@@ -43,10 +49,12 @@ def check_device(
     safety: SafetySettings | None = None,
     with_sensor: bool = True,
 ) -> DeviceReport:
-    """Findings of an idle device; takes `LOOKS` times `EVERY_S`. Commands no force and raises nothing.
+    """Findings about an idle device; takes `LOOKS` times `EVERY_S`. Commands no force; what is wrong is a finding, not
+    an exception.
 
-    place_m: where trials start. total_cap_n: the largest force that will be requested, if known; safety: its parts.
-    with_sensor: False where the device was opened without its accelerometer, of which nothing is said then.
+    place_m: where trials start. total_cap_n: the largest force that will be requested (N), if known. safety: limits of
+    the forces, to be stated. with_sensor: False if the device was opened without its accelerometer, which is then not
+    judged.
     """
     samples, info = [], device.info
     for _ in range(LOOKS):
@@ -74,6 +82,7 @@ def _answers(answered: int) -> DeviceFinding:
 
 
 def _handle(samples: list[Look], place_m: tuple[float, float, float]) -> DeviceFinding:
+    """Judge the distance of the mean position from the place; too few positions mean an uncalibrated device."""
     positions_m = [look.position_m for look in samples if look.position_m is not None]
     if len(positions_m) < ENOUGH * len(samples):
         advice = "Switch the device off and on, and calibrate it as its manual says."
@@ -103,7 +112,8 @@ def _no_accelerometer() -> DeviceFinding:
 
 
 def _noise(readings_mps2: FloatArray) -> DeviceFinding:
-    """readings_mps2 (n, 3)."""
+    """Judge the accelerometer by the standard deviation of readings at rest. readings_mps2: (n, 3). A channel that
+    never changes is not connected, because a working sensor has noise."""
     dead = [axis for axis, channel in zip("xyz", readings_mps2.T, strict=True) if np.ptp(channel) == 0.0]
     if dead:
         return _accelerometer_problem(

@@ -1,4 +1,8 @@
-"""Measure how well this computer keeps 1 kHz: hold a stimulus of zero force in real time and count late ticks."""
+"""Measure how well this computer keeps the rate of a device's loop (1 kHz): hold a stimulus of zero force in real time.
+
+Two measures: the ticks that the loop itself counts as late or missed, and the lateness of its readings or, where there
+is no telemetry, of this program's wake-ups. `study.session.stimulus.timing_verdict` holds the limits.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,15 +26,15 @@ from study.session.stimulus.timing_verdict import (
 from study.session.views.views import DeviceFinding
 
 LOOP_S = 0.1
-"""Length of the loop of zero forces that is held (s)."""
+"""Length of the period of zero forces that is repeated (s)."""
 FADE_S = 0.05
-"""Fades of the held stimulus (s)."""
+"""Duration of fade-in and fade-out of the held stimulus (s)."""
 SIGN_OF_LIFE_EVERY = 50
-"""Ticks between two signs of life to the safety layer."""
+"""Number of ticks between two signs of life to the safety layer."""
 
 SITTING_S = 1.0
-"""Duration of the check before a sitting: a thousand wake-ups at 1 kHz, of which the 99th percentile is the tenth
-latest."""
+"""Duration of the check before a sitting (s). At 1 kHz it has a thousand wake-ups, enough for a 99th percentile: about
+ten are later."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +43,9 @@ class Timing:
 
     seconds: float
     health: Health
-    """Lateness of the device's own loop."""
+    """Counts of the device's own loop: ticks, late and missed ticks, fault."""
     lateness: Lateness
+    """Lateness of the readings or wake-ups, see `check_timing`."""
     findings: tuple[DeviceFinding, ...]
 
 
@@ -51,10 +56,10 @@ def check_timing(
     on_progress: Callable[[float], None],
     load_per_processor: float | None = None,
 ) -> Timing:
-    """Hold zero force for this long, which the device's settings must allow. `on_progress(seconds)` now and then.
-    load_per_processor: measured before; None if unknown.
+    """Hold zero force for `seconds`, which the device's settings must allow, and judge the timing.
 
-    The force is zero only if the device was opened without a centring spring. Raises DeviceError for a lost device.
+    on_progress: called with the seconds done. load_per_processor: measured before; None if unknown. The force is zero
+    only if the device was opened without a centring spring. Raises DeviceError for a lost device.
     """
     rate_hz = device.info.sample_rate_hz
     zeros = Signal(np.zeros((round(LOOP_S * rate_hz), 3)), rate_hz, "force", "N", ("fx", "fy", "fz"))
@@ -70,14 +75,16 @@ def check_timing(
 def check_computer(
     clock: Clock, rate_hz: float, simulated: bool, load_per_processor: float | None
 ) -> tuple[DeviceFinding, ...]:
-    """Findings before a sitting: takes `SITTING_S`, commands nothing. load_per_processor: None if unknown."""
+    """Findings about the computer before a sitting: wake-ups at rate_hz, load, priority of the loop. Takes `SITTING_S`,
+    commands nothing. load_per_processor: None if unknown."""
     late_s = wake_at_every_tick(clock, rate_hz, SITTING_S, lambda done_s: True)
     lateness = judge_lateness(lateness_of(np.array(late_s), rate_hz), simulated)
     return (lateness, judge_load(load_per_processor), *(() if simulated else (loop_priority(),)))
 
 
 def wake_at_every_tick(clock: Clock, rate_hz: float, seconds: float, go_on: Callable[[float], bool]) -> list[float]:
-    """How late each wake-up was (s). `go_on(done_s)` is called now and then; stops early if it returns False."""
+    """Lateness of each wake-up (s), not negative. `go_on(done_s)` is called every `SIGN_OF_LIFE_EVERY` wake-ups; the
+    measurement stops if it returns False."""
     late_s: list[float] = []
     tick_s = 1.0 / rate_hz
     started_s = clock.now_s()
@@ -91,9 +98,12 @@ def wake_at_every_tick(clock: Clock, rate_hz: float, seconds: float, go_on: Call
 
 
 def _lateness_s(device: Device, clock: Clock, seconds: float, go_on: Callable[[float], bool]) -> FloatArray:
-    """Lateness of the readings of a real device's own loop by its telemetry's time stamps, after the earliest of them;
-    where there is no such loop, of this program's wake-ups. A reading after missed ticks is as late as the first of
-    them was due before it."""
+    """(n,), s: lateness of the readings of a real device's loop, from the time stamps of its telemetry; without
+    telemetry, and for a simulated device, of this program's wake-ups.
+
+    The lateness of tick k is its time stamp minus k / rate, relative to the smallest such difference. After missed
+    ticks it is counted from the time at which the first of them was due.
+    """
     rate_hz = device.info.sample_rate_hz
     if device.info.simulated or not device.telemetry:
         return np.array(wake_at_every_tick(clock, rate_hz, seconds, go_on))
@@ -106,13 +116,15 @@ def _lateness_s(device: Device, clock: Clock, seconds: float, go_on: Callable[[f
         missed.append(ticks.missed)
     found = np.concatenate(after_due_s or [np.zeros(0)])
     if not len(found):
-        return np.array([seconds])  # it never turned
+        return np.array([seconds])  # no tick was read: late by the whole time
     so_far: FloatArray = np.concatenate(missed)
     late_s: FloatArray = found - found.min() + np.diff(so_far, prepend=so_far[:1]) / rate_hz
     return late_s
 
 
 def _attend(device: Device, on_progress: Callable[[float], None], done_s: float) -> bool:
+    """Give a sign of life to the safety layer. Returns False after a fault of the device, which ends the
+    measurement."""
     device.keep_alive()
     on_progress(done_s)
     return device.fault() is Fault.NONE

@@ -1,6 +1,7 @@
-"""From recordings or a session, and a model, to a folder that names the physics that the model lacks.
+"""From recordings or a session, and a mechanical model, to a folder that names the physics that the model lacks.
 
-`fit_first_model`, `write_twin` (a model to compare with) -> `diagnosis_input`, `session_as_recordings` ->
-`diagnose_recordings` -> `write_diagnosis` -> `effect_file` (a discovered law as a user's own effect). Begin at
+Models to compare with: `fit_first_model`, `fit_without_model`, `write_twin` with `twin_calibration`. Data pass from
+`diagnosis_input` (`session_references`, `session_as_recordings`, `clean_recordings`) -> `diagnose_recordings` ->
+`write_diagnosis` and `diagnosed_summary` -> `effect_file` (a discovered law as an effect of the user). Begin at
 `diagnose_recordings.py`.
 """

@@ -1,4 +1,7 @@
-"""Reference recordings of the intact device, beside those to diagnose."""
+"""Reads clean recordings (`--clean`), made when the device was intact, as the reference for those to be diagnosed.
+
+Both must have the same channels, units and rate; the same recording cannot serve as both.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,19 +13,22 @@ from study.errors import StudyError
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error, read_input
 
 NOT_ALIKE = "Give clean recordings of the same device, with the same channels, units and rate, or leave --clean out."
+"""Advice where the two sets of recordings differ."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InputWithReference:
-    """Input of a diagnosis and its clean reference, reduced to the signals that both have."""
+    """Input of a diagnosis and its clean reference. Positions and conditions that only some recordings have are
+    removed."""
 
     found: DiagnosisInput
     clean: DiagnosisInput
 
 
 def with_clean(found: DiagnosisInput, sources: Sequence[Path], clean: Sequence[Path], seed: int) -> InputWithReference:
-    """Both inputs with matching channels, units and rate. sources: origin of `found`; clean: reference recordings,
-    or one session's folder. Raises StudyError."""
+    """Read the reference and reduce both inputs to their common signals. sources: files of `found`; clean: reference
+    recordings, or the folder of a session; seed: see `read_input`. Raises StudyError where a file is in both, or
+    channels, units or rates differ."""
     known = {source.resolve() for source in sources}
     if (both := next((path for path in clean if path.resolve() in known), None)) is not None:
         raise StudyError(

@@ -1,4 +1,4 @@
-"""A diagnosis started from the screen, which can be stopped there."""
+"""Diagnosis that is started from a screen of the application: it can be stopped, and finds an unused folder name."""
 
 from collections.abc import Callable
 from itertools import count
@@ -10,7 +10,8 @@ from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose
 
 
 def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], None]) -> Path:
-    """Run it and return the path of diagnosis.json. Raises StudyError; UserInterruptError if it was stopped."""
+    """Run a diagnosis and return the path of its diagnosis.json. on_progress: called with the step and the share done,
+    0 to 1. Raises StudyError; UserInterruptError if it was stopped. Nothing is written then."""
     try:
         return diagnose_recordings(plan, on_progress).out / DIAGNOSIS_NAME
     except KeyboardInterrupt as stopped:
@@ -23,7 +24,8 @@ def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], N
 
 
 def free_out(source: Path) -> Path:
-    """An unused folder name in a session's folder, or beside a recording."""
+    """Unused path for the result folder: `diagnosis` in the folder of a session, or NAME-diagnosis next to the
+    recording NAME.h5; numbered from 2 where it exists."""
     folder, name = (source, "diagnosis") if source.is_dir() else (source.parent, f"{source.stem}-diagnosis")
     numbered = (folder / (name if number == 1 else f"{name}-{number}") for number in count(1))
     return next(path for path in numbered if not path.exists())

@@ -1,4 +1,8 @@
-"""Diagnose recordings against a model: find the missing physics and write the result folder."""
+"""`hapteq diagnose`: find the physics that a mechanical model lacks from recordings, and write the result folder.
+
+Steps: read and check the input, take or fit the model to compare with, add the virtual spring of a session, run the
+diagnosis (`analysis.diagnosis.diagnose`), write document, improved model, figures and page.
+"""
 
 import tempfile
 from collections.abc import Callable, Sequence
@@ -38,39 +42,41 @@ if TYPE_CHECKING:
 
 
 READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
-"""Progress after reading, after fitting a model where none was given, and after the diagnosis."""
+"""Share of the progress (0 to 1) after reading, after fitting a model where none was given, and after the diagnosis."""
 
 TWIN_REMARK = (
     "No model was given. The session was compared with the simulated device's twin: a linear model, identified from "
     "recordings without a hand at the handle, as `hapteq twin` writes it."
 )
-"""Remark in the result of a session's diagnosis without a given model."""
+"""Remark in the result where a session on the simulated device was diagnosed without a given model."""
 
 
 @dataclass(frozen=True, slots=True)
 class DiagnosePlan:
-    """Order of a diagnosis: input files, output folder, and the options of `hapteq diagnose`."""
+    """Arguments of a diagnosis: input files, output folder, and the options of `hapteq diagnose`."""
 
     sources: tuple[Path, ...]
     """Recordings, or one session's folder."""
     out: Path
     """A new or empty folder."""
     model: Path | None = None
+    """Mechanical model to compare with; None: one is fitted, or identified from the simulated device."""
     without: tuple[str, ...] = ()
-    """Effects that are not considered."""
+    """Names of effects that are not considered."""
     clean: tuple[Path, ...] = ()
     """Reference recordings of the intact device, or one session's folder."""
     seed: int = 1
     """Seed of the draws: which trials of a session are used, and which are kept for the test."""
     compare: Compared = "auto"
+    """Error measure: forces, motion, or chosen by rule."""
     effect_files: tuple[Path, ...] = ()
     """Files of laws found elsewhere, as `hapteq effect` writes them."""
     seconds: float | None = None
-    """Processor time after which the search ends with its best result."""
+    """Processor time (s) after which the search ends with its best result; None: no limit."""
     discovery: bool = True
-    """Also search for laws outside the catalogue."""
+    """Whether laws outside the catalogue of effects are searched for too."""
     force_constants: tuple[float, ...] = ()
-    """Force constants: one for all commands or one per command, where these are not forces."""
+    """Force or torque per unit of a command (N or N m), where commands are not forces: for all, or for each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +89,7 @@ class DiagnosedRecordings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """A diagnosis that is not written yet."""
+    """Result of a diagnosis before it is written; see `find_answer` and `write_answer`."""
 
     findings: Findings
     plan: DiagnosePlan
@@ -106,12 +112,14 @@ class Engine(Protocol):
 
 
 def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> DiagnosedRecordings:
-    """Diagnose and write. `on_progress(step, share)`. If interrupted or refused (StudyError), nothing is written."""
+    """Run a diagnosis and write its folder. `on_progress(step, share)`, share 0 to 1. Raises StudyError for input that
+    cannot be diagnosed; then, and if interrupted, nothing is written."""
     return write_answer(find_answer(plan, on_progress, engine), on_progress)
 
 
 def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> Answer:
-    """First part of `diagnose_recordings`: the diagnosis, without writing. Figures and page take seconds more."""
+    """First part of `diagnose_recordings`: the diagnosis without writing, so that its answer can be shown before the
+    figures are drawn. Raises StudyError."""
     check_names(plan.without)
     require_new_folder(plan.out)
     on_progress("reading", 0.0)
@@ -149,7 +157,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
 
 
 def _add_clean(plan: DiagnosePlan, found: DiagnosisInput) -> tuple[DiagnosisInput, DiagnosisInput | None]:
-    """The recordings, and those of the device in order in the same form; None where the plan has none."""
+    """The recordings, and those of the intact device in the same form; None where the plan has none."""
     if not plan.clean:
         return found, None
     # Imported here: most diagnoses have no recordings of the intact device.
@@ -177,6 +185,7 @@ def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
 
 
 def _time_budget(plan: DiagnosePlan) -> TimeBudget:
+    """Whether processor time is left, counted from now; always True without a limit."""
     worked = processor_s()
     return lambda: plan.seconds is None or processor_s() - worked < plan.seconds
 
@@ -239,6 +248,8 @@ def _model(
     bounds: tuple[TimeBudget, Guard],
     on_progress: Progress,
 ) -> FirstModel:
+    """The model to compare with: the given one; for a session on the simulated device, its twin; with clean recordings,
+    a linear model of these; otherwise a model fitted to the recordings themselves."""
     within = _scale_progress(on_progress, READ, FITTED)
     if plan.model is not None:
         return FirstModel(read_given_model(plan.model, found), ())
@@ -255,6 +266,7 @@ def _model(
 
 
 def _twin(on_progress: Progress) -> MechanicalModel:
+    """The linear model of the simulated device, identified anew and not kept."""
     from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
 
     what = "identifying the simulated device's twin"
@@ -265,11 +277,13 @@ def _twin(on_progress: Progress) -> MechanicalModel:
 
 
 def _scale_progress(on_progress: Progress, begin: float, end: float) -> Callable[[str, float], None]:
+    """Progress of a step whose share 0 to 1 becomes begin to end of the whole."""
     return lambda what, share: on_progress(what, begin + (end - begin) * min(max(share, 0.0), 1.0))
 
 
 def with_spring(model: MechanicalModel, spring_n_per_m: float) -> MechanicalModel:
-    """The model with this stiffness added along every driven axis; a negative one is subtracted."""
+    """The model with the stiffness matrix K + k A A', where k = spring_n_per_m (negative: subtracted) and the columns
+    of A are the driven axes."""
     if spring_n_per_m == 0:
         return model
     axes = driven_axes(model)
@@ -277,7 +291,7 @@ def with_spring(model: MechanicalModel, spring_n_per_m: float) -> MechanicalMode
 
 
 def spring_remark(spring_n_per_m: float) -> tuple[str, ...]:
-    """Remark about the spring; empty if there is none."""
+    """Remark that a virtual spring was added to the model; empty for a stiffness of 0."""
     if spring_n_per_m == 0:
         return ()
     return (

@@ -1,4 +1,8 @@
-"""`hapteq model`: fit a first mechanical model to recordings and write it with tolerances."""
+"""`hapteq model`: fit a first mechanical model (mass, damping, stiffness, modes) to recordings and write it.
+
+The structure is given or chosen by `analysis.diagnosis.first_model.choose_structure`. The file also states why the
+structure was chosen and its error on held-out parts.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,19 +22,19 @@ from study.workflows.diagnosis.diagnosis_input import read_input
 from study.workflows.free_name import require_free
 
 TITLE = "The model was not made"
-"""Title of each error of this command."""
+"""Title of each error message of this command."""
 
 
 @dataclass(frozen=True, slots=True)
 class FirstModelPlan:
-    """Order of `fit_first_model`: recordings, model file to write, and a structure's name; "auto" chooses the
-    structure."""
+    """Arguments of `fit_first_model`: recordings, model file to write, and the name of a structure; "auto": the best is
+    chosen."""
 
     recordings: tuple[Path, ...]
     out: Path
     structure: str = "auto"
     force_constants: tuple[float, ...] = ()
-    """One for all commands or one per command, where these are not forces."""
+    """Force or torque per unit of a command (N or N m), where commands are not forces: for all, or for each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,10 +44,12 @@ class FirstModel:
     plan: FirstModelPlan
     choice: Choice
     remarks: tuple[str, ...]
+    """Sentences on the input, on the units and on the fit."""
 
 
 def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) -> FirstModel:
-    """Fit and write. `on_progress(share)`. Raises StudyError; nothing is written then."""
+    """Fit a model and write it. `on_progress(share)`, 0 to 1. Raises StudyError for a folder, for recordings with an
+    added weight, and where no structure fits; nothing is written then."""
     wanted = _parse_structure(plan.structure)
     require_free(plan.out, title=TITLE, kind="models")
     if folders := [path for path in plan.recordings if path.is_dir()]:
@@ -74,7 +80,8 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
 
 
 def first_model_lines(done: FirstModel) -> tuple[str, ...]:
-    """Lines for the terminal: the chosen structure and why, the parameters, the residual."""
+    """Lines for the terminal: the chosen structure and the reason, errors of the structures tried, parameters with 95 %
+    intervals, held-out error of each channel (%), and a sentence on the error that remains."""
     choice, fit = done.choice, done.choice.fit
     rows = [_row(each) for each in fit.parameters]
     errors = [
@@ -109,6 +116,7 @@ def first_model_summary(done: FirstModel) -> dict[str, Any]:
 
 
 def _row(estimate: ParameterEstimate) -> str:
+    """A parameter with its unit and, where it is known, its 95 % interval."""
     value = typeset(f"{estimate.value:.4g}")
     if estimate.half is None:
         return f"  {estimate.name}: {value} {estimate.unit}"

@@ -1,11 +1,12 @@
-"""The trials of a session as one recording for a diagnosis, concatenated by frequency and level.
+"""Joins the trials of a session to a single recording for a diagnosis, in the order of frequency and level.
 
-A trial's recording begins in the middle of a vibration, whereas a simulation starts from rest. So a lead is put before
-each trial: its own command repeated periodically and faded in, with unknown response.
+The recording of a trial begins in the middle of a vibration, whereas a simulation starts from rest. So a lead is put
+before each trial: its own command, repeated periodically and faded in, with an unknown response (NaN).
 
-The command is the excitation, which was decided beforehand. The virtual spring that held the handle goes into the
-model: a simulation driven by the spring's recorded force would drift. Positions are left out: they come from encoders
-in front of the cables, and the resting place of a handle with friction is random.
+The command is the excitation, which was computed beforehand. The virtual spring that held the handle becomes part of
+the model, because a simulation that is driven by the recorded force of the spring would drift. Positions are left out:
+the encoders are on the motors' side of the cables, and the position at which a handle with friction comes to rest is
+random.
 """
 
 import math
@@ -28,33 +29,39 @@ from study.store.sessions.trial_recordings import PROBE_PREFIX
 from study.workflows.results.fold_session import fold_session
 
 MOST_S = 60.0
-"""Largest total duration of the trials (s): more would cost time and add little information."""
+"""Largest total duration of the trials (s), approximately: more would cost time and add little information."""
 LEAD_S = 0.4
-"""Lead before each trial (s): a held handle settles in less."""
+"""Duration of the lead before each trial (s): a handle that is held by a hand settles in less."""
 REPEAT_S = 0.2
-"""Cycles are grouped into periods of this length (s) where they fit, so that more of the signal is compared."""
+"""Length of a period (s) in the joined recording, where it is a whole number of cycles, so that more of the signal is
+compared; otherwise a period is a cycle."""
 LEVEL_STEP_DB = 4.0
-"""Levels within this step are treated as one: a staircase has too many to compare individually."""
+"""Width (dB) of the classes of levels: a staircase has too many levels to compare individually."""
 TESTED_OF = 4
-"""One in this many trials of a frequency and level is kept for the test."""
+"""A trial in this many of the same frequency and class of levels is kept for the test."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionRecordings:
-    """Trials of a session, joined to a recording for the diagnosis."""
+    """Trials of a session, joined to a recording, and what the diagnosis must know about the session."""
 
     recording: Recording
     name: str
+    """Name of the session's folder."""
     parents: tuple[Path, ...]
+    """Log and recordings that were read."""
     remarks: tuple[str, ...]
+    """Sentences on which trials were used, left out and kept for the test."""
     simulated: bool
     """Whether the device was the simulated omega.3."""
     spring_n_per_m: float
-    """Stiffness of the virtual spring, which is not in the recording's command; 0 = none."""
+    """Stiffness of the virtual spring (N/m), whose force is not in the recording's command; 0: none, or not known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Trial:
+    """A usable trial, with frequency (Hz) and level (N) as its recording states them."""
+
     path: Path
     recording: Recording
     frequency_hz: float
@@ -62,8 +69,8 @@ class _Trial:
 
 
 def session_recordings(session: Path, seed: int) -> SessionRecordings:
-    """Read the session. seed: draws the trials if there are too many, and those kept for the test. Raises
-    StudyError."""
+    """Read the trials of a session. session: its folder. seed: of the draw of trials if there are too many, and of
+    those kept for the test. Raises StudyError where no trial is complete."""
     folder = find_session(str(session), session.absolute().parent)
     folded = fold_session(folder)
     opened = folded.state.opened
@@ -92,8 +99,8 @@ def session_recordings(session: Path, seed: int) -> SessionRecordings:
 
 
 def _trial(path: Path, logged: Mapping[str, str | None]) -> _Trial | None:
-    """The trial; None if samples are missing, something was wrong during playback, or the file is not the one
-    logged."""
+    """The trial; None if samples are missing, the recording carries flags of a problem, frequency, level or segments
+    are not stated, or the file differs from the log. logged: SHA-256 by name."""
     name = f"{path.parent.name}/{path.name}"
     if name in logged and sha256_of(path) != logged[name]:
         return None
@@ -108,7 +115,8 @@ def _trial(path: Path, logged: Mapping[str, str | None]) -> _Trial | None:
 
 
 def _draw_trials(trials: Sequence[_Trial], draw: np.random.Generator) -> list[_Trial]:
-    """Stratified random sample by frequency and level, at least one trial of each group."""
+    """Random sample of about `MOST_S`, stratified by frequency and class of levels: at least one trial of each
+    group."""
     seconds = sum(trial.recording.response.duration_s for trial in trials)
     share = min(1.0, MOST_S / seconds)
     taken: list[_Trial] = []
@@ -124,10 +132,12 @@ def _key(trial: _Trial) -> tuple[float, int]:
 
 
 def _rung(level_n: float) -> int:
+    """Class of a level, in steps of `LEVEL_STEP_DB` relative to 1 N."""
     return round(20 * math.log10(max(level_n, 1e-6)) / LEVEL_STEP_DB)
 
 
 def _concatenate_trials(trials: Sequence[_Trial], folder: SessionFolder, draw: np.random.Generator) -> Recording:
+    """The trials, each with its lead, as a recording with a segment for each trial. trials: sorted by `_key`."""
     first = trials[0].recording
     lead = round(LEAD_S * first.sample_rate_hz)
     parts: list[Mapping[str, FloatArray]] = []
@@ -161,12 +171,14 @@ def _excitation(recording: Recording) -> Signal:
 
 
 def _group_period(period: int, sample_rate_hz: float) -> int:
+    """Period in samples: `REPEAT_S` where it is a multiple of the trial's own period, otherwise that period."""
     longer = round(REPEAT_S * sample_rate_hz)
     return longer if period > 0 and longer % period == 0 else period
 
 
 def _with_lead(recording: Recording, lead: int) -> dict[str, FloatArray]:
-    """Both signals, (lead + n, channels): the command extended backwards, the response unknown (NaN) there."""
+    """Command and response, (lead + n, channels): before the trial the command is continued periodically and faded in
+    over the first half of the lead; the response there is NaN."""
     played, answered = _excitation(recording).samples, recording.response.samples
     period = recording.segments[0].period or len(recording)
     fade = np.minimum(1.0, np.arange(lead) / max(1, lead // 2))[:, None]
@@ -178,7 +190,8 @@ def _with_lead(recording: Recording, lead: int) -> dict[str, FloatArray]:
 
 
 def estimate_spring(recordings: Sequence[Recording]) -> float:
-    """Stiffness (N/m) by least squares: command minus excitation over position; 0 if unknown."""
+    """Stiffness k (N/m) of the virtual spring by least squares from command - excitation = -k position, over all
+    channels. 0 where a recording holds no excitation or no complete position of each channel."""
     pushed, way = 0.0, 0.0
     for recording in recordings:
         if recording.excitation is None or recording.position is None:

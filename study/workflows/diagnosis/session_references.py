@@ -1,7 +1,8 @@
-"""The references of a session, played without a hand, as the recordings that a diagnosis names effects from.
+"""The reference probes of a session, played without a hand on the handle, as recordings for a diagnosis.
 
-With a hand at single frequencies nothing can be named; a multisine on a free handle is a recording like those of
-`hapteq record`. What the probes with a hand found changed is said beside.
+Trials are single frequencies with a hand on the handle, from which no effect can be named. A reference is a multisine
+on the free handle, like the recordings of `hapteq record`, and is diagnosed in place of the trials. A remark states
+what all probes of the session found changed.
 """
 
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from study.workflows.results.session_drift import DriftReader
 
 @dataclass(frozen=True, slots=True)
 class SessionReferences:
-    """Recordings of a session's references (without a hand), to be diagnosed instead of its trials."""
+    """Recordings of a session's references, to be diagnosed in place of its trials. log: the session's log."""
 
     log: Path
     paths: tuple[Path, ...]
@@ -25,8 +26,8 @@ class SessionReferences:
 
 
 def find_references(session: Path) -> SessionReferences | None:
-    """The references as recordings; None where none was kept, or none matches the log. Raises StudyError where the
-    session cannot be read."""
+    """The references whose recordings are complete and match the log. session: its folder. None where there is none.
+    Raises StudyError where the session cannot be read."""
     folder = find_session(str(session), session.absolute().parent)
     folded = fold_session(folder)
     if not folded.state.protocol.probes.played:
@@ -50,12 +51,13 @@ def find_references(session: Path) -> SessionReferences | None:
 
 
 def _is_as_logged(folder: SessionFolder, event: ProbeMeasured) -> bool:
+    """Whether the recording exists and has the SHA-256 of the log."""
     path = folder.path / (event.recording or "")
     return path.is_file() and sha256_of(path) == event.sha256
 
 
 def _drifts(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
-    """One remark on the changes of the device from probe to probe, also where there are none."""
+    """A remark on the changes of the device from probe to probe, or that there are none."""
     watched = begin_watching(folded.state.opened, folded.state.protocol)
     for event in folded.contents.events[1:]:
         watched = follow(watched, event)

@@ -1,4 +1,8 @@
-"""What the calibration of a device's linkage adds to its identified model: how the inertia changes along each axis."""
+"""Adds the calibration of a device's linkage to its identified model: the change of inertia along each axis.
+
+The model is identified at the centre, where its masses are known from recordings. The calibration gives the inertia
+M(x) at the handle, from which the slope dM_aa/dx_a (kg/m) along each axis a follows.
+"""
 
 import numpy as np
 
@@ -9,12 +13,13 @@ from equalizer.signals.signal import FloatArray
 from study.errors import StudyError
 
 LEAST_PER_M = 0.05
-"""1/m: over the 20 mm that the spring lets the handle go this changes the mass by 0.1 %, which no recording shows."""
+"""Smallest relative slope of inertia that is added (1/m): over the 20 mm within which the spring keeps the handle, it
+changes the mass by 0.1 %, which no recording shows."""
 
 
 def check_same_device(calibration: LinkageCalibration, device: str, title: str) -> None:
-    """Check that calibration and recording are of the same device. Raises StudyError where the calibration is of
-    another device than the one that was recorded."""
+    """Raise StudyError where the calibration is of another device than `device`, the recorded one. title: of the
+    message."""
     if calibration.device != device:
         raise StudyError(
             title,
@@ -25,10 +30,10 @@ def check_same_device(calibration: LinkageCalibration, device: str, title: str) 
 
 
 def inertia_effects(model: MechanicalModel, calibration: LinkageCalibration) -> tuple[ModelEffect, ...]:
-    """Change of inertia along each axis at the centre, as effects; an axis along which the inertia stays the same has
-    none.
+    """Change of inertia along each axis at the centre as effects `pose_dependent_inertia`, with the parameter per_m =
+    (dM_aa/dx_a) / (a' M a) in 1/m for the driven axis a; none for an axis with a smaller slope than `LEAST_PER_M`.
 
-    The effect's `per_m` counts the mass on the drive's side of the cables alone, so it is larger than of the whole.
+    a' M a is the mass on the drive's side of the cables alone, so per_m is larger than relative to the whole mass.
     """
     slopes, axes = inertia_about(calibration, np.zeros(3))[1], driven_axes(model)
     driven_kg = np.einsum("na,nm,ma->a", axes, model.mass, axes)
@@ -43,7 +48,8 @@ def inertia_effects(model: MechanicalModel, calibration: LinkageCalibration) -> 
 def calibration_notes(
     model: MechanicalModel, identified_kg: FloatArray, calibration: LinkageCalibration
 ) -> tuple[str, ...]:
-    """Sentences. identified_kg: (3,), masses along the axes as the recordings say."""
+    """Sentences that compare the masses of the calibration with those of the recordings, and state the change of
+    inertia. identified_kg: (3,), masses along x, y, z from the recordings."""
     inertia, slopes = inertia_about(calibration, np.zeros(3))
     masses_kg = np.diag(inertia)
     apart = float(np.abs(identified_kg / masses_kg - 1).max())
@@ -63,5 +69,6 @@ def calibration_notes(
 
 
 def _own_slopes(slopes: FloatArray) -> FloatArray:
-    """(3,): of the inertia along each axis with the position along that axis, kg/m."""
+    """(3,), kg/m: derivative of the inertia along each axis with the position along the same axis. slopes: (3, 3, 3),
+    entry [a] is the derivative of the inertia matrix along axis a."""
     return np.array([slopes[axis, axis, axis] for axis in range(3)])

@@ -1,4 +1,7 @@
-"""Write the folder of a diagnosis: document, improved model, figures and page."""
+"""Writes the result folder of a diagnosis: document (JSON), improved model, figures and page (HTML).
+
+Figures are drawn in parallel. A figure that crashes is left out, and a remark on the page says so.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -20,8 +23,8 @@ from study.workflows.picture_files import DrawnPicture, draw_picture, write_draw
 
 
 def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> Findings:
-    """Write everything into `folder`. parents: input files. Returns the findings with a remark for each figure that
-    could not be drawn. Raises StudyError."""
+    """Write all files into an existing `folder`. parents: input files, for the provenance. Returns the findings with a
+    remark for each figure that could not be drawn. Raises StudyError."""
     origin = gather_provenance(parents=parents)
     write_diagnosis(folder / DIAGNOSIS_NAME, findings.diagnosis, origin)
     improved = replace(findings.improved, provenance=origin.as_dict())
@@ -41,6 +44,7 @@ def _draw_pictures(draw: Callable[[], Sequence[Picture]]) -> list[DrawnPicture]:
 
 
 def _origin_entries(origin: Provenance) -> dict[str, str]:
+    """Provenance for the page: input files with the beginning of their SHA-256, command line, versions."""
     return {
         "made from": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in origin.parents),
         "command": " ".join(origin.command),

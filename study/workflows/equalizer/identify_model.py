@@ -1,4 +1,9 @@
-"""Identify a model from recordings: estimate, fit, held-out test, and a page."""
+"""`hapteq identify`: a state-space model of a device from recordings.
+
+Steps: remove known effects if wanted; estimate the frequency response and fit the model (`identify_recordings`); test
+it by free simulation of held-out segments (`validate_on_test`); write it with quality, place and provenance. The result
+also holds what the page about it needs (`report_identification`).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -29,53 +34,54 @@ from study.workflows.equalizer.recordings_without_effects import removable_effec
 from study.workflows.free_name import require_free
 
 NEAR_M = 0.001
-"""Places farther apart than this are different; a model is of one place."""
+"""Largest difference (m) per coordinate of places that count as the same: a model holds for a single place."""
 
 
 @dataclass(frozen=True, slots=True)
 class IdentifyPlan:
-    """Order of `identify_model`: recordings, model file to write, band, order of the model, and options."""
+    """Arguments of `identify_model`: recordings, model file to write, band, order (number of states), and options."""
 
     recordings: tuple[Path, ...]
     out: Path
     band_hz: tuple[float, float] = (5.0, 35.0)
     order: int = 26
     smooth: bool | None = None
-    """Local polynomial smoothing over neighbouring lines before the fit; None: where lines scatter more than their
-    noise, as on a nonlinear device."""
+    """Whether the response is smoothed over neighbouring lines before the fit (local polynomials); None: where lines
+    scatter more than their noise, as on a nonlinear device."""
     with_spring: bool = False
-    """From the excitation, with the spring as part of the device: for playing under the same spring without relying
-    on encoders."""
+    """Whether the excitation is taken as input, which makes the virtual spring a part of the model: for playback under
+    the same spring without relying on encoders."""
     physics: Path | None = None
-    """Mechanical model whose named effects are removed from the recordings: the model is then of the linear
-    remainder."""
+    """File of a mechanical model whose named effects are removed from the recordings first: what is identified is then
+    the linear remainder. None: nothing is removed."""
     longest_decay_s: float | None = None
-    """Upper bound of the decay time of a pole; None: the default bound, longer where the recordings need it."""
+    """Upper bound of a pole's time constant (s); None: the default bound, longer where the recordings need it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IdentifiedDevice:
-    """What was written, and the data for a page about it."""
+    """The written model, and the data for a page about it."""
 
     plan: IdentifyPlan
     recordings: tuple[Recording, ...]
     estimate: FrequencyResponse
     fitted: FrequencyResponse
-    """What the model was fitted to: the estimate, or its local averages."""
+    """Frequency response that the model was fitted to: the estimate, or its local averages."""
     identified: Identified
     model: IdentifiedModel
     tested: HeldOut | None
-    """Held-out test on recordings processed like the fitted ones."""
+    """Held-out test on recordings processed like the fitted ones; None where no segment was kept for it."""
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences."""
+        """Sentences for the user on the quality of the model and on the estimate."""
         known = self.model.quality.remarks if self.model.quality else ()
         return (*known, *(as_sentence(remark) for remark in self.estimate.remarks))
 
 
 def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> IdentifiedDevice:
-    """Read, estimate, fit and write. `on_progress(share)`. Raises StudyError; nothing is written then."""
+    """Read recordings, identify a model and write it. `on_progress(share)`, 0 to 1. Raises StudyError where the
+    recordings do not suit a model; nothing is written then."""
     settings = _settings(plan)
     check_free(plan.out)
     recordings = tuple(read_recording(path) for path in plan.recordings)
@@ -104,7 +110,8 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
 
 
 def _quality(found: IdentifiedRecordings, recordings: Sequence[Recording], tested: HeldOut | None) -> ModelQuality:
-    """Quality figures; the misfit is that of the lines themselves, even if the fit used local averages."""
+    """Figures of the quality: misfit, scatter and held-out error. The misfit is that of the estimate itself, even if
+    the model was fitted to local averages."""
     identified, estimate = found.identified, found.estimate
     misfit = misfit_of_estimate(identified.model, estimate)
     remarks = (*identified.remarks, *held_out_remarks(tested, identified.cost, misfit, recordings))
@@ -114,7 +121,7 @@ def _quality(found: IdentifiedRecordings, recordings: Sequence[Recording], teste
 
 
 def check_free(out: Path) -> None:
-    """Check the output path before any work. Raises StudyError."""
+    """Check before any work that the output path can be written. Raises StudyError."""
     require_free(out, title="The model was not made", kind="models")
 
 
@@ -133,7 +140,8 @@ def _settings(plan: IdentifyPlan) -> IdentificationSettings:
 def _add_place(
     plan: IdentifyPlan, recordings: Sequence[Recording], model: IdentifiedModel, physics: MechanicalModel | None
 ) -> IdentifiedModel:
-    """The model with the place of its recordings and its provenance."""
+    """The model with the place of its recordings, and with its provenance: files, hand, spring, input, removed
+    effects."""
     provenance = {
         **model.provenance,
         **gather_provenance(parents=(*plan.recordings, *([plan.physics] if plan.physics else []))).as_dict(),
@@ -149,14 +157,15 @@ def _add_place(
 
 
 def _amplitude_n(recordings: Sequence[Recording]) -> float:
-    """Largest amplitude of the fitted segments: at this amplitude friction has its equivalent in the model."""
+    """Largest amplitude (N) of the fitted segments: the model contains the linear equivalent of friction at this
+    amplitude."""
     segments = (segment for recording in recordings for segment in recording.segments if segment.role != "test")
     return max((segment.amplitude for segment in segments), default=0.0)
 
 
 def _check_alike(recordings: Sequence[Recording], with_spring: bool) -> None:
-    """Raise unless all recordings are of one device: with or without a hand, and under one spring where it is part
-    of the device."""
+    """Raise StudyError unless all recordings are of the same system: all with a hand or all without, and, where the
+    spring becomes part of the model, all under the same spring."""
     found = {"the hand on the handle": {str(r.meta["hand"]) for r in recordings if r.meta.get("hand") is not None}}
     if with_spring:
         found["the spring"] = {_spring_words(r.meta.get("feedback")) for r in recordings}
@@ -173,13 +182,16 @@ def _spring_words(feedback: object) -> str:
 
 
 def _from_excitation(recording: Recording) -> Recording:
-    """The recording with the excitation as input, so that the feedback is part of the device."""
+    """The recording with the excitation as input, which makes the spring's feedback a part of the model. Raises
+    StudyError without an excitation."""
     if recording.excitation is None:
         raise _no_model("The recording does not hold its excitation, so the spring's share is not known.")
     return replace(recording, command=recording.excitation)
 
 
 def _common_place(recordings: Sequence[Recording]) -> tuple[float, float, float] | None:
+    """Place of the recordings (m), that of the first which states it; None without any. Raises ValueError where places
+    differ."""
     places = [recording.meta["place_m"] for recording in recordings if recording.meta.get("place_m") is not None]
     if not places:
         return None

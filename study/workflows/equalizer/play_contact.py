@@ -1,8 +1,8 @@
-"""A recorded transient, turned to the normal of a contact, played on the device: `hapteq contact`.
+"""`hapteq contact`: play a recorded transient along the normal of a contact.
 
-Everything that depends on the recording is computed before the contact: three solutions of the causal tracking problem,
-one per axis. At the contact the normal is known, and the forces are a linear combination of them. For comparison the
-recording is also played as a force along the normal with one gain, as without a model.
+The causal tracking problem (`equalizer.tracking.lqr.contact`) is solved for each of the three axes before the contact.
+At the contact the normal n is known, and the forces are sum_i n_i F_i(t). For comparison the recording is also played
+without a model: as a force along the normal with a single gain.
 """
 
 import contextlib
@@ -44,19 +44,19 @@ from study.workflows.equalizer.play_forces import (
 from study.workflows.equalizer.playback_models import PlaybackModels, Vector, read_playback_models
 
 GAIN_LINES = 100
-"""Number of lines in the band over which the gain of the comparison is averaged."""
+"""Number of frequencies in the band, in a geometric series, over which the gain of the comparison is averaged."""
 REST = Padding(after_s=0.5)
-"""Time played after the recording, to come to rest."""
+"""Time (s) that is played after the recording, in which the handle comes to rest."""
 FADE_S = 0.2
-"""Fade-out at its end: a solution with a free end has useless forces in its last ticks, and would end with a step."""
+"""Fade-out (s) at the end: the last forces of a solution with a free end are useless, and would end with a step."""
 AGAIN, NOTHING = "Start again.", "Nothing was written."
 SETTLE_S = 1.0
-"""Rest between two plays, and before the first."""
+"""Time (s) without stimulus before and after each play."""
 
 
 @dataclass(frozen=True, slots=True)
 class ContactPlan:
-    """Order of `play_contact`: model, table of the recorded transient, normal of the contact, new folder, device."""
+    """Arguments of `play_contact`. weight: of the forces in the cost, (m/s² per N)²; cap_n: largest force (N)."""
 
     model: Path
     transient: Path
@@ -65,7 +65,7 @@ class ContactPlan:
     out: Path
     device: str = "simulated"
     scale: float = 1.0
-    """Factor on the recording."""
+    """Factor by which the recording is multiplied."""
     weight: float = 1e-3
     cap_n: float = 3.0
     seed: int = 1
@@ -73,7 +73,7 @@ class ContactPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedTransient:
-    """The transient played in one way."""
+    """Forces and measured acceleration of a play of the transient."""
 
     forces: FloatArray
     """(N, 3), N: commands to the device."""
@@ -85,7 +85,7 @@ class PlayedTransient:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactPlay:
-    """A transient at a contact, as wanted, as predicted by the model, and as played in two ways."""
+    """A transient at a contact: as wanted, as predicted by the model, and as played with and without the model."""
 
     plan: ContactPlan
     normal: FloatArray
@@ -93,18 +93,18 @@ class ContactPlay:
     sample_rate_hz: float
     band_hz: tuple[float, float]
     wanted: FloatArray
-    """(N, 3), m/s^2: the part in the model's band, with the time to come to rest."""
+    """(N, 3), m/s^2: the part in the model's band, followed by the time to come to rest."""
     start: CausalStart
     equalized: PlayedTransient
     plain: PlayedTransient
-    """The recording played as a force along the normal, with one gain."""
+    """The recording played as a force along the normal, with a single gain for all frequencies."""
 
 
 def play_contact(
     plan: ContactPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving = refuse_unannounced
 ) -> ContactPlay:
-    """Reads, solves, plays and writes. on_progress: called with the share played. before_moving: see
-    `BeforeMoving`. Raises StudyError, before anything moves for what cannot be played; nothing is written then."""
+    """Solve, play with and without the model, and write. on_progress: takes the share played, 0 to 1. before_moving:
+    see `BeforeMoving`. Raises StudyError, before any motion where the input is unsuitable; nothing is written then."""
     require_new_folder(plan.out)
     normal = _unit(plan.normal)
     transient = _transient(plan)
@@ -160,7 +160,7 @@ def _along_normal(recording: FloatArray, normal: FloatArray, rows: int) -> Float
 
 
 def _beside_spring(forces: FloatArray, wanted: FloatArray, models: PlaybackModels) -> FloatArray:
-    """Commands less the force of the spring along the wanted motion."""
+    """Commands minus the force that the spring will add along the wanted motion."""
     spring, rate_hz = find_acting_spring(models), models.nearest.sample_rate_hz
     return compensate_spring(lambda _: forces, spring, rate_hz, models.band_hz)(wanted)
 
@@ -194,7 +194,7 @@ def _play_both(
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving,
 ) -> list[FloatArray]:
-    """(N, 3) each, measured."""
+    """Measured accelerations, (N, 3) in m/s^2, of each of the forces."""
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
     settings = _settings(plan, models, forces)
     measured: list[FloatArray] = []
@@ -223,7 +223,7 @@ def _play_both(
 
 
 def _settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[FloatArray, FloatArray]) -> DeviceSettings:
-    """Settings of the device, without fade-in: a force that begins with the contact begins with a step."""
+    """Settings of the device. The slew limit allows the initial step: forces begin at the contact without fade-in."""
     settings, rate_hz = playback_settings(plan.cap_n, models), models.nearest.sample_rate_hz
     steps = [np.linalg.norm(np.diff(each, axis=0, prepend=0, append=0), axis=1).max() for each in forces]
     slew_n_per_s = max(settings.limits.slew_n_per_s, float(max(steps)) * rate_hz + SPRING_SLEW_N_PER_S)
@@ -231,7 +231,7 @@ def _settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[FloatArra
 
 
 def _play_transient(device: Device, forces: FloatArray, on_share: Callable[[float], None]) -> FloatArray:
-    """(N, 3), m/s^2, of the rows of the forces."""
+    """Measured acceleration, (N, 3) in m/s^2, of the rows of forces (N, 3)."""
     settle = round(SETTLE_S * device.info.sample_rate_hz)
     padded = np.pad(forces, ((settle, settle), (0, 0)))
     return read_measured_acceleration(play_forces(device, padded, on_share))[settle : settle + len(forces)]
@@ -264,7 +264,7 @@ def _plays(done: ContactPlay) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
 
 
 def contact_summary(done: ContactPlay) -> dict[str, Any]:
-    """Figures of contact.json and `--json`: relative errors in the band, and the highest force (N)."""
+    """Values of contact.json and `--json`: relative errors in the band (1 = 100 %), and the largest force (N)."""
     return {
         "out": str(done.plan.out),
         "normal": done.normal.tolist(),
@@ -279,7 +279,7 @@ def contact_summary(done: ContactPlay) -> dict[str, Any]:
 
 
 def contact_lines(done: ContactPlay) -> tuple[str, ...]:
-    """Lines for the terminal."""
+    """Lines for the terminal: errors by the model and as measured (%), and the largest force (N)."""
     found = contact_summary(done)
     low, high = done.band_hz
     return (

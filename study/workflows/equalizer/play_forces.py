@@ -34,7 +34,8 @@ RELEASE_S = 0.05
 
 
 def require_device_alone(models: PlaybackModels) -> None:
-    """Raises StudyError for a model that was identified with a hand on the handle."""
+    """Raise StudyError for a model that was identified with a hand on the handle: it does not hold for the free
+    handle."""
     if any("held" in model.provenance.get("hand", ()) for model in models.given):
         raise _refusal(
             "The model was recorded with a hand on the handle: its forces are right for that hand in that moment.",

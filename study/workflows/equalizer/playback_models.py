@@ -1,4 +1,9 @@
-"""Combine model files for playback: one model, several places of one device, or two bands at one place."""
+"""Read identified models from files and combine them for playback.
+
+Three cases: a single model; models of several places, between which the forces or the models are interpolated
+(`equalizer.tracking.workspace`); a narrow and a wide model of the same place (`equalizer.tracking.bands`). Models that
+cannot play a table are refused.
+"""
 
 import hashlib
 import math
@@ -23,16 +28,16 @@ from study.store.disk.provenance import sha256_of
 from study.store.formats.identified_model_file import read_identified_model
 
 SAME_PLACE_M = 0.001
-"""Largest distance of two places (m) that count as one: files of one place may differ by rounding."""
+"""Largest distance (m) of two places that count as the same: files of the same place may differ by rounding."""
 GAIN_LINES = 100
-"""Frequencies of the band, in a geometric series, at which the largest gain is looked for."""
+"""Number of frequencies in the band, in a geometric series, at which the largest gain is searched."""
 HIGHEST_GAIN = 1e6
 """Largest plausible gain (m/s^2 per N): no handle weighs a milligram."""
 FAR_M = 0.005
-"""Distance from the place of a single model beyond which the user is warned."""
+"""Distance (m) from the place of a single model beyond which the user is warned."""
 
 Vector = tuple[float, float, float]
-"""x, y, z."""
+"""Components x, y, z; in metres for a place."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,21 +45,23 @@ class PlaybackModels:
     """Identified models read from files and combined for a place in the workspace."""
 
     given: tuple[IdentifiedModel, ...]
+    """The models as read, in the order of the files."""
     at: ModelsAtPlace
-    """For two bands: the narrow model only."""
+    """Models and weights at the place of playback; for two bands the narrow model only."""
     two: TwoModels | None
+    """The narrow and the wide model of two bands; None otherwise."""
     choice: InterpolationChoice | None
-    """None for models of one place."""
+    """How models of several places are interpolated; None for models of a single place."""
     remarks: tuple[str, ...]
-    """Sentences."""
+    """Sentences for the user, such as a place far from that of the model."""
     held_out: tuple[str, ...]
-    """Sentences: the error at places that were left out and interpolated from the others."""
+    """Sentences on the errors at places that were left out and interpolated from the others (cross-validation)."""
     sha256: str
-    """Hash of all files, and of the place where it affects the forces."""
+    """SHA-256 of all files, and of the place where it affects the forces (several places)."""
 
     @property
     def quality(self) -> ModelQuality | None:
-        """Expected error of the worst model; None if any has none."""
+        """Quality of the model with the largest error; None if a model states none."""
         return worst_quality(tuple(model.quality for model in self.given))
 
     @property
@@ -77,8 +84,8 @@ class PlaybackModels:
 
 
 def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: float) -> PlaybackModels:
-    """Read and combine the models. Raises StudyError for files that are not models, cannot play a table, or do not
-    go together."""
+    """Read and combine the models. at_m: place of playback (m), needed for models of several places. weight: of the
+    forces in the cost. Raises StudyError for files that are not models, cannot play a table, or do not fit together."""
     if at_m is not None and not all(map(math.isfinite, at_m)):
         raise WrongUseError(
             "There is no such place",
@@ -162,7 +169,9 @@ def _held_out_sentence(check: PlaceCheck) -> str:
 
 
 def _readable(path: Path) -> IdentifiedModel:
-    """Read a model and give its channels a table's names; files may use others, such as x, y, z, or numbers."""
+    """Read a model from fx, fy, fz (N) to ax, ay, az (m/s²) and give its channels these names; files may use others
+    that end in x, y, z, or numbers. Raises StudyError for other channels or units, an unstable model, or a gain above
+    `HIGHEST_GAIN`."""
     model = read_identified_model(path)
     in_order = all(_in_order(names) for names in (model.input_channels, model.output_channels))
     if not in_order or (model.input_unit, model.output_unit) != (FORCES.unit, TRAJECTORY.unit):
@@ -187,18 +196,20 @@ def _readable(path: Path) -> IdentifiedModel:
 
 
 def _in_order(names: tuple[str, ...]) -> bool:
-    """Whether there are three names, none of which contradicts its position."""
+    """Whether there are three names that end in x, y, z in this order, or none of which ends in these letters."""
     letters = [name[-1:].lower() for name in names]
     return len(names) == 3 and (letters == ["x", "y", "z"] or not set(letters) & set("xyz"))
 
 
 def peak_gain(model: IdentifiedModel) -> float:
-    """Largest gain of one output to one input in the band."""
+    """Largest magnitude of the response of an output to an input in the band (m/s² per N); NaN or infinity if it
+    overflows."""
     with np.errstate(over="ignore", invalid="ignore"):
         return float(np.abs(model_response(model, np.geomspace(*model.band_hz, GAIN_LINES))).max())
 
 
 def _of_one_place(models: tuple[IdentifiedModel, ...]) -> bool:
+    """Whether all models are of the same place; also True where no model states its place."""
     places = [model.place_m for model in models]
     if all(place is None for place in places):
         return True
@@ -207,6 +218,7 @@ def _of_one_place(models: tuple[IdentifiedModel, ...]) -> bool:
 
 
 def _far(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, ...]:
+    """A warning where the place of playback is far from that of the model, or that of the model is not known."""
     if at_m is None:
         return ()
     if model.place_m is None:
@@ -221,7 +233,8 @@ def _far(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, 
 
 
 def _sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
-    """Hash of the files; a single file keeps its own, so that it can be compared by hand."""
+    """SHA-256 of the files in any order, and of the place. For a single file it is that of the file, so that it can be
+    compared by hand."""
     each = [sha256_of(path) for path in paths]
     if len(each) == 1:
         return each[0]

@@ -1,4 +1,9 @@
-"""Remove known effects from recordings, so that a linear model of the remainder can be identified."""
+"""Remove known effects, such as friction, from recordings, so that a linear model of the remainder can be identified.
+
+Effects that act on the command are applied to it, and the forces of other effects along the measured motion are
+subtracted from it (`equalizer.tracking.compensation.subtract_effects`). Effects that cannot be removed stay in the
+recordings.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,12 +17,13 @@ from equalizer.tracking.compensation.subtract_effects import subtract_effects
 from study.errors import StudyError
 
 LEFT_OUT = 0.005
-"""Fraction of the excitation's power below its band, and above it."""
+"""Fraction of the excitation's power that is left out below its band, and the same above it. Heuristic."""
 
 
 def remove_effects(recordings: Sequence[Recording], physics: MechanicalModel, path: Path) -> tuple[Recording, ...]:
-    """The recordings without the effects of `physics`. path: of the mechanical model, for messages. Raises
-    StudyError if it names no removable effect, or if a recording does not measure the motion."""
+    """The recordings without the effects of `physics`. path: file of the mechanical model, for messages. Raises
+    StudyError if no effect can be removed, or a recording has no excitation, missing samples, or a response that is not
+    the acceleration of each command."""
     if not removable_effects(physics):
         left = "".join(f" {effect.kind}: {reason_not_compensated(effect)}." for effect in physics.effects)
         raise _not_removable(f"{path.name} names no effect that can be taken off a recording.{left}")
@@ -28,7 +34,7 @@ def remove_effects(recordings: Sequence[Recording], physics: MechanicalModel, pa
 
 
 def removable_effects(physics: MechanicalModel) -> list[str]:
-    """The removable effects in words."""
+    """The removable effects in words, each with its axis and its parameters or law."""
     return [
         f"{effect.kind}{f' on {effect.axis}' if effect.axis else ''} ({_numbers(effect)})"
         for effect in physics.effects
@@ -43,7 +49,8 @@ def _numbers(effect: ModelEffect) -> str:
 
 
 def excitation_band_hz(recording: Recording) -> tuple[float, float]:
-    """Band with 99 % of the excitation's power, low and high (Hz). Raises ValueError without excitation."""
+    """Lower and upper end (Hz) of the band that holds 99 % of the excitation's power, or of the command's where no
+    excitation is recorded. Raises ValueError for a constant signal."""
     driven = recording.excitation or recording.command
     samples = np.nan_to_num(driven.samples)
     if not np.ptp(samples, axis=0).any():

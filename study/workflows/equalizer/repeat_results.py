@@ -1,4 +1,8 @@
-"""Order and result of repeated playback, stored as a table of forces with a document beside it."""
+"""Arguments and result of repeated playback (iterative learning), and their files.
+
+The best forces are written as a table, with a JSON document next to it. A later run continues from these forces only if
+trajectory, model and table are unchanged (SHA-256).
+"""
 
 import hashlib
 from dataclasses import dataclass
@@ -20,29 +24,30 @@ from study.store.formats.trajectory_file import read_trajectory, write_trajector
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RepeatPlan:
-    """Order of repeated playback: wanted signal, inverse of the model, settings of the device, number of
+    """Arguments of repeated playback: wanted signal, inverse of the model, settings of the device, number of
     corrections."""
 
     wanted: Trajectory
-    """Accelerations, from rest to rest; only their part in the band is played."""
+    """Wanted accelerations (m/s²), from rest to rest; only their part in the band is played."""
     inverse: InverseOfLength
+    """Inverse of the model, from wanted accelerations to forces."""
     band_hz: tuple[float, float]
     model_sha256: str
-    """Hash of the models behind the inverse: forces are reused for the same models only."""
+    """SHA-256 of the models behind the inverse: forces are reused for the same models only."""
     settings: DeviceSettings
-    """Without a hand on the handle. Every correction respects the stimulus' cap."""
+    """Settings without a hand on the handle. Every correction respects the cap of the stimulus."""
     device: str
     repeats: int = 10
-    """After the first play."""
+    """Number of corrections after the first play."""
     first_gain: float = 1.0
-    """See `equalizer.tracking.learning.convergence`."""
+    """Gain beta of the first correction, see `equalizer.tracking.learning.convergence`."""
     spring: VirtualSpring = NO_SPRING
     """Spring that acts on the device and is not in the model already."""
     first: FloatArray | None = None
-    """(N, 3): forces to start from, one to one with the wanted signal; None = the model's."""
+    """(N, 3), N: forces to start from, row for row with the wanted signal; None: those of the model."""
     seed: int = 0
     out: Path | None = None
-    """Table of forces to write; the document is written beside it."""
+    """Table of forces to write, and the document next to it; None: nothing is written."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,20 +55,21 @@ class Repeated:
     """Result of repeated playback: the best forces, and the error of each play."""
 
     forces: Trajectory
-    """The best forces, one to one with the wanted signal."""
+    """The best forces, row for row with the wanted signal."""
     errors: tuple[float, ...]
     """Relative error in the band of each play as measured, noise included."""
     noise_floor: float
-    """Relative error of noise alone."""
+    """Relative error that noise alone causes; 0 where it is not known."""
     verdict: Verdict
+    """Why the repetition ended."""
     kept: int
-    """Number of the play with these forces, from 0."""
+    """Number of the play with the smallest residual, from 0: that of the forces kept."""
     remark: str
     played: tuple[Played, ...]
 
 
 def make_result(plan: RepeatPlan, state: IterationState, played: list[Played]) -> Repeated:
-    """The result after the last play."""
+    """The result after the last play; a repetition that could continue counts as ended with the best forces."""
     verdict = Verdict.BEST_KEPT if state.verdict is Verdict.CONTINUE else state.verdict
     return Repeated(
         forces=_table(plan, state),
@@ -87,7 +93,8 @@ def _floor(state: IterationState) -> float:
 
 
 def write_repeated(plan: RepeatPlan, state: IterationState, interrupted: bool) -> None:
-    """Write forces and document."""
+    """Write the best forces so far and the document to `plan.out`; nothing without such a path. interrupted: whether
+    the repetition was stopped by the user."""
     if plan.out is None:
         return
     table = _table(plan, state)
@@ -113,7 +120,8 @@ def write_repeated(plan: RepeatPlan, state: IterationState, interrupted: bool) -
 
 
 def earlier_forces(forces: Path, wanted: Trajectory, model_sha256: str) -> FloatArray:
-    """(N, 3): forces that an earlier run found for the same trajectory and model. Raises StudyError for others."""
+    """(N, 3), N: forces that an earlier run found for the same trajectory and model. Raises StudyError if one of them
+    differs, or the table was changed."""
     document, table = read_repeats(repeats_path(forces)), read_trajectory(forces)
     found = {
         "another trajectory": document.trajectory_sha256 == trajectory_sha256(wanted),
@@ -131,7 +139,7 @@ def earlier_forces(forces: Path, wanted: Trajectory, model_sha256: str) -> Float
 
 
 def trajectory_sha256(wanted: Trajectory) -> str:
-    """SHA-256 of sample rate and samples: forces of an earlier run are reused for the same trajectory only."""
+    """SHA-256 of sample rate and samples of a trajectory, by which a later run recognises it."""
     rate = np.float64(wanted.signal.sample_rate_hz).tobytes()
     return hashlib.sha256(rate + wanted.signal.samples.astype("<f8").tobytes()).hexdigest()
 

@@ -1,4 +1,9 @@
-"""Forces for a table, corrected on the device: solve by the model, check convergence, play, improve."""
+"""Iterative learning control of a trajectory on a device (`hapteq equalize --repeat N`).
+
+`solve_trajectory` computes forces from the model; the convergence test of `equalizer.tracking.learning.convergence`
+limits the gain of the corrections; `repeat_playback` then plays the forces, measures the error of the acceleration and
+corrects the forces by the inverse of the model. The corrected forces are valid for the virtual spring that acted.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,18 +39,21 @@ from study.workflows.equalizer.repeat_playback import OnProgress, not_repeated, 
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, earlier_forces
 
 SAFE_SHARE = 0.9
-"""Fraction of the largest gain with which every error shrinks."""
+"""Ratio of the gain that is used to the largest gain with which every error decreases (`Convergence.safe_beta`)."""
 
 
 @dataclass(frozen=True, slots=True)
 class RepeatOrder:
-    """What is asked for: number of corrections and device."""
+    """Order of `repeat_trajectory`: number of corrections, device, and options."""
 
     repeats: int
+    """Number of corrections after the first play."""
     device: str
+    """Name of the device, as `open_device` takes it."""
     earlier: Path | None = None
     """Table of forces of an earlier run to continue from."""
     seed: int = 1
+    """Seed of a simulated device."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,14 +64,19 @@ class RepeatedTrajectory:
     order: RepeatOrder
     repeated: Repeated
     tested: Convergence | None
-    """Convergence test; None if the models do not state their uncertainty."""
+    """Convergence test at gain 1; None for a single model that does not state its uncertainty."""
     gain: float
+    """Upper bound of the gain beta of the corrections, dimensionless."""
 
 
 def repeat_trajectory(
     plan: EqualizePlan, order: RepeatOrder, on_progress: OnProgress, before_moving: BeforeMoving = refuse_unannounced
 ) -> RepeatedTrajectory:
-    """Solve, play, correct and write. Raises StudyError, before anything moves if repeating is not possible."""
+    """Compute the forces, play and correct them, and write the table of forces and its document.
+
+    Raises StudyError: before anything moves where an output exists or where cap, models or convergence test do not
+    allow repeats; later where the device fails or the user interrupts.
+    """
     check_free(plan.out, repeats_path(plan.out))
     solved = solve_trajectory(plan)
     _require_repeatable(solved.models)
@@ -93,7 +106,7 @@ def repeat_trajectory(
 
 
 def repeat_summary(done: RepeatedTrajectory) -> dict[str, Any]:
-    """The figures as plain values."""
+    """Results as plain values. `errors`, `noise_floor`: relative to the wanted signal; `peak_n` in N."""
     found = done.repeated
     return {
         **summary(done.solved),
@@ -110,9 +123,9 @@ def repeat_summary(done: RepeatedTrajectory) -> dict[str, Any]:
 
 
 def repeat_lines(done: RepeatedTrajectory) -> tuple[str, ...]:
-    """The figures as terminal lines."""
+    """Results as lines of text for the terminal."""
     found = done.repeated
-    *alone, _ = summary_lines(done.solved)  # the last is about forces that no spring adds to
+    *alone, _ = summary_lines(done.solved)  # the last line states the spring of the solved forces
     lines = [*alone, _convergence_line(done)]
     for number, error in enumerate(found.errors):
         kept = ", kept" if number == found.kept else ""
@@ -125,10 +138,12 @@ def repeat_lines(done: RepeatedTrajectory) -> tuple[str, ...]:
 
 
 def _peak_n(found: Repeated) -> float:
+    """Largest magnitude of the force vector in a row, N."""
     return float(np.linalg.norm(found.forces.signal.samples, axis=1).max())
 
 
 def _verdict(done: RepeatedTrajectory) -> str:
+    """Sentence on why the repeats ended."""
     found = done.repeated
     if found.verdict is Verdict.BEST_KEPT and len(found.errors) > done.order.repeats:
         return "All repeats were played; the best forces are kept."
@@ -136,6 +151,7 @@ def _verdict(done: RepeatedTrajectory) -> str:
 
 
 def _convergence_line(done: RepeatedTrajectory) -> str:
+    """Sentence on the convergence test: worst-case share of the error that remains, and its frequency."""
     if done.tested is None:
         return "Convergence was not tested before playing: the model does not hold how well it is known."
     return (
@@ -145,6 +161,7 @@ def _convergence_line(done: RepeatedTrajectory) -> str:
 
 
 def _require_repeatable(models: PlaybackModels) -> None:
+    """Raise StudyError for two models of one place, and for a model that was identified with a hand on the handle."""
     if models.two is not None:
         raise not_repeated(
             "Two bands of one place were given, and what is felt of the upper one is no waveform to be corrected.",
@@ -154,7 +171,8 @@ def _require_repeatable(models: PlaybackModels) -> None:
 
 
 def _gain(tested: Convergence | None) -> float:
-    """Gain of the correction: `SAFE_SHARE` of the largest one that converges, at most 1. Raises StudyError."""
+    """Gain of the corrections: `SAFE_SHARE` of the largest gain that converges, at most 1; 1 without a test. Raises
+    StudyError for a gain below `LOWEST_GAIN`."""
     if tested is None:
         return 1.0
     gain = min(1.0, SAFE_SHARE * tested.safe_beta)
@@ -168,7 +186,8 @@ def _gain(tested: Convergence | None) -> float:
 
 
 def _initial_forces(solved: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSpring) -> FloatArray | None:
-    """Initial forces; None = the model's own, which the first play computes together with what follows the last row."""
+    """(N, 3): initial forces in N, from an earlier run, or from the solution with compensated effects plus the
+    compensation of the spring. None: the first play computes them from the model."""
     if order.earlier is not None:
         return earlier_forces(order.earlier, solved.wanted, solved.models.sha256)
     if solved.compensation is None:
@@ -177,5 +196,6 @@ def _initial_forces(solved: EqualizedTrajectory, order: RepeatOrder, spring: Vir
     forces = solved.forces.signal.samples
     wanted = band_part(solved.wanted.signal.samples, rate_hz, band_hz)
     held = compensate_spring(lambda _: np.zeros_like(forces), spring, rate_hz, band_hz)(wanted)
-    # Forces at the cap leave no room to carry the spring too; what then lacks is an error like any other.
+    # Where the cap does not allow the whole compensation of the spring, a share of it is added; repeats correct the
+    # rest.
     return forces + largest_share(forces, held, solved.plan.cap_n) * held

@@ -1,4 +1,8 @@
-"""Page about an identified device, with its figures beside it."""
+"""Report of an identified device: an HTML page and its figures, in the folder of the results.
+
+The page shows estimate and model, resonances, the frequency above which the axes couple, the frequency bands with
+their control methods, and a comparison of model orders (`compare_orders`).
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,13 +25,14 @@ from study.workflows.equalizer.identify_model import IdentifiedDevice
 from study.workflows.picture_files import write_pictures
 
 FREER = 1.5
-"""Factor between the bound on the decay time and the slowest decay found."""
+"""Ratio of the bound on the decay time in the comparison of orders to the slowest decay time that was found."""
 PAGE_NAME = "report.html"
-"""Page about the model, in the folder of results."""
+"""File name of the page in the folder of the results."""
 
 
 def report_identification(device: IdentifiedDevice, folder: Path, on_progress: Callable[[float], None]) -> Path:
-    """Write report.html and figures/ into `folder`; returns the page. Raises CannotWriteError."""
+    """Write report.html and figures/ into `folder`; returns the path of the page. on_progress: called with the share
+    done, 0 to 1. Raises CannotWriteError."""
     found = findings(device, lambda share: on_progress(0.8 * share))
     pictures = identification_pictures(found)
     write_pictures(folder / "figures", pictures)
@@ -39,7 +44,7 @@ def report_identification(device: IdentifiedDevice, folder: Path, on_progress: C
 
 
 def findings(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> IdentificationFindings:
-    """Content of the page."""
+    """Content of the page. on_progress: called with the share done, 0 to 1; the comparison of orders takes the time."""
     onset = coupling_onset(device.estimate)
     lowest, highest = max(1.0, float(device.estimate.frequency_hz[0])), float(device.estimate.frequency_hz[-1])
     return IdentificationFindings(
@@ -56,18 +61,20 @@ def findings(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> 
 
 
 def _order(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> OrderReport | None:
+    """Comparison of the order asked for with lower ones; None where the estimate has too few lines for it."""
     asked = device.plan.order
     orders = sorted({order for order in (10, 14, 16, 20, 26) if order <= asked} | {asked})
-    # Orders are compared under the bound that the device needs, or all of them would miss what rings.
+    # With a tighter bound on the decay time than the device needs, no order could fit its slowly decaying resonances.
     needed_s = FREER * device.identified.relaxed[0].decay_s if device.identified.relaxed else None
     settings = IdentificationSettings(device.plan.band_hz, asked, device.plan.longest_decay_s or needed_s)
     try:
         return compare_orders(device.fitted, settings, orders, on_progress)
-    except IdentificationRefused:  # half of the lines are too few for the order: then there is nothing to compare
+    except IdentificationRefused:  # half of the lines, used for each fit, are too few for the order
         return None
 
 
 def _origin_entries(device: IdentifiedDevice) -> dict[str, str]:
+    """Origin of the model: recordings with the first digits of their SHA-256, device, and kind of input."""
     parents = device.model.provenance.get("parents", [])
     return {
         "recordings": ", ".join(f"{parent['file']} ({parent['sha256'][:12]})" for parent in parents),

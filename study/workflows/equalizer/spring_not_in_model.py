@@ -1,4 +1,8 @@
-"""Spring to account for during playback that the model does not already contain."""
+"""Virtual spring whose force must be compensated during playback, because the model does not contain it.
+
+A model from the excitation to the response (`input` of its provenance is "excitation") contains the spring under which
+it was recorded; a model from the total force does not.
+"""
 
 import math
 
@@ -7,12 +11,12 @@ from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpri
 from study.errors import StudyError
 
 SAME = 0.01
-"""Relative difference below which two springs are equal."""
+"""Relative difference of stiffness and of damping up to which two springs count as equal."""
 
 
 def spring_outside_model(model: IdentifiedModel, spring: VirtualSpring) -> VirtualSpring:
-    """The part of `spring`, which acts during playback, that the model does not contain. Raises StudyError if the
-    model contains another spring."""
+    """The spring to compensate: `spring`, which acts during playback, or `NO_SPRING` if the model contains it. Raises
+    StudyError if the model contains another spring."""
     if model.provenance.get("input") != "excitation":
         return spring
     feedback = model.provenance.get("feedback")

@@ -1,6 +1,6 @@
 """Identify and validate any file, and generate the documentation of the formats from the code.
 
-`file_content` (opened once) -> `recognisers`, `session_recognisers` (one small function per format) -> `validate`,
-`validate_apart` (in a separate process), `validate_together`. `format_docs` and the `*_docs` write docs/. Begin at
-`validate.py`.
+`file_content` (the file, opened once) -> `recognisers`, `session_recognisers` (one function per format) -> `validate`
+(one file) -> `validate_apart` (many files, in a separate process) -> `validate_together` (files against each other).
+`format_docs` and `importing_docs` write pages of docs/ from the code. Begin at `validate.py`.
 """

@@ -1,4 +1,8 @@
-"""Content of a file, opened once for all recognisers."""
+"""Content of a file, read and parsed once, in the forms that the recognisers of `hapteq validate` need.
+
+A file is a folder, an HDF5 file (only its format attribute is read here), or text, which is also parsed as JSON and as
+TOML. Text above a size limit is not parsed.
+"""
 
 import csv
 import io
@@ -16,7 +20,7 @@ from study.store.disk.text_file import TOML_BYTES, read_text, too_long_key
 
 @dataclass(frozen=True, slots=True)
 class FileContent:
-    """A file's content in the forms that it can be read as; None for the others."""
+    """Content of a file; None in each field for a form in which it cannot be read."""
 
     path: Path
     is_folder: bool = False
@@ -24,7 +28,7 @@ class FileContent:
     """Format attribute of an HDF5 file; empty if it has none."""
     text: str | None = None
     json: Any = None
-    """A whole document. Lines of JSON (`events.jsonl`) are not parsed here."""
+    """The parsed document, if the whole text is one. JSON Lines (`events.jsonl`) are not parsed here."""
     toml: dict[str, Any] | None = None
 
     @property
@@ -35,7 +39,7 @@ class FileContent:
 
     @property
     def header(self) -> tuple[str, ...]:
-        """Fields of the first line, as in a table."""
+        """Fields of the first line as of a CSV table, without surrounding spaces; empty if it is not one."""
         rows = csv.reader(io.StringIO((self.text or "").partition("\n")[0]))
         try:
             return tuple(name.strip() for name in next(rows, []))
@@ -44,7 +48,8 @@ class FileContent:
 
 
 def open_content(path: Path) -> FileContent:
-    """Open a file once, for all recognisers. Raises CannotReadError, UnusableFileError."""
+    """Read a file or folder. Raises CannotReadError where it cannot be read, UnusableFileError where its name ends as
+    an HDF5 file's but its content is none."""
     try:
         if path.is_dir():
             return FileContent(path, is_folder=True)
@@ -59,7 +64,7 @@ def open_content(path: Path) -> FileContent:
 
 
 def _json(text: str) -> Any:
-    """The document; None where it is too long for one, or not JSON."""
+    """The parsed JSON document; None if the text is longer than `DOCUMENT_BYTES` or not JSON."""
     try:
         return load_json(text) if len(text) <= DOCUMENT_BYTES else None
     except ValueError:
@@ -67,7 +72,7 @@ def _json(text: str) -> Any:
 
 
 def _toml(text: str) -> dict[str, Any] | None:
-    """The document; None where it is not TOML, or so long that parsing it would take minutes."""
+    """The parsed TOML document; None if it is not TOML, or if text or a key is too long: parsing would take minutes."""
     if len(text) > TOML_BYTES or too_long_key(text):
         return None
     try:

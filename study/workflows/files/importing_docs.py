@@ -1,4 +1,8 @@
-"""docs/importing.md: how files of others are imported, with every key of a map, made from the code that reads it."""
+"""Writes docs/importing.md: how recordings of other programs are imported, and every key of an import map.
+
+The introduction is text in this module; the tables of keys, functions and shipped maps, and the limits of size, come
+from the schema and the constants of the code that reads a map, so that page and code agree.
+"""
 
 from collections.abc import Iterable
 
@@ -198,11 +202,11 @@ With `hold = "zero-order"`, `command[k]` is held from t_k to t_(k+1) and `respon
 
 Two loggers write a table each: `drive_3.csv` with the columns `t,counts,current`, `daq_3.csv` with
 `time [s],velocity [mm/s],load cell [V]`."""
-"""Beginning of the page."""
+"""Introduction of the page, in Markdown, up to the example of a map."""
 
 
 def write_importing_page() -> str:
-    """The text of docs/importing.md."""
+    """The text of docs/importing.md, in Markdown."""
     parts = [
         _INTRODUCTION,
         f"```toml\n{EXAMPLE}```",
@@ -236,21 +240,24 @@ def write_importing_page() -> str:
 
 
 def _tables() -> list[tuple[str, Node]]:
+    """Name and schema of each table of a map."""
     return [(name, node) for name, node in MAP_SCHEMA["properties"].items() if _table_of(node)]
 
 
 def _table_of(node: Node) -> Node:
-    """The schema of a table, or of each of a list of tables; empty for plain values."""
+    """Schema of a table, or of the entries of a list of tables; empty for a plain value."""
     inner = resolve_reference(MAP_SCHEMA, node)
     entries = resolve_reference(MAP_SCHEMA, inner["items"]) if inner.get("type") == "array" else inner
     return entries if "properties" in entries else {}
 
 
 def _title(name: str, node: Node) -> str:
+    """Header of a table as it is written in TOML: `[[name]]` for a list of tables, else `[name]`."""
     return f"`[[{name}]]`" if resolve_reference(MAP_SCHEMA, node).get("type") == "array" else f"`[{name}]`"
 
 
 def _keys(title: str, table: Node) -> str:
+    """Section about the plain keys of a table, as a Markdown table."""
     plain = [(key, node) for key, node in table["properties"].items() if table is not MAP_SCHEMA or not _table_of(node)]
     needed = table.get("required", ())
     rows = (
@@ -265,10 +272,12 @@ def _keys(title: str, table: Node) -> str:
 
 
 def _map_row(name: str) -> tuple[str, str, str]:
+    """Name, file patterns and title of a shipped map."""
     found = read_map(name).map
     return f"`{name}`", ", ".join(f"`{pattern}`" for pattern in found.files), found.title
 
 
 def _rows(heading: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """A Markdown table. A bar within a cell would end it and is replaced by a slash."""
     lines = [heading, tuple("---" for _ in heading), *rows]
     return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)

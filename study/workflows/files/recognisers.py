@@ -1,4 +1,8 @@
-"""Recognise a file's format: one small function per format. A new format adds its function to the tuple at the end."""
+"""Recognisers of hapteq's own file formats, for `hapteq validate`: one function per format.
+
+A recogniser identifies a format by its format attribute, its top-level keys or its header, then reads the whole file
+with the reader of that format and returns a description in words. A new format adds its function to `RECOGNISERS`.
+"""
 
 from collections.abc import Callable
 
@@ -37,13 +41,13 @@ from study.store.formats.trials_file import TRIALS_HEADER, read_trials
 from study.workflows.files.file_content import FileContent
 
 Recogniser = Callable[[FileContent], str | None]
-"""The kind of the file in words; None if it has another format. Raises UnusableFileError if the format is ours but
-the content wrong."""
+"""Function that returns the kind of a file in words, or None if the file has another format. Raises UnusableFileError
+if the file has this format but its content is wrong."""
 
 
 def recognise_recording(content: FileContent) -> str | None:
-    """An HDF5 recording, by its format attribute. Raises UnusableFileError also for the problems of
-    `silent_segments`."""
+    """An HDF5 recording, by its format attribute. Raises UnusableFileError also for segments that `silent_segments`
+    reports."""
     if content.hdf5_format != recording_layout.FORMAT:
         return None
     found = read_recording(content.path)
@@ -69,7 +73,7 @@ def describe_recording(found: Recording) -> str:
 
 
 def recognise_identified_model(content: FileContent) -> str | None:
-    """An identified model."""
+    """An identified model in HDF5, by its format attribute."""
     if content.hdf5_format != identified_model_file.FORMAT:
         return None
     found = read_identified_model(content.path)
@@ -82,7 +86,7 @@ def recognise_identified_model(content: FileContent) -> str | None:
 
 
 def recognise_calibration(content: FileContent) -> str | None:
-    """A calibration of a linkage."""
+    """A calibration of a linkage in HDF5, by its format attribute."""
     if content.hdf5_format != calibration_file.FORMAT:
         return None
     found = read_calibration(content.path)
@@ -125,7 +129,7 @@ def _unit_problem(channel: ChannelMap | ComputedMap) -> str:
 
 
 _PROTOCOL_KEYS = {key for kind in ADAPTERS for key in protocol_schema(kind)["properties"]}
-"""Keys by which a TOML file is taken for a protocol, of any kind."""
+"""Top-level keys of all kinds of protocols: a TOML file with any of them is taken for a protocol."""
 
 
 def recognise_protocol(content: FileContent) -> str | None:
@@ -141,7 +145,7 @@ def recognise_protocol(content: FileContent) -> str | None:
 
 
 def recognise_diagnosis(content: FileContent) -> str | None:
-    """A diagnosis."""
+    """A diagnosis in JSON, by its `format` entry."""
     if content.json_format != DIAGNOSIS_FORMAT:
         return None
     found = read_diagnosis(content.path)
@@ -149,7 +153,7 @@ def recognise_diagnosis(content: FileContent) -> str | None:
 
 
 def recognise_daily_check(content: FileContent) -> str | None:
-    """A daily check of a device."""
+    """A daily check of a device in JSON, by its `format` entry."""
     if content.json_format != DAILY_CHECK_FORMAT:
         return None
     found = read_daily_check(content.path)
@@ -157,7 +161,7 @@ def recognise_daily_check(content: FileContent) -> str | None:
 
 
 def recognise_repeats(content: FileContent) -> str | None:
-    """The document beside a table of repeated playback."""
+    """The JSON document that accompanies a table of forces from repeated playback, by its `format` entry."""
     if content.json_format != REPEATS_FORMAT:
         return None
     found = read_repeats(content.path)
@@ -168,7 +172,7 @@ def recognise_repeats(content: FileContent) -> str | None:
 
 
 def recognise_real_answer(content: FileContent) -> str | None:
-    """The diagnosis of a real recording."""
+    """The diagnosis of a real recording in JSON, by its `format` entry."""
     if content.json_format != REAL_ANSWER_FORMAT:
         return None
     found = read_real_answer(content.path)
@@ -176,7 +180,7 @@ def recognise_real_answer(content: FileContent) -> str | None:
 
 
 def recognise_reproduction(content: FileContent) -> str | None:
-    """A reproduction of the published figures."""
+    """A reproduction of the published figures in JSON, by its `format` entry."""
     if content.json_format != REPRODUCTION_FORMAT:
         return None
     found = read_reproduction(content.path)
@@ -194,7 +198,8 @@ def recognise_trajectory(content: FileContent) -> str | None:
 
 def recognise_trials(content: FileContent) -> str | None:
     """A CSV table of trials, by the first two columns of its header."""
-    # A header with one wrong column still belongs to a hapteq table; both tables begin with the subject.
+    # A header with an error in one column is still recognised, so that `read_trials` reports the error. Two columns are
+    # compared, because tables of thresholds also begin with the subject.
     if content.header[:2] != TRIALS_HEADER[:2] and header_problem(content.header, TRIALS_HEADER):
         return None
     return f"table of {_count(len(read_trials(content.path)), 'trial')}"
@@ -209,6 +214,7 @@ def recognise_thresholds(content: FileContent) -> str | None:
 
 
 def _count(number: int, what: str) -> str:
+    """Number and noun, in the plural unless the number is 1."""
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
@@ -228,4 +234,4 @@ RECOGNISERS: tuple[Recogniser, ...] = (
     recognise_import_map,
     recognise_protocol,
 )
-"""Tried in this order; the first answer counts."""
+"""Recognisers in the order in which they are tried; the first that returns a kind decides."""

@@ -1,4 +1,8 @@
-"""Recognisers of a study's results: session folders and logs, summaries, statistics, locks, tombstones."""
+"""Recognisers of the files of a study, for `hapteq validate`: sessions, JSON documents derived from them, locks.
+
+A session folder is checked as a whole: its log is replayed against the rules, every recording is compared with the
+SHA-256 in the log, and the tables are compared with what the log gives.
+"""
 
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -25,7 +29,7 @@ from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import result_problems
 
 KIND = "session"
-"""What messages call a session."""
+"""Name of a session folder or log in messages."""
 
 DOCUMENTS = {
     SUMMARY_FORMAT: ("session summary", ("session", "subject", "protocol", "device", "runs", "answers", "closed")),
@@ -36,11 +40,12 @@ DOCUMENTS = {
     WITHDRAWAL_FORMAT: ("withdrawal that was begun", ()),
     TOMBSTONE_FORMAT: ("tombstone of a withdrawn session", ("session", "withdrawn_utc")),
 }
-"""Kind in words and required keys, by format."""
+"""Kind in words and required keys of each JSON document, by its `format` entry."""
 
 
 def recognise_session(content: FileContent) -> str | None:
-    """A session folder, or its log."""
+    """A session folder or its log; the log alone is replayed without checks of recordings and tables. None for others.
+    Raises UnusableFileError."""
     if content.is_folder:
         folder = SessionFolder(content.path.resolve())
         if folder.withdrawn:
@@ -52,6 +57,7 @@ def recognise_session(content: FileContent) -> str | None:
 
 
 def _describe_withdrawn(folder: SessionFolder, path: Path) -> str:
+    """Kind of a withdrawn session. Raises UnusableFileError where erasing is not finished."""
     if finish := how_to_finish(folder):
         raise UnusableFileError(path, "withdrawn session", ("the erasing is not finished", finish))
     return "withdrawn session; nothing is left of it but its tombstone"
@@ -87,7 +93,8 @@ def recognise_lock(content: FileContent) -> str | None:
 
 
 def _check_session(folder: SessionFolder, path: Path) -> str:
-    """Checks beyond the log: every recording is the logged one, and the tables agree with the log."""
+    """Description of a session folder whose recordings have the logged SHA-256 and whose tables agree with the log.
+    Raises UnusableFileError otherwise."""
     folded = _fold(folder, path)
     problems = [
         *_check_recording_file(folder, folded),
@@ -99,6 +106,7 @@ def _check_session(folder: SessionFolder, path: Path) -> str:
 
 
 def _fold(folder: SessionFolder, path: Path) -> FoldedSession:
+    """The session, replayed from its log. Raises UnusableFileError for any damage, an incomplete last line included."""
     try:
         folded = fold_session(folder)
     except UnusableFileError:
@@ -112,6 +120,7 @@ def _fold(folder: SessionFolder, path: Path) -> FoldedSession:
 
 
 def _check_recording_file(folder: SessionFolder, folded: FoldedSession) -> list[str]:
+    """Recordings of trials that are missing or differ from the SHA-256 in the log."""
     problems = []
     for event in folded.contents.events:
         if not isinstance(event, TrialMeasured) or event.recording is None:
@@ -125,7 +134,8 @@ def _check_recording_file(folder: SessionFolder, folded: FoldedSession) -> list[
 
 
 def _result_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
-    """Results that contradict the log. Missing ones are due and not reported."""
+    """Result files that contradict the log, and a missing seal. A missing table is not an error, because it can
+    be written from the log."""
     texts = [f"{SEAL_NAME} is missing; hapteq resume writes it"] if folded.seal_due else []
     for result in result_problems(folder, folded.state):
         if not result.missing:
@@ -134,6 +144,7 @@ def _result_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
 
 
 def _describe(folded: FoldedSession) -> str:
+    """Participant, protocol, number of answers, end, state of checksums and seal, and steps of the clock, in words."""
     state = folded.state
     who = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
     end = state.sitting.turned_away or ("finished" if state.closed else "not finished")
@@ -146,4 +157,4 @@ def _describe(folded: FoldedSession) -> str:
 
 
 SESSION_RECOGNISERS = (recognise_session, recognise_document, recognise_lock)
-"""Asked in this order; the first that recognises a file answers."""
+"""Recognisers in the order in which they are tried; the first that returns a kind decides."""

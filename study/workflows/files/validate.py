@@ -1,4 +1,8 @@
-"""`hapteq validate`: what a file is, and everything that is wrong with it, in words."""
+"""Validation of one file or session folder (`hapteq validate`): its kind and all its problems, in words.
+
+The recognisers are tried in turn on the content. A file that none of them recognises, and that may be a recording of
+another program, is read as an import would read it.
+"""
 
 import tomllib
 from dataclasses import dataclass, replace
@@ -25,7 +29,7 @@ KNOWN = (
     "(TOML), trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and "
     "version, and session folders"
 )
-"""What `hapteq validate` recognises, for messages."""
+"""List of the kinds that `hapteq validate` recognises, for messages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,15 +38,15 @@ class Validation:
 
     path: Path
     kind: str
-    """In words: "recording, 105 s at 1000 Hz, 3 commands, 3 responses"."""
+    """Kind in words, such as "recording, 105 s at 1000 Hz, 3 commands, 3 responses"."""
     problems: tuple[str, ...]
     """One sentence each; empty = the file is valid."""
     notes: tuple[str, ...] = ()
-    """Remarks about a valid file, such as a session's folder that others can read."""
+    """Remarks that are not errors, such as a session folder that other accounts can read."""
 
 
 def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECOGNISERS + RECOGNISERS) -> Validation:
-    """Validate one file. Never raises for its content or absence."""
+    """Validate one file or session folder. Wrong content and a missing file are reported as problems, never raised."""
     found = _validate(path, recognisers)
     folders = (path, path.absolute().parent) if FOLDER.fullmatch(path.absolute().name) else (path,)
     warnings = (privacy_warning(folder) for folder in folders if _is_folder(folder))
@@ -50,7 +54,7 @@ def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECO
 
 
 def _notes(found: Validation) -> tuple[str, ...]:
-    """Remarks about a valid recording: axes that are not driven."""
+    """Remark on a valid recording: commands that are zero or missing in every sample."""
     if found.problems or not found.kind.startswith("recording, "):
         return ()
     command = read_recording(found.path).command
@@ -61,6 +65,7 @@ def _notes(found: Validation) -> tuple[str, ...]:
 
 
 def _is_folder(path: Path) -> bool:
+    """Whether the path is an existing folder. Never raises."""
     try:
         return path.is_dir()
     except OSError:  # not a possible file name
@@ -68,6 +73,7 @@ def _is_folder(path: Path) -> bool:
 
 
 def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
+    """Validation by the recognisers, then as a foreign recording; without remarks on access rights and axes."""
     if _is_foreign(path):
         return _validate_foreign(path)
     try:
@@ -89,7 +95,7 @@ def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
 
 
 def _is_foreign(path: Path) -> bool:
-    """Whether a file is of a kind in which hapteq stores nothing."""
+    """Whether an existing file has a type in which hapteq stores nothing, by its extension."""
     kind = path.suffix.lower()
     try:
         return kind in FOREIGN and kind not in (*TABLES, *RECORDS) and path.is_file()
@@ -98,8 +104,8 @@ def _is_foreign(path: Path) -> bool:
 
 
 def _validate_foreign(path: Path, kind: str = "", unknown: tuple[str, ...] = ()) -> Validation:
-    """A foreign recording, read as an import would read it. kind, unknown: of a file that may be a damaged one of our
-    own, which is reported if it is no recording either."""
+    """Validation as a recording of another program, read as an import would read it. kind, unknown: kind and problems
+    to report if the import refuses the file, because it may be a damaged hapteq file."""
     # Imported here: the import takes longer to load than most files take to check.
     from study.workflows.recording.import_recording import read_foreign
 
@@ -113,7 +119,7 @@ def _validate_foreign(path: Path, kind: str = "", unknown: tuple[str, ...] = ())
 
 
 def _describe_unknown(content: FileContent) -> tuple[str, str]:
-    """Kind and problem of a file of no known format."""
+    """Kind of a file that no recogniser knows, and the problem as a clause without a capital letter or full stop."""
     if content.is_folder:
         return "folder", "this folder is not a session: it holds no events.jsonl"
     if content.hdf5_format is not None:
@@ -132,6 +138,7 @@ def _describe_unknown(content: FileContent) -> tuple[str, str]:
 
 
 def _json_problem(content: FileContent) -> str:
+    """Why a JSON document is not recognised."""
     try:
         load_json((content.text or "")[: DOCUMENT_BYTES + 1])
     except ValueError as error:
@@ -142,6 +149,7 @@ def _json_problem(content: FileContent) -> str:
 
 
 def _toml_problem(content: FileContent) -> str:
+    """Why a TOML file is not recognised."""
     text = content.text or ""
     if len(text) > TOML_BYTES:
         return f"it has {len(text)} characters; up to {TOML_BYTES} are read"

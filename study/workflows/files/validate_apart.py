@@ -10,14 +10,14 @@ from study.errors import StudyError
 from study.workflows.files.validate import Validation, validate_file
 
 FILE_TIMEOUT_S = 60.0
-"""Longest wait for one file; a recording of an hour takes seconds."""
+"""Longest wait for one file (s); a recording of an hour takes seconds."""
 START_TIMEOUT_S = 300.0
-"""Longest wait for the imports of the worker; a swapping machine takes a minute."""
+"""Longest wait for the start and imports of the worker process (s); a computer that swaps memory takes a minute."""
 
 
 def validate_files(paths: Sequence[Path], timeout_s: float = FILE_TIMEOUT_S) -> Iterator[Validation]:
-    """Validation of each file, in order. timeout_s: longest wait for one file. One worker serves all files and is
-    replaced when a file crashes it or makes it hang. Raises StudyError where no worker starts."""
+    """Validation of each file, in order. timeout_s: longest wait for one file (s). One worker process validates all
+    files and is replaced when a file crashes it or takes too long. Raises StudyError where no worker starts."""
     worker = _start_worker()
     try:
         for path in paths:
@@ -35,7 +35,7 @@ def validate_files(paths: Sequence[Path], timeout_s: float = FILE_TIMEOUT_S) -> 
 
 
 def _validate_safely(path: Path) -> Validation:
-    """Runs in the worker; an error in hapteq itself is reported as one, not as a damaged file."""
+    """Validate a file in the worker process. An error of hapteq itself is reported as such, not as a damaged file."""
     try:
         return validate_file(path)
     except Exception as error:  # noqa: BLE001 - a file must not be called damaged for an error in hapteq
@@ -43,7 +43,8 @@ def _validate_safely(path: Path) -> Validation:
 
 
 def _start_worker() -> ProcessPoolExecutor:
-    # Spawned: a forked child would inherit HDF5's locks.
+    """A worker process whose imports are done. Raises StudyError where it does not start."""
+    # Spawned, not forked: a forked process would inherit locks of the HDF5 library.
     worker = ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
     # Started before the first file, so that a slow start is not counted against that file's time.
     try:
@@ -60,14 +61,16 @@ def _start_worker() -> ProcessPoolExecutor:
 
 
 def _ready() -> None:
-    """Runs in the worker once its imports are done."""
+    """Empty first task: its result shows that the worker's imports are done."""
 
 
 def _kill(worker: ProcessPoolExecutor) -> None:
+    """End the worker process at once, even if it hangs in a library."""
     for process in list(worker._processes.values()):  # noqa: SLF001 - the executor offers no other way before 3.14
         process.kill()
     worker.shutdown(wait=False, cancel_futures=True)
 
 
 def _damage_report(path: Path, how: str) -> Validation:
+    """Validation of a file on which the worker crashed or did not end. how: what happened, as a clause."""
     return Validation(path, "damaged file", (f"The file is damaged: {how}. Restore it from a copy.",))

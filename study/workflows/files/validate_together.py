@@ -1,4 +1,7 @@
-"""Check files against each other: a model's effects against the axes of the recordings."""
+"""Validation of files against each other: the effects of mechanical models against the channels of recordings.
+
+An effect may name the axes and channels on which it acts; a recording without these contradicts the model.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -12,7 +15,8 @@ from study.workflows.files.validate import Validation
 
 
 def check_together(found: Sequence[Validation]) -> tuple[Validation, ...]:
-    """Valid files with problems between them; a model is compared with recordings of as many commands and responses."""
+    """The validations, with further problems of each mechanical model whose effects do not fit a recording. Only valid
+    files are compared, and only a model and a recording with the same numbers of commands and responses."""
     recordings = [(each.path, read_recording(each.path)) for each in _valid_of_kind(found, "recording, ")]
     if not recordings:
         return tuple(found)
@@ -26,11 +30,13 @@ def check_together(found: Sequence[Validation]) -> tuple[Validation, ...]:
 
 
 def _valid_of_kind(found: Sequence[Validation], kind: str) -> Iterator[Validation]:
+    """Validations without problems whose kind begins with `kind`."""
     return (each for each in found if each.kind.startswith(kind) and not each.problems)
 
 
 def _problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording]]) -> Iterator[str]:
-    # Imported here: the catalogue of effects takes longer to load than most files to check.
+    """Sentences on effects that cannot be placed on the axes and channels of a recording."""
+    # Imported here: loading the catalogue of effects takes longer than checking most files.
     from equalizer.effects.placing import PlacingError, place_recorded_effects
 
     for path, recording in recordings:

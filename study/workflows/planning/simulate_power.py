@@ -1,4 +1,8 @@
-"""Statistical power over the number of participants: simulated studies on any executor, saved as they finish."""
+"""Statistical power by number of participants, from simulated studies.
+
+The studies are simulated and tested by `analysis.psychophysics.power` in chunks on any executor. Each finished chunk is
+appended to `studies.jsonl`, so that an interrupted simulation continues; power.json and a figure are written last.
+"""
 
 import json
 from collections.abc import Callable, Sequence
@@ -26,10 +30,12 @@ from study.store.disk.text_file import read_text, write_text
 from study.workflows.run_on_executor import run_pieces
 
 CHUNK = 10
-"""Studies per piece of work: some seconds, so that little is lost when a worker dies."""
+"""Number of studies in a piece of work: it takes some seconds, so that little is lost when a worker process dies."""
 HABITS_SINCE = ("guessers", "criterion_drift_sd", "unsure", "repeats", "delivery", "rove_db")
-"""Fields of `Crowd` that were added later; at their defaults, a folder that was begun earlier can be continued."""
+"""Fields of `Crowd` that were added in later versions. They are left out of the stored plan while they have their
+defaults, so that a folder from an earlier version can be continued."""
 FINISHED_NAME, RESULT_NAME = "studies.jsonl", "power.json"
+"""File with the plan in its first line and a finished chunk in each further line; file with the results."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +49,14 @@ class PowerPlan:
     studies: int
     """Number of studies of each size."""
     seed: int
+    """Seed of the simulation; with sample size and number of a study it gives all draws of that study."""
     contrast_hz: tuple[float, ...] = ()
-    """The declared contrast, first frequency minus second; empty: the highest frequency minus the lowest."""
+    """Two frequencies (Hz) of the declared contrast, first minus second; empty: the highest and the lowest
+    frequency."""
 
     @property
     def pair_hz(self) -> tuple[float, float]:
-        """The two frequencies that are compared."""
+        """The two frequencies (Hz) whose thresholds are compared, first minus second."""
         return find_judged_pair(self.crowd.frequencies_hz, self.contrast_hz)
 
 
@@ -59,10 +67,10 @@ Piece = tuple[int, int]
 def simulate_power(
     plan: PowerPlan, out: Path, executor: Executor, on_finished: Callable[[int], None]
 ) -> tuple[PowerPoint, ...]:
-    """Run all studies, calling `on_finished(count)`. The same seeds give the same numbers on any executor, in any
-    order; results in `out` from an interrupted run of the same plan are reused. Writes power.json and figures/power.
+    """Simulate and test all studies; write power.json and figures/power into `out`. on_finished: called with the number
+    of finished studies. The same seed gives the same results on any executor; `out` may hold an interrupted run.
 
-    Raises StudyError where `out` belongs to another plan, and CannotWriteError.
+    Raises WrongUseError for a trial limit, StudyError where `out` belongs to another plan, and CannotWriteError.
     """
     if plan.rule.trial_limit and not plan.rule.is_bayesian:
         raise WrongUseError(
@@ -80,7 +88,7 @@ def simulate_power(
         _append(path, {"piece": piece, "verdicts": [asdict(v) for v in verdicts]})
         finished += len(verdicts)
         on_finished(finished)
-    # In the order of the plan, not of finishing: sums of the same numbers are then the same to the bit.
+    # In the order of the plan, not in the order of finishing, so that rounding of sums is the same in every run.
     points = tuple(power_point([v for key in sorted(done) if key[0] == n for v in done[key]]) for n in plan.people)
     payload = {"plan": _plan_facts(plan), "judged_hz": plan.pair_hz, "points": [asdict(point) for point in points]}
     write_json(out / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
@@ -89,7 +97,8 @@ def simulate_power(
 
 
 def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -> None:
-    # Imported here: matplotlib takes a worker, which draws nothing, as long as its first ten studies.
+    """Draw the power curves and write them into `folder`. Raises CannotWriteError."""
+    # Imported here: workers, which draw nothing, would take as long to load Matplotlib as to simulate ten studies.
     from analysis.figures.power_curves import power_picture
     from study.workflows.picture_files import write_pictures
 
@@ -98,7 +107,7 @@ def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -
 
 
 def judge_piece(plan: PowerPlan, piece: Piece) -> list[StudyVerdict]:
-    """Runs in a worker process."""
+    """Simulate and test the studies of one chunk. Runs in a worker process."""
     people, first = piece
     last = min(first + CHUNK, plan.studies)
     return [
@@ -108,7 +117,7 @@ def judge_piece(plan: PowerPlan, piece: Piece) -> list[StudyVerdict]:
 
 
 def _plan_facts(plan: PowerPlan) -> dict[str, object]:
-    """The plan without its sample sizes: more of them may be added later."""
+    """The plan as plain values, without its sample sizes: further sizes may be added to a folder later."""
     from pydantic import TypeAdapter
 
     rule = TypeAdapter(StaircaseRule).dump_python(plan.rule, mode="json")
@@ -117,14 +126,14 @@ def _plan_facts(plan: PowerPlan) -> dict[str, object]:
         if not crowd[habit]:
             del crowd[habit]
     facts = {"crowd": crowd, "rule": rule, "studies": plan.studies, "seed": plan.seed}
-    # Left out where it is the usual pair, so that a folder that was begun before there was a choice goes on.
+    # The default pair is not stored, so that a folder from a version without a choice of the pair can be continued.
     usual = plan.pair_hz == find_judged_pair(plan.crowd.frequencies_hz, ())
     return facts if usual else {**facts, "contrast_hz": list(plan.pair_hz)}
 
 
 def _read_finished(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict]]:
-    """Results of an interrupted run of the same plan; an incomplete last line is ignored, also where it is the first,
-    the plan."""
+    """Results of an interrupted run of the same plan, by piece. An incomplete line is ignored; where the first line,
+    the plan, is missing or incomplete, the file is begun anew. Raises StudyError for another plan."""
     text = read_text(path) if path.exists() else ""
     if _first_row(plan).startswith(text):
         _begin(path, plan)
@@ -146,10 +155,12 @@ def _read_finished(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict
 
 
 def _first_row(plan: PowerPlan) -> str:
+    """First line of the file of finished studies: the plan in JSON."""
     return json.dumps({"plan": _plan_facts(plan)})
 
 
 def _begin(path: Path, plan: PowerPlan) -> None:
+    """Create the folder and the file of finished studies with the plan. Raises CannotWriteError."""
     try:
         make_folder(path.parent)
     except OSError as problem:
@@ -158,6 +169,8 @@ def _begin(path: Path, plan: PowerPlan) -> None:
 
 
 def _append(path: Path, row: dict[str, object]) -> None:
+    """Append a line in JSON. It begins with the line break, so that an incomplete line before it stays separate. Raises
+    CannotWriteError."""
     try:
         with path.open("a", encoding="utf-8") as file:
             file.write("\n" * (file.tell() > 0) + json.dumps(row))
@@ -166,7 +179,8 @@ def _append(path: Path, row: dict[str, object]) -> None:
 
 
 def power_lines(points: Sequence[PowerPoint], means: str = REVERSALS.means) -> list[str]:
-    """A table for the terminal. means: what thresholds of runs are, in the plural."""
+    """A table for the terminal: power with its 95 % interval by analysis, in percent. means: name of the thresholds of
+    single runs, in the plural."""
     paired = f"{means}, paired"
     width = max(24, len(paired))
     lines = [

@@ -1,5 +1,7 @@
-"""Recordings: made on the device, imported from other programs, inspected before any model.
+"""Recordings: made on a device, imported from files of other programs, and inspected before any model.
 
-A protocol -> `play_pieces` -> `take_facts` -> `record_device` -> one recording file; `import_recording` makes the same
-file from foreign tables; `look_at_recordings` draws it. Begin at `record_device.py`.
+A recording protocol -> `play_pieces` (play each excitation) -> `take_facts` (metadata, warnings) -> one HDF5 file, all
+conducted by `record_device`; `import_recording` makes the same file from foreign files, and `read_any_recording` reads
+either kind; `look_at_recordings` inspects them. `calibrate_linkage` records a device's linkage over the workspace.
+Begin at `record_device.py`.
 """

@@ -1,5 +1,5 @@
-"""Read a recording from any file: a hapteq recording directly, a foreign file (table, MATLAB, NumPy, …) imported in
-memory, without a map."""
+"""Read a recording from any file: a hapteq recording directly; a file of another program (table, MATLAB, NumPy, …) by
+an import in memory, without an import map, where its names state the roles of the channels."""
 
 from pathlib import Path
 
@@ -10,8 +10,8 @@ from study.store.formats.recording_file import read_recording
 
 
 def read_any_recording(path: Path) -> tuple[Recording, tuple[str, ...]]:
-    """The recording in a file, and remarks on its import; none for a hapteq recording. Raises StudyError where the file
-    cannot be read, or a foreign file needs a map."""
+    """The recording in a file, and remarks on its import (empty for a hapteq recording). Raises StudyError where the
+    file cannot be read, or where it can only be imported with an import map."""
     if path.is_file() and is_hdf5(path) and format_of(path):
         return read_recording(path), ()
     # Imported here, because loading the import takes longer than reading a hapteq recording.

@@ -1,4 +1,4 @@
-"""Metadata of each piece of a recording and its feedback, and warnings about it."""
+"""Metadata of a recording: parameters of the feedback, and facts and warnings about each played piece (a take)."""
 
 import math
 from dataclasses import asdict
@@ -10,7 +10,8 @@ from study.workflows.recording.play_pieces import PlayedPiece, direction_text
 
 
 def spring_facts(spring: SpringSettings, effective_mass_kg: float) -> dict[str, Any]:
-    """Parameters of the feedback: command = excitation - stiffness (position - place) - damping velocity."""
+    """Parameters of the virtual spring: command = excitation - k (position - place) - b velocity, in N, with the
+    stiffness k = m (2 pi f0)² from natural frequency f0 and effective mass m, and the damping b."""
     return {
         "kind": "virtual spring about the place",
         "natural_frequency_hz": spring.natural_frequency_hz,
@@ -21,7 +22,7 @@ def spring_facts(spring: SpringSettings, effective_mass_kg: float) -> dict[str, 
 
 
 def segment_facts(take: PlayedPiece) -> dict[str, Any]:
-    """Metadata of one piece."""
+    """Metadata of one played piece. Clipped values are counted in ticks; amplitudes in N."""
     piece = take.piece
     return {
         "number": piece.number,
@@ -40,7 +41,7 @@ def segment_facts(take: PlayedPiece) -> dict[str, Any]:
 
 
 def warnings_of(take: PlayedPiece) -> list[str]:
-    """Warnings for the person who recorded."""
+    """Sentences for the experimenter on lowered amplitude, clipping, missed ticks, lost packets and the slew limit."""
     health, what = take.health, _piece_text(take)
     found = []
     if take.played_n < take.requested_n:
@@ -61,17 +62,20 @@ def warnings_of(take: PlayedPiece) -> list[str]:
 
 
 def _sensor_warning(sensor: SensorFacts, what: str) -> str:
+    """Sentence on lost packets of the accelerometer. what: the piece in words."""
     packets = f"{sensor.lost} of {sensor.lost + sensor.packets} packets of the accelerometer were lost"
     return f"{packets} ({what}); at {sensor.unplaced_ticks} of {sensor.ticks} ticks its acceleration is NaN."
 
 
 def _piece_text(take: PlayedPiece) -> str:
+    """The piece in words: its frequency, or the kind of its excitation, and its direction."""
     piece = take.piece
     kind = f"{piece.frequency_hz:g} Hz" if piece.frequency_hz else piece.segment.kind
     return f"{kind} along {direction_text(piece)}"
 
 
 def _reduction_warning(take: PlayedPiece) -> str:
+    """Sentence on an amplitude that was lowered, here or in an earlier round of the same segment ("as before")."""
     why = []
     if take.sensor_clipped_before:
         why.append(f"the accelerometer clipped in {take.sensor_clipped_before} samples")

@@ -1,4 +1,7 @@
-"""Files of an analysis. Separate from the analysis, which imports statistics and plots."""
+"""Names of the files that an analysis writes, and which of them exist in a folder.
+
+Separate from `analyze_data`, which is slow to import because of its statistics and plots.
+"""
 
 from pathlib import Path
 
@@ -9,18 +12,21 @@ from study.store.disk.real_folder import is_real_folder
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 
 ANALYSIS_NAME = "analysis"
-"""Default output folder, in the analysed folder."""
+"""Name of the default output folder, inside the analysed folder."""
 
 OURS = ("thresholds", "medians", "units", "psychometric", "psychometric-*", "delivered", "ellipsoids", "staircases-*")
-"""Name patterns of figures; earlier ones are removed, since they may show a participant who has withdrawn."""
+"""Name patterns of the figures of an analysis. Existing figures are removed before new ones are written, since they may
+show a participant who has withdrawn."""
 
 STATISTICS_NAME, PAGE_NAME = "anova.json", "report.html"
+"""Names of the document with the statistics and of the report."""
 OUR_FILES = (THRESHOLDS_NAME, DETECTION_NAME, STATISTICS_NAME, PAGE_NAME)
-"""Files of an analysis beside its figures; the page is written last."""
+"""Files of an analysis other than its figures; the report, `PAGE_NAME`, is written last."""
 
 
 def is_analysis_of(out: Path, log: Path) -> bool:
-    """Whether the analysis in `out` is complete (its page is written last) and was made from the log as it is now."""
+    """Whether the analysis in `out` is complete (its report is written last) and was made from the present content of
+    `log`, by the SHA-256 in its provenance. Never raises for damaged files."""
     if not (out / PAGE_NAME).is_file():
         return False
     try:

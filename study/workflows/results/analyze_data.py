@@ -1,4 +1,8 @@
-"""Analyse a folder of sessions: thresholds.csv, detection.csv, anova.json, figures and one report."""
+"""Analysis of a folder of sessions: thresholds.csv, detection.csv, anova.json, figures and one HTML report.
+
+The sessions that belong together are selected (`collect_sessions`), analysed (`analyse_study`: thresholds, hierarchical
+model, analysis of variance) and written with their provenance.
+"""
 
 import errno
 from pathlib import Path
@@ -33,10 +37,9 @@ def analyze_data(
     data: Path | str, out: Path | str, ellipsoid: Path | str | None = None, protocol_name: str | None = None
 ) -> WrittenAnalysis:
     """Analyse all sessions in `data`; an earlier analysis in `out` is replaced. data: folder of sessions, a single
-    session, or an exported dataset. ellipsoid: a recording for the report. protocol_name: whose sessions, where there
-    are several.
-
-    Raises StudyError where there is nothing to analyse, where rows contradict their protocol, or on a full disk.
+    session, or an exported dataset. ellipsoid: recording whose acceleration ellipses the report shows. protocol_name:
+    protocol to analyse where there are several. Raises StudyError where there is nothing to analyse, where rows
+    contradict their protocol, or where files cannot be written.
     """
     data, out, ellipsoid = Path(data), Path(out), None if ellipsoid is None else Path(ellipsoid)
     collected = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
@@ -66,7 +69,7 @@ def analyze_data(
 
 
 def text_table(analysis: StudyAnalysis) -> list[str]:
-    """Thresholds as lines: one per frequency, with mean and number of participants."""
+    """Table of thresholds for the terminal: one line per frequency, means in N, with medians and declared contrast."""
     lines = ["No complete test run: there is no threshold yet."]
     if any(row.complete for row in analysis.thresholds):
         declared = describe_declared(analysis.declared_result)
@@ -77,8 +80,8 @@ def text_table(analysis: StudyAnalysis) -> list[str]:
 
 
 def _lines(table: ThresholdTable, heading: str) -> list[str]:
-    """One line per frequency: mean over participants, values that the cap cut included, their number, and the number
-    of participants."""
+    """One line per frequency: mean threshold over participants in N (values limited by the cap are included), number of
+    values limited by the cap, and number of participants."""
     lines = [f"{'frequency':>10}  {heading:>10}  {'cut by cap':>10}  participants"]
     for column, frequency_hz in enumerate(table.frequencies_hz):
         values = [value for row in table.values if (value := row[column]) is not None]
@@ -89,7 +92,7 @@ def _lines(table: ThresholdTable, heading: str) -> list[str]:
 
 
 def _primary_lines(analysis: StudyAnalysis) -> list[str]:
-    """Medians of the hierarchical model, beside the means."""
+    """Medians in N of the hierarchical model with their 95 % intervals; empty where it was not fitted."""
     if analysis.primary is None:
         return []
     lines = [f"{'frequency':>10}  {'median':>10}  95 % interval, all answers in one model"]
@@ -102,6 +105,7 @@ def _primary_lines(analysis: StudyAnalysis) -> list[str]:
 
 
 def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
+    """Acceleration ellipses of a recording; none without a path. Raises StudyError where they cannot be computed."""
     if path is None:
         return ()
     recording = read_recording(path)
@@ -117,7 +121,8 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
 
 
 def _make_private(out: Path, data: Path) -> None:
-    """Create the output folder; private if it lies beside the sessions. Raises CannotWriteError."""
+    """Create an output folder inside the folder of sessions, readable only by this account. An output folder elsewhere
+    is left to `_write`. Raises CannotWriteError."""
     if not out.resolve().is_relative_to(data.resolve()):
         return
     try:
@@ -136,12 +141,13 @@ def _write(
     provenance: Provenance,
     collected: CollectedTrials,
 ) -> None:
+    """Remove figures and report of an earlier analysis, then write all files. Raises CannotWriteError."""
     figures = out / "figures"
     try:
         make_folder(figures)
         if figures.is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, "it is a link, which is not followed")
-        # The report is written last: without it, the other files may be from different runs.
+        # The report is removed first and written last: while it is missing, the other files may be of different runs.
         for stale in analysis_outputs(out):
             if stale.parent == figures or stale.name in (DETECTION_NAME, PAGE_NAME):
                 stale.unlink()
@@ -160,7 +166,7 @@ def _write(
 
 
 def _origin_entries(provenance: Provenance, collected: CollectedTrials) -> dict[str, str]:
-    """Entries of the report's last section."""
+    """Entries of the report's last section, on the origin of the results."""
     return {
         "protocol": f"{collected.protocol.name}, hash {collected.protocol_hash}",
         "locked before the data": collected.locked,

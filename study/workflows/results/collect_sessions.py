@@ -1,4 +1,8 @@
-"""Select the sessions of one analysis: one protocol, one kind of participant, none withdrawn or contradictory."""
+"""Selection of the sessions that one analysis takes: one protocol, one population, none withdrawn or contradictory.
+
+People, simulated participants, and people at a device that did not move are never analysed together (`Population`).
+Everything that is excluded is reported in words.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,11 +24,9 @@ from study.workflows.results.session_results import finish_tables
 
 
 def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedTrials:
-    """Matching sessions below `data` (or `data` itself, a session).
-
-    Of several protocols the named one, else the one with most sessions; people before simulated participants before
-    practice without a device. Raises StudyError where there is nothing to analyse.
-    """
+    """Sessions in `data` (or `data` itself, a session) that belong together. Of several protocols: the named one (name,
+    or first 12 digits of its hash); else, of those with test or detection runs, the one with the most sessions. Of
+    several populations: the first in the order of `Population`. Raises StudyError where there is nothing to analyse."""
     folders = _folders(data)
     whole, left_out = _fold_all(folders)
     folded = [(folder, session.state) for folder, session in whole]
@@ -63,7 +65,7 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedT
 
 
 def _collect_filled_forms(sessions: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[FilledForm, ...]:
-    """Answers to the protocol's questions, of the sessions that enter."""
+    """Answers to the protocol's questions, from the logs of the sessions that are analysed."""
     return tuple(
         FilledForm(folder.subject, folder.name, event.form, event.answers)
         for folder, session in sessions
@@ -73,7 +75,7 @@ def _collect_filled_forms(sessions: Sequence[tuple[SessionFolder, FoldedSession]
 
 
 def _lock_words(states: Sequence[SessionState]) -> str:
-    """Whether the protocol was locked, in words."""
+    """Whether the protocol was locked when the sessions were opened, in words."""
     locked = sum(state.opened.protocol_locked for state in states)
     if not locked:
         return "no: what the protocol declares was not fixed by a lock"
@@ -81,7 +83,7 @@ def _lock_words(states: Sequence[SessionState]) -> str:
 
 
 def _qualities(entering: Sequence[tuple[SessionFolder, SessionState]]) -> tuple[tuple[str, str], ...]:
-    """Model quality by sessions; those that share a model are listed together."""
+    """(names of sessions, sentence on the quality of their model); sessions that share a model are listed together."""
     sessions: dict[tuple[str, str], list[str]] = {}
     for folder, state in entering:
         if (equalized := state.opened.equalized) is not None:
@@ -91,6 +93,7 @@ def _qualities(entering: Sequence[tuple[SessionFolder, SessionState]]) -> tuple[
 
 
 def _folders(data: Path) -> tuple[SessionFolder, ...]:
+    """Session folders in `data`, or `data` itself if it is a session. Raises WrongUseError where there are none."""
     if (data / LOG_NAME).exists():
         return (SessionFolder(data.resolve()),)
     folders = session_folders(data)
@@ -105,6 +108,8 @@ def _folders(data: Path) -> tuple[SessionFolder, ...]:
 
 
 def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolder, FoldedSession]], list[str]]:
+    """Usable sessions, replayed from their logs, and sentences on the others. Raises StudyError where none is
+    usable."""
     folded: list[tuple[SessionFolder, FoldedSession]] = []
     left_out: list[str] = []
     for folder in folders:
@@ -126,7 +131,8 @@ def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolde
 
 
 def _finish(folded: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[str, ...]:
-    """Write results that are due; problems are only reported, because the analysis uses the logs alone."""
+    """Write tables and seals that are missing or out of date; returns sentences on what was written. Problems are only
+    reported, because the analysis uses the logs alone."""
     texts = []
     for folder, session in folded:
         try:
@@ -144,6 +150,7 @@ def _finish(folded: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[str,
 def _choose_protocol(
     folded: Sequence[tuple[SessionFolder, SessionState]], protocol_name: str | None, data: Path
 ) -> str:
+    """Hash of the protocol to analyse. Raises WrongUseError where no session follows the named protocol."""
     counted: dict[str, list[SessionState]] = {}
     for _, state in folded:
         counted.setdefault(state.opened.protocol_hash, []).append(state)
@@ -157,7 +164,7 @@ def _choose_protocol(
             f"'{protocol_name}' was asked for; {data} holds sessions of {there}.",
             "Give one of these names, or the first twelve digits of its hash.",
         )
-    # A protocol of training alone has nothing to analyse; it is chosen only where there is no other.
+    # A protocol with training runs only has no thresholds; it is chosen only if there is no other.
     return max(named, key=lambda key: (_measures(named[key][0].protocol), len(named[key])))
 
 

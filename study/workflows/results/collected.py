@@ -1,4 +1,5 @@
-"""Data of one analysis, from sessions or an exported dataset."""
+"""Input of one analysis: trials and facts about their sessions, collected from session folders (`collect_sessions`) or
+from an exported dataset (`collect_exported`)."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,26 +12,27 @@ from study.store.sessions.archive import SessionFolder
 
 @dataclass(frozen=True, slots=True)
 class CollectedTrials:
-    """Trials that are analysed together, all of the same protocol, and facts about their sessions."""
+    """Trials of one protocol and one population that are analysed together, and facts about their sessions."""
 
     protocol: StudyProtocol
     protocol_hash: str
     trials: tuple[Trial, ...]
     sessions: tuple[SessionFolder, ...]
     seeds: tuple[int, ...]
+    """Seeds of the sessions, in the same order."""
     devices: tuple[str, ...]
     """Names of all devices that were used."""
     observers: tuple[str, ...]
     """Names of the simulated participants; empty for people."""
     left_out: tuple[str, ...]
-    """What was excluded, and why, in sentences."""
+    """Sentences on what was excluded, and why."""
     qualities: tuple[tuple[str, str], ...]
-    """Quality of the models that equalized the stimuli: (sessions, sentence); none for plain forces."""
+    """(sessions, sentence) on the quality of each model that equalized stimuli; empty where forces were commanded."""
     locked: str
-    """Whether the protocol was locked when its sessions began."""
+    """Whether the protocol was locked when its sessions began, in words."""
     finished: tuple[str, ...]
-    """Results that had to be completed now, because the program had been killed, in sentences."""
+    """Sentences on result files that were missing or out of date and have been written now."""
     parents: tuple[Path, ...]
-    """Input files."""
+    """Input files, for the provenance."""
     forms: tuple[FilledForm, ...] = ()
     """Answers to the protocol's questions."""

@@ -1,4 +1,8 @@
-"""Export a study's trials for other tools, with protocol, seeds and versions; read such a dataset back."""
+"""Export of a study's trials for other tools, and reading of exported datasets for an analysis.
+
+Four forms can be written: Psych-DS, BIDS behaviour, MATLAB (.mat) and tidy CSV, each with protocol, seeds and versions;
+Psych-DS and tidy CSV can be read back, and give the same results as the sessions.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -32,8 +36,9 @@ from study.store.sessions.written_elsewhere import note_written
 from study.workflows.results.collected import CollectedTrials
 
 MOST_LEFT_OUT = 10_000
-"""A larger number in an edited file is no number of sessions."""
+"""Largest plausible number of excluded items in a dataset; a larger one is ignored as an error of editing."""
 EXPORT_AGAIN = "Export the study again, or restore the file from a copy."
+"""Remedy for a damaged or edited dataset, for messages."""
 Form = Literal["psych-ds", "bids", "mat", "csv"]
 """Form of an export, as the command line takes it."""
 WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
@@ -42,7 +47,7 @@ WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
     "mat": write_trials_mat,
     "csv": tidy_csv.write_tidy_csv,
 }
-"""What writes each form; returns the written files."""
+"""Function that writes each form of dataset and returns the written files."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,15 +56,15 @@ class Exported:
 
     out: Path
     files: tuple[str, ...]
-    """Relative to `out`."""
+    """Paths relative to `out`."""
     trials: int
     left_out: tuple[str, ...]
-    """What was excluded, and why, in sentences."""
+    """Sentences on what was excluded, and why."""
 
 
 def export_study(collected: CollectedTrials, data: Path, out: Path, form: Form, free_text: bool = False) -> Exported:
-    """Write the dataset atomically. collected: the sessions of `data` that belong together. free_text: with what
-    participants wrote in their own words. Raises StudyError."""
+    """Write the dataset atomically into the new folder `out`. collected: the sessions of `data` that belong together.
+    free_text: include answers that participants wrote in their own words. Raises StudyError."""
     require_new_folder(out)
     facts, answers = _facts(collected), answer_table(collected.protocol, collected.forms, free_text)
     with new_folder(out) as folder:
@@ -72,6 +77,7 @@ def export_study(collected: CollectedTrials, data: Path, out: Path, form: Form, 
 
 
 def _facts(collected: CollectedTrials) -> dict[str, Any]:
+    """Metadata of the dataset: provenance, seeds, devices, and quality of the models."""
     names = [folder.name for folder in collected.sessions]
     return {
         **gather_provenance(protocol_hash=collected.protocol_hash).as_dict(),
@@ -80,14 +86,14 @@ def _facts(collected: CollectedTrials) -> dict[str, Any]:
         "devices": list(collected.devices),
         "observers": list(collected.observers),
         "locked": collected.locked,
-        # A number: its sentences name sessions of people who withdrew.
+        # Only the number: the sentences would name sessions of people who withdrew.
         "left_out_count": len(collected.left_out),
         "model_qualities": [list(each) for each in collected.qualities],
     }
 
 
 def _check_rows(folder: Path, trials: Sequence[Trial], kind: str) -> None:
-    """Raises StudyError where there is no trial, UnusableFileError where a presentation is there twice."""
+    """Raise StudyError for a dataset without trials, UnusableFileError where a presentation occurs more than once."""
     if not trials:
         raise StudyError("There is nothing to analyse", f"{folder} holds no trial.", "Export the study again.")
     rows = Counter((trial.session, trial.run, trial.trial, trial.attempt) for trial in trials)
@@ -101,7 +107,8 @@ def _check_rows(folder: Path, trials: Sequence[Trial], kind: str) -> None:
 
 
 def _left_out(facts: Mapping[str, Any]) -> tuple[str, ...]:
-    """One sentence for each that was left out before the export; none where an older export does not say."""
+    """A sentence for each item that was excluded before the export; empty where the metadata do not state the
+    number."""
     count = facts.get("left_out_count", 0)
     if not isinstance(count, int) or not 0 <= count <= MOST_LEFT_OUT:
         return ()
@@ -109,13 +116,14 @@ def _left_out(facts: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _qualities(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """(sessions, sentence) on the quality of each model; malformed entries are ignored."""
     found = facts.get("model_qualities", [])
     rows = found if isinstance(found, list) else []
     return tuple((str(row[0]), str(row[1])) for row in rows if isinstance(row, list) and len(row) == 2)
 
 
 def _seeds(facts: Mapping[str, Any], path: Path, kind: str) -> dict[str, int]:
-    """Seeds by session; none where an export does not say. Raises UnusableFileError."""
+    """Seeds by session; empty where the metadata state none. Raises UnusableFileError for values that are no seeds."""
     found = facts.get("seeds", {})
     if not isinstance(found, dict) or any(type(seed) is not int for seed in found.values()):
         raise UnusableFileError(path, kind, ("its seeds are no whole numbers by session",), EXPORT_AGAIN)
@@ -123,7 +131,7 @@ def _seeds(facts: Mapping[str, Any], path: Path, kind: str) -> dict[str, int]:
 
 
 def _names(facts: Mapping[str, Any], key: str, path: Path, kind: str) -> tuple[str, ...]:
-    """A list of texts; empty where an export does not say. Raises UnusableFileError."""
+    """Texts under a key of the metadata; empty without that key. Raises UnusableFileError for another type."""
     found = facts.get(key, [])
     if not isinstance(found, list) or not all(isinstance(name, str) for name in found):
         raise UnusableFileError(path, kind, (f"its {key} are no list of texts",), EXPORT_AGAIN)
@@ -131,13 +139,13 @@ def _names(facts: Mapping[str, Any], key: str, path: Path, kind: str) -> tuple[s
 
 
 def is_exported(folder: Path) -> bool:
-    """Whether `collect_exported` takes it."""
+    """Whether the folder is a Psych-DS or tidy CSV dataset, which `collect_exported` can read."""
     return is_psych_ds(folder) or tidy_csv.is_tidy_csv(folder)
 
 
 def collect_exported(folder: Path) -> CollectedTrials:
-    """Read a dataset of `export_study` that `is_exported`: the same trials and protocol give the same results.
-    Raises StudyError."""
+    """Read a dataset that `export_study` wrote as Psych-DS or tidy CSV. Raises StudyError, for example where the
+    protocol was changed after the export."""
     psych_ds = is_psych_ds(folder)
     found = read_psych_ds(folder) if psych_ds else tidy_csv.read_tidy_csv(folder)
     path, kind = folder / (PROTOCOL_NAME if psych_ds else tidy_csv.PROTOCOL_NAME), KIND if psych_ds else tidy_csv.KIND

@@ -1,4 +1,4 @@
-"""All results of one session: its seal and tables, then the analysis of it alone."""
+"""All results of one session: its seal, tables and summary, then the analysis of this session alone."""
 
 from study.store.sessions.archive import SessionFolder
 from study.workflows.results.analysis_files import ANALYSIS_NAME
@@ -7,8 +7,8 @@ from study.workflows.results.written_analysis import WrittenAnalysis
 
 
 def write_results(folder: SessionFolder) -> WrittenAnalysis:
-    """Write the tables and the analysis of this session. Raises StudyError."""
-    # Statistics and plots are slow to import; beginning or checking a session does not wait for them.
+    """Write tables and analysis of a session into its folder; returns the analysis. Raises StudyError."""
+    # Imported here: statistics and plots load slowly, and beginning or checking a session must not wait for them.
     from study.workflows.results.analyze_data import analyze_data
 
     write_tables(folder)

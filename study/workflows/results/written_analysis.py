@@ -1,4 +1,7 @@
-"""Result of an analysis, with the files it wrote, as a value for screen and command line."""
+"""Result of an analysis and the path of its report, as a value for screen and command line.
+
+Separate from `analyze_data`, so that importing this value does not load statistics and plots.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +17,8 @@ class WrittenAnalysis:
 
     thresholds: "tuple[Threshold, ...]"
     table: tuple[str, ...]
-    """Group means by frequency, as lines of text."""
+    """Group means (N) by frequency, as lines of text."""
     warnings: tuple[str, ...]
+    """Sentences on excluded sessions, results written now, and warnings of the analysis."""
     report: Path
+    """Path of the HTML report."""

@@ -1,6 +1,7 @@
-"""A sitting: from a plan, through an open device and an event log, to results or a withdrawal.
+"""A sitting of a participant: from its plan, through an open device and an event log, to results or a withdrawal.
 
-`plan_sitting` -> `open_session` or `resume_session` -> `prepare_sitting` (consent, set-up) -> `run_session` (the loop)
--> `end_sitting`. `participant_*` and `other_sessions` identify the participant; `simulated_*` and `rehearse_study`
-replace a person. Begin at `conduct_session.py`.
+`plan_sitting` -> `equalize_stimuli` (model) -> `open_session` or `resume_session` -> `prepare_sitting` (consent,
+set-up) -> `run_session` (loop over trials) -> `end_sitting` (results, or `withdraw_participant`). `participant_*` and
+`other_sessions` read a participant's other sessions; `simulated_*`, `simulate_session` and `rehearse_study` replace the
+person. Begin at `conduct_session.py`.
 """

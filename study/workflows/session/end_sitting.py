@@ -1,4 +1,7 @@
-"""After a sitting, with the device closed: results of a finished session, or the error that says why there are none."""
+"""End of a sitting, after the device was closed: write the results of a finished session, or raise why there are none.
+
+An unfinished session gives an error that states how to resume it; a withdrawal erases the participant's data.
+"""
 
 from dataclasses import replace
 
@@ -20,14 +23,15 @@ from study.workflows.session.resume_session import already_finished
 from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, withdraw
 
 DEVICE_FAULTS = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TOO_LONG, Fault.STOPPED}
-"""Faults that `hapteq doctor` may explain: all but those of the program's timing and of a person."""
+"""Faults that `hapteq doctor` may explain: all except those due to the timing of the program or to a person."""
 
 BUSY_ADVICE = "Close other programs, and measure with hapteq doctor whether that helps. "
+"""Remedy where a sitting ended because the computer was too busy, for messages."""
 
 
 def end_sitting(end: ConductedSitting, utc: str) -> WrittenAnalysis:
-    """Write the results, or erase what a participant withdrew. Raises StudyError for an unfinished session, with how
-    to continue and an exit code that says why it ended."""
+    """Write and return the results. Raises StudyError after erasing the data of a participant who withdrew, for a
+    participant who does not take part, and for an unfinished session, with the command to continue."""
     if end.withdrawn:
         raise _erase_withdrawn(end, utc)
     if end.state.turned_away_for_good:
@@ -39,8 +43,8 @@ def end_sitting(end: ConductedSitting, utc: str) -> WrittenAnalysis:
 
 
 def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalysis:
-    """Complete what a kill after the last run left undone: seal, tables, summary and report. Raises StudyError where
-    nothing is due, or it cannot be written."""
+    """Write the results of a closed session that are missing or out of date, for example because the program was killed
+    after the last run. Raises StudyError where none is, or where they cannot be written."""
     if folded.state.turned_away_for_good:
         finish_tables(folder, folded)
         raise does_not_take_part(folded.state)
@@ -55,6 +59,7 @@ def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalys
 
 
 def _not_finished(end: ConductedSitting) -> StudyError:
+    """Error for an unfinished session: UserInterruptError without a fault of the device, else DeviceError."""
     kind = UserInterruptError if end.fault is Fault.NONE else DeviceError
     device_advice = f"Run hapteq doctor --device {end.device_name}, which says what is wrong with it, and mend that. "
     advice = device_advice if end.fault in DEVICE_FAULTS else ""
@@ -70,7 +75,7 @@ def _not_finished(end: ConductedSitting) -> StudyError:
 
 
 def _erase_withdrawn(end: ConductedSitting, utc: str) -> StudyError:
-    """Erase everything recorded of the participant; the error to raise, with which the sitting ends, says what."""
+    """Erase everything recorded of the participant; returns the error to raise, which lists the erased sessions."""
     data, plan = end.folder.path.parent, plan_withdrawal(end.folder)
     elsewhere = copies_elsewhere(data, plan)
     withdraw(data, plan, utc)

@@ -1,4 +1,9 @@
-"""Equalizer of a session: load it, check it against protocol and device, keep it in the session folder."""
+"""Equalizer of a session: its model is loaded, checked against protocol and device, and kept in the session folder.
+
+With the protocol's quantity "delivered_acceleration", forces are computed from wanted accelerations by a periodic
+inverse of the identified model (`ModelEqualizer`). Levels stay forces in N: `level_scales` states for each frequency
+the level that stands for 1 m/s² (see `study.session.facts.level_scale`).
+"""
 
 import math
 from dataclasses import dataclass
@@ -26,34 +31,37 @@ from study.store.sessions.archive import SessionFolder
 from study.workflows.equalizer.spring_not_in_model import spring_outside_model
 
 MODEL_NAME = "model.h5"
-"""Copy of the model in the session's folder."""
+"""File name of the copy of the model in the session folder."""
 NEAR_M = 0.02
-"""Largest distance (m) from the place of identification: farther away, coupling between the axes grows back to what was
-published without an equalizer."""
+"""Largest distance (m) of the place of identification from the centre of the workspace, where a study takes place.
+Farther away, the coupling between the axes grows to the published value without an equalizer."""
 
 AXES = (("fx", "fy", "fz"), ("ax", "ay", "az"))
 """Channels that a model of a study needs: forces, then accelerations, in this order."""
 IDENTIFY_AGAIN = "Identify it again with hapteq identify."
+"""Remedy for an unusable model, for messages."""
 LARGEST_ERROR = 0.1
-"""Largest relative error of a stimulus by the model itself; beyond it a level would not have its meaning."""
+"""Largest relative error of the acceleration that the model predicts for the equalized force of a stimulus. With a
+larger error a level would not stand for its acceleration."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equalized:
-    """Equalizer of the stimuli and its description. `facts`: None where forces are commanded."""
+    """Equalizer of the stimuli, and its description for the log."""
 
     equalizer: Equalizer
     facts: EqualizedFacts | None
+    """None where forces are commanded."""
     source: Path | None = None
-    """Model file to be kept with the session."""
+    """Model file to copy into the session folder; None without a model and in a resumed session."""
 
 
 NOT_EQUALIZED = Equalized(Identity(), None)
-"""Of a study whose stimuli are forces."""
+"""Identity equalizer of a study whose stimuli are commanded forces."""
 
 
 def check_playable(protocol: StudyProtocol, model: Path | None) -> None:
-    """Raise StudyError where protocol and model do not fit each other, before any device is opened."""
+    """Raise StudyError where protocol and model do not fit each other. Called before any device is opened."""
     needs_model = protocol.stimulus.quantity == "delivered_acceleration"
     if needs_model and model is None:
         raise StudyError(
@@ -73,34 +81,35 @@ def check_playable(protocol: StudyProtocol, model: Path | None) -> None:
 
 
 def load_equalizer() -> None:
-    """Import the equalizer before a device is opened, because the import is slow and the device's loop would wait.
-    Only called where stimuli are equalized."""
+    """Import the equalizer module before a device is opened: the import is slow, and the device's loop must not wait.
+    Called only where stimuli are equalized."""
     import equalizer.tracking.feedforward.model_equalizer  # noqa: F401
 
 
 def equalize_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceInfo) -> Equalized:
-    """Equalizer for a protocol and model that passed `check_playable`. Raises StudyError for a model that does not
-    fit the device."""
+    """Equalizer for a protocol and model that passed `check_playable`. Raises StudyError for a model that does not fit
+    the device: another sample rate or spring, or an onset that cannot be computed."""
     if model is None:
         return NOT_EQUALIZED
     identified = read_identified_model(model)
     equalizer = _equalizer(identified, protocol, info)
     try:
         scales = level_scales(protocol, equalizer, info.sample_rate_hz)
-    except (ValueError, ArithmeticError) as error:  # linear algebra fails on an invalid model
+    except (ValueError, ArithmeticError) as error:  # numerical failure on an invalid model
         raise _refusal(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
     facts = EqualizedFacts(MODEL_NAME, sha256_of(model), scales, quality_sentence(identified.quality))
     return Equalized(equalizer, facts, model)
 
 
 def keep_model(equalized: Equalized, folder: SessionFolder) -> None:
-    """Copy the model into the session folder, before the log names it."""
+    """Copy the model into the session folder, before the log names it. No effect where there is no file to copy."""
     if equalized.source is not None:
         write_atomically(folder.path / MODEL_NAME, read_regular(equalized.source))
 
 
 def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInfo) -> Equalized:
-    """Equalizer of a resumed session: its own model, which must be unchanged."""
+    """Equalizer of a resumed session, from the model in its folder. Raises StudyError where the model is missing or its
+    SHA-256 differs from the log."""
     facts = state.opened.equalized
     if facts is None:
         return NOT_EQUALIZED
@@ -116,7 +125,8 @@ def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInf
 
 
 def level_scales(protocol: StudyProtocol, equalizer: Equalizer, rate_hz: float) -> tuple[LevelScale, ...]:
-    """For each frequency, the level (N) that the more demanding direction needs for 1 m/s^2, onset included."""
+    """Scale at each frequency: level (N) for 1 m/s^2, the larger of those of the two directions, onset included, and
+    the acceleration at the staircase's cap."""
     cap_n = protocol.staircase.cap_n
     scales = []
     for frequency_hz in protocol.all_frequencies_hz:
@@ -128,7 +138,8 @@ def level_scales(protocol: StudyProtocol, equalizer: Equalizer, rate_hz: float) 
 def _hardest(
     protocol: StudyProtocol, equalizer: Equalizer, direction: int, frequency_hz: float, rate_hz: float
 ) -> float:
-    """Peak force for 1 m/s^2 or, if the slew limit is reached first, the equivalent force."""
+    """Level (N) for 1 m/s^2: the peak force or, if the slew limit is reached before the cap, the level that makes the
+    stimulus reach both together: (slew rate of the force / slew limit without the spring's share) x highest level."""
     limits = limits_of_study(protocol)
     vector = direction_vector(protocol.directions, direction)
     stimulus = held_stimulus(protocol.stimulus, vector, frequency_hz, 1.0, equalizer, rate_hz)
@@ -139,10 +150,13 @@ def _hardest(
 
 
 def _largest(vectors: FloatArray) -> float:
+    """Largest Euclidean norm of the rows (n, 3)."""
     return float(np.linalg.norm(vectors, axis=1).max())
 
 
 def _equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: DeviceInfo) -> Equalizer:
+    """Equalizer of a model, compensated for the spring of the protocol unless the model contains it. Raises StudyError
+    for another sample rate than the device's, or another spring in the model."""
     from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 
     if model.sample_rate_hz != info.sample_rate_hz:
@@ -156,6 +170,7 @@ def _equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: DeviceInfo
 
 
 def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
+    """Raise StudyError for wrong units or channels, an unstable model, too narrow a band, or another place."""
     shape = (model.D.shape, model.input_unit, model.output_unit)
     if shape != ((3, 3), "N", "m/s^2"):
         raise _refusal(
@@ -182,8 +197,8 @@ def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
 
 
 def _check_axes(model: IdentifiedModel, path: Path) -> None:
-    """Raise for our channel names in another order, which would send forces along wrong axes. Unknown names are
-    accepted."""
+    """Raise StudyError for the channel names of `AXES` in another order, with which forces would act along wrong axes.
+    Other names are accepted."""
     for names, ours in zip((model.input_channels, model.output_channels), AXES, strict=True):
         if set(names) == set(ours) and names != ours:
             raise _refusal(
@@ -193,6 +208,8 @@ def _check_axes(model: IdentifiedModel, path: Path) -> None:
 
 
 def _check_reach(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
+    """Raise StudyError where the model's response to the equalized force, G H w for the wanted unit vector w, differs
+    from w by more than `LARGEST_ERROR` at a frequency of the protocol."""
     from equalizer.plant.model_response import model_response
     from equalizer.tracking.feedforward.periodic_inverse import inverse_response
 
@@ -210,4 +227,5 @@ def _check_reach(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
 
 
 def _refusal(happened: str, do_now: str) -> StudyError:
+    """Error for a model that cannot equalize the study, raised before anything moves."""
     return StudyError("This model cannot equalize the study", happened, do_now, saved="Nothing moved.")

@@ -1,4 +1,4 @@
-"""Other sessions of a participant that contribute to the vibration dose of the hand."""
+"""Vibration dose of a participant's hand from other sessions of the data folder, for the exposure limit of a day."""
 
 from study.errors import StudyError
 from study.session.facts.sitting_events import DoseElsewhere
@@ -9,9 +9,10 @@ from study.workflows.results.fold_session import fold_session
 
 
 def dose_before(folder: SessionFolder, observer: str | None, simulated: bool, utc: str) -> DoseElsewhere | None:
-    """Dose that this participant's hand got today in other sessions of the data folder on the same kind of device.
+    """Dose from this participant's other sessions since the last rest of a night's length (see `dose_elsewhere`).
 
-    An unreadable session is named and not counted. None for a simulated participant.
+    Only sessions on the same kind of device (real or simulated) count. An unreadable session is named in the result and
+    not counted. None for a simulated participant, and where no other session counts and all were read.
     """
     if observer is not None:
         return None

@@ -1,4 +1,8 @@
-"""Number of a participant within a protocol: it selects the row of the balanced order and the labelling."""
+"""Participant number within a protocol: it selects the row of the balanced order, and which direction is labelled 1.
+
+The number is assigned after the preparation, so that persons who refuse or are excluded take no row. Logs are searched
+as raw bytes where possible, because a data folder may hold many long logs, some of them damaged.
+"""
 
 import re
 import tomllib
@@ -17,23 +21,23 @@ from study.store.sessions.withdrawal_files import SessionParticipant, read_begun
 from study.workflows.trial.sitting import Sitting, record
 
 PLACED = b'"event":"place_taken"'
-"""In a line of a log: the event that gives the participant's number."""
+"""Bytes of a log line whose event assigns the participant number."""
 NUMBER = re.compile(rb'"participant_number":(\d{1,6})\b')
-"""The number in a log: in its opening line, or in the event that replaces it; the last occurrence counts."""
+"""Participant number in a log: in the first line, or in the event that replaces it. The last occurrence counts."""
 PROTOCOL_NAME = re.compile(rb'(?:\\n|")name = \\"([^"\\]*)\\"')
-"""Name of the protocol in the opening line, whose TOML text stands in it as a JSON string."""
+"""Name of the protocol in the first line of a log, which contains the protocol's TOML text as a JSON string."""
 OF_A_PERSON = b'"observer":null'
-"""In the opening line of a person's session."""
+"""Bytes in the first line of the log of a person's session."""
 PRESENTED = b'"event":"trial_presented"'
-"""In a line of a log: the first of these ends the preparation."""
+"""Bytes of a log line that presents a trial; the first such line ends the preparation."""
 
 
 def participant_number(data: Path, subject: str, protocol: str, simulated: bool) -> int:
-    """Number of the participant in this protocol, from 0; a returning one keeps the number.
+    """Number of the participant in this protocol, from 0. A returning participant keeps it; otherwise the next is free.
 
-    Only those who take part count: a person who refused, was excluded, or left before the place was taken has none.
-    People and simulated participants are counted separately. Withdrawn participants keep their number, so that no row
-    of a balanced order is given twice, and so do those with a damaged log, as far as it is readable.
+    People and simulated participants are counted separately. A person who refused, was excluded, or left before the
+    number was assigned has none. Numbers of withdrawn participants, and of damaged logs as far as they are readable,
+    stay taken, so that no row of the balanced order is assigned twice.
     """
     numbers = []
     for folder in session_folders(data):
@@ -47,7 +51,8 @@ def participant_number(data: Path, subject: str, protocol: str, simulated: bool)
 
 
 def read_begun_participant(folder: SessionFolder) -> SessionParticipant | None:
-    """What a session folder says about its participant; None if nothing was begun or can be read."""
+    """Protocol, kind and number of a session's participant, from its tombstone, a withdrawal that was begun, or its
+    log. None if no session was begun or nothing can be read."""
     if folder.tombstone.exists():
         return read_begun(folder)
     intent = read_intent(folder.path.parent, folder.subject)
@@ -64,8 +69,8 @@ def read_begun_participant(folder: SessionFolder) -> SessionParticipant | None:
 
 
 def _begun_in_damaged(folder: SessionFolder) -> SessionParticipant | None:
-    """Read the place from a damaged log. Holding a place too long costs a row of the balanced order; giving it twice
-    costs the balance."""
+    """Participant of a damaged log, from its bytes. A number that stays taken wrongly costs a row of the balanced
+    order; a number assigned twice would destroy the balance."""
     try:
         content = read_regular(folder.log)
     except OSError:
@@ -78,7 +83,8 @@ def _begun_in_damaged(folder: SessionFolder) -> SessionParticipant | None:
 
 
 def _read_place(folder: SessionFolder, opening: SessionOpened) -> int | None:
-    """Read the place from the lines before the first trial, so that a long log is not read completely."""
+    """Participant number from the lines before the first trial, so that the rest of a long log is not parsed. None if
+    it was not assigned yet, or the log cannot be read."""
     if not place_comes_later(opening):
         return opening.participant_number
     chain = Chain()
@@ -91,13 +97,14 @@ def _read_place(folder: SessionFolder, opening: SessionOpened) -> int | None:
                 return place.participant_number
     except OSError:
         return None
-    except ValueError:  # damaged before the first trial: most likely the expected number was taken
+    except ValueError:  # damaged before the first trial: the number expected at the opening was most likely assigned
         return opening.participant_number
     return None
 
 
 def take_place(state: SessionState, sitting: Sitting) -> SessionState:
-    """Assign the place once, when everything before the first stimulus is passed. A lock serialises programs."""
+    """Assign the participant number and log it, once, after the preparation was passed; otherwise the state is
+    unchanged. A lock of the data folder prevents that two programs assign the same number. Raises StudyError."""
     if not place_comes_later(state.opened) or state.takes_part:
         return state
     data = sitting.folder.path.parent

@@ -1,7 +1,8 @@
-"""Find a participant's data in a data folder: what provably belongs to them, and what only might.
+"""Search for a participant's data in a data folder, for a withdrawal: proved data, which it erases, and doubtful data.
 
-Proved: a session folder whose log or tombstone names the participant; an analysis whose tables name the participant; an
-unfinished file or folder that does. Links are reported and never followed.
+Proved: a session folder whose log or tombstone names the participant; an analysis whose tables, statistics or figures
+name the participant; an unfinished file or folder (of an interrupted write) that names one of the participant's
+sessions. Doubtful data are reported and kept. Symbolic links are reported and never followed.
 """
 
 import csv
@@ -26,11 +27,11 @@ PART = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}\.part")
 """Name of an unfinished file or folder from an interrupted write."""
 
 LARGEST_BYTES = 1 << 24
-"""Largest file that is searched for a name; recordings and pictures are not searched."""
+"""Largest file (bytes) that is searched for a name; recordings and bitmaps are not searched."""
 LONGEST_LINE = 1 << 20
-"""Bytes of a log's first line that are read."""
+"""Largest number of bytes of a log's first line that are read."""
 TEXTS = (".json", ".csv", ".html", ".svg", ".toml", ".txt", ".md", ".jsonl", ".part")
-"""File types that are searched for names of a participant's sessions."""
+"""Extensions of files that are searched for names of a participant's sessions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,17 +43,17 @@ class Traces:
     derived: tuple[str, ...]
     """Proved analyses and unfinished files, relative to the data folder."""
     doubtful: tuple[str, ...]
-    """Sentences on what may be the participant's and is not erased."""
+    """Sentences on data that may be the participant's and are not erased."""
 
 
 def find_traces(data: Path, subject: str, proved: Collection[str] = ()) -> Traces:
-    """Search without changes. data: the resolved data folder. proved: session folders that were proved before their
-    logs were erased."""
+    """Search `data`, a resolved path, without changing it. proved: names of session folders that were proved before an
+    interrupted withdrawal erased their logs."""
     sessions, derived, doubtful = [], [], []
     for path in sorted(data.iterdir()):
         match = FOLDER.fullmatch(path.name)
         if match is not None and match["subject"] == subject:
-            # A log that was added since then is not erased on the evidence of the folder's earlier content.
+            # A folder that was proved earlier counts only without new content, for which nothing is proved.
             if is_session_of(path, subject) or (path.name in proved and _was_session(path)):
                 sessions.append(path.name)
             else:
@@ -84,7 +85,8 @@ def is_session_of(path: Path, subject: str) -> bool:
 
 
 def _was_session(path: Path) -> bool:
-    """Whether its log, which is erased last, is gone, and nothing else has been added since."""
+    """Whether a session folder was emptied by a withdrawal, which erases the log last: it holds nothing but its lock, a
+    tombstone, and unfinished files."""
     if not is_real_folder(path):
         return False
     names = {inner.name for inner in path.iterdir() if PART.fullmatch(inner.name) is None}
@@ -104,7 +106,7 @@ def analysis_names(folder: Path, subject: str) -> bool | None:
 
 
 def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:
-    """Session and subject, even if the rest of the first line is damaged."""
+    """Session and subject by the first line of the log, which need not be a valid event; None if it cannot be read."""
     if not is_real_file(folder.log):
         return None
     try:
@@ -116,12 +118,14 @@ def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:
 
 
 def _no_session(path: Path, subject: str) -> str:
+    """Sentence on a folder or link that is named like a session of the subject, but is not proved to be one."""
     if path.is_symlink():
         return f"{path.name} is a link; neither it nor what it leads to was touched."
     return f"{path.name} holds no log that says it is a session of {subject}."
 
 
 def _strange_folder(path: Path, subject: str) -> Iterator[str]:
+    """Sentence on a folder with another name that holds a log or a diagnosis of the subject."""
     opening = _read_opening(SessionFolder(path))
     if opening is not None and opening[1] == subject:
         yield f"{path.name} holds a log of {subject} under another name: it was copied or renamed."
@@ -130,12 +134,13 @@ def _strange_folder(path: Path, subject: str) -> Iterator[str]:
 
 
 def _may_hold_analysis(path: Path) -> bool:
+    """Whether the path is a folder that is neither a session nor unfinished."""
     return is_real_folder(path) and FOLDER.fullmatch(path.name) is None and PART.fullmatch(path.name) is None
 
 
 def _analysis_traces(folder: Path, subject: str, alone: bool) -> tuple[list[Path], list[Path]]:
-    """Proved and unclear paths: files of the analysis in `folder`, and unfinished ones. alone: unfinished ones
-    belong to the analysis."""
+    """Proved and doubtful paths among the files of the analysis in `folder` and its unfinished files. alone: `folder`
+    is not the data folder itself, so that its unfinished files belong to the analysis."""
     files = list(analysis_outputs(folder))
     whose = analysis_names(folder, subject) if files else False
     found, unclear = (files if whose else []), (files if whose is None and folder.name == ANALYSIS_NAME else [])
@@ -151,6 +156,7 @@ def _analysis_traces(folder: Path, subject: str, alone: bool) -> tuple[list[Path
 
 
 def _rows_name(table: Path, subject: str) -> bool | None:
+    """Whether a row of a table of thresholds is the subject's; None if the table cannot be read."""
     text = _text(table)
     if text is None:
         return None
@@ -161,6 +167,8 @@ def _rows_name(table: Path, subject: str) -> bool | None:
 
 
 def _statistics_name(path: Path, subject: str) -> bool | None:
+    """Whether the document of statistics names the subject, as a participant or in the seeds of its sessions; None if
+    it cannot be read."""
     text = _text(path)
     try:
         document = json.loads(text) if text is not None else None
@@ -176,12 +184,13 @@ def _statistics_name(path: Path, subject: str) -> bool | None:
 
 
 def _is_others_file(path: Path, subject: str) -> bool:
-    """Whether it is not one of those that the program keeps beside the sessions."""
+    """Whether a file is none of those that the program keeps in the data folder: the record of a withdrawal, the note
+    of folders elsewhere, unfinished files."""
     return path.name not in (f"{subject}.withdrawal.json", WRITTEN_ELSEWHERE) and PART.fullmatch(path.name) is None
 
 
 def _names(path: Path, subject: str) -> bool:
-    """Whether a name or text names a session of this subject; for a folder, anything in it."""
+    """Whether the name of a path, its text or, for a folder, any content names a session of this subject."""
     session = re.compile(rf"(?<![A-Za-z0-9]){re.escape(subject)}(_\d{{3,}}|\.withdrawal\.json)(?!\d)")
     if session.search(path.name):
         return True
@@ -191,7 +200,7 @@ def _names(path: Path, subject: str) -> bool:
 
 
 def _text(path: Path) -> str | None:
-    """The text; None if it is not a regular file, or too large for a hapteq text file."""
+    """Text of a file; None if it is not a regular file, cannot be read, or is larger than `LARGEST_BYTES`."""
     try:
         return read_regular(path, LARGEST_BYTES).decode("utf-8", errors="replace") if is_real_file(path) else None
     except OSError:

@@ -1,4 +1,7 @@
-"""Plan a sitting from a request: read the protocol, check the code, draw the seed."""
+"""Plan of a sitting: read the protocol, check the model and the participant code, draw the seed.
+
+Errors in these are raised here, before a device is opened or a session folder is created.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +17,8 @@ from study.workflows.session.participant_number import read_begun_participant
 
 
 def check_code(data: Path, subject: str, simulated: bool) -> None:
-    """Raise WrongUseError if the code belongs to another person."""
+    """Raise WrongUseError if the participant code is of a participant who withdrew or, by an existing session, of a
+    participant of the other kind (person or simulated)."""
     for folder in _folders(data, subject):
         if folder.withdrawn:
             raise WrongUseError(
@@ -33,15 +37,17 @@ def check_code(data: Path, subject: str, simulated: bool) -> None:
 
 
 def find_unfinished_sessions(data: Path, subject: str, protocol: str) -> tuple[SessionFolder, ...]:
-    """Resumable sessions of the same participant and protocol."""
+    """Sessions of this participant and protocol that can be resumed."""
     return tuple(folder for folder in _folders(data, subject) if _can_go_on(folder, protocol))
 
 
 def _folders(data: Path, subject: str) -> tuple[SessionFolder, ...]:
+    """Session folders of a participant code."""
     return tuple(folder for folder in session_folders(data) if folder.subject == subject)
 
 
 def _can_go_on(folder: SessionFolder, protocol: str) -> bool:
+    """Whether the session can be read, follows this protocol, and is neither closed nor refused."""
     try:
         state = fold_session(folder).state
     except StudyError:
@@ -55,14 +61,14 @@ class SittingPlan:
 
     session: SessionPlan
     notes: tuple[str, ...]
-    """Remarks before the session begins."""
+    """Sentences to show before the session begins."""
 
 
 def plan_sitting(
     protocol_name: str, subject: str, observer: str | None, seed: int | None, data: Path, model: Path | None = None
 ) -> SittingPlan:
-    """The plan. observer: name of a simulated participant; None for a person. Raises StudyError if the sitting
-    cannot begin."""
+    """The plan. subject: participant code; observer: name of a simulated participant, None for a person; seed: None = a
+    new random one. Raises StudyError if the sitting cannot begin."""
     source = read_study_protocol(protocol_name, data)
     plan = SessionPlan(
         protocol=source.protocol,

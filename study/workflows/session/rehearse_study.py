@@ -1,5 +1,8 @@
-"""Rehearse a whole study with simulated participants, several at once; begun sessions are resumed, finished ones
-kept."""
+"""Rehearsal of a whole study with simulated participants in parallel processes (`hapteq rehearse`).
+
+Sessions run on the simulated device in virtual time. The same call continues an interrupted rehearsal: unfinished
+sessions are resumed, finished ones are kept.
+"""
 
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -32,23 +35,25 @@ DEVICE = "simulated"
 
 @dataclass(frozen=True, slots=True)
 class Rehearsal:
-    """Protocol, number of participants, seed and output folder."""
+    """Order of `rehearse_study`: protocol, number of participants, seed and output folder."""
 
     protocol: StudyProtocol
     protocol_text: str
+    """The protocol in TOML, as it is written into the logs."""
     subjects: int
+    """Number of participants."""
     seed: int
     data: Path
     model: Path | None = None
     """Identified model that equalizes the stimuli."""
     observer: str = "person"
-    """A kind of population (`study.participants.population.KINDS`), or an observer that all of them are."""
+    """A kind of population (`study.participants.population.KINDS`), or the name of an observer for all participants."""
     locked: bool = False
     """Whether the protocol was locked before the rehearsal began."""
 
 
 def make_rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
-    """Participant `number` (from 0). Raises StudyError for an unknown name."""
+    """The observer of participant `number` (from 0). Raises StudyError for an unknown name."""
     kind = rehearsal.observer.replace("-", "_")
     if kind in KINDS:
         return member(kind, number + 1, rehearsal.seed)
@@ -56,13 +61,13 @@ def make_rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
 
 
 def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: Callable[[int], None]) -> None:
-    """Run all participants, calling `on_finished(count)`. After an interruption the same call continues: running
-    sessions are finished within seconds, no other is begun.
+    """Run the sessions of all participants. on_finished: called with the number of finished sessions.
 
-    workers: so many processes of this computer; or an executor whose workers may share no disk with it. From these
-    whole sessions come back, and what one that dies had begun is played anew by another.
+    workers: a number of processes of this computer, or an executor, whose workers need not share a disk with it: they
+    return the files of whole sessions. On an interruption, running sessions are finished and no other is begun.
 
-    Raises StudyError where the folder holds a rehearsal of another protocol, seed or model.
+    Raises StudyError where the folder holds a rehearsal of another protocol, seed, observer or model, or where a
+    simulated participant did not finish.
     """
     _check_same(rehearsal)
     kept = "begun so far" if isinstance(workers, int) else "finished so far"
@@ -77,7 +82,7 @@ def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: C
 
 
 def _rehearse_elsewhere(rehearsal: Rehearsal, executor: Executor, on_finished: Callable[[int], None]) -> None:
-    """A session that was begun in the folder is finished here."""
+    """Run the sessions on an executor. Sessions that were begun in the folder are finished in this process first."""
     held = session_folders(rehearsal.data)
     begun = {number for number in range(rehearsal.subjects) if any(f.subject == subject_code(number) for f in held)}
     model = {} if rehearsal.model is None else read_file(rehearsal.model)
@@ -100,18 +105,21 @@ def subject_code(number: int) -> str:
 
 
 def codes(subjects: int) -> set[str]:
-    """Codes of this many simulated participants."""
+    """Participant codes of the first `subjects` simulated participants."""
     return {subject_code(number) for number in range(subjects)}
 
 
 def subject_seed(seed: int, number: int) -> int:
-    """Seed of one participant: hashed, so that neighbouring rehearsals share no participant."""
+    """Seed of one participant: a hash of the rehearsal's seed and the number, so that rehearsals with consecutive seeds
+    have no participant in common."""
     from numpy.random import SeedSequence
 
     return int(SeedSequence(seed, spawn_key=(number,)).generate_state(1)[0])
 
 
 def _rehearse_sitting(rehearsal: Rehearsal, number: int) -> None:
+    """Run or resume the session of one participant and write its tables; nothing is done for a withdrawn participant.
+    Raises StudyError where it does not finish."""
     observer = make_rehearsed_observer(rehearsal, number)
     seed = subject_seed(rehearsal.seed, number)
     if any(f.withdrawn for f in session_folders(rehearsal.data) if f.subject == subject_code(number)):
@@ -130,8 +138,8 @@ def _rehearse_sitting(rehearsal: Rehearsal, number: int) -> None:
 
 
 def play_apart(rehearsal: Rehearsal, model: Files, number: int) -> tuple[str, Files, str]:
-    """Runs on a worker: plays a session in a folder of its own. model: the model's file. Returns the name of the
-    session, its files, and why it ended early (empty: it did not)."""
+    """Run a new session in a temporary folder of a worker. model: content of the model's file, by name. Returns the
+    name of the session, its files, and why it ended early (empty if it finished)."""
     with TemporaryDirectory() as place:
         write_files(Path(place), model)
         path = None if rehearsal.model is None else Path(place) / rehearsal.model.name
@@ -141,6 +149,7 @@ def play_apart(rehearsal: Rehearsal, model: Files, number: int) -> tuple[str, Fi
 
 
 def _play_new(rehearsal: Rehearsal, number: int) -> ConductedSitting:
+    """Run a new session of participant `number` (from 0) on the simulated device. Raises StudyError."""
     observer, seed = make_rehearsed_observer(rehearsal, number), subject_seed(rehearsal.seed, number)
     plan = SessionPlan(
         protocol=rehearsal.protocol,
@@ -157,6 +166,7 @@ def _play_new(rehearsal: Rehearsal, number: int) -> ConductedSitting:
 
 
 def _require_finished(session: str, why: str) -> None:
+    """Raise StudyError for a session that ended early. why: empty if it finished."""
     if why:
         raise StudyError(
             "A simulated participant did not finish",
@@ -167,7 +177,7 @@ def _require_finished(session: str, why: str) -> None:
 
 
 def _find_begun(data: Path, subject: str) -> SessionFolder | None:
-    """The participant's last session with a first line; a crash at the start leaves an empty folder."""
+    """The participant's last session whose log is not empty: a crash at the start leaves an empty log or none."""
     folders = [f for f in session_folders(data) if f.subject == subject and f.log.exists() and f.log.stat().st_size]
     return folders[-1] if folders else None
 

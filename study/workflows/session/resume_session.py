@@ -1,4 +1,8 @@
-"""Resume a session after a crash or a pause: fold its log, check it, close an open trial."""
+"""Resumption of a session after a crash or a pause: its state is rebuilt from the log, and an open trial is closed.
+
+An incomplete last line of the log is removed. A trial without an answer is void; a trial with an answer is judged from
+its recording or from the device's counters in the log, because answers that were seen must not be dropped.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -44,13 +48,14 @@ from study.workflows.trial.trial_facts import health_from_log
 
 @contextmanager
 def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> Iterator[OpenedSession]:
-    """An existing session, repaired and locked while the context lasts."""
+    """An existing session, repaired, and locked while the context lasts. Raises StudyError where it cannot be resumed:
+    a damaged log, a finished session, another kind of device, a participant who does not take part."""
     close_data_folder(folder.path.parent)
-    close_to_others(folder.path, inside=True)  # an earlier version left its files to everyone
+    close_to_others(folder.path, inside=True)  # earlier versions wrote files that other accounts could read
     with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
-        # A stop request of the interrupted sitting must not end this one, and its live state is outdated; from now on
-        # requests are received.
+        # A stop request of the interrupted sitting must not end this sitting, and its live state is outdated. Requests
+        # that arrive from now on are received.
         RequestInbox(folder.path).clear()
         remove_live(folder.path)
         try:
@@ -70,7 +75,7 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
                 monotonic_s=clock.now_s(),
             )
             log.append(resumed)
-            # Ctrl-C, which a participant may press too, is distinguished from a program that died.
+            # An interruption by Ctrl-C, which a participant may press too, has another cause than a crash.
             interrupted = isinstance(folded.contents.events[-1], SessionInterrupted)
             state = _close_open_trial(apply(folded.state, resumed), folder, log, clock, interrupted)
             yield OpenedSession(folder, log, state)
@@ -79,7 +84,8 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
 
 
 def _close_as_turned_away(folded: FoldedSession, folder: SessionFolder, log: EventLog, clock: Clock) -> None:
-    """Complete what a crash may have prevented: last line, seal and tables."""
+    """Close the session of a participant who refused or was excluded: last event, seal and tables, if a crash prevented
+    them."""
     if not folded.state.closed:
         mend(folder.log, folded.contents)
         outcome = folded.state.sitting.turned_away or "refused"
@@ -88,6 +94,7 @@ def _close_as_turned_away(folded: FoldedSession, folder: SessionFolder, log: Eve
 
 
 def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFolder) -> None:
+    """Raise StudyError for a closed session, and for a real instead of a simulated device or the reverse."""
     if state.closed:
         raise already_finished(state, folder)
     if device.simulated != state.opened.device.simulated:
@@ -113,7 +120,8 @@ def already_finished(state: SessionState, folder: SessionFolder) -> StudyError:
 def _close_open_trial(
     state: SessionState, folder: SessionFolder, log: EventLog, clock: Clock, interrupted: bool
 ) -> SessionState:
-    """An answered trial counts; an unanswered one is void, because it may have been felt."""
+    """Close the trial that was open when the program ended: an answered trial is judged late; an unanswered trial is
+    void, because the stimulus may have been felt. Returns the new state."""
     presented = state.presented
     if presented is None:
         return state
@@ -136,20 +144,21 @@ def _close_open_trial(
 def _judge_late(
     state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
 ) -> TrialMeasured | TrialSpoiled:
-    """Judge a trial whose program ended between answer and measurement.
+    """Judge a trial where the program ended between answer and measurement.
 
-    A recording is only written of a trial that was judged to count. Without one, the trial is judged by what was logged
-    with its answer. If that is unknown too (older logs), the answer counts as unmeasured: the staircase of an earlier
-    sitting may have moved by it, and dropping answers after they were seen would bias the result.
+    A recording exists only if the trial was judged to count. Without a usable recording, the trial is judged by the
+    device's counters that were logged with the answer. Without these (older logs) the answer counts as unmeasured: to
+    drop answers after they were seen would bias the result.
     """
     try:
         late = _from_recording(state, presented, folder, clock)
-    except (StudyError, ValueError):  # the answer is safe in the log; a damaged recording stays for a later look
+    except (StudyError, ValueError):  # the answer is in the log; the damaged recording is kept for inspection
         late = None
     return late if late is not None else _without_recording(state, presented, clock)
 
 
 def _without_recording(state: SessionState, presented: TrialPresented, clock: Clock) -> TrialMeasured | TrialSpoiled:
+    """Event of an answered trial without a recording, judged by the counters that were logged with the answer."""
     logged = state.answered.health if state.answered is not None else None
     health = health_from_log(logged) if logged is not None else None
     verdict = Judgement("", ())
@@ -190,7 +199,8 @@ def _without_recording(state: SessionState, presented: TrialPresented, clock: Cl
 def _from_recording(
     state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
 ) -> TrialMeasured | None:
-    """Measurement from the recording; None if there is none. Raises StudyError, ValueError if it cannot be used."""
+    """Event of an answered trial, measured from its recording; None if there is none. Raises StudyError or ValueError
+    if the recording cannot be used."""
     found = find_trial_recording(folder, recording_name(presented.run, presented.trial, presented.attempt))
     if found is None:
         return None
@@ -223,5 +233,6 @@ def _from_recording(
 
 
 def _sensor_of(logged: object) -> SensorFacts | None:
-    """The sensor's facts as they stand in a recording. Raises ValueError where the value is not one."""
+    """Facts about the accelerometer in the metadata of a recording; None without them. Raises ValueError for other
+    content."""
     return None if logged is None else TypeAdapter(SensorFacts).validate_python(logged)

@@ -1,4 +1,7 @@
-"""Simulate a whole session of a simulated participant on the simulated device by one call."""
+"""Simulation of one whole session by one call: a simulated participant on the simulated device, in virtual time.
+
+`rehearse_study` simulates the sessions of a whole study.
+"""
 
 from pathlib import Path
 
@@ -21,10 +24,11 @@ def simulate_session(
     seed: int = 1,
     model: Path | str | None = None,
 ) -> SessionFolder:
-    """Run it in virtual time, and write its log and its tables.
+    """Run a session in virtual time and write its log and tables below `data`; returns the session folder.
 
-    observer: one of the names of `hapteq study --observer`; subject: the code that the session is filed under; model:
-    an identified model that equalizes the stimuli. The same seed gives the same session. Raises StudyError.
+    observer: a name that `hapteq study --observer` takes; subject: participant code of the session; model: identified
+    model that equalizes the stimuli. The same seed gives the same answers. Raises StudyError, also where the simulated
+    participant does not finish.
     """
     plan = SessionPlan(
         protocol=protocol.protocol,

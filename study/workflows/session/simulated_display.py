@@ -1,4 +1,8 @@
-"""Simulated participant at display and handle: feels the stimulus and answers after a response time."""
+"""Display and hand of a simulated participant: implements the ports `Display` and `Hand` of `workflows.trial.display`.
+
+Questions are answered by an `Observer` after its response time; all waiting passes on the given clock, so that a
+session can run in virtual time.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -30,13 +34,13 @@ from study.workflows.session.simulated_touch import SimulatedTouch
 from study.workflows.trial.display import SignOfLife
 
 GLANCE_S = 0.1
-"""Interval of the signs of life to the device while waiting."""
+"""Interval (s) of the signs of life to the device while waiting."""
 
 PATIENCE_S = 60.0
-"""Longest wait for the handle: a simulated one is not moved by a person."""
+"""Longest wait (s) for the handle to return to its place: no person moves the handle of a simulated participant."""
 
 CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
-"""Reply where a sign of life ended the wait."""
+"""Reply where the sign of life returned False, which ends the wait."""
 
 
 class SimulatedDisplay:
@@ -50,7 +54,8 @@ class SimulatedDisplay:
         on_question: Callable[[Question], None] | None = None,
         touch: SimulatedTouch | None = None,
     ) -> None:
-        """touch: for an observer who feels what is delivered."""
+        """observer: model of the participant; seed: of the session, for the observer's draws; on_question: called with
+        each question; touch: measures the delivered acceleration, for an observer who depends on it."""
         self._observer = observer
         self._seed = seed
         self._clock = clock
@@ -60,7 +65,7 @@ class SimulatedDisplay:
         self._stimulus: Present | None = None
 
     def feel(self, stimulus: Present, answers_before: int) -> None:
-        """Keeps the stimulus for the answer, and for the touch."""
+        """Store the stimulus, for the answer and for `SimulatedTouch`."""
         self._stimulus = stimulus
         self._felt = PerceivedStimulus(
             run=stimulus.run,
@@ -75,7 +80,7 @@ class SimulatedDisplay:
         )
 
     def fill_in(self, form: Form) -> FormReply:
-        """The first answer that each field allows, as a participant who takes part gives it."""
+        """Fill each field with the first answer that it allows; a participant who takes part gives this answer."""
         return FormReply({field.key: _first_answer(field) for field in form.fields})
 
     def device_checked(self, report: DeviceReport) -> bool:
@@ -91,7 +96,7 @@ class SimulatedDisplay:
         return None if self._wait(notice.seconds, sign_of_life) else CUT_SHORT
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        """Gives up after `PATIENCE_S`."""
+        """Wait until the handle is at its place; ends the sitting after `PATIENCE_S`."""
         until_s = self._clock.now_s() + PATIENCE_S
         while not look().ready:
             if self._clock.now_s() > until_s:
@@ -101,7 +106,8 @@ class SimulatedDisplay:
         return None
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
-        """The answer of the observer, after its response time. Raises RuntimeError where nothing was felt before."""
+        """Answer of the observer after its response time; no answer where that exceeds the time limit, or where the
+        observer asks for a repetition that is allowed. Raises RuntimeError before the first stimulus."""
         if self._on_question is not None:
             self._on_question(question)
         if self._felt is None:
@@ -122,8 +128,9 @@ class SimulatedDisplay:
     def _wait_and_feel(
         self, felt: PerceivedStimulus, seconds: float, sign_of_life: SignOfLife
     ) -> PerceivedStimulus | None:
-        """Wait and return what is felt; None where the sign of life ended the wait. A detection trial is over when the
-        question comes."""
+        """Wait for `seconds`; returns the stimulus, with the delivered acceleration of its last periods where there is
+        a touch. None where the sign of life ended the wait. In a detection trial the stimulus ended before the
+        question."""
         touch, stimulus = self._touch, self._stimulus
         if touch is None or stimulus is None or felt.phase is Phase.DETECTION:
             return felt if self._wait(seconds, sign_of_life) else None
@@ -156,7 +163,7 @@ class SimulatedDisplay:
         return None
 
     def _wait(self, seconds: float, sign_of_life: SignOfLife) -> bool:
-        """Wait; False if the sign of life ended it."""
+        """Wait for `seconds` on the clock, with a sign of life every `GLANCE_S`; False if it ended the wait."""
         until_s = self._clock.now_s() + seconds
         while (left_s := until_s - self._clock.now_s()) > 1e-9:
             self._clock.sleep(min(GLANCE_S, left_s))
@@ -166,6 +173,7 @@ class SimulatedDisplay:
 
 
 def _first_answer(field: FormField) -> str:
+    """First choice, lowest number, or a placeholder text where an answer is required."""
     if field.choices:
         return field.choices[0]
     if field.limits is not None:

@@ -1,4 +1,8 @@
-"""The simulated hand's sense of touch: what the device delivers while a stimulus is held."""
+"""Sense of touch of a simulated participant: acceleration that the device delivers while a stimulus is held.
+
+The accelerometer is sampled at every tick over the last periods before the answer; `measure_delivered` gives the
+amplitudes along and across the direction and of the harmonics.
+"""
 
 import numpy as np
 
@@ -16,13 +20,14 @@ from study.workflows.results.fold_session import fold_session
 from study.workflows.trial.display import SignOfLife
 
 PERIODS = 2.0
-"""Duration that is felt before the answer: friction and sensor noise vary from period to period."""
+"""Number of periods before the answer that are measured: more than one, because friction and sensor noise vary from
+period to period."""
 TICKS_PER_SIGN = 50
-"""Ticks between signs of life: 50 ms at 1 kHz."""
+"""Number of ticks between signs of life: 50 ms at a sample rate of 1 kHz."""
 
 
 class SimulatedTouch:
-    """Samples the accelerometer as the participant waits. Idle until a session is opened."""
+    """Samples the accelerometer while the participant waits. Measures nothing until `on_opened` is called."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -30,16 +35,16 @@ class SimulatedTouch:
         self._directions: TestDirections | None = None
 
     def on_opened(self, folder: SessionFolder, device: Device) -> None:
-        """Connects the device of the session and the orientation of its directions."""
+        """Take the device of the opened session, and the directions of its protocol."""
         self._device, self._directions = device, fold_session(folder).state.protocol.directions
 
     def seconds(self, stimulus: Present) -> float:
-        """How long a stimulus is felt (s)."""
+        """Duration of the measurement (s): `PERIODS` periods of the stimulus."""
         return PERIODS / stimulus.frequency_hz
 
     def feel(self, stimulus: Present, sign_of_life: SignOfLife) -> Delivered | None:
-        """Play the stimulus for `seconds(stimulus)` and return the delivered acceleration. None without a device, or
-        where the sign of life ended it."""
+        """Sample the held stimulus for `seconds(stimulus)` and return the delivered acceleration. None without a
+        device, where the sign of life ended the wait, or where less than a period was measured."""
         if self._device is None or self._directions is None:
             return None
         rate_hz = self._device.info.sample_rate_hz
@@ -53,6 +58,7 @@ class SimulatedTouch:
         if not covers_a_period(int(np.isfinite(felt).all(axis=1).sum()), rate_hz, stimulus.frequency_hz):
             return None
         vector = direction_vector(self._directions, stimulus.direction)
+        # A recording needs a command; its values do not enter the measurement.
         force = Signal(np.zeros_like(felt), rate_hz, "force", "N", ("fx", "fy", "fz"))
         response = Signal(felt, rate_hz, "acceleration", "m/s^2", ("ax", "ay", "az"))
         return measure_delivered(Recording(self._device.info.name, force, response), vector, stimulus.frequency_hz)

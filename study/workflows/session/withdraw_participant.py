@@ -1,8 +1,8 @@
-"""Withdrawal: erase a participant's data permanently and leave a tombstone.
+"""Withdrawal of a participant: all data are erased permanently, and a tombstone replaces each session.
 
-The tombstone keeps the names of session and protocol, and the place in its balanced order: nothing measured. What is to
-be erased is determined and written down first, each log is erased last, then the tombstone takes its place: after an
-interruption the same command continues.
+The tombstone contains the names of session and protocol and the participant number, but no measured data. The list of
+what will be erased is written to the disk first, and the log of each session is erased last, so that the same command
+continues an interrupted withdrawal.
 """
 
 import errno
@@ -22,11 +22,12 @@ from study.workflows.session.participant_number import read_begun_participant
 from study.workflows.session.participant_traces import analysis_names, find_traces
 
 ELSEWHERE = "Analyses written elsewhere with --out, and copies, still hold the numbers: erase them."
+"""Reminder of copies that the program cannot find, for messages."""
 
 
 @dataclass(frozen=True, slots=True)
 class Withdrawal:
-    """What a withdrawal erases in a data folder, and what remains to be checked."""
+    """Plan of a withdrawal: what is erased in the data folder, and what a person must check."""
 
     subject: str
     sessions: tuple[str, ...]
@@ -34,17 +35,17 @@ class Withdrawal:
     derived: tuple[str, ...]
     """Analyses and unfinished files with the participant's data, relative to the data folder."""
     doubtful: tuple[str, ...]
-    """Sentences on what may be the participant's and is kept, to be checked."""
+    """Sentences on data that may be the participant's; they are kept and must be checked by a person."""
 
     @property
     def derived_roots(self) -> tuple[str, ...]:
-        """Folders or files of the data folder that contain analyses."""
+        """First part of each path in `derived`: the folders or files of the data folder that contain it."""
         return tuple(dict.fromkeys(PurePosixPath(name).parts[0] for name in self.derived))
 
 
 def session_to_withdraw(session: str, data: Path) -> SessionFolder:
-    """The session by its folder or, within `data`, by its name. Raises WrongUseError; also for a link, which is not
-    followed."""
+    """The session by the path of its folder or by its name in `data`. Raises WrongUseError for an unknown session, and
+    for a symbolic link, which is not followed."""
     path = Path(session) if Path(session).is_dir() else data / session
     folder = SessionFolder(path.absolute().parent.resolve() / path.absolute().name)
     if folder.path.is_symlink():
@@ -63,9 +64,8 @@ def session_to_withdraw(session: str, data: Path) -> SessionFolder:
 
 
 def plan_withdrawal(session: SessionFolder) -> Withdrawal:
-    """What would be erased: every session of the same participant, and what was derived from them.
-
-    Raises StudyError where nothing is proved to be the participant's.
+    """Plan of what is erased: every session of the session's participant, and the analyses made from them. Nothing is
+    changed. Raises StudyError where nothing is proved to be the participant's.
     """
     data, subject = session.path.parent.resolve(), session.subject
     begun = read_intent(data, subject)
@@ -82,7 +82,8 @@ def plan_withdrawal(session: SessionFolder) -> Withdrawal:
 
 
 def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
-    """Erase. Raises StudyError before any change if a session is running, or where the system refuses."""
+    """Erase what the plan lists and write the tombstones. utc: time of the withdrawal. Raises StudyError: before any
+    change if a session is running, or where the system does not allow to erase a file."""
     data, subject = data.resolve(), withdrawal.subject
     folders = tuple(SessionFolder(data / name) for name in withdrawal.sessions)
     try:
@@ -106,14 +107,16 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
 
 
 def copies_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
-    """Sentences on copies outside the data folder that were noted when they were written."""
+    """Sentences on analyses and exports outside the data folder, noted when they were written, that name or may name
+    the participant."""
     noted = [path for path in folders_written_elsewhere(data) if path.exists()]
     named = [path for path in noted if analysis_names(path, withdrawal.subject) is not False]
     return (*(f"Written with --out, and not erased: {path}" for path in named), ELSEWHERE)
 
 
 def _lock_for_erasing(folder: SessionFolder, held: ExitStack) -> None:
-    """Lock the session while it is erased. A link in its place is not followed."""
+    """Lock session and log until `held` is closed. Raises OSError if a link or file is at the folder's path, and
+    StudyError if the session is running."""
     if not is_real_folder(folder.path):
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)
     lock = folder.path / LOCK_NAME
@@ -125,6 +128,8 @@ def _lock_for_erasing(folder: SessionFolder, held: ExitStack) -> None:
 
 
 def _erase_session(data: RealFolder, folder: SessionFolder) -> None:
+    """Erase all files of the session but its lock and tombstone; the log last, after the rest was synced to the
+    disk."""
     with open_folder(data, folder.name) as place:
         for name in place.names():
             if name not in (TOMBSTONE_NAME, LOCK_NAME, LOG_NAME):
@@ -135,14 +140,15 @@ def _erase_session(data: RealFolder, folder: SessionFolder) -> None:
 
 
 def _erase_derived(data: RealFolder, name: str) -> None:
-    """Erase the file or folder, and parent folders that become empty, up to the data folder."""
+    """Erase a file or folder, and those of its parent folders below the data folder that become empty. name: path
+    relative to the data folder."""
     *parents, last = PurePosixPath(name).parts
     try:
         with open_folder(data, *parents) as place:
             place.erase(last)
             place.sync()
     except (FileNotFoundError, NotADirectoryError):
-        return  # gone already, or a link was put into its way: what that leads to is not ours
+        return  # already erased, or a folder was replaced by a link: links are not followed
     while parents:
         *parents, last = parents
         with open_folder(data, *parents) as place:
@@ -150,6 +156,7 @@ def _erase_derived(data: RealFolder, name: str) -> None:
 
 
 def _not_everything(data: Path, withdrawal: Withdrawal, problem: OSError) -> StudyError:
+    """Error for a withdrawal that the system did not allow to complete, with the command that continues it."""
     where = f" ({problem.filename})" if problem.filename else ""
     first = withdrawal.sessions[0] if withdrawal.sessions else f"{withdrawal.subject}_001"
     return StudyError(

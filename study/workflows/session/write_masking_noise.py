@@ -1,4 +1,8 @@
-"""Write masking noise that is played during a sitting, so that the device is not heard."""
+"""Masking noise as a WAV file, to be played during a sitting so that the participant cannot hear the device.
+
+The samples are those of `equalizer.signals.masking_noise`: pink noise between two corner frequencies that can be
+repeated without a discontinuity.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +13,7 @@ from study.store.disk.file_errors import AlreadyThereError
 from study.store.disk.wav_file import write_wav
 
 SAMPLE_RATE_HZ = 44_100
-"""Sample rate of the file, that of audio CDs (Hz)."""
+"""Sample rate of the file (Hz): that of audio CDs."""
 
 HOW_TO_USE = (
     "Play it in a loop, without a gap, from before the demonstration until after the last trial: it repeats without "
@@ -19,6 +23,7 @@ HOW_TO_USE = (
     "Keep it below 80 dB(A), the lower action value of directive 2003/10/EC for a working day. If the device is heard "
     "through that, add ear protection rather than level.",
 )
+"""Instructions for the experimenter, shown after the file was written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,16 +31,17 @@ class NoisePlan:
     """Length, band (Hz) and seed of masking noise."""
 
     minutes: float
-    """Rounded to whole seconds."""
+    """Length in minutes, rounded to whole seconds."""
     low_hz: float
     high_hz: float
     seed: int
 
 
 def write_masking_noise(path: Path, plan: NoisePlan) -> None:
-    """A WAV file, 5 MB per minute.
+    """Write the noise as a WAV file: mono, 16 bit, about 5 MB per minute.
 
-    Raises WrongUseError where the plan gives no noise, AlreadyThereError, CannotWriteError.
+    Raises WrongUseError for another file type or for a length or band that gives no noise, AlreadyThereError,
+    CannotWriteError.
     """
     if path.suffix.lower() != ".wav":
         raise WrongUseError(

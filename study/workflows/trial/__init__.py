@@ -1,5 +1,7 @@
-"""One trial at the handle: wait, log, play, ask, log, release, measure, log.
+"""One trial: wait for the handle, log, play the stimulus, ask, log the answer, release the force, measure, log.
 
-`sitting` holds the ports (`display`, `requests_port`, `session_supervisor`) -> `await_handle` -> `ask_participant` ->
-`trial_facts` -> `judge_trial`; `demonstrate` and `take_pause` run between trials. Begin at `present_trial.py`.
+`present_trial` conducts it: `ask_participant` (stimulus and answer) -> `judge_trial` (does it count) -> `trial_facts`
+(events, recording) -> `after_trial` (how the sitting continues). `sitting` holds the ports: `display`, `requests_port`,
+`session_supervisor`, `masking`. `demonstrate`, `play_probe` and `take_pause` run between trials. Begin at
+`present_trial.py`.
 """

@@ -1,4 +1,4 @@
-"""Result of a trial, a demonstration or a wait for the handle."""
+"""Result of a trial, a demonstration, a probe or a wait for the handle: how the sitting continues."""
 
 from __future__ import annotations
 
@@ -15,22 +15,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AfterTrial:
-    """State after a trial or a wait, and how the sitting goes on."""
+    """State of the session after a trial or a wait, and how the sitting continues."""
 
     state: SessionState
     correct: bool | None = None
-    """None for a void trial, and where nothing was asked."""
+    """Whether the answer was right; None for a void trial, and where there was no question."""
     leave: str = ""
     """Why the sitting ends here; empty if it continues."""
     void: str = ""
-    """Why the trial is void without having been asked for; empty if it counts."""
+    """Why the trial is void; empty if it counts, or if the participant asked for its repetition."""
     pause: str = ""
-    """Who asked for a pause; empty if it was not asked for."""
+    """Reason for a pause that was asked for; empty without a request."""
     fault: Fault = Fault.NONE
+    """Fault of the device during the trial."""
 
 
 def cut_short(state: SessionState, reply: Unanswered) -> AfterTrial:
-    """Result if nothing that counts was presented: the participant leaves, wants a pause, or is absent."""
+    """Result of a wait or stimulus that ended without an answer. reply: why it ended (leaving, a pause, another
+    reason)."""
     if reply.leave:
         return AfterTrial(state, leave=reply.reason)
     if reply.pause:
@@ -39,12 +41,12 @@ def cut_short(state: SessionState, reply: Unanswered) -> AfterTrial:
 
 
 def check_end_request(state: SessionState, sitting: Sitting) -> AfterTrial | None:
-    """A stop or pause requested while nothing was played."""
+    """Result of a stop or pause that was requested while no stimulus was played; None without a request."""
     sitting.supervisor.listen()
     reply = sitting.supervisor.resolve(Unanswered("", leave=False, asked=True))
     return cut_short(state, reply) if isinstance(reply, Unanswered) and (reply.leave or reply.pause) else None
 
 
 def reason_to_leave(fault: Fault) -> str:
-    """Reason for faults after which the device must be opened again; empty for others."""
+    """Text of a fault after which the sitting ends, because the device must be opened again; empty for other faults."""
     return fault.value if fault in (Fault.STOPPED, Fault.LOST, Fault.FORCE_LEFT) else ""

@@ -1,5 +1,8 @@
-"""Play one stimulus and get its answer: held until the answer or, in a detection trial, in one of two intervals
-(two-interval forced choice, 2IFC)."""
+"""Play one stimulus and get the participant's answer.
+
+In a direction trial the stimulus is held until the answer, the number of a direction. In a detection
+trial it is played in one of two intervals (two-interval forced choice, 2IFC), and the question follows.
+"""
 
 from dataclasses import dataclass
 
@@ -20,27 +23,28 @@ class StimulusReply:
 
     reply: Reply
     started_s: float
-    """Time at which answering became possible."""
+    """Time (s, by the session's clock) from which an answer was possible: the response time counts from here."""
     felt_whole: bool
-    """Whether the device had no fault until the answer. Later faults, such as during a slow disk write, do not void the
-    answer."""
+    """Whether the device had no fault until the answer. A later fault, for example during a slow disk write, does not
+    make the trial void."""
     played: Played | None
-    """Result of a stimulus that ended before the question; None if it is still held or never began."""
+    """Result of a stimulus that was released before the question; None if it is still held or never began."""
     holding: bool
-    """Whether it still has to be released."""
+    """Whether the stimulus is still held and has to be released."""
     health: Health | None = None
     """Counters of the device at the answer; None if the question was not reached."""
     pulse: Pulse | None = None
-    """Pulse at the onset of the force; None where the lab has no line for it, or the force did not begin."""
+    """Pulse on the trigger line at the onset of the force; None without such a line, or if the force did not begin."""
 
 
 def ask_participant(state: SessionState, present: Present, question: Question, sitting: Sitting) -> StimulusReply:
-    """Play the stimulus, ask, and return the reply."""
+    """Play the stimulus, ask the question, and return the reply. In a direction trial the stimulus is still held
+    then."""
     sitting.supervisor.begin("trial")
     if present.phase is Phase.DETECTION:
         return _in_one_of_two_intervals(state, present, question, sitting)
     sitting.device.hold(_stimulus(state, present, sitting))
-    # Taken before the pulse: a lost pulse takes time, which must not shorten the response time.
+    # Read before the pulse is sent: the attempt to send a pulse may take time, which belongs to the response time.
     started_s = sitting.clock.now_s()
     pulse = sitting.pulse()
     sitting.hand.feel(present, state.answers)
@@ -54,7 +58,8 @@ def ask_participant(state: SessionState, present: Present, question: Question, s
 def _in_one_of_two_intervals(
     state: SessionState, present: Present, question: Question, sitting: Sitting
 ) -> StimulusReply:
-    """Play the stimulus in interval 1 or 2 (`present.label`), nothing in the other, then ask in which it was."""
+    """Play the stimulus in interval 1 or 2 (`present.label`) and nothing in the other one, then ask for the
+    interval."""
     played: Played | None = None
     pulse: Pulse | None = None
     sitting.hand.feel(present, state.answers)
@@ -79,7 +84,8 @@ def _in_one_of_two_intervals(
 
 
 def _reply_to(question: Question, sitting: Sitting) -> Reply:
-    """The reply; a repeat request beyond the limit is ignored and the question asked again."""
+    """Reply to the question. A request to repeat the trial beyond the allowed number is ignored: the question is asked
+    again."""
     while True:
         reply = sitting.supervisor.resolve(sitting.display.ask(question, sitting.supervisor.glance))
         repeat = isinstance(reply, Unanswered) and reply.asked and not (reply.pause or reply.leave)
@@ -88,7 +94,8 @@ def _reply_to(question: Question, sitting: Sitting) -> Reply:
 
 
 def _wait(title: str, number: int, seconds: float, sitting: Sitting) -> Unanswered | None:
-    """Wait during an interval; a button pressed meanwhile is ignored."""
+    """Wait `seconds` during an interval or gap. None when they have passed; else why the wait ended: a button pressed
+    too early makes the trial void (`VoidCause.EARLY`)."""
     reply = sitting.display.show_playing(PlayingNotice(title, number, seconds, picture=None), sitting.supervisor.glance)
     if reply is None and sitting.supervisor.glance():
         return None
@@ -101,6 +108,7 @@ def _wait(title: str, number: int, seconds: float, sitting: Sitting) -> Unanswer
 
 
 def _stimulus(state: SessionState, present: Present, sitting: Sitting) -> HeldStimulus:
+    """The stimulus of a trial, with its level converted to the quantity of the equalizer (N or m/s²)."""
     return held_stimulus(
         state.protocol.stimulus,
         direction_vector(state.protocol.directions, present.direction),

@@ -1,4 +1,5 @@
-"""The labelled demonstration: each direction at each frequency, as often as the participant wants."""
+"""Labelled demonstration before the trials: the participant chooses a direction and a frequency and feels the stimulus,
+as often as wanted. Every stimulus is logged before it is played."""
 
 from protocols.procedure.schedule import demo_level_n, label_of
 from study.devices.device import Fault
@@ -13,7 +14,7 @@ from study.workflows.trial.sitting import Sitting, record
 
 
 def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
-    """Run the demonstration until the participant has felt enough, leaves, or wants a pause. It can be repeated."""
+    """Run the demonstration until the participant ends it, leaves, or a pause is requested. It can be run again."""
     felt_so_far: tuple[tuple[int, int], ...] = ()
     vibration = 1
     while True:
@@ -36,6 +37,7 @@ def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
 
 
 def _menu(state: SessionState, felt_so_far: tuple[tuple[int, int], ...], vibration: int) -> DemoMenu:
+    """The menu. felt_so_far: (vibration, direction number) of stimuli already played; vibration: the last chosen."""
     return DemoMenu(
         picture=picture_of(state.protocol.directions, labels_are_swapped(state.protocol, state.opened)),
         vibrations=len(state.protocol.all_frequencies_hz),
@@ -46,6 +48,7 @@ def _menu(state: SessionState, felt_so_far: tuple[tuple[int, int], ...], vibrati
 
 
 def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial:
+    """Log and play one stimulus at its roved level (`demo_level_n`); returns how the demonstration continues."""
     protocol = state.protocol
     frequency_hz = protocol.all_frequencies_hz[choice.vibration - 1]
     level_n = demo_level_n(protocol.demo, state.opened.seed, state.sitting.demos)

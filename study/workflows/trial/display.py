@@ -1,6 +1,7 @@
-"""The display port: how a session talks to the participant. Implemented by line mode, a screen, and a simulation.
+"""Ports from a session to the participant: display (notices, forms, questions) and hand (what is felt).
 
-Any method may raise KeyboardInterrupt to leave: the force is released at once, and the session can be resumed.
+The display is implemented by line mode, by a screen and by a simulated participant. Any of its methods may raise
+KeyboardInterrupt to leave: the force is released at once, and the session can be resumed.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ if TYPE_CHECKING:
     from study.session.state.due_trial import Present
 
 SignOfLife = Callable[[], bool]
-"""To be called at least every 100 ms while waiting: it keeps the device alive and takes requests to stop or pause.
-False: something ended the wait (a fault, a request, a device button); return at once with any reply."""
+"""Function that a display calls at least every 100 ms while it waits: it resets the device's watchdog and takes
+requests to stop or pause. Where it returns False (a fault, a request, a device button), the display returns at once,
+with any reply."""
 
 
 class Display(Protocol):
@@ -42,49 +44,50 @@ class Display(Protocol):
         ...
 
     def device_checked(self, report: DeviceReport) -> bool:
-        """Show the findings. True: go on. False: check again."""
+        """Show the findings of the device check. Returns True to continue, False to repeat the check."""
         ...
 
     def welcome(self, notice: Welcome) -> None:
-        """Instructions. Returns when the participant is ready."""
+        """Show the instructions. Returns when the participant is ready."""
         ...
 
     def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
-        """Choose the next demonstration, if any."""
+        """Return the participant's choice: the next demonstration, or the end of the demonstration."""
         ...
 
     def show_playing(self, notice: PlayingNotice, sign_of_life: SignOfLife) -> Unanswered | None:
-        """Wait while something of a fixed length plays. None when its time is over; else why it was cut short."""
+        """Wait while a stimulus or interval of fixed length passes. None when its time is over; else why the wait
+        ended."""
         ...
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        """Wait until `look().ready`, checking about every 100 ms. None when it is; else why the wait was cut short."""
+        """Wait until `look().ready`, checked about every 100 ms. Returns None then; else why the wait ended early."""
         ...
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
-        """Wait for the answer 1 or 2."""
+        """Show the question and wait for the answer, 1 or 2; returns it, or why there is none."""
         ...
 
     def feedback(self, correct: bool) -> None:
-        """Show whether the answer was right. Only where the protocol gives feedback."""
+        """Show whether the answer was right. Called only where the protocol gives feedback."""
         ...
 
     def practice_over(self, result: PracticeResult) -> None:
-        """Show a notice. Returns when the participant has read it."""
+        """Show the result of a practice. Returns when the participant has read it."""
         ...
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
-        """An enforced rest; returns the seconds rested. Fewer than `notice.seconds` only where `sign_of_life` ended
+        """Show an enforced rest; returns its duration (s), less than `notice.seconds` only where `sign_of_life` ended
         it."""
         ...
 
     def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
-        """Show a pause: nothing is played until the participant decides how to continue. LEAVE where `sign_of_life`
-        ended the wait."""
+        """Show a pause, during which nothing is played, and return how the participant continues. `AfterPause.LEAVE`
+        where `sign_of_life` ended the wait."""
         ...
 
     def await_return(self, reason: str) -> None:
-        """Wait, after a void trial, until the participant is ready."""
+        """Show why a trial was void, and wait until the participant is ready."""
         ...
 
     def goodbye(self, notice: Goodbye) -> None:
@@ -97,16 +100,16 @@ class Display(Protocol):
 
 
 class Hand(Protocol):
-    """The hand on the handle. A person feels the device; a simulated hand is given the stimulus."""
+    """Interface of the hand on the handle. A person feels the device; a simulated hand is told the stimulus."""
 
     def feel(self, stimulus: Present, answers_before: int) -> None:
-        """Told what is played: as soon as a stimulus is held; in a detection trial, before its first interval.
-        answers_before: answers of the session so far, training included."""
+        """Receive the stimulus: called as soon as it is held; in a detection trial before the first interval.
+        answers_before: number of answers of the session so far, training included."""
         ...
 
 
 class PersonsHand:
-    """A person's hand, which needs no information."""
+    """Hand of a person, who feels the device: `feel` does nothing."""
 
     def feel(self, stimulus: Present, answers_before: int) -> None:
         return None

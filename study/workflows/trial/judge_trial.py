@@ -1,8 +1,8 @@
 """Judge from the device's counters whether an answered trial counts.
 
-A trial is void where the participant did not feel the stimulus as planned (a fault, or ticks of the 1 kHz loop that
-were missed or late), or where a measurement that the protocol requires is missing. It then comes again; the answer is
-kept in the log, and counts for nothing.
+A trial is void if the participant did not feel the stimulus as planned (a fault of the device, or missed or late ticks
+of its 1 kHz loop), or if a measurement that the protocol requires is missing. A void trial is repeated; its answer
+stays in the log but is not used. The limits are those of the protocol (`MeasurementSettings`).
 """
 
 from dataclasses import dataclass
@@ -20,21 +20,21 @@ class Judgement:
     spoiled: str
     """Why the trial is void; empty if it counts."""
     flags: tuple[str, ...]
-    """Remarks on a trial that counts."""
+    """Remarks on a trial that counts, in words."""
     cause: VoidCause = VoidCause.FAULT
-    """Cause of a void trial."""
+    """Cause of a void trial; without meaning for a trial that counts."""
     measured: bool = True
-    """Whether the acceleration can be trusted, where there is any."""
+    """Whether enough of the acceleration was received to measure the stimulus."""
 
 
 def judge(
     health: Health, settings: MeasurementSettings, felt_whole: bool, at_answer: Health | None = None
 ) -> Judgement:
-    """Judge the trial. health: counters until the release; at_answer: those at the answer, None where both are the
-    same. felt_whole: whether the stimulus was complete until the answer; later faults are then only flagged.
+    """Judge an answered trial. health: counters until the release; at_answer: counters at the answer, None if both are
+    equal. felt_whole: whether the stimulus was complete until the answer; a later fault is then only a remark.
 
-    Late ticks are counted until the answer, because later ones change nothing that was felt; missed ticks, which also
-    make the recorded spectrum wrong, until the release.
+    Late ticks are judged until the answer, because later ones were not felt before it. Missed ticks are judged until
+    the release, because they also falsify the recorded spectrum.
     """
     if health.fault is not Fault.NONE and not felt_whole:
         return Judgement(health.fault.value, (), cause_of(health.fault))
@@ -59,7 +59,7 @@ def judge(
 
 
 def _too_late(health: Health, settings: MeasurementSettings) -> str:
-    """Which limit for late ticks was passed; empty if none was."""
+    """Which limit for late ticks was exceeded, in words; empty if none was."""
     share = (health.missed_ticks + health.late_ticks) / max(health.ticks, 1)
     if share > settings.late_ticks_limit:
         return f"{100 * share:.1f} % {TICKS_LATE}"
@@ -68,13 +68,13 @@ def _too_late(health: Health, settings: MeasurementSettings) -> str:
 
 
 def _acceleration_missing(health: Health, settings: MeasurementSettings) -> str:
-    """How much of the acceleration is missing, in words; empty where that is within the protocol's limit, or there is
-    no accelerometer."""
+    """Missing share of the acceleration, in words; empty within the protocol's limit, or where the device has no
+    accelerometer that sends packets."""
     if health.sensor is None or health.sensor.missing <= settings.lost_packets_limit:
         return ""
     return f"{100 * health.sensor.missing:.1f} % {ACCELERATION_MISSING}"
 
 
 def cause_of(fault: Fault) -> VoidCause:
-    """Cause of a trial that this fault made void."""
+    """Cause of a trial that is void because of this fault: a stalled program counts as a late screen."""
     return VoidCause.SCREEN_LATE if fault is Fault.STALLED else VoidCause.FAULT

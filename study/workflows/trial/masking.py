@@ -1,8 +1,8 @@
-"""Masking noise of a sitting, so that the device cannot be heard.
+"""Masking noise during a sitting, so that the participant cannot hear the device.
 
-It starts before the first trial, is silent in pauses, and is logged. No trial counts without it: it is checked before
-every trial and at every answer. The noise is a loop of band-limited noise from a seed, so that a session can be
-repeated with the same sound.
+The noise starts before the first trial, is silent in pauses, and is logged. A trial counts only with noise: it is
+checked before every trial and at every answer. The sound is a loop of pink noise (`make_masking_noise`) from a seed, so
+that another session can use the same sound.
 """
 
 import contextlib
@@ -20,15 +20,15 @@ from study.session.state.state import SessionState
 from study.workflows.trial.sitting import Sitting, Sound, record
 
 SAMPLE_RATE_HZ = 44_100
-"""Sample rate of the noise: one that every sound card plays."""
+"""Sample rate of the noise (Hz), a standard rate of sound cards."""
 LOOP_S = 60
-"""Length of the loop (s): longer than a person remembers noise."""
+"""Length of the loop (s): too long for a listener to recognise the repetition."""
 
 
 @contextlib.contextmanager
 def open_masking_sound(settings: MaskingSettings, clock: Clock, observer: str | None) -> Iterator[Sound | None]:
-    """The sound output with the masking noise, not yet playing; closed at the end. None where the protocol wants none,
-    or no person is there (a simulated participant, virtual time). Raises `DeviceError`, before a session is begun."""
+    """Sound output with the masking noise, not yet playing, closed at the end of the context. None where the protocol
+    plays none, or without a person (a simulated participant, virtual time). Raises `DeviceError` without an output."""
     if not settings.play or clock.virtual or observer is not None:
         yield None
         return
@@ -39,7 +39,7 @@ def open_masking_sound(settings: MaskingSettings, clock: Clock, observer: str | 
 
 
 def start_masking(state: SessionState, sitting: Sitting) -> SessionState:
-    """Start the masking noise, and log it. Raises `DeviceError`."""
+    """Start the masking noise and log that it plays. Raises `DeviceError`. No effect without a sound output."""
     if sitting.sound is None:
         return state
     sitting.sound.start()
@@ -47,7 +47,7 @@ def start_masking(state: SessionState, sitting: Sitting) -> SessionState:
 
 
 def check_masking(state: SessionState, sitting: Sitting) -> SessionState:
-    """Check before a trial that the noise is playing. Raises `DeviceError` where it is not, which is logged first."""
+    """Check before a trial that the noise is playing. Raises `DeviceError` if it is not, after logging the failure."""
     if sitting.sound is None:
         return state
     try:
@@ -78,6 +78,7 @@ def stop_masking(state: SessionState, sitting: Sitting) -> SessionState:
 
 
 def _log(state: SessionState, sitting: Sitting, sound: Sound, playing: bool, trouble: str = "") -> SessionState:
+    """Log whether the noise plays, with its settings. trouble: why it does not; empty if it was stopped as planned."""
     settings = state.protocol.masking
     fact = MaskingPlayed(
         utc=sitting.clock.utc(),

@@ -1,4 +1,4 @@
-"""A pause: nothing is played until the participant decides how to continue."""
+"""A pause of the sitting: nothing is played until the participant decides to continue, to leave or to withdraw."""
 
 from dataclasses import dataclass
 
@@ -10,35 +10,36 @@ from study.workflows.trial.sitting import Sitting, record, write_notes
 
 @dataclass(frozen=True, slots=True)
 class PauseOutcome:
-    """State after a pause, and whether the sitting goes on."""
+    """State of the session after a pause, and whether the sitting continues."""
 
     state: SessionState
     leave: str
-    """Why the sitting ends here; empty where it goes on."""
+    """Why the sitting ends here; empty if it continues."""
     withdrawn: bool
+    """Whether the participant withdrew, so that all data are to be erased."""
 
 
 LEAVE = {AfterPause.LEAVE: "the participant left", AfterPause.WITHDRAW: "the participant withdrew"}
-"""Why a sitting ends after a pause, by the participant's decision."""
+"""Why a sitting ends after a pause, by the participant's decision; decisions to continue are not listed."""
 
 
 def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutcome:
-    """Show the pause until the participant decides, and log it with its duration. Notes are logged meanwhile. reason:
-    shown to the participant."""
+    """Show the pause until the participant decides, and log it with its duration (s). Notes that are taken during the
+    pause are logged at once. reason: shown to the participant."""
     supervisor = sitting.supervisor
     who = supervisor.pause_asked or "participant"
     supervisor.begin("pause")
     started_s = sitting.clock.now_s()
 
     def glance() -> bool:
-        """Notes are written to the disk soon after they were typed, even in a long pause."""
+        """Sign of life of the pause, which also writes new notes to the disk: a pause may be long."""
         nonlocal state
         state = write_notes(state, sitting)
         return supervisor.glance()
 
     decision = sitting.display.pause(PauseNotice(reason, state.answers), glance)
     state = write_notes(state, sitting)
-    # A pause that was requested during the pause is over: cleared only after the last check.
+    # Cleared after the pause, so that a request made during the pause does not start another one.
     supervisor.pause_asked = None
     paused_s = sitting.clock.now_s() - started_s
     state = record(state, PauseTaken(utc=sitting.clock.utc(), who=who, paused_s=paused_s), sitting)

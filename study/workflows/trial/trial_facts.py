@@ -1,4 +1,7 @@
-"""The facts of one trial as events, and the metadata of its recording."""
+"""Events of one trial for the session log (presented, measured, void), and the metadata of its recording.
+
+Units: levels in N, accelerations in m/s², times in s; displacement and offset in mm.
+"""
 
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -20,19 +23,21 @@ from study.workflows.trial.sitting import Sitting
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What the device did in an answered trial."""
+    """Result of an answered trial that counts: what the device played and what was measured."""
 
     played: Played
     values: Delivered | None
+    """Delivered amplitudes; None where too little of the steady part was recorded."""
     flags: tuple[str, ...]
+    """Remarks of the judgement, in words."""
     vector: FloatArray
-    """(3,): the direction played."""
+    """(3,): unit vector of the direction played."""
     measured: bool
     """Whether the acceleration of the recording can be trusted."""
 
 
 def trial_presented(present: Present, sitting: Sitting) -> TrialPresented:
-    """Event logged before the stimulus."""
+    """Event that is logged before the stimulus is played."""
     return TrialPresented(
         utc=sitting.clock.utc(),
         run=present.run,
@@ -51,7 +56,7 @@ def trial_presented(present: Present, sitting: Sitting) -> TrialPresented:
 
 
 def answer_health(health: Health, felt_whole: bool) -> AnswerHealth:
-    """Device counters logged with the answer."""
+    """Counters of the device, as they are logged with the answer."""
     return AnswerHealth(
         fault=health.fault.name,
         felt_whole=felt_whole,
@@ -68,7 +73,8 @@ def answer_health(health: Health, felt_whole: bool) -> AnswerHealth:
 
 
 def health_from_log(logged: AnswerHealth) -> Health:
-    """Device counters from the log. An unknown fault name still counts as a fault."""
+    """Counters of the device from the log, without those that are not logged (feedback, sensor). An unknown name of a
+    fault, for example of a later version, counts as a fault."""
     return Health(
         fault=Fault.__members__.get(logged.fault, Fault.NOT_A_NUMBER),
         ticks=logged.ticks,
@@ -86,7 +92,7 @@ def health_from_log(logged: AnswerHealth) -> Health:
 def trial_spoiled(
     present: Present, why: tuple[str, VoidCause], health: Health | None, sitting: Sitting
 ) -> TrialSpoiled:
-    """Event of a void trial. why: in words, and as a cause. health: None if nothing was played."""
+    """Event of a void trial. why: the reason in words, and its cause. health: None if nothing was played."""
     reason, cause = why
     return TrialSpoiled(
         utc=sitting.clock.utc(),
@@ -104,7 +110,7 @@ def trial_spoiled(
 
 
 def trial_measured(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> TrialMeasured:
-    """Event of a trial that counts. Saves the recording first, because the event names it."""
+    """Event of a trial that counts. The recording is saved first, because the event contains its name and SHA-256."""
     saved = None
     if outcome.played.recording is not None:
         conditions = _conditions(present, outcome, state, sitting)
@@ -116,7 +122,7 @@ def trial_measured(present: Present, outcome: Outcome, state: SessionState, sitt
         run=present.run,
         trial=present.trial,
         attempt=present.attempt,
-        # Without a steady part nothing can be measured, which is no fault: most quick answers come before it.
+        # A quick answer comes before the steady part of the stimulus: nothing can be measured then, which is no fault.
         status="flagged" if outcome.flags else "unmeasured" if values is None else "ok",
         flags=outcome.flags,
         recording=saved.name if saved else None,
@@ -135,12 +141,12 @@ def trial_measured(present: Present, outcome: Outcome, state: SessionState, sitt
 
 
 def _seconds(health: Health, sitting: Sitting) -> float:
-    """Duration of vibration, from the onset to rest, fades included."""
+    """Duration of the vibration (s) from onset to rest, fades included: it counts for the vibration dose."""
     return health.ticks / sitting.device.info.sample_rate_hz
 
 
 def _farthest_mm(played: Played, sitting: Sitting) -> float | None:
-    """Largest distance of the handle from its place during the recording."""
+    """Largest distance (mm) of the handle from its place during the recording; None without position data."""
     if played.recording is None or played.recording.position is None:
         return None
     offset_m = np.linalg.norm(played.recording.position.samples - np.asarray(sitting.place_m), axis=1)
@@ -148,7 +154,7 @@ def _farthest_mm(played: Played, sitting: Sitting) -> float | None:
 
 
 def _conditions(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> dict[str, Any]:
-    """Metadata in the recording file: what was played, and its origin."""
+    """Metadata of the recording file: what was played, counters of the device, and provenance."""
     return {
         "session": sitting.folder.name,
         "trial": {"run": present.run, "trial": present.trial, "attempt": present.attempt},

@@ -1,4 +1,7 @@
-"""List a data folder, and the choices of the start screen. Read only."""
+"""Lists for the start screen: the sessions of a data folder, and the protocols, models and devices to choose from.
+
+Nothing is changed. Damaged files are listed with a remark or left out; they never raise an error.
+"""
 
 import tomllib
 from pathlib import Path
@@ -17,7 +20,7 @@ from study.workflows.views.session_line import session_line
 
 
 def protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
-    """Protocols to choose from: shipped ones first, then files in the data folder and beside it."""
+    """Study protocols to choose from: shipped ones first, then files in the data folder and in its parent folder."""
     places = dict.fromkeys((data.absolute(), data.absolute().parent))
     found = [str(path) for place in places for path in _toml_files(place) if _says_study(path)]
     lines = (protocol_line(name, data) for name in (*list_shipped_protocols(), *found))
@@ -25,6 +28,7 @@ def protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
 
 
 def _toml_files(folder: Path) -> list[Path]:
+    """TOML files in a folder, by name; none if it cannot be read."""
     try:
         return sorted(path for path in folder.glob("*.toml") if path.is_file())
     except OSError:
@@ -32,6 +36,7 @@ def _toml_files(folder: Path) -> list[Path]:
 
 
 def _says_study(path: Path) -> bool:
+    """Whether a TOML file has the entry kind = "study"."""
     try:
         return tomllib.loads(read_toml_text(path, "protocol")).get("kind") == "study"
     except (StudyError, ValueError, RecursionError):
@@ -53,14 +58,14 @@ def protocol_line(name: str, data: Path) -> ProtocolLine | None:
 
 
 def model_files(data: Path) -> tuple[str, ...]:
-    """Model files in the data folder and beside it, latest first."""
+    """Files of identified models in the data folder and in its parent folder, the latest first."""
     places = dict.fromkeys((data.absolute(), data.absolute().parent))
     found = [path for place in places for path in _hdf5_files(place)]
     return tuple(str(path) for path in sorted(found, key=_mtime_s, reverse=True) if _is_model(path))
 
 
 def model_words(path: str) -> str:
-    """Quality of a model, in a few words."""
+    """Quality of the model in a file, in a few words, or why it cannot be used."""
     try:
         return quality_brief(read_identified_model(Path(path)).quality)
     except StudyError as problem:
@@ -68,6 +73,7 @@ def model_words(path: str) -> str:
 
 
 def _hdf5_files(folder: Path) -> list[Path]:
+    """HDF5 files in a folder; none if it cannot be read."""
     try:
         return [path for path in folder.glob("*.h5") if path.is_file()]
     except OSError:
@@ -75,6 +81,7 @@ def _hdf5_files(folder: Path) -> list[Path]:
 
 
 def _mtime_s(path: Path) -> float:
+    """Time of the last change (s since 1970); 0 for a file that has vanished."""
     try:
         return path.stat().st_mtime
     except OSError:
@@ -82,6 +89,7 @@ def _mtime_s(path: Path) -> float:
 
 
 def _is_model(path: Path) -> bool:
+    """Whether an HDF5 file is an identified model."""
     try:
         return is_identified_model(path)
     except StudyError:  # a recording, or not a hapteq file
@@ -89,7 +97,7 @@ def _is_model(path: Path) -> bool:
 
 
 def home_view(data: Path) -> HomeView:
-    """Content of the start screen. A missing data folder is shown as empty."""
+    """Content of the start screen, free of control characters. A missing data folder is shown as empty."""
     models = model_files(data)
     qualities = tuple((model, model_words(model)) for model in models)
     return HomeView(
@@ -98,7 +106,7 @@ def home_view(data: Path) -> HomeView:
 
 
 def session_lines(data: Path) -> tuple[SessionLine, ...]:
-    """Lines of all sessions, latest first. Unreadable sessions are listed with a remark."""
+    """Lines of all sessions, the latest first. Unreadable sessions are listed with a remark."""
     try:
         folders = session_folders(data)
     except OSError:

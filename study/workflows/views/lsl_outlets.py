@@ -1,4 +1,7 @@
-"""Outlets of the lab streaming layer (LSL), whose library is imported only where something is streamed."""
+"""Outlets of the lab streaming layer (LSL) for the markers and signals of a session.
+
+The optional library pylsl is imported only when an outlet is made. Times of samples are on LSL's own clock, in s.
+"""
 
 import hashlib
 from dataclasses import dataclass
@@ -10,12 +13,12 @@ from study.errors import StudyError
 from study.regular_file import open_regular
 
 LONGEST_FIRST_BYTES = 2**20
-"""Largest first line of a log that is read; it identifies the session."""
+"""Largest part (bytes) of the first line of a log that is read; its hash identifies the session."""
 
 
 @dataclass(frozen=True, slots=True)
 class StreamDescription:
-    """A stream of samples as other programs see it."""
+    """Description of a stream of samples, as other programs receive it; a unit for each channel, empty for none."""
 
     name: str
     kind: str
@@ -27,13 +30,13 @@ class SignalOutlet(Protocol):
     """An LSL outlet of a stream of samples."""
 
     def push(self, samples: FloatArray, at_s: FloatArray) -> None:
-        """Send samples with their times. samples (n, channels); at_s (n,): on LSL's clock."""
+        """Send samples with their times. samples: (n, channels); at_s: (n,), times on LSL's clock (s)."""
         ...
 
 
 class MarkerOutlet:
-    """An outlet of the library for one session's log. Raises StudyError where the library is not installed or the log
-    cannot be read."""
+    """Outlet for the markers of one session. Raises StudyError where the library is not installed or the log cannot be
+    read."""
 
     def __init__(self, log: Path) -> None:
         self._library = _library()
@@ -50,11 +53,13 @@ class MarkerOutlet:
         self._outlet.push_sample([marker], at_s)
 
     def signal_outlet(self, stream: StreamDescription, rate_hz: float) -> SignalOutlet:
-        """Another outlet of the same session."""
+        """Outlet for a stream of signals of the same session. rate_hz: its nominal sample rate."""
         return _Signals(self._library, f"{self._source} {stream.name}", stream, rate_hz)
 
 
 class _Signals:
+    """A `SignalOutlet` of pylsl for samples in double precision, with label, unit and type of each channel."""
+
     def __init__(self, library: Any, source: str, stream: StreamDescription, rate_hz: float) -> None:
         info = library.StreamInfo(stream.name, stream.kind, len(stream.channels), rate_hz, "double64", source)
         channels = info.desc().append_child("channels")
@@ -69,8 +74,8 @@ class _Signals:
 
 
 def source_id(log: Path) -> str:
-    """Identifier by which a recorder finds the stream again after a restart: unique to the session, independent of its
-    folder, and without information about it. Raises StudyError."""
+    """Identifier by which a recorder finds the stream again after a restart: 64 bits of the SHA-256 of the log's first
+    line. It does not depend on the folder and reveals nothing about the session. Raises StudyError."""
     try:
         with open_regular(log) as file:
             first = file.readline(LONGEST_FIRST_BYTES)
@@ -90,6 +95,7 @@ def not_followed_error(log: Path, problem: Exception) -> StudyError:
 
 
 def _library() -> Any:
+    """The module pylsl. Raises StudyError where it, or its C library, is not installed."""
     try:
         import pylsl
     except (ImportError, RuntimeError, OSError) as problem:  # installed, but without the C library

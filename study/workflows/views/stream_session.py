@@ -1,7 +1,8 @@
-"""A session's facts as markers of the lab streaming layer (LSL), stamped with the time at which they became facts.
+"""Streaming of a session's events as markers of the lab streaming layer (LSL), with the time at which they happened.
 
-A program of its own follows the log, so that nothing of it can delay or end the session. A fact carries the session's
-monotonic clock; the offset of LSL's clock to it is measured again and again and is a marker too.
+A separate program follows the log, so that streaming cannot delay or end the session. Every event in the log carries
+the time t by the session's monotonic clock; its marker gets the time t + offset on LSL's clock. The offset between the
+two clocks is measured every `OFFSET_EVERY_S` and is streamed as a marker too.
 """
 
 import json
@@ -17,37 +18,38 @@ from study.regular_file import TABLE_BYTES, open_regular
 from study.workflows.views.lsl_outlets import not_followed_error
 
 EVERY_S = 0.02
-"""Between two looks at the log: a marker comes so late, its time stamp does not."""
+"""Interval (s) between two readings of the log: markers are sent up to this much later, with correct times."""
 OFFSET_EVERY_S = 10.0
 """Interval at which the offset of the two clocks is measured (s)."""
 OFFSET_TRIES = 10
-"""The closest pair of readings counts: any other was interrupted in between."""
+"""Number of pairs of clock readings in a measurement of the offset. The pair read in the shortest time is used: longer
+ones were interrupted between the readings."""
 NOTED_S = 0.001
-"""A smaller change of the offset is not noted again in the session's log."""
+"""Smallest change of the offset (s) for which `SideTasks.on_offset` is called again."""
 FRESH_S = 5.0
-"""An older fact has another clock (a simulated session's, or that of before a restart): its marker is stamped when it
-is sent, and says so."""
+"""Largest age (s) of an event by this computer's monotonic clock. An event outside 0 to this age is on another clock
+(of a simulated session, or before a restart of the computer): its marker gets the time of sending and states so."""
 
 TOLD = (
     "event", "run", "trial", "attempt", "phase", "frequency_hz", "level_n", "direction", "angle_deg", "polarity",
     "answer", "response_time_s", "status", "cause", "missed_ticks", "late_ticks", "latest_s", "delivered_mps2",
     "outcome",
 )  # fmt: skip
-"""Fields of each fact that are streamed: nothing about the person, no notes, no forms."""
+"""Fields of an event that are streamed: no information about the person, no notes, no forms."""
 
 LAST = "session_closed"
-"""No fact of a trial follows it, and it is never taken back."""
+"""Last event of a session: streaming ends after it."""
 
 
 class Outlet(Protocol):
     """Interface of the LSL outlet of a session's markers."""
 
     def clock_s(self) -> float:
-        """LSL's own clock."""
+        """Time on LSL's own clock (s)."""
         ...
 
     def push(self, marker: str, at_s: float) -> None:
-        """Send a marker with its time. at_s: on LSL's clock."""
+        """Send a marker. at_s: its time on LSL's clock (s)."""
         ...
 
 
@@ -56,24 +58,26 @@ class SideTasks:
     """Tasks between two readings of the log."""
 
     on_offset: Callable[[float], None]
-    """Called with the offset of the clocks at first, and whenever it has changed by `NOTED_S`."""
+    """Called with the offset, LSL's clock minus the session's (s), at first and when it has changed by `NOTED_S`."""
     push_signals: Callable[[float], int]
-    """Given that offset: sends what the device's loop did meanwhile, and answers how many ticks were lost."""
+    """Called with the offset (s) at every reading: sends the new signals of the device's loop, and returns the number
+    of ticks that were lost."""
 
 
 NOTHING_BESIDE = SideTasks(lambda offset_s: None, lambda offset_s: 0)
-"""No other tasks: no ticks are sent, and none lost."""
+"""No other tasks: no signals are sent, and no ticks are lost."""
 
 
 class LogFollower:
-    """Whole lines as they are written: at the first look those that were there, then those that came since the last."""
+    """Reads complete lines of a growing log: all existing lines at first, then the new lines since the last reading."""
 
     def __init__(self, log: Path) -> None:
         self._log = log
         self._offset = 0
 
     def lines(self) -> list[bytes]:
-        """A last line that is still being written waits. Raises OSError, and ValueError where lines went."""
+        """New complete lines; an incomplete last line is returned once it is complete. Raises OSError, and ValueError
+        where the log became shorter or grew by more than `TABLE_BYTES`."""
         with open_regular(self._log) as file:
             fresh = os.fstat(file.fileno()).st_size - self._offset
             if not 0 <= fresh <= TABLE_BYTES:
@@ -92,8 +96,9 @@ def stream_session(
     sleep: Callable[[float], None] = time.sleep,
     beside: SideTasks = NOTHING_BESIDE,
 ) -> int:
-    """Follow the log until the session is closed or Ctrl-C; of one that is closed already nothing is sent. Returns how
-    many facts became markers. Raises StudyError."""
+    """Follow the log until the session is closed, and send the events that are logged after the start. Of a session
+    that is already closed nothing is sent. Returns the number of events sent. Raises StudyError where the log cannot be
+    read."""
     noted_s = math.inf
     try:
         follower, sent, offset_s, next_offset_s = LogFollower(log), 0, 0.0, now_s()
@@ -120,7 +125,8 @@ def stream_session(
 
 
 def measure_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
-    """LSL's clock less the session's, from the reading that took least time."""
+    """Offset (s): LSL's clock minus the session's, from the pair of readings that took the least time. LSL's reading is
+    compared with the mean of the session's clock before and after it."""
     pairs = []
     for _ in range(OFFSET_TRIES):
         before_s = now_s()
@@ -131,6 +137,7 @@ def measure_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
 
 
 def _fact(line: bytes) -> dict[str, Any]:
+    """The event in a line of the log. Raises ValueError where it is not a JSON object."""
     fact = json.loads(line)
     if not isinstance(fact, dict):
         raise ValueError(f"a line of it is no fact: {line[:40]!r}")
@@ -140,6 +147,7 @@ def _fact(line: bytes) -> dict[str, Any]:
 def _send_fact(
     fact: dict[str, Any], outlet: Outlet, offset_s: float, now_s: float, on_marker: Callable[[str], None]
 ) -> None:
+    """Send the streamed fields of an event, with the time of the event if it is recent, else the time of sending."""
     fields = {name: fact[name] for name in TOLD if fact.get(name) is not None}
     happened_s = fact.get("monotonic_s")
     if isinstance(happened_s, float) and 0 <= now_s - happened_s <= FRESH_S:
@@ -153,4 +161,5 @@ def _send_fact(
 
 
 def _text(fields: dict[str, Any]) -> str:
+    """A marker: the fields as compact JSON."""
     return json.dumps(fields, separators=(",", ":"))

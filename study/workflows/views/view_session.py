@@ -1,4 +1,7 @@
-"""View of one session: facts, thresholds, staircases and its log in words. Read only; damage never raises."""
+"""View of one session for screen and command line: facts, thresholds, staircases, and the log in words.
+
+Nothing is changed. A damaged session is shown as far as it can be read, with warnings; it never raises an error.
+"""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,9 +32,8 @@ THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "tri
 
 
 def session_view(path: Path, zone: Zone = in_utc) -> SessionView:
-    """The view. path: the session's folder. A damaged session shows what can be read, and a warning.
-
-    zone: of the displayed times; `study.local_clock.machine_zone` for a person.
+    """The view of the session in the folder `path`. zone: time zone of the displayed times, UTC by default; a screen
+    for a person takes `study.local_clock.machine_zone`.
     """
     folder = SessionFolder(path.absolute())
     try:
@@ -42,6 +44,7 @@ def session_view(path: Path, zone: Zone = in_utc) -> SessionView:
 
 
 def _full_view(folder: SessionFolder, folded: FoldedSession, zone: Zone) -> SessionView:
+    """View of a session whose log was read without damage."""
     state = folded.state
     analysis, problem = _analysis(state)
     clock = (f"Before {local_time(step.utc, zone)}: {step.sentence}" for step in state.sitting.clock_steps)
@@ -58,6 +61,7 @@ def _full_view(folder: SessionFolder, folded: FoldedSession, zone: Zone) -> Sess
 
 
 def _log_remarks(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
+    """Sentences on an incomplete last line, results that are missing or out of date, and missing checksums."""
     due = ", ".join(due_results(folder, folded))
     remarks = (
         (
@@ -71,8 +75,9 @@ def _log_remarks(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...
 
 
 def _view_damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> SessionView:
+    """View of a damaged session: its line, the problem, and the events that can be read."""
     line = session_line(folder)
-    if line.standing != "unreadable":  # it looked whole at a glance, and is not
+    if line.standing != "unreadable":  # the line reads only parts of the log, and did not find the damage
         line = SessionLine(
             line.name, line.path, line.subject, line.protocol, line.begun_utc, line.observer,
             line.answers, 0, line.runs, "unreadable", problem.happened,
@@ -85,13 +90,15 @@ def _view_damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> Ses
 def _bare_view(
     folder: SessionFolder, line: SessionLine, warnings: tuple[str, ...] = (), events: tuple[str, ...] = ()
 ) -> SessionView:
+    """View of a withdrawn or damaged session, without thresholds and staircases."""
     facts = (("participant", line.subject), ("folder", str(folder.path)))
     notes = warnings or ((line.remark,) if line.remark else ())
     return SessionView(line, facts, (), notes, (), events, _report(folder), _figures(folder))
 
 
 def _analysis(state: SessionState) -> "tuple[StudyAnalysis | None, tuple[str, ...]]":
-    # Statistics load slowly, and the engine, which looks at sessions too, begins at once.
+    """Analysis of the session alone, or None with a sentence on why there is none."""
+    # Imported here: statistics load slowly, and programs that import this module must start at once.
     from analysis.psychophysics.study_analysis import analyse_study
 
     try:
@@ -101,6 +108,7 @@ def _analysis(state: SessionState) -> "tuple[StudyAnalysis | None, tuple[str, ..
 
 
 def _threshold_rows(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[tuple[str, ...], ...]:
+    """Table of thresholds with its header; empty while no run is complete."""
     rows = (*analysis.thresholds, *analysis.detection) if analysis else ()
     if not any(row.complete for row in rows):
         return ()
@@ -108,6 +116,7 @@ def _threshold_rows(state: SessionState, analysis: "StudyAnalysis | None") -> tu
 
 
 def _threshold_row(row: Threshold, run: Run) -> tuple[str, ...]:
+    """Row of a run under `THRESHOLD_HEADER`: threshold in N and, where it was measured, in m/s²."""
     remark = "cut by the cap" if row.censored else ""
     if not row.complete:
         remark = "trial limit" if row.ended is RunEnd.TRIAL_LIMIT else "not complete"
@@ -126,6 +135,7 @@ def _threshold_row(row: Threshold, run: Run) -> tuple[str, ...]:
 
 
 def _staircases(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[Staircase, ...]:
+    """Staircases of all runs with counted trials, except practice."""
     rows = {row.run: row for row in (*analysis.thresholds, *analysis.detection)} if analysis else {}
     begun = (run for run in state.runs if not run.practice)
     drawn = (_staircase(state, run, rows.get(run.index)) for run in begun)
@@ -133,6 +143,7 @@ def _staircases(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[
 
 
 def _staircase(state: SessionState, run: Run, row: Threshold | None) -> Staircase:
+    """Levels (N), answers and reversals of the counted trials of a run, without catch trials."""
     counted = [t for t in state.trials if t.run == run.index and t.counts and t.phase is not Phase.CATCH]
     over = run.index < state.run
     return Staircase(
@@ -146,9 +157,11 @@ def _staircase(state: SessionState, run: Run, row: Threshold | None) -> Staircas
 
 
 def _report(folder: SessionFolder) -> str:
+    """Path of the report of the session's analysis; empty if there is none."""
     report = folder.path / ANALYSIS_NAME / "report.html"
     return str(report) if report.is_file() else ""
 
 
 def _figures(folder: SessionFolder) -> tuple[str, ...]:
+    """Paths of the PNG figures of the session's analysis."""
     return tuple(str(path) for path in sorted((folder.path / ANALYSIS_NAME / "figures").glob("*.png")))

@@ -1,4 +1,8 @@
-"""Follow a running session read-only, and send it requests to stop, pause, or take a note."""
+"""Following of a running session for a second screen, and requests to it (stop, pause, note).
+
+The log is only read: new lines are checked against the hash chain and applied to the state one by one. A request is a
+file in the session's inbox.
+"""
 
 import io
 from pathlib import Path
@@ -28,21 +32,22 @@ if TYPE_CHECKING:
     from study.workflows.results.session_drift import DriftReader
 
 PROBE_EVERY_S = 1.0
-"""Shortest interval between probes of the lock of a session without a sign of life."""
+"""Shortest interval (s) between checks of the log's lock, for a session whose live state is out of date."""
 
 
 def follow(folder: Path) -> "Follower":
-    """Follower of the session in this folder."""
+    """A follower of the session in this folder."""
     return Follower(SessionFolder(folder))
 
 
 def ask(folder: Path, request: Request) -> str:
-    """Send a request; returns its name in the session's inbox. Raises StudyError where it cannot be written."""
+    """Send a request to the session in this folder; returns its name in the session's inbox. Raises StudyError where it
+    cannot be written."""
     return RequestInbox(folder).send(request)
 
 
 class Follower:
-    """Reads the new part of the log at every look; never writes."""
+    """Follows one session: `look` reads the new part of its log and returns the view. Never writes."""
 
     def __init__(self, folder: SessionFolder) -> None:
         self._folder = folder
@@ -58,7 +63,8 @@ class Follower:
         self._drifts: DriftReader | None = None
 
     def look(self, now_utc: str) -> WatchView | None:
-        """The current view; None while there is no first line. Raises StudyError where the first line is invalid."""
+        """The view at the time now_utc (ISO 8601); None while the log has no first line. Raises StudyError where the
+        first line is invalid. Later damage is reported in the view."""
         self._take_in_what_is_new()
         if self._watched is None:
             return None
@@ -68,18 +74,21 @@ class Follower:
         return self._view
 
     def _look_for_drifts(self, watched: FollowedSession) -> tuple[DriftLine, ...]:
+        """Drifts of device and hand by the probes so far; empty without probes."""
         if not watched.probes:
             return ()
-        if self._drifts is None:  # its arrays take long to import, and most sessions have no probes
+        if self._drifts is None:  # imported here, because the import is slow and most sessions have no probes
             from study.workflows.results.session_drift import DriftReader
 
             self._drifts = DriftReader(self._folder)
         return self._drifts.look(watched.probes)
 
     def _take_in_what_is_new(self) -> None:
+        """Read the new part of the log and apply its complete lines. A problem stops at its line, which is read again
+        at the next look. Raises StudyError where the session cannot be followed at all."""
         sealed_bytes = (
             self._count_sealed_bytes()
-        )  # before the log is read: it is written after the lines that it covers
+        )  # read before the log: a seal is written after the lines that it covers, so the log must be as long
         try:
             with open_regular(self._folder.log) as file:
                 self._begin_again_if_rewritten(file)
@@ -91,7 +100,7 @@ class Follower:
                 raise _not_ours(f"The log of {self._folder.name}: {self._problem}") from problem
             return
         self._problem, self._missing = "", False
-        # What comes after the last line end is being written, or was torn by a crash.
+        # Bytes after the last line end belong to a line that is being written, or that a crash left incomplete.
         for line in (whole + b"\n" for whole in fresh.split(b"\n")[:-1]):
             self._problem = self._take_in(line)
             if self._problem:
@@ -104,20 +113,22 @@ class Follower:
             self._problem = "its end is missing."
 
     def _count_sealed_bytes(self) -> int | None:
-        """Sealed length of the log; None if a seal cannot be read."""
+        """Length of the log (bytes) that its seals cover; 0 without a seal, None if a seal cannot be read."""
         try:
             return max((read_seal(path).bytes for path in seal_paths(self._folder.path).values()), default=0)
         except StudyError:
             return None
 
     def _begin_again_if_rewritten(self, file: io.BufferedReader) -> None:
-        """Start over if the log became shorter: its writer removes a line that could not be synced."""
+        """Start from the beginning if the last line read is no longer at its place in the file: the writer of a log
+        removes a line that could not be synced to the disk."""
         file.seek(self._read_bytes - len(self._last_line))
         if file.read(len(self._last_line)) != self._last_line:
             self._watched, self._read_bytes, self._last_line, self._chain = None, 0, b"", Chain()
 
     def _take_in(self, line: bytes) -> str:
-        """Apply one line; returns its problem, empty if there is none."""
+        """Apply one line of the log; returns its problem as a clause, empty if there is none. Raises StudyError for an
+        invalid first line."""
         try:
             chain, content = read_chained(self._chain, line.removesuffix(b"\n"))
             event = parse_event(content)
@@ -139,12 +150,14 @@ class Follower:
         try:
             self._watched = after(self._watched, event)
         except LogContradiction:
-            # Not in the problem's own words: they may tell what the open trial plays.
+            # The text of the exception is not shown: it may reveal the stimulus of the open trial.
             return "it contradicts the rules."
         self._chain = chain
         return ""
 
     def _is_written(self, live: Live | None, now_utc: str) -> bool | None:
+        """Whether a program has the log open for writing; None while a recent live state makes the check
+        unnecessary."""
         if self._missing:
             return False
         if live is not None and seconds_between(live.utc, now_utc) <= SILENT_AFTER_S:
@@ -156,10 +169,11 @@ class Follower:
 
 
 _FIRST = "The first line of the log of {} is none that this version knows."
-"""Why a session cannot be followed; the session's name is filled in."""
+"""Why a session cannot be followed, for messages; the placeholder is the session's name."""
 
 
 def _not_ours(why: str) -> StudyError:
+    """Error for a session that this version cannot follow."""
     return StudyError(
         "This session cannot be followed",
         why,

@@ -1,5 +1,8 @@
-"""Curve of a discovered law of the force: the missing force without it, against the variable that explains most of it,
-or, where no single variable does, against the law's own value."""
+"""Signature curve of a discovered law: the missing force against the variable that explains most of the law's force.
+
+The variable is that of the largest correlation ratio (variance of bin means over variance). Where none reaches
+`_MAIN_SHARE`, the missing force is drawn against the law's own value, so that a correct law is a straight line.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -21,11 +24,13 @@ _BEYOND = 0.25
 _MAIN_SHARE = 0.5
 """Correlation ratio of a law's force with one variable from which the curve is drawn against it alone. By hand."""
 _LINE_POINTS = 400
-"""Points of a drawn law."""
+"""Number of points of a drawn law."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Variable:
+    """A signal that a law may depend on."""
+
     name: str
     """Label of the abscissa with unit: "velocity of x (m/s)"."""
     values: FloatArray
@@ -35,9 +40,8 @@ class _Variable:
 def law_signature(
     evidence: Evidence, placed: PlacedEffect, axes: tuple[str, ...], system: UnitSystem
 ) -> Signature | None:
-    """The curve of a discovered law along the measured motion; of a law of the command, by what it changes there. None
-    where it acts on a response, or depends on a signal that is neither time nor an axis's motion or command. axes: name
-    of each driven axis."""
+    """The curve of a discovered law along the measured motion; for a law of the command, of its change of the command.
+    None where it acts on a response, or depends on a signal other than time, motions and commands. axes: names."""
     if placed.effect.law is None or placed.effect.law.acts_on == "response":
         return None
     law = law_with_values(placed.effect.law, placed.values)
@@ -76,7 +80,7 @@ def law_signature(
 
 
 def _variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSystem) -> Mapping[str, _Variable]:
-    """Signals by their names in a formula."""
+    """Signals by their names in a formula: time, then position, velocity, acceleration and command of each axis."""
     rate_hz, length = evidence.sample_rate_hz, system.length
     found = {"t": _Variable("time (s)", np.arange(len(evidence.command)) / rate_hz)}
     for number, (axis, letter) in enumerate(zip(axes, axis_names(axes), strict=True)):
@@ -90,7 +94,8 @@ def _variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSystem) ->
 
 
 def _evaluate_beyond(law: Law, seen: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
-    """The formula of one variable over the visited range and somewhat beyond, and that range."""
+    """Abscissa and value of a formula of one variable over the visited range and `_BEYOND` of it on either side; and
+    that range. seen: (n,), visited values."""
     low, high = float(seen.min()), float(seen.max())
     margin = _BEYOND * (high - low)
     at = np.linspace(low - margin, high + margin, _LINE_POINTS)
@@ -100,6 +105,6 @@ def _evaluate_beyond(law: Law, seen: FloatArray, rate_hz: float) -> tuple[FloatA
 
 
 def _identity(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The straight line of a law drawn against its own force."""
+    """Both ends of the straight line of a law drawn against its own force: abscissa and ordinate."""
     ends = np.array([values.min(), values.max()])
     return ends, ends

@@ -1,4 +1,8 @@
-"""Bin means with standard errors that allow for correlated samples."""
+"""Bin means of a signal over a variable, with standard errors that allow for correlated samples.
+
+Samples of one bin within `_BLOCK_S` count as one: with block means y_b of weights w_b, and the bin's mean y, the
+standard error is sqrt(sum of w_b² (y_b - y)²) / sum of w_b.
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -7,20 +11,20 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 _BINS, _LAW_BINS = 30, 120
-"""Bins of the missing force over a state, and of a drawn law."""
+"""Number of bins of the missing force over a state, and of a drawn law."""
 _BLOCK_S = 0.5
-"""Time between samples that count as independent."""
+"""Length of the blocks (s) that count as independent."""
 _FEWEST = 20
-"""Fewest samples of a bin that is shown."""
+"""Least number of samples of a bin that is shown."""
 _RESTING = 0.01
-"""Share of the range about the median that counts as rest when bins are chosen."""
+"""Share of the range on either side of the median that counts as rest when bins are chosen."""
 
 
 def bin_means(
     at: FloatArray, values: FloatArray, used: Mask, rate_hz: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Abscissa, mean and its standard error per bin. Half of the bins have equal counts, half equal widths, so that
-    both the middle and the ends are covered. at, values, used: (n,)"""
+    """Mean abscissa, mean value and its standard error per bin, (bins,) each. Half of the bin edges are at equal
+    counts, half at equal widths, so that both the middle and the ends are covered. at, values, used: (n,)"""
     blocks = (np.flatnonzero(used) / (_BLOCK_S * rate_hz)).astype(int)
     x, y = at[used], values[used]
     bin_of = np.digitize(x, _edges(x, _BINS)[1:-1])
@@ -66,6 +70,7 @@ def compute_running_rms(
 
 
 def _edges(x: FloatArray, bins: int) -> FloatArray:
+    """Edges of at most `bins` bins, rising."""
     low, high = np.quantile(x, [0.001, 0.999])
     # A channel that rests most of the time would have all its bins at rest.
     busy = x[np.abs(x - np.median(x)) > _RESTING * (high - low)]
@@ -74,6 +79,7 @@ def _edges(x: FloatArray, bins: int) -> FloatArray:
 
 
 def _mean(values: FloatArray, blocks: npt.NDArray[np.int_]) -> tuple[float, float]:
+    """Mean and its standard error (see above); for a single block, the standard deviation of the values."""
     _, where = np.unique(blocks, return_inverse=True)
     weight = np.bincount(where).astype(float)
     means = np.bincount(where, weights=values) / weight

@@ -1,5 +1,9 @@
-"""Signature curve of a named effect: the residual without it against the variable that it depends on, and the fitted
-law, simulated and averaged over the same kind of bins."""
+"""Signature curve of a named effect: the residual of the model without it, against the variable that it depends on.
+
+For forces of the mechanism and the actuator the residual is the missing force, for sensors the error of a channel. The
+fitted law is drawn with it: simulated, and averaged over bins of the same kind. Effects without such a variable are
+shown as the spectrum of the residual.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -50,9 +54,9 @@ ALONG: Mapping[str, Along] = {
     "sensor_drift": "time",
     "clock_drift": "growth",
 }
-"""Variable of each effect's curve; for all other effects the spectrum of the residual is shown."""
+"""Variable of each effect's curve; an effect that is not listed is shown as a spectrum ("frequency")."""
 _FREQUENCY_LINES = 1024
-"""Lines of a spectrum that is drawn."""
+"""Number of spectral lines before they are averaged in twelfths of an octave."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +72,7 @@ class Names:
 
 
 def signature_of(evidence: Evidence, complete: FloatArray, placed: PlacedEffect, names: Names, hold: Hold) -> Signature:
-    """The curve of one effect. evidence: of the final model with all its effects but this one; complete: (n, p),
+    """The curve of one effect. evidence: of the final model with all its effects except this one. complete: (n, p),
     prediction of the final model with all its effects."""
     law = law_signature(evidence, placed, names.axes, names.system)
     if law is not None:
@@ -87,6 +91,7 @@ def signature_of(evidence: Evidence, complete: FloatArray, placed: PlacedEffect,
 
 
 def _motion_signature(evidence: Evidence, placed: PlacedEffect, along: Along, names: Names, hold: Hold) -> Signature:
+    """Missing force of the axis with the strongest one, over its motion."""
     axis = _strongest(placed.sites, evidence.axis_force)
     played = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (placed,), hold)
     force = played.axis_force
@@ -110,6 +115,7 @@ def _motion_signature(evidence: Evidence, placed: PlacedEffect, along: Along, na
 
 
 def _abscissa(position: FloatArray, velocity: FloatArray, along: Along, rate_hz: float) -> FloatArray:
+    """(n,): position, velocity or acceleration of an axis."""
     if along == "acceleration":
         return np.asarray(np.gradient(velocity) * rate_hz)
     return velocity if along == "velocity" else position
@@ -128,6 +134,7 @@ def _equivalent_force(evidence: Evidence, played: SimulationResult, hold: Hold) 
 
 
 def _command_signature(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signature:
+    """Missing force over the command of its axis; the law is the change of the command."""
     assert isinstance(placed.effect.acts, OnCommand)
     axis = _strongest(placed.sites, evidence.axis_force)
     command, used = evidence.command[:, axis], evidence.used > 0
@@ -142,6 +149,7 @@ def _command_signature(evidence: Evidence, placed: PlacedEffect, names: Names) -
 
 
 def _make_reading_signature(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names) -> Signature:
+    """Error of a channel over the predicted reading that explains most of it. change: (n, p), by the effect."""
     used = evidence.used > 0
     drives = evidence.predicted[used]
     # The pair of channels with the strongest effect: regression of the change in one channel on the signal of the
@@ -160,6 +168,7 @@ def _make_reading_signature(evidence: Evidence, placed: PlacedEffect, change: Fl
 def _time_signature(
     evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names, along: Along
 ) -> Signature:
+    """Error of the channel with the largest change over time; its running rms where it grows with time ("growth")."""
     used, rate_hz = evidence.used > 0, evidence.sample_rate_hz
     here = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
     errors, seconds = (evidence.response - evidence.predicted)[:, here], np.arange(len(change)) / rate_hz
@@ -175,6 +184,7 @@ def _time_signature(
 
 
 def _frequency_signature(evidence: Evidence, change: FloatArray, placed: PlacedEffect, names: Names) -> Signature:
+    """Spectrum of the error of the channel with the largest change, and that of the change by the effect."""
     rate_hz, used = evidence.sample_rate_hz, evidence.used > 0
     errors = evidence.response - evidence.predicted
     here = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
@@ -188,7 +198,8 @@ def _frequency_signature(evidence: Evidence, change: FloatArray, placed: PlacedE
 
 
 def _spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Amplitude density in twelfths of an octave, with its standard error."""
+    """Frequency (Hz), amplitude density (unit/√Hz) in twelfths of an octave, and its standard error. Half-overlapping
+    Hann windows count as 1.5 independent ones per window length."""
     length = min(2 * _FREQUENCY_LINES, len(signal))
     lines_hz, power = spectral_density(signal, rate_hz, length)
     stretches = max(1.0, 1.5 * len(signal) / length)
@@ -201,4 +212,5 @@ def _spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArra
 
 
 def _strongest(sites: tuple[int, ...], force: FloatArray) -> int:
+    """The site with the largest mean square of force (n, m)."""
     return max(sites, key=lambda site: float(np.mean(force[:, site] ** 2)))

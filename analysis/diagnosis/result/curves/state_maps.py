@@ -1,4 +1,9 @@
-"""The missing force along each axis against position, velocity, command and time, and its hysteresis loops."""
+"""Maps of the missing force along each axis against position, velocity, command and time, and hysteresis loops.
+
+From force balances, the missing force is the residual of mass, damping and stiffness (or of the given model); without
+balances, that of the re-tuned model, from its evidence. Its sign is that of a force on the device. Where laws complete
+the model, the residual with them is shown, too.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,12 +28,13 @@ if TYPE_CHECKING:
 
 
 CLOUD = 600
-"""Number of single samples that are drawn."""
+"""Number of single samples that are drawn, about."""
 LOOP_SAMPLES = 2000
-"""Most samples of a loop."""
+"""Largest number of samples of a loop."""
 LOOP_PERIODS = 1.1
 """Length of a loop in periods of the motion's strongest line, so that it closes."""
 NAMED, NOT_CONFIRMED = "with what is named", "with the best candidates, not confirmed"
+"""Texts for the laws that complete the model."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,9 +46,11 @@ class StateView:
     unit: str
     """Unit of the abscissa, SI."""
     cloud_at: FloatArray
+    """Abscissa of the single samples."""
     cloud: FloatArray
     """Single samples of the missing force."""
     at: FloatArray
+    """Mean abscissa per bin."""
     mean: FloatArray
     """Mean of the missing force per bin."""
     error: FloatArray
@@ -53,12 +61,13 @@ class StateView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loop:
-    """Forces of a stretch of the recording, in the order of time."""
+    """Forces over a state variable for about one period of the motion, in the order of time."""
 
     along: str
     unit: str
     at: FloatArray
     measured: FloatArray
+    """Applied or measured force."""
     before: FloatArray
     """Force that the model without new physics needs for this motion."""
     after: FloatArray
@@ -84,7 +93,7 @@ class StateMaps:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _AxisSeries:
-    """One axis's samples (n,), parts one after another."""
+    """Samples (n,) of one axis, all parts in a row; SI."""
 
     rate_hz: float
     seconds: FloatArray
@@ -122,6 +131,8 @@ def state_maps(
 
 
 def _series_of_balance(balance: "Balance", diagnosis: Diagnosis, letter: str) -> tuple[_AxisSeries | None, str]:
+    """The samples of one axis from its balance, None without any, and the text for the laws that complete the model:
+    the named ones, else all that were chosen."""
     regression = balance.search.regression
     names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
     named = [law.place for law in balance.laws if law.played_as in names]
@@ -144,15 +155,18 @@ def _series_of_balance(balance: "Balance", diagnosis: Diagnosis, letter: str) ->
 
 
 def _forces_without_remainder(regression: "Regression", remainder: Sequence[FloatArray]) -> list[FloatArray]:
+    """Force that the model needs for the motion: the measured force less the residual, per motion."""
     return [force - left for force, left in zip(regression.force, remainder, strict=True)]
 
 
 def _seconds(motions: "Sequence[Motion]") -> FloatArray:
+    """(n,): time of the decimated samples, as if the parts followed one another without a gap."""
     count = sum(len(motion.force[:: motion.step]) for motion in motions)
     return np.asarray(np.arange(count) * motions[0].step / motions[0].rate_hz)
 
 
 def _slices(counts: Sequence[int]) -> tuple[slice, ...]:
+    """Ranges of parts with these numbers of samples."""
     ends = np.cumsum([0, *counts]).tolist()
     return tuple(slice(begin, end) for begin, end in pairwise(ends))
 
@@ -176,6 +190,7 @@ def _series_of_evidence(evidence: Sequence[Evidence], axis: int) -> _AxisSeries 
 
 
 def _maps(series: _AxisSeries, labels: tuple[str, str, str, str], length: str) -> StateMaps:
+    """The maps of one axis. labels: axis, unit of the force, model, completed. length: unit of the position."""
     axis, unit, model, completed = labels
     # As the missing force on the device: friction then points against the motion.
     missing = series.before - series.force
@@ -198,6 +213,7 @@ def _maps(series: _AxisSeries, labels: tuple[str, str, str, str], length: str) -
 def _view(
     series: _AxisSeries, labels: tuple[str, str], at: FloatArray, missing: tuple[FloatArray, FloatArray | None]
 ) -> StateView:
+    """The missing force over one variable. labels: its name and unit. missing: without and with completing laws."""
     before, after = missing
     places = np.flatnonzero(series.used)
     shown = places[:: max(len(places) // CLOUD, 1)]
@@ -207,6 +223,7 @@ def _view(
 
 
 def _loops(series: _AxisSeries, length: str) -> tuple[Loop, ...]:
+    """Loops over position and velocity."""
     part = _largest_period(series)
     after = np.zeros(0) if series.after is None else series.after[part]
     forces = series.force[part], series.before[part], after

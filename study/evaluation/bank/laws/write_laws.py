@@ -1,5 +1,10 @@
-"""Write the results of a blind test of laws: a JSON document, a table with one row per case, and lines for the
-terminal."""
+"""Writes the results of a blind test of laws (`prove_laws`), in which laws outside the catalogue of effects are
+concealed.
+
+`write_laws` writes into the folder of the test: `proof.json` (all figures) and `proof.csv` (one row per case).
+`write_law_table` writes figures and misses as small CSV tables that can be kept under version control. `law_lines` and
+`law_summary` give the result as text for the terminal and as JSON.
+"""
 
 import json
 import sys
@@ -19,7 +24,9 @@ from study.store.disk.provenance import command_line, gather_provenance
 from study.store.disk.text_file import write_text
 
 FORMAT, VERSION = "hapteq-proof", 1
+"""Name and version of the format of `proof.json`."""
 DOCUMENT, TABLE = "proof.json", "proof.csv"
+"""Names of the files in the folder of the test."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,20 +36,34 @@ class LawRow:
     number: int
     seed: int
     kind: str
+    """law, nothing, decoy (an effect of the catalogue) or mode (a linear mode)."""
     concealed: str
+    """Name of the concealed law or effect."""
     at: str
+    """Axes of the law; without a law, the axes of the case."""
     numbers: str
+    """Parameters of the law as name=value, separated by blanks."""
     shows: bool
+    """Whether the concealed law or effect is detectable."""
     verdict: str
     named: str
+    """Laws that the diagnosis names."""
     names: str
+    """Effects of the catalogue that the diagnosis names."""
     candidates: str
+    """Laws that the diagnosis gives as candidates only."""
     structure: bool
+    """Whether place, axis, variables and memory of the found laws are right."""
     error: float | None
+    """Relative error of the found law in the visited range; None where it is unknown or infinite, as below."""
     louder: float | None
+    """Relative error of the found law at a higher level."""
     retuned: float | None
+    """Rms error of the re-tuned model over the noise's rms, in the worst channel."""
     after: float | None
+    """The same ratio for the model with the effects that were found."""
     seconds: float | None
+    """Processor time of the diagnosis (s)."""
     miss: bool
 
 
@@ -59,7 +80,8 @@ def write_laws(done: LawBlindTest) -> None:
 
 
 def write_law_table(path: Path, done: LawBlindTest) -> None:
-    """Write figures and misses as a small table that can be kept beside the code. Raises StudyError."""
+    """Write the figures as a small table at `path`, and the misses in a second table with the suffix -misses. Raises
+    StudyError."""
     figures = [FigureRow(each.name, each.value, each.low, each.high, each.of) for each in done.score.figures]
     lines = [
         f"# {len(done.outcomes)} cases of laws, seeds {done.plan.seed} to {done.plan.seed + done.plan.cases - 1}",
@@ -72,7 +94,7 @@ def write_law_table(path: Path, done: LawBlindTest) -> None:
 
 
 def law_lines(done: LawBlindTest) -> Iterator[str]:
-    """Result as terminal lines, misses first."""
+    """Lines for the terminal: each miss, each figure, the seal of the labels."""
     yield f"{len(done.score.misses)} misses in {len(done.outcomes)} cases"
     for miss in done.score.misses:
         truth = miss.kind if miss.truth is None else miss.truth.formula
@@ -92,6 +114,7 @@ def law_summary(done: LawBlindTest) -> str:
 
 
 def _facts(done: LawBlindTest) -> dict[str, Any]:
+    """Values that the document and the summary share."""
     return {
         "of": "laws",
         "seed": done.plan.seed,
@@ -105,6 +128,7 @@ def _facts(done: LawBlindTest) -> dict[str, Any]:
 
 
 def _answer_text(of: LawOutcome) -> str:
+    """The answer in words: verdict, effects, laws or candidates, and the error of the law in percent."""
     laws = " and ".join(_law_text(law) for law in of.laws)
     how = "" if of.named or not of.candidates else "candidate "
     names = ", ".join(of.names)
@@ -129,4 +153,5 @@ def _row(of: LawOutcome) -> LawRow:
 
 
 def _short(value: float | None) -> float | None:
+    """The value with four decimals; None for NaN and infinity."""
     return None if value is None or value != value or value == float("inf") else round(value, 4)

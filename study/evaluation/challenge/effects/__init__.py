@@ -1,6 +1,7 @@
-"""The effects that can be concealed, by family: each file draws an effect's parameters and builds it into a device.
+"""The effects that can be concealed, by family: each file draws the parameters of its effects and builds them into a
+device.
 
-Of the catalogue: `actuator`, `friction`, `inertia_and_drag`, `springs`, `hand`, `sensor`, along the signal's path.
-`decoys` are outside of it: a right diagnosis leaves them without a name. `concealed_effect`, one folder
-up, is what an effect consists of; `draw_case` collects them. Begin at `springs.py`.
+In the catalogue, along the path of the signal: `actuator`; `friction`, `inertia_and_drag`, `springs`, `hand`; `sensor`.
+Outside the catalogue: `decoys`, which a correct diagnosis does not name. `challenge.concealed_effect` defines an
+effect, and `challenge.draw_case` collects them. Begin at `springs.py`.
 """

@@ -1,4 +1,4 @@
-"""Concealed effects of the actuator, between the commanded and the exerted force: how strong they are drawn, and built.
+"""Concealed effects of the actuator, between the commanded force u and the exerted force F (N).
 
     saturation   F = clip(u, -limit, limit)                            one axis      limit in N
     dead band    F = u - width sign(u) where |u| > width, else 0       one axis      width in N
@@ -8,8 +8,8 @@
     delay        F(t) = u(t - delay)                                   all axes      delay in s
 
 Each range goes from an effect that hardly shows in the recordings of the challenge to a gross fault; the strength (0 to
-1) interpolates geometrically. The ranges were chosen by hand for commands with peaks of 0.5 to 3 N (`LEVELS_N`). The
-compiled force: `actuator_kernel.drive`.
+1) interpolates geometrically. The ranges were chosen by hand for commands with peaks of 0.5 to 3 N (`LEVELS_N`).
+`actuator_kernel.drive` computes the force.
 """
 
 from study.evaluation.challenge.actuator_kernel import DEAD, DELAY_S, GAIN, LAG_S, LIMIT, RATE

@@ -1,8 +1,13 @@
-"""Dry friction between handle and ground, on one axis.
+"""Concealed effects of dry friction between handle and ground, on one axis.
 
-Every law is a relaxed bristle (elastic presliding). Where the law itself has no presliding, the bristle is so stiff
-(3e6 N/m) that it slides within nanometres. Levels are those of the moving handle; with position they vary as level (1 +
-slope x + bend x^2). Stribeck's excess of static friction falls as exp(-(v / speed)^2).
+    Coulomb                     |F| = level                                            level in N
+    asymmetric                  a level for each direction of motion                   levels in N
+    Stribeck                    |F| = coulomb + (static - coulomb) exp(-(v / speed)^2)  N, m/s
+    presliding                  Coulomb friction behind a spring                       level in N, stiffness in N/m
+    position-dependent          |F| = level (1 + slope x + bend x^2)                   N, 1/m, 1/m^2
+
+All are a bristle with elastic presliding (Dahl; `friction_kernel`). Where the law has no presliding, the bristle has
+3e6 N/m and slides within 0.1 um. The ranges of the levels go from 0.003 or 0.01 N (strength 0) to 0.2 or 0.25 N (1).
 """
 
 from dataclasses import replace
@@ -16,6 +21,7 @@ STIFF_N_PER_M = 3e6
 
 
 def _with_bristle(device: Device, axis: int, cells: dict[int, float]) -> Device:
+    """The device with these columns of friction on an axis; `STIFF_N_PER_M` where `cells` has no stiffness."""
     return replace(device, friction=with_cells(device.friction, axis, {STIFFNESS: STIFF_N_PER_M} | cells))
 
 
@@ -80,4 +86,4 @@ EFFECTS = (
     ConcealedEffect("presliding_hysteresis", "mechanism", True, _draw_presliding, _build_presliding),
     ConcealedEffect("position_dependent_friction", "mechanism", True, _draw_along, _build_along),
 )
-"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""
+"""Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""

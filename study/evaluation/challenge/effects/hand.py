@@ -1,7 +1,9 @@
-"""Impedance of a hand on the handle: mass, damping and stiffness on every axis, in other proportions for y and z.
+"""Concealed effects of a hand on the handle.
 
-A time-varying grip modulates the damping between handle and ground by 1 + depth sin(2 pi rate t + phase); whether the
-stiffness varies with it is drawn.
+Hand impedance: mass (kg), damping (N s/m) and stiffness (N/m) to the ground along x, in other proportions along y and z
+(factors `mass_y` and so on). At strength 1 they have the size of a light grip, at 0 a hundredth of it.
+Time-varying grip: the damping between handle and ground is multiplied by 1 + depth sin(2 pi rate t + phase); whether
+the stiffness varies in the same way is drawn.
 """
 
 from dataclasses import replace
@@ -15,6 +17,7 @@ from study.evaluation.challenge.mechanism_kernel import DAMPING_DEPTH, RATE, STI
 
 
 def _draw_hand(at: EffectContext) -> dict[str, float]:
+    """Along x at strength 1: 0.04 to 0.09 kg, 2.5 to 6 N s/m, 100 to 300 N/m, log-uniform."""
     tight = at.log_between(0.01, 1.0)
     drawn = {
         "mass": tight * at.draw_log_uniform(0.04, 0.09),
@@ -27,6 +30,7 @@ def _draw_hand(at: EffectContext) -> dict[str, float]:
 
 def _build_hand(device: Device, axis: int, values: Values) -> Device:
     def on_handle(name: str, ground: FloatArray) -> FloatArray:
+        """Matrix (3, 3) of the bench plus the hand's diagonal matrix."""
         return ground + values[name] * np.diag((1.0, values[f"{name}_y"], values[f"{name}_z"]))
 
     bench = replace(
@@ -39,6 +43,7 @@ def _build_hand(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_grip(at: EffectContext) -> dict[str, float]:
+    """Rate (Hz), depth 0.02 to 0.8, phase (rad); stiffness_share: 0 or 1, whether the stiffness varies too."""
     return {
         "rate_hz": at.draw_log_uniform(0.03, 0.5),
         "depth": at.log_between(0.02, 0.8),
@@ -59,4 +64,4 @@ EFFECTS = (
     ConcealedEffect("hand_impedance", "hand", False, _draw_hand, _build_hand),
     ConcealedEffect("time_varying_grip", "hand", False, _draw_grip, _build_grip),
 )
-"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""
+"""Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""

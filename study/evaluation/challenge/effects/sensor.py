@@ -1,9 +1,12 @@
-"""Sensor effects between the handle's motion and its record.
+"""Concealed effects of sensor, clock and logger, between the motion of the handle and its record.
 
-Gain, nonlinearity (a + cubic a^3), limit, offset and cross-axis sensitivity act in one channel; the others in all.
-Sensor lag replaces the accelerometer's pole at 500 Hz. Misalignment rotates the accelerometer about a random axis.
-Drift grows linearly from start to end; drift and hum have a share of their own in each channel, the largest given by
-`total` and `amplitude`. A positive logger offset delays the acceleration, not the position.
+In a single channel: gain; nonlinearity a + cubic a^3 of the acceleration a; clipping at +-limit; offset; cross-axis
+sensitivity. In all channels: lag (bandwidth in Hz, in place of 500 Hz); misalignment (rotation about a random axis);
+drift, linear from 0 to `total` at the end; mains hum; quantization to `step`; clock error (ppm); lost samples (fraction
+that repeats the sample before); logger offset (s; positive: the acceleration is delayed, but not the position).
+
+Accelerations are in m/s^2. Drift and hum have a random share in each channel; the largest share is 1. The strength
+interpolates each range geometrically. `challenge.sensor` applies the effects.
 """
 
 from dataclasses import replace
@@ -22,6 +25,7 @@ def _with_sensor(device: Device, sensor: Sensor) -> Device:
 
 
 def _in_channel(table: FloatArray, axis: int, value: float) -> FloatArray:
+    """Copy of the table (3,) with the value of a channel replaced."""
     changed = table.copy()
     changed[axis] = value
     return changed
@@ -36,6 +40,7 @@ def _build_lag(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_clipping(at: EffectContext) -> dict[str, float]:
+    """Limit (m/s^2) that cuts 2 % to 70 % off the largest reading."""
     return {"limit": at.peak_mps2[at.axis] * (1.0 - at.log_between(0.02, 0.7))}
 
 
@@ -44,6 +49,7 @@ def _build_clipping(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_misalignment(at: EffectContext) -> dict[str, float]:
+    """Angle of 0.1 to 15 degrees, and the rotation vector (degrees)."""
     degrees = at.log_between(0.1, 15.0)
     about = degrees * at.direction()
     return {"degrees": degrees} | dict(zip(("about_x", "about_y", "about_z"), map(float, about), strict=True))
@@ -65,6 +71,7 @@ def _build_gain(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_curve(at: EffectContext) -> dict[str, float]:
+    """cubic, 1/(m/s^2)^2: at the largest reading, the cubic term is 0.5 % to 25 % of the reading."""
     return {"cubic": at.sign() * at.log_between(0.005, 0.25) / at.peak_mps2[at.axis] ** 2}
 
 
@@ -135,13 +142,14 @@ def _build_lost(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_crossed(at: EffectContext) -> dict[str, float]:
+    """Shares of the two other channels, in cyclic order; together 0.3 % to 15 % (root of the sum of squares)."""
     turn = at.random.uniform(0.0, 2 * np.pi)
     size = at.log_between(0.003, 0.15)
     return {"from_next": float(size * np.cos(turn)), "from_after_next": float(size * np.sin(turn))}
 
 
 def _build_crossed(device: Device, axis: int, values: Values) -> Device:
-    # In place of an unlabelled extra's mixing, so that the label is what the device has.
+    # Replaces the mixing of a nuisance effect in this row, so that the label agrees with the device.
     mixing = device.sensor.orientation.copy()
     mixing[axis, (axis + 1) % 3] = values["from_next"]
     mixing[axis, (axis + 2) % 3] = values["from_after_next"]
@@ -181,4 +189,4 @@ EFFECTS = (
     ConcealedEffect("sensor_offset", "sensor", True, _draw_offset, _build_offset),
     ConcealedEffect("logger_offset", "sensor", False, _draw_logger, _build_logger),
 )
-"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""
+"""Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""

@@ -1,7 +1,12 @@
-"""Position-dependent forces on one axis of the handle.
+"""Concealed effects that exert a force F on one axis of the handle as a function of its position x.
 
-Hardening -k3 x^3; asymmetric -k2 x^2; constant +force; cogging amplitude sin(2 pi x / pitch + phase) with random phase;
-an end stop is a spring that begins at `position`, on that side only or symmetrically on both: which is drawn.
+    hardening    F = -k3 x^3                                     k3 in N/m^3
+    asymmetric   F = -k2 x^2                                     k2 in N/m^2
+    constant     F = force                                       N
+    cogging      F = amplitude sin(2 pi x / pitch + phase)       N, m, rad (random phase)
+    end stop     F = -stiffness (x - position) beyond position   N/m, m; on one side or on both, which is drawn
+
+The strength interpolates the range of the main parameter geometrically. `handle_force_kernel` computes the force.
 """
 
 import numpy as np
@@ -22,6 +27,7 @@ from study.evaluation.challenge.handle_force_kernel import (
 
 
 def _draw_hardening(at: EffectContext) -> dict[str, float]:
+    """k3 such that the force at the end of the travel is 0.005 to 0.4 N."""
     return {"k3": at.log_between(0.005, 0.4) / at.travel_m[at.axis] ** 3}
 
 
@@ -30,7 +36,7 @@ def _build_hardening(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_asymmetric(at: EffectContext) -> dict[str, float]:
-    # A fraction of the ground's stiffness at the end of the travel: with more, the soft side would be unstable.
+    # k2 x at the end of the travel over the ground's stiffness; above 0.5 the tangent stiffness would be negative.
     stiffness = at.bench.stiffness[at.axis, at.axis]
     return {"k2": float(at.sign() * at.log_between(0.005, 0.3) * stiffness / at.travel_m[at.axis])}
 
@@ -61,6 +67,7 @@ def _build_cogging(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_stop(at: EffectContext) -> dict[str, float]:
+    """Position at 99.8 % (weakest) to 40 % of the travel without the stop; opposite: 1 for a stop on both sides."""
     reached = 1.0 - 0.6 * at.log_between(0.003, 1.0)
     return {
         "position": at.sign() * reached * at.travel_m[at.axis],
@@ -83,4 +90,4 @@ EFFECTS = (
     ConcealedEffect("cogging", "mechanism", True, _draw_cogging, _build_cogging),
     ConcealedEffect("end_stop", "mechanism", True, _draw_stop, _build_stop),
 )
-"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""
+"""Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""

@@ -1,7 +1,9 @@
-"""Faults of sensor, clock and line injected into a recording of a real device: real noise, known truth. Those of
+"""Faults of sensor, clock and line injected into a recording of a real device: real noise, known truth. Faults of
 mechanism and actuator are in `force_injections`.
 
-Written for the challenge only: no code is shared with the effects that a diagnosis compares.
+The size of a fault is drawn relative to the response (rms, peak, median frequency), because nothing else is known of
+the device; a strength of 0 to 1 interpolates geometrically. No code is shared with the effects that a diagnosis
+compares.
 """
 
 from collections.abc import Callable, Mapping
@@ -35,29 +37,31 @@ from study.evaluation.challenge.injection.reading_faults import (
 )
 
 MAINS_HZ = (50.0, 60.0)
-"""Nominal frequencies of the mains, of which hum has one (Hz)."""
+"""Nominal frequencies of the mains (Hz); hum has either of them."""
 FASTEST_PPM = 2e4
 """Largest drawn clock error (ppm): that of oscillators without a crystal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Properties of the response by which the size of a fault is drawn."""
+    """Properties of the response by which the size of a fault is drawn; rms and peak in the unit of the response."""
 
     rate_hz: float
+    """Sample rate (Hz)."""
     rms: float
-    """Rms of the largest channel."""
+    """Largest rms of a channel, without its mean."""
     peak: float
     """Largest magnitude in any channel."""
     middle_hz: float
-    """Median frequency of the response's power."""
+    """Median frequency of the response's power (Hz), at least the resolution of its spectrum."""
     seconds: float
+    """Duration of the response (s)."""
 
 
 Draw = Callable[[Reading, float, np.random.Generator], dict[str, float]]
-"""Parameters of a fault from its strength, 0 (weakest) to 1."""
+"""draw(reading, strength, random): the parameters of a fault; strength 0 = weakest, 1 = strongest."""
 Spoil = Callable[[FloatArray, float, Mapping[str, float], np.random.Generator], FloatArray]
-"""Function from response (n, p), sample rate, parameters and random generator to the response with the fault."""
+"""spoil(samples, rate_hz, values, random): the response (n, p) with the fault (`reading_faults`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +75,7 @@ class Injection:
     axes: int = 1
     """Number of response channels that it needs."""
     memory: bool = False
-    """Depends on earlier readings: begins anew with each take."""
+    """Whether the fault depends on earlier readings, so that it is applied to each take separately."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,18 +84,21 @@ class Injected:
 
     recording: Recording
     effect: str
-    """Empty where nothing was injected."""
+    """Name of the fault; empty where nothing was injected."""
     values: dict[str, float]
+    """Parameters of the fault, by name."""
     strength: float
     change: FloatArray
-    """(p,): rms change per response channel; per command channel where the command was altered."""
+    """(p,): rms change per response channel; for a fault of mechanism or actuator, per command channel."""
 
 
 def _log_between(low: float, high: float, strength: float) -> float:
+    """Geometric interpolation between two values by the strength."""
     return float(low * (high / low) ** strength)
 
 
 def _draw_turn(at: Reading, strength: float, random: np.random.Generator) -> dict[str, float]:
+    """Misalignment: angle of 1 to 20 degrees about a random axis, a unit vector."""
     x, y, z = (direction := random.normal(size=3)) / np.linalg.norm(direction)
     return {"degrees": _log_between(1.0, 20.0, strength), "about_x": float(x), "about_y": float(y), "about_z": float(z)}
 
@@ -146,12 +153,12 @@ INJECTIONS: tuple[Injection, ...] = (
     Injection("cross_axis_sensitivity", lambda at, s, r: {"from_next": _log_between(0.02, 0.8, s)}, cross, axes=2),
     Injection("sensor_misalignment", _draw_turn, turn, axes=3),
 )
-"""Faults of sensor, clock and line: name, draw of the parameters, and the change of the response."""
+"""Faults of sensor, clock and line: name in the vocabulary, draw of the parameters, and change of the response."""
 
 
 def inject(recording: Recording, effect: str, strength: float, random: np.random.Generator) -> Injected:
-    """Inject one fault. effect: a name from INJECTIONS; empty = none. Raises ValueError for an unknown name, an
-    invalid strength, or a fault that needs more channels than the recording has."""
+    """Inject a fault. effect: a name from INJECTIONS or FORCE_INJECTIONS; empty = none. Raises ValueError for an
+    unknown name, a strength outside 0..1, or a fault for which the recording lacks channels or a motion."""
     if not effect:
         return Injected(recording, "", {}, 0.0, np.zeros(recording.response.samples.shape[1]))
     if not 0.0 <= strength <= 1.0:
@@ -178,7 +185,8 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
 def _inject_force(
     recording: Recording, wanted: ForceInjection, strength: float, random: np.random.Generator
 ) -> Injected:
-    """Inject a fault of mechanism or drive at a randomly drawn axis."""
+    """Inject a fault of mechanism or drive at a random axis: the recorded command is changed instead of the response.
+    Raises ValueError where the recording has no motion along the command."""
     samples = recording.command.samples.copy()
     axis = int(random.integers(samples.shape[1]))
     motion = axis_motion(recording, axis)
@@ -193,9 +201,9 @@ def _inject_force(
 
 
 def applicable_injections(recording: Recording) -> tuple[str, ...]:
-    """Names of the faults that this recording can carry: mains hum needs a sample rate well above it; a misalignment
-    needs the three channels x, y, z of one sensor; a force needs a measured motion along each command, and a fault
-    of the drive one that is not imposed."""
+    """Names of the faults that can be injected into this recording. Mains hum needs a sample rate above four times its
+    frequency; a misalignment needs the three channels x, y, z of a sensor; a fault of the mechanism needs a measured
+    motion along each command; a fault of the drive needs in addition that the motion is not imposed."""
     rate_hz = recording.sample_rate_hz
     width = 3 if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"} else 1
     hums = rate_hz > 4 * max(MAINS_HZ)
@@ -218,7 +226,8 @@ def place_of(effect: str) -> Place:
 
 
 def describe_reading(recording: Recording) -> Reading:
-    """Rate, rms, peak, median frequency and duration of the response."""
+    """Rate, rms, peak, median frequency and duration of the response; rows with NaN are left out, except in
+    duration."""
     samples = recording.response.samples
     known = samples[np.isfinite(samples).all(axis=1)]
     moving = known - known.mean(axis=0)

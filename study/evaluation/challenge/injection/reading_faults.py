@@ -1,5 +1,8 @@
-"""Faults of sensor, clock and line applied to readings. All take readings (n, p), sample rate (Hz), parameters,
-random generator, and return (n, p)."""
+"""Faults of sensor, clock and line applied to readings of a real device.
+
+Every function takes the readings (n, p), the sample rate (Hz), the parameters by name and a random generator, and
+returns new readings (n, p). Amplitudes are in the unit of the readings. `injections` draws the parameters.
+"""
 
 from collections.abc import Mapping
 
@@ -11,7 +14,7 @@ from equalizer.signals.signal import FloatArray
 
 
 def lag(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    """First-order low-pass with the given bandwidth (Hz)."""
+    """First-order low-pass with the corner frequency `bandwidth` (Hz), at rest at the first reading."""
     share = 1.0 - np.exp(-2 * np.pi * values["bandwidth"] / rate_hz)
     filtered, _ = lfilter([share], [1.0, share - 1.0], samples, axis=0, zi=(1.0 - share) * samples[:1])
     return np.asarray(filtered)
@@ -23,18 +26,18 @@ def clip(samples: FloatArray, rate_hz: float, values: Mapping[str, float], rando
 
 
 def hum(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    """Mains hum, the same in all channels."""
+    """Mains hum, the same in all channels: `amplitude`, `frequency` (Hz), phase `turn` (turns)."""
     turns = values["frequency"] * np.arange(len(samples)) / rate_hz + values["turn"]
     return np.asarray(samples + values["amplitude"] * np.sin(2 * np.pi * turns)[:, None])
 
 
 def drift(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    """Linear drift to `total` at the end."""
+    """Drift, the same in all channels: linear from 0 at the start to `total` at the end."""
     return samples + values["total"] * np.linspace(0.0, 1.0, len(samples))[:, None]
 
 
 def offset(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    """Constant offset."""
+    """Constant `offset`, the same in all channels."""
     return samples + values["offset"]
 
 
@@ -44,7 +47,7 @@ def steps(samples: FloatArray, rate_hz: float, values: Mapping[str, float], rand
 
 
 def lose(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    """Each sample is lost with probability `fraction` and repeats the one before."""
+    """Each sample is lost with probability `fraction` and then repeats the previous sample."""
     lost = random.random(len(samples)) < values["fraction"]
     lost[0] = False
     kept = np.maximum.accumulate(np.where(lost, 0, np.arange(len(samples))))
@@ -54,20 +57,20 @@ def lose(samples: FloatArray, rate_hz: float, values: Mapping[str, float], rando
 def other_clock(
     samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Readings taken at t (1 + ppm 1e-6), interpolated linearly."""
+    """Clock error: readings taken at t (1 + ppm 1e-6), interpolated linearly."""
     at = np.arange(len(samples), dtype=np.float64)
     read = at * (1.0 + 1e-6 * values["ppm"])
     return np.column_stack([np.interp(read, at, channel) for channel in samples.T])
 
 
 def turn(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    """Rotation of the three channels by `degrees` about an axis."""
+    """Misalignment: rotation of the three channels by `degrees` about the unit vector (about_x, about_y, about_z)."""
     about = np.array([values["about_x"], values["about_y"], values["about_z"]])
     return np.asarray(Rotation.from_rotvec(np.radians(values["degrees"]) * about).apply(np.array(samples)))
 
 
 def scale(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    """Gain factor."""
+    """Factor `gain` in all channels."""
     return values["gain"] * samples
 
 
@@ -88,12 +91,12 @@ def square(samples: FloatArray, rate_hz: float, values: Mapping[str, float], ran
 
 
 def noise(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    """Added white noise with the given rms."""
+    """Added white normal noise with the given `rms`."""
     return np.asarray(samples + values["rms"] * random.normal(size=samples.shape))
 
 
 def play(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    """Hysteresis: the sensor is driven through a gap."""
+    """Hysteresis (play operator) with the total width `gap`. A missing reading (NaN) stays missing."""
     found, read, half = np.empty_like(samples), samples[0], 0.5 * values["gap"]
     for k, here in enumerate(samples):
         known = np.isfinite(here)
@@ -103,7 +106,8 @@ def play(samples: FloatArray, rate_hz: float, values: Mapping[str, float], rando
 
 
 def cross(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    """The first channel also reads the second."""
+    """Cross-axis sensitivity: the first channel also reads the second, scaled to the standard deviation of the first,
+    times `from_next`."""
     found = samples.copy()
     found[:, 0] += values["from_next"] * samples[:, 1] * np.nanstd(samples[:, 0]) / np.nanstd(samples[:, 1])
     return np.asarray(found)

@@ -1,5 +1,9 @@
-"""Build a law into a device, scaled so that the ratio of its rms force to that of the commands is the same on every
-bench."""
+"""Builds a concealed law into a device, scaled so that a strength means the same on every bench.
+
+For a law that is a force, the ratio of the rms of the force, along the motion without the law, to the rms of the
+command is given by the strength; for a law of commands or readings, the ratio of the rms of the change to that of the
+changed signal.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -13,31 +17,36 @@ from study.evaluation.challenge.laws.concealed_laws import LawKind, Random, Size
 from study.evaluation.challenge.mechanism_kernel import Motion
 
 WEAKEST, STRONGEST = 0.015, 0.25
-"""Size of a law relative to the rms of the commands, or of the readings."""
+"""Rms of a law relative to that of the commands, or of the readings, at strength 0 and 1."""
 OF_SOFT = 1.0
-"""Size of a saturating curve, whose own parameter sets how far it bends."""
+"""Size k of a saturating law of commands or readings: its parameter a alone sets its strength."""
 
 
 @dataclass(frozen=True, slots=True)
 class LawTruth:
-    """The label of one law that the device has and the model lacks."""
+    """The label of a law that the device has and the model lacks."""
 
     law: str
+    """Name of the law."""
     formula: str
     axes: tuple[str, ...]
+    """Letters of the axes on which the law acts."""
     acts_on: tuple[str, ...]
+    """Equivalent places of action: force, command or response."""
     variables: tuple[tuple[str, ...], ...]
     """Per axis of `axes`: equivalent sets of variables, each sorted and joined by spaces."""
     memory: bool
+    """Whether the law depends on earlier motion or commands."""
     numbers: dict[str, float]
+    """Size k, parameters a and b, sign s."""
 
 
 def build_law(
     device: Device, kind: LawKind, free: tuple[Motion, FloatArray], places: tuple[int, int], strength: float,
     random: Random,
 ) -> tuple[Device, LawTruth]:  # fmt: skip
-    """The device with the law, and its label. free: motion and commands without it. places: its axis, and another
-    axis."""
+    """The device with the law, and its label. free: motion and commands (samples, 3) without the law. places: the axis
+    of the law, and another axis. strength: 0 to 1."""
     moved, command = free
     axis, other = places
     sizes = Sizes(
@@ -60,6 +69,7 @@ def build_law(
 
 
 def _truth(kind: LawKind, places: tuple[int, int], numbers: dict[str, float]) -> LawTruth:
+    """The label of a law at these axes."""
     turned = (places, places[::-1]) if kind.both else (places,)
     readings = tuple(
         tuple(_with_axis_names(reading, own, other) for reading in kind.variables) for own, other in turned
@@ -70,7 +80,7 @@ def _truth(kind: LawKind, places: tuple[int, int], numbers: dict[str, float]) ->
 
 
 def _with_axis_names(reading: str, own: int, other: int) -> str:
-    """Variables such as "vx vy" with the letters of the actual axes."""
+    """Variables such as "vx vy", with x and y replaced by the letters of the axes `own` and `other`."""
     letters = {"x": AXES[own], "y": AXES[other]}
     names = [name if name == "t" else name[:-1] + letters[name[-1]] for name in reading.split()]
     return " ".join(sorted(names))
@@ -83,8 +93,8 @@ def _build_change(
     places: tuple[int, int],
     numbers: tuple[float, float, float, float],
 ) -> tuple[Device, float]:
-    """Build a law that alters commands or readings; returns the device and the law's size. numbers: a, b, side,
-    share."""
+    """Build in a law that changes commands or readings; returns the device and the size of the law. numbers: parameters
+    a and b, sign, and share (rms of the change relative to the signal). A law with a > 0 has the size `OF_SOFT`."""
     change, (axis, other), (moved, command) = kind.change, places, free
     first, second, side, share = numbers
     assert change is not None
@@ -103,7 +113,7 @@ def _build_change(
 
 
 def _force_along_motion(row: FloatArray, moved: Motion, command: FloatArray) -> FloatArray:
-    """(samples,): force of the law along the given motion."""
+    """(samples,), N: force of the law (a row of `law_kernel`) along the given motion and command."""
     kept, force = 0.0, np.zeros(len(command))
     for k in range(len(command)):
         q, v, drive = moved.position[k], moved.velocity[k], command[k]
@@ -113,4 +123,5 @@ def _force_along_motion(row: FloatArray, moved: Motion, command: FloatArray) -> 
 
 
 def _rms(samples: FloatArray) -> float:
+    """Root mean square, with a tiny lower limit so that it can be divided by."""
     return max(float(np.sqrt(np.mean(samples**2))), 1e-300)

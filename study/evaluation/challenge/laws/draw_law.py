@@ -1,7 +1,7 @@
-"""Draw a bank of devices with laws outside the catalogue, nulls and decoys.
+"""Draws the cases of a bank of laws: devices with a law outside the catalogue, and controls without such a law.
 
-Of every twenty: twelve with a law, four with nothing missing, three with an effect of the catalogue, one with a linear
-mode. Laws take turns.
+A turn of twenty cases has twelve with a law, four with nothing missing, three with an effect of the catalogue and one
+with an additional linear mode, in random order. All laws, and all effects, are used before any is used again.
 """
 
 from dataclasses import dataclass
@@ -27,63 +27,69 @@ from study.evaluation.challenge.sensor import read
 LawBankKind = Literal["law", "nothing", "decoy", "mode"]
 """What is concealed: a law, nothing, an effect of the catalogue, or a linear mode."""
 COUNTS: dict[LawBankKind, int] = {"law": 12, "nothing": 4, "decoy": 3, "mode": 1}
-"""Devices of each kind in a turn of twenty."""
+"""Number of cases of each kind in a turn of twenty."""
 TURN: tuple[LawBankKind, ...] = tuple(kind for kind, count in COUNTS.items() for _ in range(count))
 """Kind of each case of a turn; the turn repeats."""
 LOWEST = 0.35
-"""Lowest strength of what is concealed."""
+"""Lowest strength of a concealed law, effect or mode; the highest is 1."""
 MODE = "extra_mode"
 """Effect of the kind `mode`."""
 CATALOGUED = tuple(name for name in EFFECTS if name not in (*ALL_AXES, MODE, "hand_impedance"))
-"""Effects of the kind `decoy`: those that a single axis shows."""
+"""Effects of the kind `decoy`: all of the catalogue that can be identified on a single axis, except a hand."""
 ONE_AXIS = 0.75
-"""Fraction of single-axis laws that are built into a device of one axis."""
+"""Fraction of the cases with one driven axis, of those whose law, if any, needs a single axis; the others have two."""
 LOUD_N = 4.5
-"""Level (N) of a stretch kept for the test: 1.5 times the highest level used to find laws."""
+"""Level (N) of an additional test segment and of the second fresh motion: 1.5 times the highest level of the fit."""
 FRESH_N, FRESH_PERIOD, FRESH_PERIODS = 2.0, 2000, 2
-"""Test motion that no recording contains: peak of its multisine, samples per period, periods."""
+"""Fresh test motion, which no recording contains: nominal peak of its multisine (N), samples per period, periods."""
 
 
 @dataclass(frozen=True, slots=True)
 class LawDraw:
-    """What was drawn for one number of the bank of laws."""
+    """The draw for a number of the bank of laws."""
 
     number: int
     seed: int
     kind: LawBankKind
     concealed: str
-    """Name of a law or an effect, or empty."""
+    """Name of the concealed law or effect; empty for nothing."""
     strength: float
+    """`LOWEST` to 1."""
     model: Concealed
+    """Origin of the model, calibrated or retuned."""
     rig: Rig
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fresh:
-    """Noise-free motion under commands that no recording contains: the test of a found law."""
+    """Noise-free motion under commands that no recording contains, by which a found law is judged. Arrays (samples,
+    axes) of the rig's axes."""
 
     level_n: float
+    """Level of the command (N); per axis it is divided by the root of the number of axes."""
     command: FloatArray
-    """(samples, axes), N."""
+    """N, before a law of the drive."""
     moved: Motion
+    """True motion, SI units."""
     reading: FloatArray
-    """m/s^2, with the sensor's law but no other sensor effect."""
+    """m/s^2, with the law of the sensor but no other sensor effect."""
     lawful: FloatArray
-    """N: force of the laws."""
+    """N: force of the laws, with the change of the command by a law of the drive."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LawCase:
-    """A case with a law, its label, and fresh test motions."""
+    """A case of the bank of laws, its label, and fresh test motions."""
 
     case: Case
     truth: LawTruth | None
+    """Label of the law; None where no law is concealed."""
     fresh: tuple[Fresh, ...]
-    """For devices with a law: in the visited range, then at a higher level."""
+    """For devices with a law: a motion at the level `FRESH_N`, then at `LOUD_N`. Empty for others."""
 
 
 def draw_law(seed: int, number: int, brief: bool = False) -> LawDraw:
-    """Draw the case of one number: the same for the same seed and number. brief: short periods."""
+    """Draw the case of a number. The same seed and number give the same case. brief: periods of half the length."""
     turn, place = divmod(number, len(TURN))
     order = np.random.default_rng([seed, 41, turn]).permutation(len(TURN))
     kind = TURN[order[place]]
@@ -100,7 +106,8 @@ def draw_law(seed: int, number: int, brief: bool = False) -> LawDraw:
 
 
 def law_case(each: LawDraw, name: str) -> LawCase:
-    """Generate the drawn case. name: device name in recording and model."""
+    """Generate the drawn case. name: device name in recording and model. Raises ValueError where the motion diverges
+    with the law at any strength that is tried."""
     if each.kind != "law":
         effects = (each.concealed,) if each.concealed else ()
         strengths = each.strength if effects else None
@@ -125,7 +132,8 @@ def law_case(each: LawDraw, name: str) -> LawCase:
 def _lawful(
     each: LawDraw, bare: Device, free: tuple[Motion, DrivePlan], random: np.random.Generator
 ) -> tuple[Device, Motion, LawTruth]:
-    """Build in a law at the drawn strength, halved as long as the motion would diverge."""
+    """Build in a law at the drawn strength, or at a half or a quarter of it where the motion would diverge or exceed
+    three times that without the law. Raises ValueError where all three do. The parameters are the same for each."""
     (moved, plan), axes = free, each.rig.axes
     own = int(random.integers(len(axes)))
     places = (axes[own], axes[(own + 1) % len(axes)])
@@ -143,10 +151,12 @@ def _lawful(
 
 
 def _refuse_further(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
+    """`Case.again` of a device with a law: such cases have no further experiments. Raises ValueError."""
     raise ValueError("a device with a law is not recorded again")
 
 
 def _make_fresh(device: Device, rig: Rig, random: np.random.Generator, level_n: float) -> Fresh:
+    """Motion of the device under a new multisine on all axes of the rig."""
     command = np.zeros((FRESH_PERIOD * FRESH_PERIODS, 3))
     for axis in rig.axes:
         command[:, axis] = np.tile(multisine(random, level_n / len(rig.axes) ** 0.5, FRESH_PERIOD), FRESH_PERIODS)

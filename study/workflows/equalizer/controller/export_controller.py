@@ -1,4 +1,8 @@
-"""`hapteq export-controller`: C sources of the real-time controller of an identified model."""
+"""`hapteq export-controller`: C sources of the real-time controller of an identified model.
+
+The controller (`equalizer.tracking.realtime`) plays a stored transient in any direction, and tracks a stream of wanted
+accelerations with a preview. Header, example loop and check program are written into a new folder.
+"""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,23 +25,24 @@ from study.workflows.equalizer.controller.c_text import CHECK, EXAMPLE, HEADER, 
 from study.workflows.free_name import require_free
 
 TITLE = "The controller was not exported"
-"""Title of each error of this command."""
+"""Title of each error message of this command."""
 LONGEST_ROWS = 5000
-"""Longest transient in rows: every row is 130 numbers for a model of order 26, and a compiler reads them all."""
+"""Longest transient (rows): every row becomes 130 numbers for a model of order 26, all of which a compiler must
+read."""
 LONGEST_PREVIEW_S = 2.0
 """Longest preview that is accepted (s)."""
 TRY = "Such as --preview 200 --cap 3."
-"""Settings that fit in most cases, for messages."""
+"""Advice for messages: settings that fit in most cases."""
 
 
 @dataclass(frozen=True, slots=True)
 class ControllerPlan:
-    """Order of `export_controller`: file of an identified model, new folder for the sources, and settings."""
+    """Arguments of `export_controller`: file of an identified model, new folder for the sources, and settings."""
 
     model: Path
     out: Path
     transient: Path | None = None
-    """A table of wanted accelerations; None = a tap (a short built-in transient)."""
+    """Table of wanted accelerations (m/s²); None: a tap, a short built-in transient."""
     settings: RealtimeSettings = field(default_factory=RealtimeSettings)
 
 
@@ -56,7 +61,8 @@ class ExportedController:
 
 
 def export_controller(plan: ControllerPlan) -> ExportedController:
-    """Computes and writes. Raises StudyError; nothing is written then."""
+    """Compute the controller and write its sources. Raises StudyError for a cap above the strongest device, and for a
+    model or transient from which no controller can be made; nothing is written then."""
     require_free(plan.out, title=TITLE, kind="controllers")
     if plan.settings.cap_n > STRONGEST_N:
         raise _refusal(f"The cap is {plan.settings.cap_n:g} N; the strongest device gives {STRONGEST_N:g} N.", TRY)
@@ -77,7 +83,8 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
 
 
 def controller_settings(weight: float, preview_s: float, cap_n: float) -> RealtimeSettings:
-    """Settings of the real-time controller from the order. Raises StudyError for what no loop can run."""
+    """Settings of the real-time controller. weight: of the forces in the cost; preview_s: time (s) for which the stream
+    is known in advance; cap_n: largest force (N). Raises StudyError for values outside their limits."""
     if not preview_s <= LONGEST_PREVIEW_S:
         raise _refusal(f"A preview of {preview_s:g} s was asked for; {LONGEST_PREVIEW_S:g} s is the longest.", TRY)
     try:
@@ -87,7 +94,8 @@ def controller_settings(weight: float, preview_s: float, cap_n: float) -> Realti
 
 
 def summarise_export(exported: ExportedController) -> dict[str, Any]:
-    """The export as plain values, for one JSON document. Errors are relative, as predicted by the model itself."""
+    """The export as plain values, for a JSON document. Errors are relative (1 = 100 %), as predicted by the model
+    itself."""
     controller, rate_hz = exported.controller, exported.model.sample_rate_hz
     return {
         "files": [str(path) for path in exported.files],
@@ -104,7 +112,8 @@ def summarise_export(exported: ExportedController) -> dict[str, Any]:
 
 
 def warn_of_export(exported: ExportedController) -> tuple[str, ...]:
-    """A warning if the controller's cap is above the force that hapteq plays with a hand on the handle; else empty."""
+    """A warning if the controller's cap is above the largest force that hapteq plays with a hand on the handle;
+    otherwise empty."""
     cap_n = exported.controller.cap_n
     if cap_n <= HAND_STIMULUS_CAP_N:
         return ()
@@ -129,6 +138,8 @@ def describe_export(exported: ExportedController) -> tuple[str, ...]:
 
 
 def _read_wanted(path: Path, model: IdentifiedModel) -> FloatArray:
+    """(N, 3), m/s²: the transient of a table. Raises TableError for another kind of table, another sample rate than the
+    model's, or too many rows."""
     table = read_trajectory(path)
     if table.kind is not TRAJECTORY:
         raise TableError((f"{path.name} holds forces; a transient is a table of accelerations",))
@@ -139,12 +150,14 @@ def _read_wanted(path: Path, model: IdentifiedModel) -> FloatArray:
 
 
 def _require_plain(model: IdentifiedModel) -> None:
-    """A force in three axes and an acceleration in three: what the loop is told and what its cap means."""
+    """Require a model of three forces (N) and three accelerations (m/s²), the units of the exported loop and of its
+    cap. Raises TrackingError."""
     if model.D.shape != (3, 3) or model.input_unit != "N" or model.output_unit != "m/s^2":
         raise TrackingError("the model is not of three forces (N) and three accelerations (m/s^2)")
 
 
 def _origin(plan: ControllerPlan, model: IdentifiedModel) -> tuple[str, ...]:
+    """Lines for the header: model file, band, place, channels, transient and weight."""
     low_hz, high_hz = model.band_hz
     table = "a tap along the last axis, 1 m/s^2" if plan.transient is None else plan.transient.name
     place = "" if model.place_m is None else f", at {', '.join(f'{each:g}' for each in model.place_m)} m"
