@@ -24,6 +24,7 @@ def bench():
     sys.path[:] = before
 
 
+@pytest.mark.slow
 def test_our_side_runs_and_is_within_its_bars(bench, monkeypatch, capsys):
     # How quick this machine is just now is for the benchmark to say.
     monkeypatch.setattr(bench, "CPU_S", 60.0)

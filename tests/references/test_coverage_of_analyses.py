@@ -1,5 +1,7 @@
 """The counts that reports print are those of the page, and say what the simulation says."""
 
+import pytest
+
 from analysis.psychophysics.coverage.coverage_words import CASES_HZ, NAMES, coverage_lines, coverage_sentence
 from analysis.psychophysics.coverage.measured_coverage import MEASURED
 from tests.references.coverage_of_analyses import BEGIN, END, PAGE, judge, measure, module_text
@@ -29,6 +31,7 @@ def test_the_counts_are_of_these_analyses():
     assert share["one-way", 0.0] < 0.03
 
 
+@pytest.mark.slow
 def test_two_studies_counted_anew_give_a_module_that_says_so():
     rows = measure(2)
     assert {row.intervals for row in rows if row.analysis == "model"} == {2}

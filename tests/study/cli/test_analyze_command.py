@@ -58,6 +58,7 @@ def test_ellipsoids_enter_the_report(run, data, tmp_path):
     assert "hapteq record ellipsoid" in err
 
 
+@pytest.mark.slow
 def test_figures_of_a_participant_who_withdrew_do_not_stay(run, data, small_file, tmp_path):
     assert run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P02", "--data", data)[0] == 0
     out = tmp_path / "elsewhere"

@@ -39,6 +39,7 @@ def test_unknown_people_are_refused_with_those_there_are(tmp_path, capsys, optio
     assert not (tmp_path / "no").exists()
 
 
+@pytest.mark.slow
 def test_people_feel_what_a_device_delivered_in_sessions(tmp_path, small_text, capsys):
     (tmp_path / "small.toml").write_text(small_text)
     small = ("--protocol", str(tmp_path / "small.toml"))
@@ -56,6 +57,7 @@ def test_people_feel_what_a_device_delivered_in_sessions(tmp_path, small_text, c
     assert "no measured trials of both directions at" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_protocol_that_roves_its_levels_is_simulated_so_and_it_is_said(tmp_path, small_text, capsys):
     roved = small_text.replace("fade_in_s = 0.1", "fade_in_s = 0.1\nrove_db = 6.0").replace(
         "cap_n = 3.0\nup", "cap_n = 2.12\nup"

@@ -69,8 +69,7 @@ def told(loose):
 def test_play_that_rattles_is_named_at_its_axis_with_its_gap(told):
     (claim,) = told.after.fitted.hypothesis.claims
     assert (claim.effect.name, claim.sites) == ("backlash", (AXIS,))
-    values = told.after.fitted.hypothesis.list_placed_effects()[0].values
-    assert values["gap"] == pytest.approx(GAP_M, rel=0.1)
+    assert told.after.fitted.hypothesis.list_placed_effects()[0].values["gap"] == pytest.approx(GAP_M, rel=0.1)
 
 
 def test_errors_stay_small_where_parameters_are_correlated():

@@ -89,6 +89,7 @@ def test_the_right_name_is_left_by_the_recording_that_was_proposed(followed):
     assert (seen[0], seen[-1]) == ((0, 2), (2, 2))
 
 
+@pytest.mark.slow
 def test_both_cases_are_told_nothing_of_which_is_which(followed):
     folder, *_ = followed
     again = ProofFolder(folder.path / NEXT)
@@ -98,6 +99,7 @@ def test_both_cases_are_told_nothing_of_which_is_which(followed):
         assert {path.name for path in place.iterdir()} == {ANSWER, MODEL, "settings.json"}  # recordings are forgotten
 
 
+@pytest.mark.slow
 def test_the_same_call_continues_without_doing_anything_twice(followed):
     folder, outcome, _, found, _ = followed
     before = {path: path.stat().st_mtime_ns for path in (folder.path / NEXT).rglob("*") if path.is_file()}
