@@ -58,6 +58,7 @@ def test_environments_are_not_committed(bench):
     assert ".venv-peers/" in ignored
 
 
+@pytest.mark.slow
 def test_a_peer_that_cannot_be_installed_is_a_row_that_says_why(bench, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     absent = bench.Peer("hapteq-absent", ("hapteq-absent==0.0.0",), "MIT")
@@ -67,6 +68,7 @@ def test_a_peer_that_cannot_be_installed_is_a_row_that_says_why(bench, tmp_path,
     assert re.search(r"hapteq-absent +not installed: ERROR: No matching distribution found for hapteq-absent", printed)
 
 
+@pytest.mark.slow
 def test_a_method_that_fails_is_a_row_with_its_last_line(bench, tmp_path, capsys):
     row, _ = bench.rows_of(
         "hapteq", Path(sys.executable), bench.OURS, bench.Method("broken", {}), [tmp_path / "no.npz"]

@@ -112,6 +112,7 @@ def test_what_the_data_do_not_tell_is_not_known(trials, protocol):
     assert "not known. The model needs answers of two participants" in page(analysis)
 
 
+@pytest.mark.slow
 def test_a_median_above_the_cap_leaves_a_single_end(simulate_study, protocol):
     declared = replace(protocol, analysis=AnalysisSettings("hierarchical", (45.0, 5.0)))
     by_model, published = analyse_study(simulate_study(), declared).declared_result.results

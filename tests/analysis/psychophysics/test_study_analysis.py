@@ -34,12 +34,14 @@ def test_a_whole_study_is_analysed(simulate_study, protocol, quick_json):
     assert document["cut_by_cap"] == document["lower_bounds"] == sum(row.censored for row in analysis.thresholds)
 
 
+@pytest.mark.slow
 def test_thresholds_rise_where_they_were_made_to_rise(simulate_study, protocol):
     analysis = analyse_study(simulate_study(), protocol)
     means = [group.mean for group in analysis.anova.groups]
     assert np.argsort(means).tolist()[-2:] == [3, 4]
 
 
+@pytest.mark.slow
 def test_without_an_effect_few_studies_find_one(simulate_study, protocol):
     frequencies = protocol.stimulus.frequencies_hz
     p = []

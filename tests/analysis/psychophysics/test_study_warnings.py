@@ -136,6 +136,7 @@ def test_lapses_at_low_frequencies_are_named_with_their_interval(able, protocol)
     assert "s01 (1 of 1; 95 % interval 21 to 100 %)" in sentence
 
 
+@pytest.mark.slow
 def test_an_error_at_full_level_and_high_frequency_is_no_lapse(able, protocol):
     assert warnings([*able, *lapses(able, 45.0, wrong=True)], protocol) == ()
     assert warnings([*able, *lapses(able, 5.0, wrong=False)], protocol) == ()

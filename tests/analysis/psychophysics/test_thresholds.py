@@ -72,6 +72,7 @@ def test_cap_contact_before_the_averaged_reversals_does_not_mark(answered, rule)
     assert not row.censored
 
 
+@pytest.mark.slow
 def test_guessers_are_flagged_and_able_observers_are_not(simulate, rule):
     flagged = {}
     for name, true_n, runs in (("guesser", np.inf, 200), ("able", 1.0, 300)):

@@ -192,6 +192,7 @@ def test_practice_says_how_it_ended(everything, full_protocol, answers, outcome)
     assert row[-1] == outcome
 
 
+@pytest.mark.slow
 def test_what_the_cap_cut_is_marked_in_rows_means_intervals_and_effect_sizes(words, simulate_study):
     html = words(simulate_study(subjects=3, true_n=(0.4, 0.4, 0.4, 0.4, float("inf"))))
     rows = re.findall(r"<tr>.*?</tr>", html, re.DOTALL)

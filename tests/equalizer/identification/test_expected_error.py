@@ -22,6 +22,7 @@ def resonant(plants, dampings, random):
     return plants._sampled(modes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", PLANTS)
 def test_the_true_error_is_not_above_the_stated_one(plants, measuring, seed):
     random = np.random.default_rng([18, seed])

@@ -119,7 +119,7 @@ def test_what_is_wrong_is_reported_and_nothing_is_written(
 @pytest.mark.parametrize(
     "typed",
     [
-        "real recordings --out empty",
+        pytest.param("real recordings --out empty", marks=pytest.mark.slow),
         pytest.param("real recordings --out empty/out", marks=pytest.mark.slow),
         f"kit score labels.csv {SCORE}",
     ],

@@ -25,6 +25,7 @@ def test_a_plan_without_habits_says_nothing_of_them_so_that_older_folders_go_on(
     assert (crowd["lapse"], crowd["family"]) == (0.02, "weibull")
 
 
+@pytest.mark.slow
 def test_curve_lapses_and_habits_reach_the_simulated_people(tmp_path):
     crowd = plan_of(tmp_path / "other", "--people", "repeating", "--curve", "logistic", "--lapse", "0.05")
     assert (crowd["unsure"], crowd["repeats"], crowd["family"], crowd["lapse"]) == (0.5, 3, "logistic", 0.05)

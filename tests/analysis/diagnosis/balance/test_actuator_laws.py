@@ -115,6 +115,7 @@ def of_speed(balance_of):
     return found
 
 
+@pytest.mark.slow
 def test_a_gain_that_falls_with_the_command_is_no_drag(of_speed):
     balance = of_speed(lambda u: u * (1 - 0.5 * np.abs(u)), 0.0)
     assert named(balance)["force_nonlinearity"].values["square"] == pytest.approx(-1, abs=0.2)
@@ -155,6 +156,7 @@ def test_a_drag_is_named_only_where_no_curve_of_the_command_does_as_well(balance
     assert ("quadratic_damping" in named(balance)) == drags
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag_s", [0.06, pytest.param(0.01, marks=pytest.mark.slow)])
 def test_a_valve_whose_speed_falls_behind_its_command_is_no_drag(balance_of, lag_s):
     """lag_s: of the speed behind the valve; below the sample period, no inertia shows."""
@@ -191,6 +193,7 @@ def pulled(law, seed, count=2500, rate_hz=250.0):
     return recording(current[:, None], (position + noise)[:, None], rate_hz)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("power", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_the_pull_of_a_coil_is_the_first_candidate_and_laws_of_the_motion_do_not_take_its_part(balance_of, power):
     shot = pulled(lambda i, x: 2.9e-6 * i**power / (0.01 - x) ** 2, 1)

@@ -45,6 +45,7 @@ def test_friction_that_holds_a_motor_between_its_moves_is_no_dead_band(balance_o
     assert named.law.effect in family_of("coulomb_friction")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_a_dead_band_beside_which_the_motor_coasts_is_no_friction(balance_of, seed):
     (balance,) = balance_of(moved(0.0, LEVEL_N, seed))

@@ -39,6 +39,7 @@ def test_the_weight_of_a_lever_is_recovered(balance):
     assert "cogging" not in named
 
 
+@pytest.mark.slow
 def test_a_balanced_lever_has_no_weight(balance):
     assert "gravity_torque" not in {law.law.effect for law in balance(0.0, RUBBING).named}
 

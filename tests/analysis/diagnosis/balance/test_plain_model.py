@@ -32,6 +32,7 @@ def test_beside_friction_it_is_that_of_the_balance(rubbing):
     assert model.stiffness[0, 0] == pytest.approx(100.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_without_a_named_law_another_fit_is_asked_for(played, axes):
     from analysis.diagnosis.first_model.model_from_balance import plain_model
 

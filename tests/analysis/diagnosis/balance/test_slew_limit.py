@@ -62,6 +62,7 @@ def test_a_servo_without_a_limit_gets_no_name(followed, balance_of):
     assert not balance.named
 
 
+@pytest.mark.slow
 def test_of_a_force_no_limit_is_asked(followed, balance_of):
     given = followed(SPEED)
     (balance,) = balance_of(replace(given, command=replace(given.command, quantity="force", unit="N")))

@@ -45,6 +45,7 @@ def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(r
     assert named.parameters["gain"].value == pytest.approx(gain, rel=0.05)
 
 
+@pytest.mark.slow
 def test_two_drives_of_one_body_in_order_name_nothing(rig):
     found = compare([two_drives(5)], [two_drives(4)], frozenset(), rig.time_left)
     assert found is not None

@@ -86,6 +86,7 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     assert found_in(recorded((), seed)) is None
 
 
+@pytest.mark.slow
 def test_ten_times_the_noise_leaves_the_law(seed=6):
     laws = found_in(recorded((DRAG,), seed, noise=10.0))
     assert laws is not None
@@ -155,6 +156,7 @@ def test_formulas_are_written_as_a_reader_would(written, read):
     assert simplify_powers(written) == read
 
 
+@pytest.mark.slow
 def test_a_diagnosis_says_the_law(seed=10):
     """The catalogue's own law is struck out: its formula is found."""
     recording = recorded((law("-p0*vx*abs(vx)", 5.0),), seed)

@@ -72,6 +72,7 @@ def test_several_forces_on_one_axis_may_be_one_law_and_a_force_and_a_sensor_may_
     assert not may_stand_for_a_law(hardened[0], named(hardened, cube, claim("sensor_gain", gain=1.01)))
 
 
+@pytest.mark.slow
 def test_an_exponent_that_was_rounded_counts_as_a_number(hardened):
     context, _ = hardened
     cube, drag = claim("hardening_stiffness", k3=CUBIC), claim("quadratic_damping", coefficient=0.1)
@@ -115,6 +116,7 @@ def test_a_law_whose_rivals_were_not_fitted_is_a_candidate(hardened):
     assert any("time ended" in each.why_not for each in said.unconfirmed)
 
 
+@pytest.mark.slow
 def test_a_search_whose_time_ends_within_a_fit_keeps_what_it_has(hardened):
     context, known = hardened
     kept = [discover(context, known, quiet, CountedBudget(questions)) for questions in (1, 50, 80, 160, 100_000)]

@@ -36,6 +36,7 @@ def searched():
     return context, known, found
 
 
+@pytest.mark.slow
 def test_a_law_that_takes_nearly_all_of_a_louder_error_is_named_though_some_noises_are_left(searched):
     context, known, found = searched
     assert found.found.after.score.test.max() > 3
@@ -71,6 +72,7 @@ def test_of_laws_that_fit_alike_the_one_that_the_louder_test_bears_out_is_chosen
     assert chosen.found.steps[-1] is chosen.found.after
 
 
+@pytest.mark.slow
 def test_a_law_too_weak_to_be_known_takes_no_other_laws_name_away(searched):
     context, known, found = searched
     weak = replace(law("p0*x*vx*abs(vx)", 1e-3), units=())

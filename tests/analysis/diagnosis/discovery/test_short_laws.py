@@ -99,6 +99,7 @@ def test_out_of_time_over_a_pair_the_law_that_leaves_a_part_is_kept(hears, seed=
     assert OUT_OF_TIME in result.remarks
 
 
+@pytest.mark.slow
 def test_a_law_that_leaves_a_part_gives_way_to_names_that_explain(seed=12):
     """Of a device with two effects, an early answer that holds the first one alone is not kept."""
     context, _ = arena_of(recorded((CUBE, DRAG_2), seed))
@@ -110,6 +111,7 @@ def test_a_law_that_leaves_a_part_gives_way_to_names_that_explain(seed=12):
     assert names_of(result) == {"hardening_stiffness", "quadratic_damping"}
 
 
+@pytest.mark.slow
 def test_a_short_law_is_found_once_for_both_questions(seed=11):
     said: list[str] = []
     context, known = arena_of(recorded((DRAG_15,), seed))

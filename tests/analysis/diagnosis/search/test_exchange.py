@@ -134,6 +134,7 @@ def test_a_plain_law_is_exchanged_for_its_refinement_beside_the_second(rubbing_a
     assert {law.hypothesis.claims[-1].sites for law in fits} == {(0,)}
 
 
+@pytest.mark.slow
 def test_a_refinement_that_adds_little_takes_no_place(arena_of):
     rubs = PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.08})
     context = arena_of((rubs, PlacedEffect(EFFECTS["force_saturation"], (0,), {"limit": LIMIT_N})))
@@ -152,6 +153,7 @@ def test_another_law_of_the_family_takes_the_place_of_one_that_it_does_not_refin
     assert found.after.score.worst_channel < EXPLAINED_ERROR
 
 
+@pytest.mark.slow
 def test_a_law_without_refinements_stays(rubbing_and_late):
     plain = found_of(rubbing_and_late, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
     none = [EFFECTS[name] for name in ("viscous_damping", "sensor_lag")]

@@ -149,6 +149,7 @@ def test_commands_in_another_order_explain_nothing(rubs, diagnosed):
     assert named(other) == []
 
 
+@pytest.mark.slow
 def test_a_refined_law_is_not_named_for_the_plain_one_that_was_to_be_left_out(rubs, diagnosed):
     found = found_in(rubs, diagnosed.device(1), ("asymmetric_friction", "hardening_stiffness"))
     assert (found.diagnosis.verdict, named(found)) == ("unexplained", [])

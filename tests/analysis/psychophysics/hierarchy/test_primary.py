@@ -25,6 +25,7 @@ def studies(crowd, count, people=10):
     return [simulate_study(crowd, PUBLISHED, people, (77, number)) for number in range(count)]
 
 
+@pytest.mark.slow
 def test_a_contrast_towards_the_cap_is_not_lost():
     """Where reversal means come out 5 dB too small (3 N at 35 Hz, 4 N at 45 Hz)."""
     true = 20 * np.log10(4.0 / 0.35)
@@ -91,6 +92,7 @@ def test_guessers_leave_everything_finite():
     assert found.medians[1].above_cap
 
 
+@pytest.mark.slow
 def test_nothing_is_known_of_differences_between_frequencies_that_no_one_tells():
     """Two medians of 30 dB above the cap have no difference: of guessers, half of such contrasts had p below 0.05."""
     (study,) = studies(Crowd((5.0, 35.0, 45.0), (0.5, 1e4, 1e4)), 1, people=6)

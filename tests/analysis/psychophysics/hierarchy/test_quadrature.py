@@ -98,6 +98,7 @@ def test_a_person_without_answers_at_a_frequency_has_an_integral(prepared):
     assert found.value[0] == pytest.approx(grid_integral(fewer, 0, numbers), abs=4e-3)
 
 
+@pytest.mark.slow
 def test_medians_are_higher_than_by_the_method_of_laplace():
     """Over studies with equal thresholds of 0.6 N: by 0.2 dB, which Laplace's method puts them too low."""
     shift, errors = [], []

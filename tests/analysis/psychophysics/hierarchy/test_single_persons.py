@@ -54,6 +54,7 @@ def test_what_is_not_known_is_averaged_over_as_an_integral_does_it():
     assert np.exp(height[at]) == pytest.approx(quad(likelihood, -3, 3)[0], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_one_participant_has_thresholds_by_likelihood_in_report_document_and_figures(simulate_study, protocol):
     analysis = analyse_study(simulate_study(subjects=1), protocol)
     page = render_study_report(analysis, study_pictures(analysis), {}, "2026-01-02T03:04:05Z")

@@ -42,6 +42,7 @@ def test_who_guesses_is_said_to_be_above_the_cap_and_who_is_sure_is_not():
     assert estimate(posterior(sure.answered, CAP_DB), CAP_DB).above_cap < 0.01
 
 
+@pytest.mark.slow
 def test_thresholds_are_recovered_with_a_smaller_error_per_trial_than_by_the_staircase():
     crowd = Crowd((5.0,), (2.0,))
     rules = {name: rule for name, rule in list_compared_rules(PUBLISHED).items() if name in RULES}

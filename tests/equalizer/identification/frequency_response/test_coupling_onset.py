@@ -80,6 +80,7 @@ def test_coupled_from_the_start_is_reported():
     assert found.frequency_hz == LINES[0]
 
 
+@pytest.mark.slow
 def test_the_interval_covers_the_truth_and_is_no_wider_than_it_must_be():
     """95 of 100 in the long run."""
     found = [

@@ -90,7 +90,7 @@ def test_a_clock_that_began_anew_is_told_apart(first, times_us):
     assert (np.diff(samples.sequence) == 1).all() and (np.diff(samples.time_us) > 0).all()
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 def test_among_a_million_garbled_bytes_every_good_packet_is_found(seed):
     """Packets between stretches of noise that is full of sync bytes; some packets lose bytes, some have one changed."""
     random = np.random.default_rng(seed)
@@ -154,7 +154,7 @@ def test_a_false_packet_that_ends_in_a_real_one_does_not_hide_it(overlap):
         assert (parser.counts.restarts, parser.counts.spoiled_bytes) == (0, SIZE - overlap)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 def test_false_packets_among_a_million_garbled_bytes_count_for_nothing(seed):
     """Whole ones with a right check sum, and ones that end in a real packet: neither hides, shifts nor restarts."""
     random = np.random.default_rng(seed)

@@ -37,7 +37,7 @@ def bank(tmp_path):
 
 
 @pytest.mark.timeout(120)
-@pytest.mark.parametrize("when", ["before", "after"])
+@pytest.mark.parametrize("when", ["before", pytest.param("after", marks=pytest.mark.slow)])
 def test_a_killed_sealing_goes_on_with_every_case_labelled(bank, when):
     killed = subprocess.run([sys.executable, "-c", KILLED, bank.path, when], check=False)
     assert killed.returncode == -signal.SIGKILL

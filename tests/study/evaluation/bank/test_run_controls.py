@@ -8,6 +8,7 @@ from study.evaluation.bank.run_controls import run_controls
 from study.evaluation.challenge.controls import CONTROLS
 
 
+@pytest.mark.slow
 def test_noise_alone_and_a_clean_device_name_nothing_and_are_asked_once(tmp_path):
     quick = [control for control in CONTROLS if control.name in ("a silent recording", "strength zero")]
     seen = []

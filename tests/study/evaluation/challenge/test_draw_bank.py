@@ -82,6 +82,7 @@ def test_extras_change_the_readings_by_less_than_the_noise_and_are_the_same_for_
     assert 0.0 < np.std(first - bare) < 1e-5
 
 
+@pytest.mark.slow
 def test_cases_of_a_bank_are_called_what_they_are_told():
     one = draw(50_000, next(n for n in range(40) if draw(50_000, n, True).bank == "main"), True)
     case = case_of(one, "a0b1")

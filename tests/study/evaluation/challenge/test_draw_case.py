@@ -44,6 +44,7 @@ def test_a_case_is_a_sound_recording_with_a_linear_model_and_the_truth(friction_
     assert truth.values["level"] == pytest.approx(np.sqrt(0.003 * 0.25))
 
 
+@pytest.mark.slow
 def test_nothing_missing_is_an_empty_truth():
     assert draw_case(6).truth == ()
 

@@ -27,6 +27,7 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_the_model_says_how_the_inertia_changes_along_each_axis(folder, capsys):
     out = folder / "m.toml"
     asked = ["--protocol", str(folder / "shorter.toml"), "--band", "2", "25", "--seed", "2", "--json"]

@@ -85,6 +85,7 @@ def loudest_hz(recording, segment):
     return round(np.argmax(lines) * RATE_HZ / (segment.stop - segment.start))
 
 
+@pytest.mark.slow
 def test_another_seed_keeps_other_trials_for_the_test(session):
     roles = [[segment.role for segment in session_recordings(session, seed).recording.segments] for seed in (1, 1, 2)]
     assert roles[0] == roles[1] != roles[2]

@@ -35,6 +35,7 @@ def run(tmp_path):
     return simulated
 
 
+@pytest.mark.slow
 def test_a_large_effect_is_found_more_often_by_more_people(run):
     few, many = run(PLAN)
     assert (few.people, many.people, few.studies) == (3, 8, 12)
@@ -44,6 +45,7 @@ def test_a_large_effect_is_found_more_often_by_more_people(run):
     assert len(power_lines((few, many))) == 3
 
 
+@pytest.mark.slow
 def test_without_an_effect_few_studies_find_one(run):
     (point,) = run(replace(PLAN, crowd=Crowd((5.0, 45.0), (0.7, 0.7)), people=(5,), studies=30))
     assert point.primary.value < 0.15  # at 5 % five of 30 come once in 50 repetitions

@@ -23,6 +23,7 @@ def test_clean_recordings_go_to_the_engine_and_are_named_as_parents(files, findi
     assert [parent["file"] for parent in origin["parents"]] == ["rec.h5", "clean.h5", "model.toml"]
 
 
+@pytest.mark.slow
 def test_without_a_model_the_clean_recordings_are_what_one_is_fitted_to(files, findings, tmp_path, made):
     write_recording(tmp_path / "clean.h5", made.recorded(1, (), seed=9))
     engine = Scripted(findings)
