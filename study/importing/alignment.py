@@ -87,10 +87,16 @@ def _find_crossing_s(logger: Logger, text: str, level: float) -> float:
     ImportProblemError without a crossing."""
     values: Any = logger.line(text)
     times_s = logger.base.times_s(len(values))
-    above = values >= level
+    known = np.flatnonzero(np.isfinite(values))
+    above = values[known] >= level
     change = np.flatnonzero(above[1:] != above[:-1])
     if not len(change):
         raise ImportProblemError(f"clock '{logger.clock.name}': {text} never passes the trigger level of {level:g}")
-    k = int(change[0])
+    k, after = (int(place) for place in known[change[0] : change[0] + 2])
+    if after > k + 1:
+        raise ImportProblemError(
+            f"clock '{logger.clock.name}': {text} passes the trigger level of {level:g} where samples are missing, "
+            f"between {k} and {after}; fill them, or state offset_s in place of the trigger"
+        )
     share = (level - values[k]) / (values[k + 1] - values[k])
     return float(times_s[k] + share * (times_s[k + 1] - times_s[k]))

@@ -102,6 +102,24 @@ def test_clocks_that_cannot_be_aligned_are_named(loggers, offset, sentence):
     assert sentence in refusal(TWO_LOGGERS.format(offset=offset), *loggers)
 
 
+@pytest.mark.parametrize("missing", [slice(600, 602), slice(601, 606)])
+def test_a_trigger_edge_with_missing_samples_is_refused(loggers, files, missing):
+    daq = dict(np.load(loggers[0]))
+    daq["trigger"][missing] = np.nan  # the edge is near sample 601
+    offset = 'trigger = "sync"\ntrigger_level = 0.025\nreference_trigger = "trigger"\nreference_level = 0.0005'
+    said = refusal(TWO_LOGGERS.format(offset=offset), files("daq.npz", **daq), loggers[1])
+    assert "Clock 'daq': trigger passes the trigger level of 0.0005 where samples are missing, between" in said
+    assert "state offset_s in place of the trigger" in said
+
+
+def test_a_trigger_may_lack_samples_away_from_its_edge(loggers, files):
+    daq = dict(np.load(loggers[0]))
+    daq["trigger"][[300, 900]] = np.nan
+    offset = 'trigger = "sync"\ntrigger_level = 0.025\nreference_trigger = "trigger"\nreference_level = 0.005'
+    recording = built(TWO_LOGGERS.format(offset=offset), files("daq.npz", **daq), loggers[1]).recording
+    assert recording.meta["parts"][0]["clock_offsets_s"]["drive"] == pytest.approx(OFFSET_S, abs=1e-6)
+
+
 def test_a_logger_whose_file_is_not_given_is_named(loggers):
     assert "Clock 'drive' is in the file 'drive.npz', which fits 0 of daq.npz" in refusal(
         TWO_LOGGERS.format(offset=""), loggers[0]
