@@ -8,6 +8,7 @@ from analysis.evaluation.blind_test.injected import InjectedOutcome
 from analysis.figures.diagnosis.real_held_out import real_picture
 from analysis.reports.real_report import Trouble, render_real_report
 from study.store.disk.csv_rows import rows_to_csv
+from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.provenance import gather_provenance
 from study.store.disk.text_file import write_text
 from study.workflows.picture_files import write_pictures
@@ -98,9 +99,18 @@ def write_real(out: Path, results: RealResults, generated: str) -> WrittenReal:
             rows_to_csv([_injection_row(each) for each in results.injected], InjectedRow),
             overwrite=True,
         )
+    else:
+        _remove_stale(out / INJECTED_NAME)
     page = render_real_report(results.answers, results.troubles, results.injected, pictures, shown, generated)
     write_text(out / PAGE_NAME, page, overwrite=True)
     return WrittenReal(results, out / PAGE_NAME, out / TABLE_NAME)
+
+
+def _remove_stale(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as problem:
+        raise CannotWriteError(path, problem) from problem
 
 
 def _row(real_answer: RealAnswer) -> RealRow:
