@@ -255,11 +255,18 @@ def _facts_and_segments(
     every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
     commands = [(channel.role, channel.name) for channel in every if channel.role == "command"]
     factors = {units[key].factor for key in commands}
+    if len(factors) > 1 and any(segment.amplitude > 0 for segment in wanted.segment):
+        raise ImportProblemError(
+            "a segment states its amplitude, but the commands have units of different size; leave amplitude out, so "
+            "that it is measured, or give the commands in SI units"
+        )
     scale = factors.pop() if len(factors) == 1 else 1.0
     facts, segments, start = [], [], 0
     for part in parts:
         grid = part.signals.grid
-        command: FloatArray = np.column_stack([part.signals.columns[key] for key in commands])
+        command: FloatArray = np.column_stack(
+            [part.signals.columns[key] * (units[key].factor / scale) for key in commands]
+        )
         label = (str(part.facts["file"]), str(part.facts["prefix"]))
         for segment in segments_of(wanted.segment, label, command, grid.rate_hz):
             moved = replace(segment, start=segment.start + start, stop=segment.stop + start)

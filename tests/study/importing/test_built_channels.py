@@ -114,3 +114,13 @@ def test_a_condition_is_read_in_si_and_kept(files):
         ("motor",),
     )
     np.testing.assert_allclose(found.condition.samples, 293.15)
+
+
+TORQUE = '[[channel]]\nrole = "command"\nname = "tx"\nvalue = "200 * u"\nunit = "mN*m"\n[[segment]]\nkind = "noise"\n'
+
+
+def test_amplitudes_of_commands_of_different_units_are_measured_in_si(files):
+    found = built(map_text(end=TORQUE), files()).recording
+    assert found.command.unit == ("N", "N m")
+    assert found.segments[0].amplitude == pytest.approx(np.abs(U).max())
+    assert "units of different size; leave amplitude out" in refusal(map_text(end=TORQUE + "amplitude = 2\n"), files())
