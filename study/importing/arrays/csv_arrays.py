@@ -119,7 +119,7 @@ def _table(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: Ta
                 numbers[name] = np.array(FaultyColumn(problem), dtype=object)
     joined = join_stamps(stamps)
     in_seconds = {name: _seconds_name(name, columns) for name in joined}
-    every = numbers | {name: stamp.seconds - stamp.seconds[0] for name, stamp in joined.items()}
+    every = numbers | {name: _since_first(stamp.seconds) for name, stamp in joined.items()}
     notes = tuple(f"{name}: read as seconds since {stamp.first}." for name, stamp in joined.items())
     notes += tuple(f"Left out: '{name}' holds words, not numbers." for name in words)
     by_name = {in_seconds.get(name, name): every[name] for name in columns if name in every}
@@ -170,8 +170,9 @@ def _seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], str] | N
     if len(line) < 2 or len(line) != max(array.shape) or array.dtype.kind not in "MmSU":
         return None
     if array.dtype.kind in "Mm":
-        since = line - line[0]
-        return np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s")), str(line[0])
+        first = line[int(np.argmin(np.isnat(line)))]
+        since = line - first
+        return np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s")), str(first)
     if not is_stamp(str(line[0].decode("utf-8", "replace") if isinstance(line[0], bytes) else line[0]).strip()):
         return None
     import pandas as pd
@@ -180,7 +181,12 @@ def _seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], str] | N
     if stamps is None:
         return None
     joined = join_stamps({"": stamps})[""]
-    return joined.seconds - joined.seconds[0], joined.first
+    return _since_first(joined.seconds), joined.first
+
+
+def _since_first(seconds: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Seconds since the first stamp that is not missing."""
+    return np.asarray(seconds - seconds[int(np.argmax(np.isfinite(seconds)))])
 
 
 def _lines(text: str, settings: CsvMap) -> list[Line]:

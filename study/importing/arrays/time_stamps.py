@@ -128,6 +128,8 @@ def join_stamps(columns: Mapping[str, StampColumn]) -> dict[str, StampColumn]:
         both = StampColumn(day.seconds + clock.seconds, True, True, f"{day.first} {clock.first}")
         return joined | {clock_name: both}
     for name, clock in clocks.items():
-        over = np.cumsum(np.diff(clock.seconds, prepend=clock.seconds[:1]) < -DAY_S / 2)
+        known = np.flatnonzero(np.isfinite(clock.seconds))
+        over = np.zeros(len(clock.seconds))
+        over[known[1:]] = np.cumsum(np.diff(clock.seconds[known]) < -DAY_S / 2)
         joined[name] = StampColumn(clock.seconds + over * DAY_S, False, True, clock.first)
     return joined

@@ -54,6 +54,23 @@ def test_clock_times_without_a_date_pass_midnight(tmp_path):
     np.testing.assert_allclose(found, np.arange(4) / 10, atol=1e-9)
 
 
+@pytest.mark.parametrize("missing", [0, 2])
+def test_a_missing_stamp_leaves_the_others_as_they_are(tmp_path, missing):
+    stamps = ["23:59:59.8", "23:59:59.9", "00:00:00.0", "00:00:00.1"]
+    stamps[missing] = ""
+    seconds = np.arange(4) / 10 - (0.1 if missing == 0 else 0.0)
+    seconds[missing] = np.nan
+    found = read_arrays(table(tmp_path, stamps), CsvMap()).by_name["Logged [s]"]
+    np.testing.assert_allclose(found, seconds, atol=1e-9)
+
+
+def test_a_missing_first_date_of_a_stored_array_leaves_the_others_as_they_are(tmp_path):
+    np.savez(tmp_path / "a.npz", when=np.array(["NaT", "2024-03-01T12:00:01", "2024-03-01T12:00:02"], "M8[s]"))
+    found = read_arrays(tmp_path / "a.npz", CsvMap())
+    np.testing.assert_array_equal(found.by_name["when [s]"], [np.nan, 0.0, 1.0])
+    assert found.notes == ("when: read as seconds since 2024-03-01T12:00:01.",)
+
+
 def test_a_date_whose_order_is_open_is_refused(tmp_path):
     with pytest.raises(ImportRefusedError, match="'02/03/2024' may be day and month or month and day; write dates as"):
         read_arrays(table(tmp_path, ["02/03/2024 12:00:00", "03/03/2024 12:00:00"]), CsvMap())
