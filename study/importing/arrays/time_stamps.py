@@ -5,6 +5,7 @@ clock times, they are added. In dates that do not begin with the year, day and m
 accepted only where all dates are the same.
 """
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -80,6 +81,10 @@ def _clock_seconds(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
     second = parts["second"].str.replace(r"[,:]", ".", regex=True).astype(float)
     hour = parts["hour"].astype(float)
     half = parts["half"].fillna("").str.lower().str[:1]
+    # Alone, a clock time may be the time since a start, which has more hours.
+    highest = np.select([half == "a", half == "p", parts["date"].notna()], [12.0, 23.0, 24.0], math.inf)
+    for place in np.flatnonzero(hour > highest):
+        raise ValueError(f"'{text.iloc[place]}' is no clock time: it has hour {hour.iloc[place]:g}; correct it")
     hour = hour.where(half == "", hour % 12) + 12.0 * (half == "p")
     ahead = parts["zone"].fillna("").map({zone: _zone_s(zone) for zone in parts["zone"].fillna("").unique()})
     return np.asarray(hour * HOUR_S + parts["minute"].astype(float) * 60 + second - ahead, dtype=np.float64)

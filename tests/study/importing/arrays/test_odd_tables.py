@@ -192,11 +192,20 @@ def test_a_quote_that_is_not_closed_swallows_no_rows(tmp_path):
         (("12:00:00+01:00", "12:00:01"), "some of its clock times have a zone, others none"),
         (("12:75:00", "12:76:00"), "'12:75:00' is no clock time"),
         (("12:00:59.5", "12:00:60.5"), "'12:00:60.5' is no clock time"),
+        (("2024-03-01 24:00:00", "2024-03-01 25:00:00"), "'2024-03-01 25:00:00' is no clock time: it has hour 25"),
+        (("11:00:00 PM", "25:00:00 PM"), "'25:00:00 PM' is no clock time: it has hour 25"),
+        (("11:00:00 AM", "13:00:00 AM"), "'13:00:00 AM' is no clock time: it has hour 13"),
     ],
 )
 def test_clock_times_that_cannot_be_are_refused(tmp_path, stamps, said):
     with pytest.raises(ImportRefusedError, match=f"(?i){re.escape(said)}"):
         read(tmp_path, "when,u\n" + "".join(f"{stamp},1.5\n" for stamp in stamps))
+
+
+@pytest.mark.parametrize("stamps", [("30:00:00", "30:00:01"), ("13:00:00 PM", "13:00:01 PM")])
+def test_times_since_a_start_and_hours_of_a_whole_day_are_read(tmp_path, stamps):
+    found = read(tmp_path, "when,u\n" + "".join(f"{stamp},1.5\n" for stamp in stamps))
+    np.testing.assert_array_equal(found.by_name["when [s]"], [0.0, 1.0])
 
 
 def test_a_text_that_is_no_table_is_refused_before_it_takes_memory(tmp_path):
