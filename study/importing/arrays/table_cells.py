@@ -55,6 +55,8 @@ def split_row(line: str, delimiter: str) -> list[str]:
 def is_number(field: str, decimal: str) -> bool:
     """Whether a field is a number, or empty. With a decimal comma, a field with a point is no number: the point would
     separate thousands."""
+    if "_" in field:  # Python reads 1_000 as 1000, but in files it is a label
+        return False
     try:
         float(field.replace(".", " ").replace(",", ".") if decimal == "," else field)
     except ValueError:

@@ -116,3 +116,9 @@ def test_records_with_keys_of_their_own_are_refused_at_once(tmp_path):
         read(tmp_path, [{f"k{k}": 1} for k in range(5000)])
     with pytest.raises(ImportRefusedError, match="more than 2097152 records"):
         read(tmp_path, "[" + "[]," * 2**21 + "[]]")
+
+
+def test_a_label_of_digits_is_no_number(tmp_path):
+    found = read(tmp_path, {"label": ["1_1", "1_2"], "u": ["1", "2"]}).by_name
+    assert found["u"].tolist() == [1.0, 2.0]
+    assert found["label"].dtype.kind != "f"

@@ -227,3 +227,8 @@ def test_a_long_field_is_shortened_in_errors(tmp_path):
 def test_a_name_in_quotes_may_hold_a_line_break(tmp_path):
     rows = "".join(f"{t},{u}\n" for t, u in VALUES)
     assert list(read(tmp_path, f'Rig 3\n"time\n[s]","force\n[N]"\n{rows}').by_name) == ["time [s]", "force [N]"]
+
+
+def test_names_of_digits_with_underscores_are_a_header(tmp_path):
+    rows = "".join(f"{t},{u}\n" for t, u in VALUES)
+    assert list(read(tmp_path, f"1_0,2_0\n{rows}").by_name) == ["1_0", "2_0"]
