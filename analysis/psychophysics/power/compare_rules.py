@@ -115,7 +115,7 @@ def play(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> tuple[float
     """Simulate a run of a person drawn from the crowd. key: seeds the draws. Returns the true threshold (dB re 1 N),
     the last state, and the highest level played (N)."""
     random = np.random.default_rng(key)
-    spread = crowd.frequency_sd_db if isinstance(crowd.frequency_sd_db, float) else crowd.frequency_sd_db[0]
+    spread = crowd.frequency_sd_db[0] if isinstance(crowd.frequency_sd_db, tuple) else crowd.frequency_sd_db
     true_db = to_db(crowd.medians_n[0]) + math.hypot(crowd.person_sd_db, spread) * random.standard_normal()
     slope = (crowd.slope or USUAL_SLOPE[crowd.family]) * math.exp(crowd.slope_log_sd * random.standard_normal())
     person = ComparedPerson(float(true_db), slope, crowd.criterion_sd * random.standard_normal())

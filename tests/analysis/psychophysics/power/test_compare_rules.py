@@ -52,6 +52,12 @@ def test_thresholds_are_recovered_with_a_smaller_error_per_trial_than_by_the_sta
     assert psi.highest_n <= 3.0
 
 
+def test_a_spread_may_be_a_whole_number():
+    assert play(Crowd((5.0,), (0.6,), frequency_sd_db=2), RULE, (3,)) == play(
+        Crowd((5.0,), (0.6,), frequency_sd_db=2.0), RULE, (3,)
+    )
+
+
 RULES = ("staircase, new step after the reversal", "Psi, 60 trials")
 
 
