@@ -108,8 +108,9 @@ def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
     half its 1 % quantile, so that a single low bin does not set it."""
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlim(max(1.0, float(bins.frequency_hz[0])), float(bins.frequency_hz[-1]))
-    shown = bins.frequency_hz >= 1.0
+    lowest_hz = 1.0 if bins.frequency_hz[-1] > 1.0 else 0.0  # of slow or untimed recordings, all is shown
+    shown = bins.frequency_hz >= lowest_hz
+    axes.set_xlim(max(lowest_hz, float(bins.frequency_hz[0])), float(bins.frequency_hz[-1]))
     magnitude = np.abs(bins.response[shown & bins.reliable if (shown & bins.reliable).any() else shown])
     axes.set_ylim(0.5 * float(np.quantile(magnitude, 0.01)), 2.0 * float(magnitude.max()))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
@@ -79,3 +81,9 @@ def test_fifteen_thousand_lines_are_no_burden_for_a_page(response):
 def test_no_line_draws_a_sentence(response):
     figure = draw_transfer_functions(response.within(600.0, 700.0))
     assert [text.get_text() for text in figure.texts] == ["There is no line to draw."]
+
+
+def test_a_response_below_1_hz_is_shown_whole(response):
+    figure = draw_transfer_functions(replace(response, frequency_hz=LINES / 1000))
+    assert figure.axes[0].get_xlim() == pytest.approx((1 / 30_000, 0.499), rel=0.03)
+    assert figure.axes[0].get_ylim()[1] == pytest.approx(6.0)
