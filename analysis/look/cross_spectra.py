@@ -57,6 +57,7 @@ def cross_spectra(
     total = sum(stop - start for start, stop in stretches)
     usual = 2 ** int(np.log2(max(2 * total / _WINDOWS, _SHORTEST)))
     length = min(samples_per_window or min(usual, _LONGEST), max(stop - start for start, stop in stretches))
+    length -= length % 2  # even, so that the last line is at the Nyquist frequency
     if length < _SHORTEST:
         return None
     starts = [at for start, stop in stretches for at in range(start, stop - length + 1, max(1, length // 2))]
@@ -71,6 +72,7 @@ def cross_spectra(
         piece = piece - ramp @ (ramp.T @ piece)
         lines = np.fft.rfft(piece * window[:, None], axis=0)[1 : length // 2 + 1]
         summed += np.einsum("li,lj->lij", lines.conj(), lines)
+    summed[-1] /= 2  # the line at the Nyquist frequency stands for itself alone
     scale = 2.0 / (rate_hz * float(np.sum(window**2)) * len(chosen))
     frequency_hz = np.arange(1, length // 2 + 1) * (rate_hz / length)
     return CrossSpectra(
