@@ -57,9 +57,9 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
     rotational = model.get("rotational", document.get("rotational", False))
     if not isinstance(rotational, bool):
         problems.append(f"rotational is {_quote_value(rotational)}; it must be true or false")
+    origin = _read_table(document, "provenance", problems)
     if problems:
         raise MechanicalModelError(tuple(problems))
-    origin = _read_table(document, "provenance", problems)
     return MechanicalModel(
         name=words["name"],
         quantity=words["quantity"],

@@ -122,6 +122,7 @@ def test_an_effect_without_axis_is_shared_by_all():
         ("[model]", "[sensor]\nbandwith_hz = 1\n[model]", "unknown key 'sensor.bandwith_hz' (did you mean 'band"),
         ("[model]", '[sensor]\nrange = "3 g"\n[model]', "sensor.range is '3 g'; it must be a number"),
         ("[model]", "rotational = 1\n[model]", "rotational is 1; it must be true or false"),
+        ("[model]", 'provenance = "measured"\n[model]', "provenance must be a table: [provenance]"),
         ("[model]", "effect = 3\n[model]", "effects are written as tables: [[effect]]"),
         ("[model]", '[[effect]]\nlevel = 1\n[model]', "effect 1 has no kind"),
         ("[model]", '[[effect]]\nkind = "backlash"\naxis = 1\ngap = 1\n[model]', "effect 1: axis is 1; it must be a"),
