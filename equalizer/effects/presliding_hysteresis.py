@@ -56,6 +56,8 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     motion = axis_motion(evidence, axis)
     path, used = evidence.axis_position[:, axis], evidence.used > 0
     rms = float(np.sqrt(np.mean(motion.position**2)))
+    if rms == 0:
+        return ()
     longest, found = best_trial(
         regress_beside_linear(motion), (BENDS * rms).tolist(), lambda slip: (-bristle_bend(path, slip)[used],)
     )

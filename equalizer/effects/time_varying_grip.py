@@ -74,6 +74,8 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         spring_force[used, column] = (
             -value_to_ground(evidence.model.stiffness, axes, site) * evidence.axis_position[used, site]
         )
+    if not damping_force.any():
+        return ()
     found = []
     for rate_hz in _likely_rates(force, damping_force, rate):
         angle = 2 * np.pi * rate_hz * np.arange(n)[:, None] / rate
