@@ -34,7 +34,8 @@ class RoundedNoise:
 def rounding_step(samples: FloatArray) -> float:
     """The step of which all values of a channel are multiples, apart from an offset; 0 where there is none, or for
     fewer than three values. samples: (n,)"""
-    values = np.unique(samples[np.isfinite(samples)][:_EXAMINED])
+    known = samples[np.isfinite(samples)][:_EXAMINED]
+    values = np.unique(known)
     if len(values) < 3:
         return 0.0
     gaps = np.diff(values)
@@ -45,7 +46,7 @@ def rounding_step(samples: FloatArray) -> float:
     within = max(_TOLERANCE * step, float(np.spacing(np.float32(np.abs(values).max()))))
     regular = bool(np.max(np.abs(values - values[0] - step * steps)) < 0.1 * step + within)
     # A fine-grained float also has a smallest gap, but a rounded channel returns to each of its values.
-    return step if regular and len(values) < 0.5 * min(len(samples), _EXAMINED) else 0.0
+    return step if regular and len(values) < 0.5 * len(known) else 0.0
 
 
 def undo_rounding(between_repeats: float, step: float) -> RoundedNoise:

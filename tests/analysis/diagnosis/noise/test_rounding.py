@@ -20,6 +20,14 @@ def test_a_channel_that_is_not_rounded_has_no_step():
     assert rounding_step(np.zeros(100)) == 0
 
 
+def test_missing_samples_do_not_make_a_channel_a_rounded_one():
+    fine = np.round(np.cumsum(np.random.default_rng(1).standard_normal(2000)), 3)
+    assert rounding_step(fine) == 0
+    with_gaps = np.full(3 * len(fine), np.nan)
+    with_gaps[::3] = fine
+    assert rounding_step(with_gaps) == 0
+
+
 @settings(max_examples=20, deadline=None)
 @given(before=st.floats(0.02, 1.2), seed=st.integers(0, 1000))
 def test_what_rounding_hides_between_repeats_is_put_back(before, seed):
