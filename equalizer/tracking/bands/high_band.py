@@ -173,7 +173,9 @@ def minimum_phase(gain: FloatArray) -> ComplexArray:
     By folding the real cepstrum (Oppenheim and Schafer, Discrete-Time Signal Processing).
     """
     n = 2 * (len(gain) - 1)
-    cepstrum = np.fft.irfft(np.log(gain), n)
+    # A zero, as at 0 Hz, has no logarithm: it counts as the rounding error of the largest gain.
+    floor = max(np.finfo(float).eps * float(gain.max()), np.finfo(float).tiny)
+    cepstrum = np.fft.irfft(np.log(np.maximum(gain, floor)), n)
     cepstrum[1 : n // 2] *= 2
     cepstrum[n // 2 + 1 :] = 0
     return np.asarray(np.exp(np.fft.rfft(cepstrum)))

@@ -107,6 +107,16 @@ def test_minimum_phase_keeps_the_gain_and_is_causal():
     assert np.abs(impulse[2048:]).max() < 1e-6 * np.abs(impulse).max()
 
 
+def test_from_a_contact_on_a_device_that_gives_nothing_at_0_hz_is_played(burst):
+    lines = np.arange(0.0, 500.5, 0.5)
+    turning = 2 * np.pi * lines
+    gain = -(turning**2) / (200 + 3j * turning - 0.3 * turning**2)
+    measured = MeasuredResponse(lines, gain[:, None, None] * np.eye(3))
+    found = high_band_forces(burst, RATE_HZ, measured, settings=HighBandSettings(causal=True))
+    played = predict_acceleration(found.forces, RATE_HZ, measured)
+    assert np.linalg.norm(played) == pytest.approx(np.linalg.norm(burst), rel=0.01)
+
+
 @pytest.mark.parametrize("weight", [1e-4, 0.1])
 def test_a_weight_that_inverts_noise_or_loses_level_is_refused(weight):
     with pytest.raises(ValueError, match=r"weight is .*; it must be within 0\.001 and 0\.01"):
