@@ -75,7 +75,7 @@ class CapPolicy:
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedEqualizer:
     """The equalizer of one device. Raises ValueError where the split and the models disagree on bands or sample rate,
-    and for a force weight outside 1e-3 to 1e-2."""
+    for a force weight outside 1e-3 to 1e-2, and for a stylus actuator with a causal split."""
 
     middle: IdentifiedModel
     """Identified model, which plays the middle band."""
@@ -96,6 +96,11 @@ class BandedEqualizer:
                 raise ValueError(f"the split has a {name} band beyond {edge:g} Hz, but there is no model to play it")
             if edge is None and band is not None:
                 raise ValueError(f"there is a model for a {name} band, but the split has none")
+        if self.causal and self.high is not None and self.high.stylus is not None:
+            raise ValueError(
+                "the share of a stylus actuator has no causal form: it would begin before the contact; use a "
+                "linear-phase split, or leave the stylus out"
+            )
         if not SMALLEST_WEIGHT <= self.weights.weight <= LARGEST_WEIGHT:
             raise ValueError(
                 f"weight is {self.weights.weight}; it must be within {SMALLEST_WEIGHT:g} and {LARGEST_WEIGHT:g}"

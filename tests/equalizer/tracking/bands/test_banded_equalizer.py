@@ -175,6 +175,13 @@ def test_a_stylus_takes_force_off_the_motors(band_model, high, impact):
     assert np.linalg.norm(with_it.by_band[2]) < 0.8 * np.linalg.norm(without.by_band[2])
 
 
+def test_a_stylus_from_a_contact_on_is_refused(band_model, low, high):
+    """Its share has zero phase: its command would begin before the contact, and wrap around to the end."""
+    stylus = StylusActuator(np.array([40.0, 450.0]), np.full(2, 30 + 5j), 50.0, 10.0)
+    with pytest.raises(ValueError, match="no causal form.*use a linear-phase split, or leave the stylus out"):
+        BandedEqualizer(band_model, CausalSplit(BandEdges(), RATE_HZ), low, HighBand(high.source, stylus=stylus))
+
+
 def test_the_rendered_spring_is_left_its_part(band_model, low, high):
     t, spring = np.arange(2000) / RATE_HZ, VirtualSpring(200.0, 3.0)
     wanted = (np.sin(2 * np.pi * 10 * t) * np.hanning(2000))[:, None] * np.array([1.0, 0, 0])
