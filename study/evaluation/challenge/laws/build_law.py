@@ -64,7 +64,7 @@ def build_law(
         if kind.both:
             rows.append([kind.code, other, axis, size, first, second, -side])
         device = replace(device, laws=np.array(rows))
-    numbers = {"k": float(size), "a": first, "b": second, "s": side}
+    numbers = {"k": abs(float(size)), "a": first, "b": second, "s": side}
     return device, _truth(kind, places, numbers)
 
 

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.law_kernel import law_force
+from study.evaluation.challenge.laws.build_law import build_law
 from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, Sizes
 from study.evaluation.challenge.laws.draw_law import COUNTS, TURN, draw_law, law_case
+from study.evaluation.challenge.mechanism_kernel import Motion
 
 SEED = 7
 SIZES = Sizes(0.01, 0.2, 20.0)
@@ -73,3 +76,16 @@ def test_what_changes_commands_and_readings_leaves_none_alone_at_zero(kind):
     zero, some = np.zeros(5), np.linspace(-3.0, 3.0, 5)
     assert np.array_equal(kind.change(zero, some, first, second), zero)
     assert np.abs(kind.change(some, some, first, second)).max() > 0
+
+
+@pytest.mark.parametrize("name", ["amplifier of two gains", "crooked sensor"])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_labels_numbers_in_its_formula_are_the_change(bench, name, seed):
+    (kind,) = (kind for kind in LAW_KINDS if kind.name == name)
+    samples = np.random.default_rng(1).normal(0.0, 2.0, (500, 3))
+    moved = Motion(samples, 0.001 * samples, 0.1 * samples, 0.0 * samples)
+    device, truth = build_law(Device(bench), kind, (moved, samples), (0, 1), 0.5, np.random.default_rng(seed))
+    become = device.drive_law if kind.acts_on[0] == "command" else device.sensor.law
+    of, k, s = samples[:, 0], truth.numbers["k"], truth.numbers["s"]
+    assert k > 0
+    np.testing.assert_allclose(become(samples)[:, 0], of + s * k * (np.abs(of) if name[0] == "a" else of**2))
