@@ -74,7 +74,7 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     "transport_delay": EffectWords("a delay of the command"),
     "force_gain": EffectWords("a wrong force gain", {"gain": "a factor of {}"}),
     "force_nonlinearity": EffectWords(
-        "a force that is not in proportion to its command", {"square": "{} of it with the square"}
+        "a force that is not proportional to its command", {"square": "{} of it with the square"}
     ),
     "sensor_lag": EffectWords("a low pass in the sensor", {"bandwidth": "at {}"}),
     "sensor_clipping": EffectWords("clipping in the sensor", {"limit": "at {}"}),

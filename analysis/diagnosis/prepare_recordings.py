@@ -83,7 +83,10 @@ def _keep_common_conditions(recordings: Sequence[Recording]) -> PreparedRecordin
         return PreparedRecordings(tuple(recordings))
     return PreparedRecordings(
         tuple(replace(each, condition=None) for each in recordings),
-        ("Not all recordings hold the same conditions in the same order: no law was asked to depend on them.",),
+        (
+            "Not all recordings hold the same conditions in the same order: no law with a dependence on them was "
+            "tested.",
+        ),
     )
 
 
@@ -137,12 +140,15 @@ def _bridge_or_cut(recording: Recording, name: str) -> tuple[Recording, str]:
     texts = [
         f"{len(chosen)} gap{'s' if len(chosen) != 1 else ''} ({sum(b - a for a, b in chosen)} samples) {what}"
         for chosen, what in (
-            (narrow, "bridged by straight lines, as they hardly differ from the command over so short a time"),
-            (wide, f"cut out, so that {len(parts)} parts are compared by themselves"),
+            (
+                narrow,
+                "interpolated linearly, because the command hardly deviates from a straight line over so short a time",
+            ),
+            (wide, f"cut out, so that {len(parts)} parts are compared separately"),
         )
         if chosen
     ]
-    return filled, f"{name} misses the command in places: {', '.join(texts)}."
+    return filled, f"{name} has gaps in the command: {', '.join(texts)}."
 
 
 def _can_bridge(samples: FloatArray, gap: int) -> bool:

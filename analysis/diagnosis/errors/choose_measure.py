@@ -34,12 +34,12 @@ DITHER = 0.02
 ORDERED = 0.45
 """End of the band relative to the sample rate, for samples without a time axis."""
 BY_FORCE = (
-    "The force that the model needs along the measured motion is compared with the one that entered: the motion was "
-    "measured, and small errors of a model that was fitted to it would grow in a simulation."
+    "The force that the model needs along the measured motion is compared with the force that was applied: the "
+    "motion was measured, and small errors of a model that was fitted to it would grow in a simulation."
 )
 ASKED_MOTION = (
-    "The motion is compared, as was asked, in short windows, each from a state estimated from the measured motion; by "
-    "itself the rule would have compared forces."
+    "As requested, the motion is compared in short windows, each from a state estimated from the measured motion; "
+    "the automatic choice would have compared forces."
 )
 NO_STATE = (
     "The model integrates freely and the sensors do not show its state, so it was simulated from rest; errors grow "
@@ -128,7 +128,7 @@ def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:
     if not known:
         return ()
     kinds = ", ".join(dict.fromkeys(noun_of(placed.effect.name) for placed in known))
-    return (f"The model names effects of its own, which are part of every simulation: {kinds}.",)
+    return (f"The given model contains these effects, which are part of every simulation: {kinds}.",)
 
 
 def _leave_out_beginning(record: Observed, model: MechanicalModel) -> Observed:

@@ -38,8 +38,8 @@ Measure = Literal["free simulation", "windows", "predicted force"]
 WINDOW_S = 1.0
 """Shortest window (s)."""
 UNTIMED = (
-    "No time is known: forces are compared as they stand beside the positions, sample by sample; nothing that depends "
-    "on speed, acceleration or frequency is known."
+    "No time is known: forces are compared as a function of the position, sample by sample; nothing that depends on "
+    "speed, acceleration or frequency can be determined."
 )
 IN_SAMPLES = (
     "No time is known: each sample is counted as one second, so that every time, speed and frequency is per sample."
@@ -49,20 +49,22 @@ IMPOSED = (
     "with the measured one."
 )
 CLOSED_LOOP = (
-    "The command depends on the response and the model does not hold itself, so a simulation by the command alone "
-    "would drift; the force that the model needs along the measured motion is compared with the one that entered."
+    "The command depends on the response and the model has no stable position of rest, so a simulation by the "
+    "command alone would drift; the force that the model needs along the measured motion is compared with the force "
+    "that was applied."
 )
 UNSTABLE = (
-    "By itself the model grows without end, so the device was held by a controller, and simulations say nothing; the "
-    "force that the model needs along the measured motion is compared with the one that entered."
+    "The model alone is unstable, so a controller must have held the device, and a simulation without the controller "
+    "is meaningless; the force that the model needs along the measured motion is compared with the force that was "
+    "applied."
 )
 CLOSED_LOOP_WINDOWS = (
-    "The command depends on the response and the model does not hold itself; it is simulated in short windows, each "
-    "from a state estimated from the measured motion."
+    "The command depends on the response and the model has no stable position of rest; it is simulated in short "
+    "windows, each from a state estimated from the measured motion."
 )
 DRIFTS = (
-    "The model integrates freely, so that small errors would grow without end; it is simulated in short windows, each "
-    "from a state estimated from the measured motion."
+    "The model integrates freely, so that small errors would grow without bound; it is simulated in short windows, "
+    "each from a state estimated from the measured motion."
 )
 NOT_AT_REST = (
     "The recording does not begin at rest; the model is simulated in short windows, each from a state estimated from "

@@ -66,7 +66,9 @@ def choose_structure(
         fit = (
             fit_structure(given, wanted) if by_force and given else fit_modal_structure(recordings, wanted, on_progress)
         )
-        return Choice(fit, (TriedStructure(fit.kind, fit.error, ""),), "It was asked for.", remains(given, fit))
+        return Choice(
+            fit, (TriedStructure(fit.kind, fit.error, ""),), "The structure was requested.", remains(given, fit)
+        )
     fits, tried = _fit_structures(given, recordings, on_progress)
     if not fits:
         raise StructureRefused("; ".join(f"{item.kind}: {item.why_not}" for item in tried))
@@ -77,8 +79,8 @@ def choose_structure(
         return Choice(best, tried, text, remains(None, best))
     best = choose_plainest(fits)
     reason = (
-        f"{best.kind} is the structure of fewest parameters from which no other takes "
-        f"{100 * RICHER_STRUCTURE_GAIN:.0f} % of the error power, fold by fold."
+        f"{best.kind} is the structure of fewest parameters whose error power no other structure lowers by "
+        f"{100 * RICHER_STRUCTURE_GAIN:.0f} % or more in every fold."
     )
     return _with_modes(Choice(best, tried, reason, remains(given, best)), recordings, on_progress)
 
@@ -87,7 +89,7 @@ def remains(given: BalancedRecordings | None, fit: StructureFit) -> str:
     """A sentence on the model's error, and what it depends on."""
     left = f"{100 * fit.error:.3g} % of the {fit.compared}"
     if given is None or fit.joint is None or given.untimed:
-        return f"{left} remains."
+        return f"An error of {left} remains."
     motions = given.regressions[0].motions
     left_over = [rows[m.valid_samples(m.fit)] for rows, m in zip(fit.joint.remainders, motions, strict=True)]
     shares = {
@@ -96,8 +98,8 @@ def remains(given: BalancedRecordings | None, fit: StructureFit) -> str:
     }
     name, share = max(shares.items(), key=lambda item: item[1])
     if share < REMAINDER_REPORTED:
-        return f"{left} remains; it goes with neither speed nor position."
-    return f"{left} remains; {100 * share:.0f} % of its power goes with {name}."
+        return f"An error of {left} remains; it depends on neither speed nor position."
+    return f"An error of {left} remains; {100 * share:.0f} % of its power is explained by {name}."
 
 
 def _share(columns: Sequence[FloatArray], left: Sequence[FloatArray]) -> float:
@@ -133,7 +135,7 @@ def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Cal
     if plain.fit.kind != "mass-spring":
         return plain
     if any(is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
-        why = "it is fitted to spectra, which a controller or an imposed motion bends"
+        why = "it is fitted to spectra, which a controller or an imposed motion biases"
         return _with_tried(plain, TriedStructure("two-mode", None, why))
     try:
         other = fit_modal_structure(recordings, "two-mode", on_progress)
@@ -146,7 +148,10 @@ def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Cal
         float(simulation_errors(model, lines, (min(ends), max(ends)))[0][-1])
         for model in (plain.fit.model, other.model)
     ]
-    text = f"In a free simulation mass-spring leaves {100 * errors[0]:.3g} %, two-mode {100 * errors[1]:.3g} %."
+    text = (
+        f"In a free simulation the error of mass-spring is {100 * errors[0]:.3g} %, that of two-mode "
+        f"{100 * errors[1]:.3g} %."
+    )
     if errors[1] < (1 - MODES_GAIN) * errors[0]:
         tried = (*plain.tried, TriedStructure("two-mode", other.error, ""))
         return Choice(other, tried, text, remains(None, other))

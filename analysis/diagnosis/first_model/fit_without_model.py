@@ -38,11 +38,11 @@ from equalizer.signals.recording import Recording
 
 RIGID_REMARK = (
     "No model was given. One body per axis, with damping and, where that shows, a spring, was fitted first to the "
-    "forces along the measured motion; its damping is left open by a quarter, for friction hides in it."
+    "forces along the measured motion; its damping may change by a quarter, because it may include friction."
 )
 BALANCE_REMARK = (
     "No model was given. One body per axis, with damping and a spring, was fitted first to the forces along the "
-    "measured motion; its parameters are left open by a tenth, and by half of what the named laws change in them."
+    "measured motion; its parameters may change by a tenth, and by half of what the named laws change in them."
 )
 UNTIMED_REMARK = (
     "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "
@@ -119,17 +119,17 @@ def fit_first_linear_model(
     try:
         fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {whose}")
         if not any(_answers(fit.model, recording) for recording in recordings):
-            raise MechanicalFitRefused("the model that fits best hardly answers to the commands")
+            raise MechanicalFitRefused("the model that fits best hardly responds to the commands")
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
         if (rigid := _rigid_model(recordings, whose)) is not None:
             return rigid, (RIGID_REMARK,)
         raise NothingToDiagnose((f"no model was given, and none can be fitted: {refusal}",)) from refusal
-    tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on what was kept for a test"
+    tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on held-out data"
     text = (
-        f"No model was given. A linear one was fitted to {whose} first, with an error of "
-        f"{100 * fit.error:.1f} %{tested}, and its masses, dampers and springs were left open by much more than that; "
-        "what it could take on itself, such as friction at one level as damping, is not missing from it any more, and "
-        "is not named."
+        f"No model was given. A linear model was fitted to {whose} first, with an error of {100 * fit.error:.1f} "
+        f"%{tested}, and its masses, dampers and springs may change by much more than that. Physics that its "
+        "parameters can represent, such as friction at one level as damping, is part of this model and is therefore "
+        "not named."
     )
     return widen_tolerance(fit.model), (text, *(as_sentence(remark) for remark in fit.remarks))
 
@@ -148,7 +148,10 @@ def _require_no_weight(recordings: Sequence[Recording]) -> None:
     """Raises NothingToDiagnose where the device carried a weight, whose mass a fitted model would include."""
     if has_carried_weight(recordings):
         raise NothingToDiagnose(
-            ("a recording was made with a weight on, and a model that is fitted to it would hold the weight",)
+            (
+                "a recording was made with a weight on the handle, and a model that is fitted to it would include "
+                "the weight; give a calibrated model, or recordings without the weight",
+            )
         )
 
 

@@ -56,7 +56,7 @@ def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, 
         found.append(replace(each, command=command, excitation=None, segments=segments, meta=meta))
     what = "inertia (1 kg m^2)" if turning else "mass (1 kg)"
     return tuple(found), (
-        "No command changes: the motion is free, and tells forces only in proportion to the mass. All forces are per "
+        "No command changes: the motion is free and determines forces only relative to the mass. All forces are per "
         f"unit {what}."
     )
 

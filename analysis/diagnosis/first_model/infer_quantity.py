@@ -39,8 +39,8 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
         if set(first.response.units) != {UNSTATED}:
             return recordings, ""
         return tuple(_with_quantity(each, "position") for each in recordings), (
-            f"Nothing says what {conjoin(list(first.response.channels))} measures: it was taken for a position that "
-            "moves freely; if it is a speed, say so in the map (quantity)."
+            f"The recording does not state what {conjoin(list(first.response.channels))} measures; it was taken for a "
+            "position that moves freely; if it is a speed, state that in the map (quantity)."
         )
     moved = set(first.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
     quantity = "force" if moved else _likely_quantity(recordings)
@@ -48,8 +48,8 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
         return recordings, ""
     names = conjoin(list(first.response.channels))
     return tuple(_with_quantity(each, quantity) for each in recordings), (
-        f"Nothing says what {names} measures: it was taken for a {quantity}, as its time series suggests; if it is "
-        "another, say so in the map (quantity)."
+        f"The recording does not state what {names} measures; it was taken for a {quantity}, as its time series "
+        "suggests; if it is another quantity, state that in the map (quantity)."
     )
 
 
@@ -72,7 +72,7 @@ def _sentence_of_names(recording: Recording, quantities: Sequence[str]) -> str:
         for name, quantity in zip(recording.response.channels, quantities, strict=True)
         if quantity in KNOWN
     ]
-    return f"By name alone, {conjoin(taken)}; if it is another, say so in the map (quantity)."
+    return f"From the name alone, {conjoin(taken)}; if it is another quantity, state that in the map (quantity)."
 
 
 def _likely_quantity(recordings: Sequence[Recording]) -> str:

@@ -111,9 +111,9 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
     if motions[0].order == 2:
         raise NoMotionError("only accelerations were measured")
     if len(motions[0].channels) != count or len(first.response.channels) != count:
-        raise NoMotionError("not every command has one measured motion of its own")
+        raise NoMotionError("not every command has exactly one measured motion")
     if not any(motion.valid_samples(motion.fit).any() for motion in motions):
-        raise NoMotionError("too little of the motion is to be fitted to")
+        raise NoMotionError("too few samples with motion are available for the fit")
     turns = any(scales_of(motions, axis, first.is_rotational).turns for axis in range(count))
     untimed = not np.isfinite(motions[0].band_hz)
     return BalancedRecordings(
@@ -132,9 +132,9 @@ def fit_structure(given: BalancedRecordings, kind: Kind) -> StructureFit:
         fit = joint_fit(given.regressions, parts)
         model = _model(given, fit, kind)
     except np.linalg.LinAlgError as problem:
-        raise StructureRefused("the motion does not tell its parameters apart") from problem
+        raise StructureRefused("the motion does not determine its parameters separately") from problem
     except MechanicalModelError as problem:
-        raise StructureRefused(f"its parameters are no mechanism: {problem}") from problem
+        raise StructureRefused(f"its parameters do not form a possible mechanism: {problem}") from problem
     names = given.recording.command.channels
     return StructureFit(
         kind,
@@ -162,7 +162,7 @@ def fit_modal_structure(
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as problem:
         raise StructureRefused(str(problem)) from problem
     if kind == "two-mode" and fit.model.coordinates == axes:
-        raise StructureRefused("a mode on an axis does not lower the error on lines that were left out")
+        raise StructureRefused("a mode on an axis does not lower the error on held-out lines")
     errors = tuple(each.fit if each.held_out is None else each.held_out for each in fit.errors)
     remarks = tuple(as_sentence(remark) for remark in fit.remarks)
     channels = recordings[0].response.channels
@@ -199,15 +199,21 @@ def choose_plainest(fits: Sequence[StructureFit]) -> StructureFit:
 def _refuse(given: BalancedRecordings, kind: Kind) -> None:
     """Raise StructureRefused where the force balance of these recordings cannot determine the structure."""
     if given.untimed and kind != "massless":
-        raise StructureRefused("no time is known, so neither speeds nor accelerations are: only massless can be fitted")
+        raise StructureRefused(
+            "no time is known, and hence neither speeds nor accelerations: only massless can be fitted"
+        )
     if kind == "two-mode":
         raise StructureRefused("it is fitted to spectra")
     if given.free and kind == "massless":
-        raise StructureRefused("what moves by itself has a mass")
+        raise StructureRefused("a body in free motion has a mass")
     if given.turns and kind != "motor":
-        raise StructureRefused("the shaft goes round and round, where no spring holds it: only motor can be fitted")
+        raise StructureRefused(
+            "the shaft turns through whole revolutions, so no spring holds it: only motor can be fitted"
+        )
     if kind == "gravity" and not given.rotational:
-        raise StructureRefused("along a line a weight is a constant force, not a spring: gravity is of pendulums")
+        raise StructureRefused(
+            "along a straight line the weight is a constant force and not a spring: gravity applies to pendulums only"
+        )
 
 
 def _model(given: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalModel:
@@ -295,5 +301,7 @@ def _remarks(given: BalancedRecordings, kind: Kind) -> tuple[str, ...]:
         )
     if kind == "massless":
         timed = "" if not given.untimed else " No time is known: samples are numbered, and damping is not fitted."
-        return (f"The mass in the file is a floor that no force shows; simulations need one.{timed}",)
+        return (
+            f"The mass in the file is a lower bound that the forces do not determine; simulations need a mass.{timed}",
+        )
     return ()

@@ -67,7 +67,7 @@ def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
                     excitation=_select_excitation(each.excitation, each.command, kept))
             for each in recordings
         ),
-        f"{names} among the commands is no force: it was taken as a condition that laws may depend on.",
+        f"{names} among the commands is not a force: it was taken as a condition on which laws may depend.",
     )  # fmt: skip
 
 

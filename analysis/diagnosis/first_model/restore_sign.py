@@ -41,8 +41,8 @@ def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
         found.append(replace(recording, response=replace(recording.response, samples=signed[:, None])))
     name = recordings[0].response.channels[0]
     return tuple(found), (
-        f"{name} is never negative though the command pushes both ways: its sensor tells the amount alone (an absolute "
-        "value), and its sign was restored from the command."
+        f"{name} is never negative though the command pushes both ways: its sensor measures the absolute value only, "
+        "so the sign was restored from the command."
     )
 
 

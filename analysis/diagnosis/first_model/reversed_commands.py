@@ -50,9 +50,9 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
     note = {REVERSED: names}
     turned = tuple(_reverse(replace(each, meta={**each.meta, **note}), imposed, sign) for each in recordings)
     return turned, (
-        f"{conjoin(names)} {verb} counted against the motion: as recorded, the device would give work instead of "
-        f"taking it. The sign was turned round, and a model that is written has it in its input matrix; where the "
-        f"device is a source of work, say so by a model of your own."
+        f"{conjoin(names)} {verb} counted against the motion: as recorded, the device would deliver work instead of "
+        "absorbing it. The sign was reversed; a saved model has this sign in its input matrix. If the device really "
+        "is a source of work, give a model with the recorded sign."
     )
 
 

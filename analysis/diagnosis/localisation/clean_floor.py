@@ -51,11 +51,14 @@ def clean_floor_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
     shares = conjoin([f"{name} {100 * share:.2g} %" for name, share in zip(channels, floor.channels, strict=False)])
     count = f"{floor.recordings} clean recording{'s' if floor.recordings != 1 else ''}"
     text = (
-        f"What a device in order differs by from its re-tuned model was learned from {count}: {shares} of the "
-        f"channel's signal (the largest that was seen; in the map, times {floor.beyond:.2g}). So much counts as noise "
-        "here, more of it where in frequency more of it lies. Named is only what explains more of what is diagnosed "
-        f"than {floor.beyond:.2g} times what it explains of a clean recording."
+        f"The difference between a device without faults and its re-tuned model was estimated from {count}: {shares} "
+        f"of the channel's signal (the largest observed; in the map, times {floor.beyond:.2g}). This difference "
+        "counts as noise here, with its distribution over frequency. An effect is named only where it explains more "
+        f"than {floor.beyond:.2g} times as much of the diagnosed recordings as of a clean one."
     )
     if max(floor.channels) <= LEARNED_TOO_MUCH:
         return text
-    return f"{text} That is much: what the clean recordings hold, too, cannot be found, and little faults hardly can."
+    return (
+        f"{text} This is a large difference: a fault that the clean recordings also contain cannot be found, and "
+        "small faults hardly can."
+    )

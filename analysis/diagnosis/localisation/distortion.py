@@ -131,7 +131,10 @@ def _untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) -> li
     if len({period.segment.amplitude for period, _ in periods}) < 2:
         remarks.append("There is one level only: how distortion changes with the level cannot be measured.")
     if not any(lines.any_silent for _, lines in periods):
-        remarks.append("No line was left silent: distortion on driven lines cannot be distinguished from the response.")
+        remarks.append(
+            "There are no silent (undriven) lines: distortion on driven lines cannot be distinguished from the "
+            "response."
+        )
     elif not any(lines.even.any() for _, lines in periods):
         remarks.append("Even lines were driven, too: odd and even distortion cannot be distinguished.")
     elif not any(lines.odd.any() for _, lines in periods):

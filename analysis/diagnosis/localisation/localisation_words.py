@@ -12,8 +12,11 @@ from analysis.diagnosis.settings import ENTRY_AS_GOOD_P, ENTRY_LEAST_LINES
 from analysis.diagnosis.unit_wording import share_text
 from analysis.wording import conjoin, p_text
 
-_FORCE = "the drive, the mechanism and a hand all push there, and these channels cannot tell which does"
-_FORCES = "drives, mechanism and a hand enter so, and so does timing, which shifts all channels alike"
+_FORCE = "the drive, the mechanism and a hand all act there, and these channels do not distinguish them"
+_FORCES = (
+    "drives, the mechanism and a hand act in this way, and so does an error of timing, which shifts all channels "
+    "equally"
+)
 
 
 def localisation_sentences(local: Localisation) -> tuple[str, ...]:
@@ -33,7 +36,8 @@ def entry_sentence(entry: EntryPoint | None) -> str:
         filter(
             None,
             (
-                f"What re-tuning leaves enters as {best.name}{kind}: {explained}{_rival_entry(entry)}.",
+                f"The mismatch after re-tuning enters as {best.name}{kind}: this explains "
+                f"{explained}{_rival_entry(entry)}.",
                 _sensor_rule_sentence(entry),
             ),
         )
@@ -45,17 +49,17 @@ def states_sentence(states: Sequence[StateMismatch]) -> str:
     if not states:
         return ""
     parts = [
-        f"{state.output}, driven by {state.input}, {state.region.words} ({share_text(state.region.share)} of what is "
-        f"missing, {p_text(state.region.p_value)})"
+        f"{state.output}, driven by {state.input}, {state.region.words} ({share_text(state.region.share)} of the "
+        f"mismatch, {p_text(state.region.p_value)})"
         for state in states
     ]
-    return f"It is tied to a state: {'; '.join(parts)}."
+    return f"The mismatch depends on a state: {'; '.join(parts)}."
 
 
 def _rival_entry(entry: EntryPoint) -> str:
     """Clauses on entries that the data cannot distinguish from the best, and on the next best entry; may be empty."""
     best, others = entry.ranking[0], [score for score in entry.ranking[1:] if score.name not in entry.ranking[0].alike]
-    alike = f"; so does {conjoin(best.alike)}, which looks the same" if best.alike else ""
+    alike = f"; {conjoin(best.alike)} would have the same effect" if best.alike else ""
     # Entries along several axes contain those along each, and errors of several channels contain each channel's.
     rivals = [other for other in others if not (other.axis is None and other.place == best.place)]
     if not rivals:
@@ -63,8 +67,10 @@ def _rival_entry(entry: EntryPoint) -> str:
     second = rivals[0]
     chance = p_text(second.p_value)
     if second.p_value > ENTRY_AS_GOOD_P:
-        return f"{alike}; {second.name} would explain it about as well ({_percent(second)}, {chance})"
-    return f"{alike}; next comes {second.name} with {_percent(second)} ({chance} that it is as good)"
+        return f"{alike}; {second.name} would explain it about equally well ({_percent(second)}, {chance})"
+    return (
+        f"{alike}; the next best entry is {second.name} with {_percent(second)} ({chance} for its being equally good)"
+    )
 
 
 def _sensor_rule_sentence(entry: EntryPoint) -> str:
@@ -73,10 +79,12 @@ def _sensor_rule_sentence(entry: EntryPoint) -> str:
         return ""
     if entry.rule.verdict == "motion":
         return (
-            "The position shows it, too: the device itself moves otherwise, and no sensor of the response is at fault."
+            "The position shows the mismatch, too: the motion of the device itself differs from the model, and no "
+            "sensor of the response is at fault."
         )
     return (
-        "The position shows nothing of it: the fault is in how the response is measured, not in how the device moves."
+        "The position does not show the mismatch: the fault is in the measurement of the response, not in the motion "
+        "of the device."
     )
 
 

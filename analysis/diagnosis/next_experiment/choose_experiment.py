@@ -125,14 +125,14 @@ def as_document(best: ExperimentSet, names: Sequence[str]) -> NextExperiment | N
     if not best.experiments:
         return None
     weighted = any(experiment.added for experiment in best.experiments)
-    said = "; the recording's meta must say the weight (added_mass_kg, or added_inertia_kg_m2)" if weighted else ""
+    said = "; the recording's meta must state the weight (added_mass_kg, or added_inertia_kg_m2)" if weighted else ""
     first, *more = (experiment.words for experiment in best.experiments)
     where = "in these recordings together" if more else "there"
     return NextExperiment(
         command="; then ".join([f"record {first}", *more]),
         splits=(names[0], *dict.fromkeys(names[1 + number] for number in best.discriminated)),
-        why=f"{where} they differ by more than the noise and the tolerances can hide: the right one would win by at "
-        f"least {best.gain:.3g} in log likelihood{said}",
+        why=f"{where} their predictions differ by more than noise and tolerances can explain: the log likelihood of the "
+        f"true one would exceed that of the others by at least {best.gain:.3g}{said}",
     )
 
 

@@ -73,7 +73,7 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
         Experiment(f"{wide} at {level:.3g}", swept(level, fastest_hz), "sweep"),
         Experiment(f"a slow sinusoid of {slow_hz:.3g} Hz at {level:.3g}", slow(level), "slow"),
         Experiment(
-            f"a slow sinusoid of {slow_hz:.3g} Hz at {level / 10:.3g}, so small that it hardly moves",
+            f"a slow sinusoid of {slow_hz:.3g} Hz at {level / 10:.3g}, so small that the device hardly moves",
             slow(level / 10),
             "slow",
         ),
@@ -112,7 +112,8 @@ def _pushes(sweep: str, level: float, half: FloatArray, fade: int) -> tuple[Expe
     push = apply_fades(np.full(samples, level / 2), fade, fade)
     return (
         Experiment(
-            f"{sweep} at {level / 2:.3g} on top of a constant push of as much, which moves it to another place",
+            f"{sweep} at {level / 2:.3g} in addition to a constant force of the same size, which moves the device to "
+            "another place",
             half + np.outer(push, along),
             "sweep",
         ),

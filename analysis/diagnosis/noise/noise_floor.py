@@ -57,13 +57,13 @@ def noise_floor(recording: Recording) -> NoiseFloor:
     signals = [recording.response] + ([] if recording.position is None else [recording.position])
     rests = [rest_noise(recording, signal.samples, lines_hz) for signal in signals]
     if all(rest is not None for rest in rests):
-        remark = "Nothing repeats in this recording: its noise is what it shows at rest."
+        remark = "Nothing repeats in this recording: its noise was measured at rest."
         return _build_floor("rest", lines_hz, [rest for rest in rests if rest is not None], signals, remark)
     undriven = [quiet_band_noise(recording, signal.samples, lines_hz) for signal in signals]
     if all(hiss is not None for hiss in undriven):
         remark = (
-            "Nothing repeats in this recording and it never rests: its noise is what lies above the driven band, "
-            "and was taken to be as strong below."
+            "Nothing repeats in this recording and it never rests: its noise was measured above the driven band and "
+            "is assumed to have the same density below."
         )
         return _build_floor("quiet band", lines_hz, [hiss for hiss in undriven if hiss is not None], signals, remark)
     remark = "Nothing repeats in this recording, it never rests and all its band is driven: its noise is not known."
@@ -101,9 +101,9 @@ def _describe_variation(signal: Signal, noise: ChannelNoise) -> list[str]:
     for number, name in enumerate(signal.channels):
         left = sum(segment.varies[number] for segment in noise.segments)
         if left:
-            instead = "what is heard at rest" if noise.more_than_rest[number] else "that of the others"
+            instead = "that measured at rest" if noise.more_than_rest[number] else "that of the other segments"
             remarks.append(
                 f"{name} ({signal.quantities[number]}): {left} of {len(noise.segments)} segments differ between "
-                f"periods by more than the quietest; the noise is {instead}."
+                f"periods by more than the quietest segment; the noise is {instead}."
             )
     return remarks

@@ -108,8 +108,8 @@ def require_alike(learned_by: str, error: str) -> None:
     """Require that clean and diagnosed recordings have the same error measure. Raises NothingLearned."""
     if learned_by != error:
         raise NothingLearned(
-            f"the clean recordings can only be compared by {learned_by}, those to diagnose by {error}, so that one "
-            "says nothing of the other"
+            f"the clean recordings can only be compared by {learned_by}, those to diagnose by {error}, so their "
+            "errors are not comparable; give clean recordings that were made in the same way"
         )
 
 

@@ -23,7 +23,7 @@ from analysis.diagnosis.settings import EXPLAINED_ERROR, NOISE_ALONE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 
-THERE_BEFORE = "the clean recordings are predicted better with it, too: it did not come since"
+THERE_BEFORE = "it improves the prediction of the clean recordings, too, so it was present before the change"
 
 
 def search_with_reference(

@@ -103,8 +103,8 @@ def _still_sentence(measure: ErrorMeasure) -> str:
     if not held_out_stands_still(measure.records, measure.noise):
         return ""
     return (
-        "What was held out for the test holds no motion: errors on it would say nothing, and none is given. Mark a "
-        "stretch that moves as the test."
+        "The held-out data contain no motion, so no error on them is stated. Give a stretch with motion the role of "
+        "a test."
     )
 
 

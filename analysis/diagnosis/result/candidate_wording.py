@@ -16,34 +16,34 @@ from equalizer.signals.unit_system import UnitSystem
 _FAMILIES = (
     (
         "friction",
-        "friction whose law these data leave open",
+        "friction whose law these data do not determine",
         {"coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
          "position_dependent_friction", "viscous_damping", "quadratic_damping", "drifting_friction",
          "condition_dependent_friction"},
     ),
     (
         "a stiffness that changes along the travel",
-        "a stiffness whose law these data leave open",
+        "a stiffness whose law these data do not determine",
         {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque", "loose_joint"},
     ),
     (
         "a late command: lag or delay",
-        "a late command: lag or delay, which these data cannot tell apart",
+        "a late command: lag or delay, which these data do not distinguish",
         {"amplifier_lag", "transport_delay"},
     ),
     (
         "a late reading: lag or delay",
-        "a late reading: lag or delay, which these data cannot tell apart",
+        "a late reading: lag or delay, which these data do not distinguish",
         {"sensor_lag", "logger_offset", "clock_drift"},
     ),
     (
         "a late command or reading: lag or delay",
-        "a late command or reading, by lag or delay, which these data cannot tell apart",
+        "a late command or reading, by lag or delay, which these data do not distinguish",
         {"amplifier_lag", "transport_delay", "sensor_lag", "logger_offset"},
     ),
     (
-        "what holds an axis at rest",
-        "dead band or friction, for the axis rests as long as either would hold it",
+        "an effect that holds an axis at rest",
+        "dead band or friction, because the axis rests exactly where either would hold it",
         {"force_deadband", "coulomb_friction"},
     ),
 )  # fmt: skip
@@ -87,10 +87,10 @@ def class_sentence(effect: NamedEffect) -> str:
     if len(names) < 2:
         return ""
     family = _family(_class_names(effect))
-    title = family[1] if family is not None else "one of several laws that these data cannot tell apart"
+    title = family[1] if family is not None else "one of several laws that these data do not distinguish"
     return (
-        f"{capitalise(title)}: {', '.join(map(noun_of, names[:-1]))} or {noun_of(names[-1])} would each explain it as "
-        f"well on held-out data. The parameters are those of {noun_of(names[0])}."
+        f"{capitalise(title)}: {', '.join(map(noun_of, names[:-1]))} or {noun_of(names[-1])} would each explain it "
+        f"equally well on held-out data. The parameters are those of {noun_of(names[0])}."
     )
 
 
@@ -100,8 +100,8 @@ def refinement_sentence(effect: NamedEffect) -> str:
     if not names:
         return ""
     text = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
-    hold = "refine it, and bring" if len(names) > 1 else "refines it, and brings"
-    return f"{capitalise(text)} {hold} nothing on held-out data."
+    hold = "are refinements of this law and bring" if len(names) > 1 else "is a refinement of this law and brings"
+    return f"{capitalise(text)} {hold} no gain on held-out data."
 
 
 def _class_names(effect: NamedEffect) -> tuple[str, ...]:
@@ -153,7 +153,7 @@ def best_candidate_sentence(diagnosis: Diagnosis, device: Device | None = None) 
 def _with_gain(candidate: Candidate, device: Device | None) -> str:
     """The candidate with its gain on held-out data, and the reason why it is not named."""
     return (
-        f"{candidate_title(candidate, device)}. It would take {share_text(candidate.held_out_gain)} of the error's "
-        f"power on held-out data, {share_text(candidate.share_of_black_box)} of what all laws together take. Why it "
-        f"is not named: {end_sentence(candidate.why_not)}"
+        f"{candidate_title(candidate, device)}. It would explain {share_text(candidate.held_out_gain)} of the error's "
+        f"power on held-out data, {share_text(candidate.share_of_black_box)} of what all laws together explain. "
+        f"Reason not to name it: {end_sentence(candidate.why_not)}"
     )

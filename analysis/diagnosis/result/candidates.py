@@ -36,8 +36,11 @@ REFINING = {
 }
 """Laws without a simulation, and the special cases that each contains."""
 # PLAINER, ALIKE and BEYOND: reasons in the document for which an effect is not named.
-PLAINER = "its special case, which is named, leaves hardly more in a simulation, where its further parameters are open"
-ALIKE = "as good in its place on held-out data"
+PLAINER = (
+    "its special case, which is named, has hardly a larger error in a simulation, which does not determine the "
+    "further parameters"
+)
+ALIKE = "equally good in its place on held-out data"
 LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
 """Effects that delay a signal: with a single measured response, a late command and a late reading are equivalent."""
 
@@ -176,7 +179,7 @@ def linear_remarks(
         beside, motion = balance.search.regression.beside, balance.search.regression.motions[0]
         laws = [law.effect for law in balance.linear_laws]
         late = f"{beside.delay_s:.3g} samples" if in_samples else f"{1e3 * beside.delay_s:.3g} ms"
-        parts = [f"a command that is {late} late (a lag or a delay)"] if beside.delay_s else []
+        parts = [f"a delay of the command of {late} (or a lag)"] if beside.delay_s else []
         parts += [noun_of(name) for name in dict.fromkeys(laws)]
         if len(motion.channels) > len(balances):
             others = [name for k, name in enumerate(motion.channels) if k != beside.own]
@@ -184,8 +187,8 @@ def linear_remarks(
         if parts:
             where = f" along {channel}" if len(channels) > 1 else ""
             texts.append(
-                f"Beside mass, damping and stiffness the first model holds{where} {conjoin(parts)}; what is linear is "
-                "no missing physics."
+                f"In addition to mass, damping and stiffness, the first model contains{where} {conjoin(parts)}; "
+                "linear terms are not counted as missing physics."
             )
     return tuple(texts)
 
@@ -256,7 +259,7 @@ def refines(effect: str, plain: str) -> bool:
 def _candidate(weighed: "JudgedLaw", axis: str, effects: Sequence[NamedEffect] = ()) -> Candidate:
     """A law of a balance as a candidate of the document. effects: the named effects."""
     plainer = any(refines(weighed.law.effect, named.effect) and named.axis == axis for named in effects)
-    why_not = PLAINER if plainer else "simulations of the whole recording do not bear it out"
+    why_not = PLAINER if plainer else "simulations of the whole recording do not confirm it"
     return Candidate(
         effect=weighed.law.effect,
         place=place_of(weighed.law.effect),

@@ -22,13 +22,16 @@ def black_box_sentence(box: BlackBox | None, named: bool) -> str:
     if box is None:
         return ""
     physics = "the physics" if named else "the re-tuned model"
-    fitted = f"A black box ({box.kind}, {box.numbers} parameters), fitted to the same samples, leaves"
-    errors = f"{error_of_signal(box.test)} on the held-out data; {physics} leaves {error_text(box.physics)}"
+    fitted = f"A black box ({box.kind}, {box.numbers} parameters), fitted to the same samples, has an error of"
+    errors = f"{error_of_signal(box.test)} on the held-out data; {physics} has {error_text(box.physics)}"
     if black_box_beats(box):
-        return f"{fitted} {errors}. The black box predicts better: the data hold something that was not named."
+        return (
+            f"{fitted} {errors}. The black box predicts better: the data contain structure that no named effect "
+            "explains."
+        )
     if box.physics * SAME_TO_READERS < box.test:
         return f"{fitted} {errors}. {capitalise(physics)} predicts better."
-    return f"{fitted} {errors}: no better."
+    return f"{fitted} {errors}: the black box does not predict better."
 
 
 def black_box_beats(box: BlackBox) -> bool:
@@ -46,22 +49,24 @@ def _describe_ceiling_of_axis(reached: BalanceErrors, single: bool) -> str:
     along = "" if single else f" along {reached.axis}"
     if not reached.tested:
         return (
-            f"In the force balance{along}, no law could be tested: the device moves once, and next to nothing moves in "
-            "what was held back. Record several moves, or hold one of them back."
+            f"In the force balance{along}, no law could be tested: the device moves only once, and the held-out data "
+            "contain almost no motion. Record several motions, or give one of them the role of a test."
         )
-    model = "the re-tuned model leaves" if reached.given else "mass, damping and stiffness alone leave"
+    model = (
+        "the error of the re-tuned model is" if reached.given else "the error of mass, damping and stiffness alone is"
+    )
     alone = f"In the force balance{along}, on held-out data, {model} {error_text(reached.linear)} of the force"
-    named = f"what is named leaves {error_text(reached.named)}" if reached.any_named else "no law is named"
+    named = f"with the named laws it is {error_text(reached.named)}" if reached.any_named else "no law is named"
     if reached.any_named and reached.named <= reached.ceiling * (1 + SAME):
-        return f"{alone}, {named}, and all laws together leave no less."
-    share = f"; that is {share_text(reached.share)} of the way" if reached.named < reached.linear else ""
+        return f"{alone}, {named}, and all laws together reach no smaller error."
+    share = f", which is {share_text(reached.share)} of that reduction" if reached.named < reached.linear else ""
     return (
-        f"{alone}, and all laws together {error_text(reached.ceiling)}, which no sum of a few laws should be expected "
-        f"to beat: {named}{share}."
+        f"{alone}; with all laws together it is {error_text(reached.ceiling)}, a bound that a sum of a few laws can "
+        f"hardly reach; {named}{share}."
     )
 
 
-_NOISE_SOURCES = {"rest": "as it is at rest", "quiet band": "as it is above the driven band"}
+_NOISE_SOURCES = {"rest": "at the level measured at rest", "quiet band": "at the level measured above the driven band"}
 """Words for noise that was not estimated from repeats, by `NoiseFloor.how`. Its level during excitation is then
 unknown, so that errors are not stated in units of it."""
 
@@ -108,13 +113,13 @@ def confirmation_sentence(fit: Errors, test: Errors) -> str:
     assert test.after is not None and test.retuned is not None and test.noise and fit.after is not None and fit.noise
     if test.after > test.retuned:
         return (
-            "The held-out data do not confirm this: there the re-tuned model alone does better "
-            f"({error_of_signal(test.retuned)} against {error_text(test.after)})."
+            "The held-out data do not confirm this: there the re-tuned model alone has a smaller error "
+            f"({error_of_signal(test.retuned)} compared with {error_text(test.after)})."
         )
     there, here = test.after / test.noise, fit.after / fit.noise
     if there > FIT_CONFIRMED * max(here, 1.0):
         return (
-            f"The held-out data confirm this only in part: {times_text(there)} the noise is left there, "
-            f"{times_text(here)} the noise on what was fitted."
+            f"The held-out data confirm this only in part: the error is {times_text(there)} the noise there and "
+            f"{times_text(here)} the noise on the fitted data."
         )
     return ""

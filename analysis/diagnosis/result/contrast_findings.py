@@ -28,15 +28,15 @@ from equalizer.signals.unit_system import LINEAR, UnitSystem
 MOST = 6
 """Most candidates that a diagnosis lists."""
 BESIDE = (
-    "The recordings were compared with the clean ones by a model that was fitted to both at once and holds all "
-    "laws that they ask for: a fault is what the clean ones lack. It counts beyond {:.3g} times what it would gain "
-    "between stretches of either."
+    "The recordings were compared with the clean ones by a model that was fitted to both sets at once, with all laws "
+    "that they need: a fault is an effect that the clean recordings lack. It counts where its gain exceeds {:.3g} "
+    "times the gain that it would have between stretches of one set."
 )
 NOT_COMPARED = (
-    "The recordings could not be compared with the clean ones: too little was recorded without gaps, one of them "
-    "hardly moves, or the fits broke down. What is said here is of the model alone."
+    "The recordings could not be compared with the clean ones: too little was recorded without gaps, one recording "
+    "contains hardly any motion, or the fits failed. The results here use the model alone."
 )
-BY_ITSELF = "This is seen in the readings themselves, and not in those of the clean recordings; no model was asked."
+BY_ITSELF = "The sensor's signal itself shows this fault, and the clean recordings do not; no model was used."
 
 
 def add_contrast(whole: Findings, found: Contrast, recording: Recording, beyond: float) -> Findings:
@@ -104,7 +104,7 @@ def _errors(found: Comparison, before: float, after: float) -> Errors:
 def _name_fault(best: JudgedFault, decided: Decision, recording: Recording, system: UnitSystem) -> NamedEffect:
     """The fault as a named effect of the document, with its class."""
     effect = best.fault.effect
-    rivals = tuple(Rival(name, 0.0, True, "as good in its place on what was compared") for name in decided.alike)
+    rivals = tuple(Rival(name, 0.0, True, "equally good in its place on the compared data") for name in decided.alike)
     return NamedEffect(
         effect=effect,
         place=best.fault.place,

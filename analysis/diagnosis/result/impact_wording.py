@@ -9,11 +9,11 @@ import math
 from analysis.diagnosis.document import Diagnosis
 
 IMPACTS_COMPARED = (
-    "The device rattles, and no simulation predicts a sequence of impacts for long: two that differ by a billionth "
-    "soon part. Instead of samples, the power of each channel in each half octave of each segment was compared. The "
-    "errors are root-mean-square logarithms of the ratio of amplitudes, and what two simulations of the same play "
-    "differ by, at least 5 %, stands where the noise stands otherwise. No black box was fitted beside: it would have "
-    "to predict each impact."
+    "The device rattles, and no simulation predicts a sequence of impacts for long: simulations whose initial states "
+    "differ by a billionth soon diverge. Instead of samples, the power of each channel in each half octave of each "
+    "segment was compared. The errors are root-mean-square logarithms of the ratio of amplitudes, and the difference "
+    "between two simulations of the same play, at least 5 %, takes the place of the noise. No black box was fitted "
+    "for comparison, because it would have to predict each impact."
 )
 """Remark on every such diagnosis: how impacts were compared, and what the errors mean."""
 
@@ -25,11 +25,11 @@ def impact_sentence(diagnosis: Diagnosis, named: str) -> str:
     rest = "" if diagnosis.verdict == "explained" else ", but that is not all"
     off = [errors.retuned, errors.after, errors.noise]
     factors = [f"{math.exp(ratio):.3g}" for ratio in off if ratio is not None]
-    text = "how far its amplitudes are off is not known"
+    text = "the error of the predicted amplitudes is not known"
     if len(factors) == len(off):
         without, with_it, chance = factors
         text = (
-            f"how strong they are, can: by half octaves, amplitudes are off by a factor of {without} without it and "
-            f"of {with_it} with it, and chance alone makes {chance} of it"
+            f"their strength can: in half octaves, the predicted amplitudes are wrong by a factor of {without} "
+            f"without this effect and of {with_it} with it; chance alone gives a factor of {chance}"
         )
     return f"Missing in the model: {named}{rest}. Its impacts cannot be predicted one by one; {text}."

@@ -34,7 +34,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
-BY_CHANCE = "what chance makes of it"
+BY_CHANCE = "the error by chance alone"
 BY_NOISE = "the noise"
 """Units of errors in sentences: the difference between two simulations by chance, or the noise."""
 
@@ -145,12 +145,18 @@ def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: t
     if only_refines(other, best):
         gain = "too little" if worst < (1 - _SAME_ERROR) * least else "nothing"
         return (
-            f"it holds the named law as a special case{where}, and what it allows beyond that brings {gain}: "
-            f"{worst:.3g} times {unit} in the worst channel, the named one {least:.3g}"
+            f"it contains the named law as a special case{where}, and its further parameters gain {gain}: its error "
+            f"in the worst channel is {worst:.3g} times {unit}, that of the named law {least:.3g}"
         )
     if same:
-        return f"as good{where}: it leaves {worst:.2f} times {unit} in the worst channel, the named one {least:.2f}"
-    return f"at its best{where} it leaves {worst:.3g} times {unit} in the worst channel, the named one {least:.3g}"
+        return (
+            f"equally good{where}: its error in the worst channel is {worst:.2f} times {unit}, that of the named "
+            f"effect {least:.2f}"
+        )
+    return (
+        f"at its best{where}, its error in the worst channel is {worst:.3g} times {unit}, that of the named effect "
+        f"{least:.3g}"
+    )
 
 
 def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, labels: Labels) -> dict[str, Estimate]:

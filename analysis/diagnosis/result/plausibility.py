@@ -41,11 +41,11 @@ def _effect_doubts(placed: PlacedEffect, found: Findings) -> Iterator[str]:
         if not parameter.fixed and _is_at_bound(value, parameter):
             text = value_text(value, _unit(placed.effect.name, parameter.name, found))
             yield (
-                f"The {parameter.name.replace('_', ' ')} of {noun} ran into the end of what was allowed ({text}): the "
-                "fit has found no best value for it."
+                f"The {parameter.name.replace('_', ' ')} of {noun} reached the limit of its allowed range ({text}): "
+                "the fit has not found a best value."
             )
     if placed.effect.name == "stribeck_friction" and values["static"] < values["coulomb"]:
-        yield "Friction came out smaller at rest than in motion, which real surfaces seldom do."
+        yield "The fitted friction is smaller at rest than in motion, which is rare for real surfaces."
 
 
 def _is_at_bound(value: float, parameter: Parameter) -> bool:
@@ -65,7 +65,10 @@ def _interval_doubts(effect: NamedEffect, named: Sequence[PlacedEffect]) -> Iter
         low, high = estimate.ci95
         if low <= parameter.none <= high:
             text = value_text(estimate.value, estimate.unit, estimate.ci95)
-            yield f"The interval of {noun_of(effect.effect)}, {text}, holds no effect at all: the data hardly bear it."
+            yield (
+                f"The interval of {noun_of(effect.effect)}, {text}, includes the value without the effect: the data "
+                "hardly support it."
+            )
 
 
 def _model_doubts(improved: MechanicalModel) -> Iterator[str]:
@@ -73,7 +76,11 @@ def _model_doubts(improved: MechanicalModel) -> Iterator[str]:
     for name, matrix in (("damping", improved.damping), ("stiffness", improved.stiffness)):
         lowest, largest = _ends(matrix)
         if lowest < -_LOSSES * max(largest, 1e-300):
-            what = "would gain energy by itself" if name == "damping" else "would run away by itself"
+            what = (
+                "would generate energy"
+                if name == "damping"
+                else "would move away from its position of rest without a force"
+            )
             yield f"The improved model's {name} is negative in one direction: in it, the device {what}."
 
 

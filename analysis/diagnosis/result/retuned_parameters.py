@@ -68,8 +68,8 @@ def describe_retuning(moved: Sequence[MovedParameter], fitted: bool = False) -> 
     more = len(moved) - _LISTED
     sentence = conjoin([*texts, f"{more} more"] if more > 0 else texts)
     if fitted:
-        beyond = "these parameters of the first model moved by more than was left open at first"
-        return f"Fitted once more, {beyond}: {sentence}."
+        beyond = "these parameters of the first model changed by more than the tolerance of the first fit"
+        return f"In the final fit, {beyond}: {sentence}."
     return f"Re-tuned beyond the calibration's standard deviation: {sentence}."
 
 
@@ -81,23 +81,27 @@ def doubtful_sentences(moved: Sequence[MovedParameter], fitted: bool = False) ->
     at_end = [number for number in far if number.at_bound]
     if fitted:
         names = conjoin([number.name for number in at_end])
-        return (f"As far as they may, these parameters of the first model moved: {names}.{_OPEN}",) if at_end else ()
+        return (
+            (f"These parameters of the first model reached the limit of their allowed range: {names}.{_OPEN}",)
+            if at_end
+            else ()
+        )
     if len(far) > _LISTED:
         return (
-            f"{len(far)} parameters were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration or more"
-            f"{f', {len(at_end)} of them as far as they may' if at_end else ''}: "
-            "either the calibration is wrong, or they stand for physics that was not named.",
+            f"{len(far)} parameters were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration or "
+            f"more{f', {len(at_end)} of them to the limit of their allowed range' if at_end else ''}: either the "
+            "calibration is wrong, or they compensate for physics that was not named.",
         )
     return tuple(
-        f"The {number.name} was moved by {abs(number.deviations):.2g} standard deviations of its calibration"
-        f"{_AS_FAR if number in at_end else ''}: "
-        "either the calibration is wrong, or it stands for physics that was not named."
+        f"The {number.name} was moved by {abs(number.deviations):.2g} standard deviations of its "
+        f"calibration{_AS_FAR if number in at_end else ''}: either the calibration is wrong, or it compensates for "
+        "physics that was not named."
         for number in far
     )
 
 
-_OPEN = " The fit has found no best value for them, or they stand for physics that was not named."
-_AS_FAR = ", as far as it may"
+_OPEN = " The fit has not found a best value for them, or they compensate for physics that was not named."
+_AS_FAR = ", to the limit of its allowed range"
 
 
 def _is_error_raised(errors: Errors) -> bool:
@@ -122,7 +126,7 @@ def describe_raised_error(errors: Errors) -> str:
     if not _is_error_raised(errors) or errors.before is None or errors.retuned is None:
         return ""
     return (
-        f"Re-tuning raises the error on held-out data from {error_text(errors.before)} to {error_text(errors.retuned)} "
-        "of the signal: what was fitted to differs from what was kept for the test, and re-tuned parameters are "
-        "doubtful."
+        f"Re-tuning raises the error on held-out data from {error_text(errors.before)} to "
+        f"{error_text(errors.retuned)} of the signal: the fitted data differ from the held-out data, and the re-tuned "
+        "parameters are doubtful."
     )

@@ -69,12 +69,11 @@ def constant_sentence(model: MechanicalModel) -> str:
     if moves is None:
         moved = "has no unit" if system.length == "1" else f"is in {system.length}"
         return (
-            f"The command {text}, and the motion {moved}: forces, masses and stiffnesses are counted in these, and are "
-            "no N or kg."
+            f"The command {text}, and the motion {moved}: forces, masses and stiffnesses are given in these units and "
+            "not in N or kg."
         )
     per = "" if system.force == "1" else f" per {system.force}"
     return (
-        f"The command {text}, and nothing says what {moves[0]} that gives: every {moves[0]}, mass, damping and "
-        f"stiffness is to be multiplied by the {moves[0]} constant ({moves[1]}{per}), which is not known; "
-        "--force-constant states it."
+        f"The command {text}, and the {moves[0]} that it produces is not known: every {moves[0]}, mass, damping and "
+        f"stiffness must be multiplied by the {moves[0]} constant ({moves[1]}{per}); state it with --force-constant."
     )
