@@ -95,7 +95,7 @@ def _check_played_alike(baseline: Recording, recording: Recording) -> None:
     """Raise NotMeasurableError unless both have segments of the same kinds, amplitudes and periods, in one order."""
     then, now = ([(s.kind, s.amplitude, s.period) for s in each.segments] for each in (baseline, recording))
     if len(then) != len(now):
-        raise NotMeasurableError(f"{len(now)} pieces were played, {len(then)} at the acceptance")
+        raise NotMeasurableError(f"{len(now)} segments were played now, but {len(then)} at the acceptance")
     for before, after in zip(then, now, strict=True):
         if before != after:
             words = (

@@ -51,7 +51,7 @@ def measure_device(recording: Recording) -> DeviceMeasures:
     friction = np.array([_friction_n(recording, axis) for axis in range(len(recording.command.channels))])
     rests = _second_halves_of_rests(recording)
     if not rests:
-        raise NotMeasurableError("the handle never rests in it")
+        raise NotMeasurableError("the recording contains no rest of the handle, from which the noise is measured")
     noise, samples = _noise(recording, rests)
     return DeviceMeasures(friction[:, 0], friction[:, 1], response, noise, samples)
 
@@ -59,7 +59,7 @@ def measure_device(recording: Recording) -> DeviceMeasures:
 def _without_gaps(recording: Recording) -> Recording:
     """The recording with missed ticks interpolated: a single one would otherwise cost a whole period."""
     if recording.position is None:
-        raise NotMeasurableError("it has no position")
+        raise NotMeasurableError("the recording contains no position signal")
     command, response = _fill_missing(recording.command, "command"), _fill_missing(recording.response, "response")
     position = _fill_missing(recording.position, "position")
     excitation = None if recording.excitation is None else _fill_missing(recording.excitation, "excitation")
@@ -70,7 +70,9 @@ def _fill_missing(signal: Signal, name: str) -> Signal:
     """The signal with missing samples interpolated. Raises NotMeasurableError for a share above `MISSED_LIMIT`."""
     missing = 1 - float(np.isfinite(signal.samples).all(axis=1).mean())
     if missing > MISSED_LIMIT:
-        raise NotMeasurableError(f"{100 * missing:.1f} % of its {name} is missing, more than {100 * MISSED_LIMIT:g} %")
+        raise NotMeasurableError(
+            f"{100 * missing:.1f} % of the samples of {name} are missing; at most {100 * MISSED_LIMIT:g} % are allowed"
+        )
     return replace(signal, samples=fill_gaps(signal.samples))
 
 
@@ -97,7 +99,10 @@ def _friction_n(recording: Recording, axis: int) -> tuple[float, float]:
         for start in range(segment.start, segment.stop - segment.period + 1, segment.period)
     ]
     if len(found) < 2:
-        raise NotMeasurableError(f"it has {len(found)} slow strokes along {recording.command.channels[axis]}, not 2")
+        raise NotMeasurableError(
+            f"the recording contains {len(found)} slow strokes along {recording.command.channels[axis]}; at least 2 "
+            "are needed"
+        )
     return float(np.mean(found)), float(np.std(found, ddof=1) / np.sqrt(len(found)))
 
 

@@ -69,7 +69,7 @@ def probe_lines(recording: Recording, period_s: float) -> ProbeLines:
         _mean_spectrum(each.samples[start:stop], period) for each in (designed, recording.command, recording.response)
     )
     if not np.isfinite(force).all() or not np.isfinite(acceleration).all():
-        raise ValueError("samples of it are missing")
+        raise ValueError("the recording has missing samples")
     position = np.full(force.shape, np.nan, dtype=complex)
     if recording.position is not None and recording.position.samples.shape[1] == force.shape[1]:
         position = _mean_spectrum(recording.position.samples[start:stop], period)
@@ -96,11 +96,13 @@ def apparent_mass_kg(lines: ProbeLines) -> float:
     in_band = (lines.frequency_hz >= low_hz) & (lines.frequency_hz <= high_hz)
     rows, axes = np.nonzero(lines.driven & in_band[:, None])
     if not len(rows):
-        raise ValueError(f"it has no line between {low_hz:g} and {high_hz:g} Hz, which would tell the handle's mass")
+        raise ValueError(
+            f"it has no driven line between {low_hz:g} and {high_hz:g} Hz, from which the handle's mass is estimated"
+        )
     with np.errstate(divide="ignore", invalid="ignore"):  # a dead sensor reads zero
         mass_kg = float(np.median((lines.force_n[rows, axes] / lines.acceleration_mps2[rows, axes]).real))
     if not np.isfinite(mass_kg) or mass_kg <= 0:
-        raise ValueError("its acceleration does not follow the force: is the accelerometer right?")
+        raise ValueError("its acceleration does not follow the force: check the accelerometer and its cable")
     return mass_kg
 
 
@@ -108,7 +110,7 @@ def _mean_spectrum(samples: FloatArray, period: int) -> ComplexArray:
     """(lines, axes): spectrum of the mean of the last whole periods, without the lines at zero and half the rate."""
     periods = len(samples) // period
     if not periods:
-        raise ValueError("less than one period of it was kept")
+        raise ValueError("less than one whole period was recorded")
     mean = samples[len(samples) - periods * period :].reshape(periods, period, -1).mean(axis=0)
     spectrum: ComplexArray = (2 / period * np.fft.rfft(mean, axis=0))[1 : period // 2]
     return spectrum

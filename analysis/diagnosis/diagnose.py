@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from analysis.diagnosis.balance.judge_laws import Balance
 
 
-TOO_SHORT = "the recordings are so short that other laws would explain them as well"
+TOO_SHORT = "the recordings are so short that other laws would explain them equally well"
 """Reason not to name a law of short recordings (`is_too_short_to_name`)."""
 
 
@@ -57,7 +57,7 @@ def diagnose(
     current step and the share that is done. Raises NothingLearned where clean recordings cannot be compared."""
     balances: tuple[Balance, ...] = ()
     if settings.fitted and not settings.clean:
-        progress("weighing laws in the force balance", 0.0)
+        progress("testing laws in the force balance", 0.0)
         known = settings.balances
         balances = known if known is not None else _balances(recordings, settings, map_)
         if is_too_short_to_name(recordings):
@@ -115,9 +115,9 @@ def _diagnose_by_model(
         return _assemble(recordings, settings, fitting, unsearched, balances)
     outcome = search_by_simulation(recordings, fitting, settings, map_, progress, balances)
     if not settings.fitted and not settings.clean:
-        progress("weighing laws in the force balance", 0.9)
+        progress("testing laws in the force balance", 0.9)
         outcome, balances = _judge_with_model(recordings, fitting, outcome, settings)
-    progress("writing down what was found", 0.95)
+    progress("writing the results", 0.95)
     return _assemble(recordings, settings, fitting, outcome, balances)
 
 
@@ -152,7 +152,7 @@ def _diagnose_beside_clean(
         if unweighed is not None:
             return unweighed
     found = _evaluate_given_model(recordings, fitting, settings, map_)
-    progress("writing down what was found", 0.95)
+    progress("writing the results", 0.95)
     floor = CleanFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
     whole = _assemble(recordings, settings, fitting, SearchOutcome(found, floor), ())
     return add_contrast(whole, contrast, recordings[0], FAULT_BEYOND)

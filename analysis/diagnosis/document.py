@@ -20,10 +20,10 @@ STRICT = ConfigDict(extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
 Verdict = Literal["no_mismatch", "parameters", "explained", "partly_explained", "unexplained"]
 Share = Annotated[float, Field(ge=0, le=1)]
-Rms = Annotated[float | None, Field(ge=0, description="Normalised rms; null where it cannot be known.")]
+Rms = Annotated[float | None, Field(ge=0, description="Normalised rms; null where it is not known.")]
 EffectWord = Annotated[
     str,
-    Field(pattern=r"^[a-z][a-z0-9_]{0,63}$", description="A name of the vocabulary, or a new one written like them."),
+    Field(pattern=r"^[a-z][a-z0-9_]{0,63}$", description="A name of the vocabulary, or a new name in the same form."),
 ]
 
 
@@ -46,7 +46,7 @@ class FoundLaw:
         found = law_of(self.expression, self.acts_on, self.axis)
         if set(found.variables) != set(self.variables):
             needed = ", ".join(found.variables) or "no signals"
-            raise ValueError(f"the law {self.expression} needs {needed}; its variables say otherwise")
+            raise ValueError(f"the law {self.expression} needs {needed}, but its variables list others")
         return self
 
 
@@ -92,7 +92,7 @@ class Rival:
 
     effect: EffectWord
     probability: Share
-    inseparable: Annotated[bool, Field(description="True: these data cannot tell it from the named effect.")]
+    inseparable: Annotated[bool, Field(description="True: these data cannot distinguish it from the named effect.")]
     why_not: str
 
 
@@ -109,12 +109,15 @@ class NamedEffect:
     rivals: tuple[Rival, ...] = ()
     class_: Annotated[
         tuple[EffectWord, ...],
-        Field(alias="class", description="Laws that these data cannot part, this one first; empty where they can."),
+        Field(
+            alias="class",
+            description="Laws that these data cannot distinguish, this one first; empty where there are no others.",
+        ),
     ] = ()
     law: Annotated[FoundLaw | None, Field(description=f"Of a {DISCOVERED_LAW}, or of one that was kept.")] = None
     held_out_gain: Annotated[
         Estimate | None,
-        Field(description="Share of the error power on data that nothing was fitted to that goes with it; 95 %."),
+        Field(description="Share of the error power on held-out data that the effect explains, with a 95 % interval."),
     ] = None
 
     @model_validator(mode="after")
@@ -123,12 +126,12 @@ class NamedEffect:
         if self.law is None and self.effect == DISCOVERED_LAW:
             raise ValueError(f"{DISCOVERED_LAW} lacks its law")
         if self.law is not None and self.effect in EFFECTS_BY_NAME:
-            raise ValueError(f"{self.effect} has a name, and so no law")
+            raise ValueError(f"{self.effect} is an effect of the catalogue, so it must not have a law")
         known = EFFECTS_BY_NAME.get(self.effect)
         if known is None:
             return self
         if self.place != known.place:
-            raise ValueError(f"{self.effect} sits in the {known.place}, not in the {self.place}")
+            raise ValueError(f"{self.effect} belongs to the {known.place}, not to the {self.place}")
         if known.main.name not in self.parameters:
             raise ValueError(f"{self.effect} lacks its main parameter, {known.main.name} ({known.main.unit})")
         return self
@@ -143,8 +146,15 @@ class Candidate:
     axis: str | None
     parameters: dict[str, float]
     """Fitted values by the name of the parameter, in SI units."""
-    held_out_gain: Annotated[Share, Field(description="Of the error power on data that nothing was fitted to.")]
-    share_of_black_box: Annotated[Share, Field(description="Of what all laws together take of the linear error power.")]
+    held_out_gain: Annotated[
+        Share, Field(description="Share of the error power on held-out data that it would explain.")
+    ]
+    share_of_black_box: Annotated[
+        Share,
+        Field(
+            description="The same as a share of the power that all laws together explain of the linear model's error."
+        ),
+    ]
     why_not: str
     law: Annotated[FoundLaw | None, Field(description=f"Of a {DISCOVERED_LAW}.")] = None
 
@@ -195,7 +205,7 @@ class Diagnosis:
     ]
     next_experiment: NextExperiment | None
     candidates: Annotated[
-        tuple[Candidate, ...], Field(description="The best that were not confirmed, the first first.")
+        tuple[Candidate, ...], Field(description="The best candidates that were not confirmed, the best first.")
     ] = ()
 
     @model_validator(mode="after")
@@ -204,12 +214,12 @@ class Diagnosis:
         named = self.verdict in ("explained", "partly_explained")
         if named != bool(self.effects):
             raise ValueError(
-                f"the verdict '{self.verdict}' goes with {'one effect or more' if named else 'no effects'}"
+                f"the verdict '{self.verdict}' requires {'one effect or more' if named else 'an empty list of effects'}"
             )
         if self.verdict == "partly_explained" and not self.remainder:
-            raise ValueError("the verdict 'partly_explained' goes with a remainder")
+            raise ValueError("the verdict 'partly_explained' requires a remainder")
         if self.verdict == "unexplained" and not self.mismatch:
-            raise ValueError("the verdict 'unexplained' goes with a mismatch")
+            raise ValueError("the verdict 'unexplained' requires a mismatch")
         return self
 
     @property
@@ -253,7 +263,7 @@ def _inseparable(effect: NamedEffect) -> tuple[str, ...]:
     return tuple(rival.effect for rival in effect.rivals if rival.inseparable)
 
 
-_PLAIN = {"unexpected_keyword_argument": "this key is not known here", "missing": "this is missing"}
+_PLAIN = {"unexpected_keyword_argument": "this key is unknown", "missing": "this is missing"}
 """Messages that replace those of pydantic, by pydantic's type of error."""
 
 

@@ -62,10 +62,10 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
         {"frequency": "at {}", "mass": "carrying {}", "damping_ratio": "damping ratio {}"},
     ),
     "added_mass": EffectWords("an added mass"),
-    "hand_impedance": EffectWords("a hand that holds on", {"mass": _BARE, "damping": _BARE, "stiffness": _BARE}),
+    "hand_impedance": EffectWords("the impedance of a hand", {"mass": _BARE, "damping": _BARE, "stiffness": _BARE}),
     "time_varying_grip": EffectWords("a grip that varies in time", {"rate_hz": "at {}", "depth": "by {}"}, ("depth",)),
     "body_on_actuator": EffectWords(
-        "a body that hangs on the drive", {"mass": _BARE, "damping": _BARE, "stiffness": _BARE}
+        "a body attached by a spring and a damper", {"mass": _BARE, "damping": _BARE, "stiffness": _BARE}
     ),
     "force_saturation": EffectWords("force saturation", {"limit": "at {}"}),
     "force_deadband": EffectWords("a dead band of the force", {"width": "± {}"}),
@@ -80,7 +80,7 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     "sensor_clipping": EffectWords("clipping in the sensor", {"limit": "at {}"}),
     "sensor_misalignment": EffectWords("a turned sensor"),
     "cross_axis_sensitivity": EffectWords(
-        "sensor axes that hear each other",
+        "cross-axis sensitivity of the sensor",
         {"from_next": "{} of the next axis", "from_after_next": "{} of the one after it"},
         (
             "from_next",
@@ -88,13 +88,13 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
         ),
     ),
     "sensor_gain": EffectWords("a wrong sensor gain", {"gain": "a factor of {}"}),
-    "sensor_nonlinearity": EffectWords("a sensor that is not linear", {"cubic": "cubic term {}"}),
+    "sensor_nonlinearity": EffectWords("a nonlinear sensor", {"cubic": "cubic term {}"}),
     "sensor_offset": EffectWords("a sensor offset"),
     "sensor_drift": EffectWords("a drift of the sensor", {"total": "{} in all"}),
     "quantization": EffectWords("rounding to steps (quantisation)", {"step": "steps of {}"}),
     "mains_hum": EffectWords("mains hum", {"amplitude": _BARE, "frequency": "at {}"}),
-    "clock_drift": EffectWords("clocks that run apart", {"ppm": _BARE}),
-    "logger_offset": EffectWords("a logger that is late", {"offset": _BARE}),
+    "clock_drift": EffectWords("drift between the clocks", {"ppm": _BARE}),
+    "logger_offset": EffectWords("a delay of the logger", {"offset": _BARE}),
     "lost_samples": EffectWords("lost samples", {"fraction": "{} of all"}, ("fraction",)),
 }
 
@@ -115,7 +115,7 @@ _PER_CONDITION = "{} per standard deviation of the condition"
 LAW_WORDS: Mapping[str, LawWords] = {
     "viscoelastic_relaxation": LawWords(
         EffectWords(
-            "a spring that gives way in time (viscoelastic relaxation)",
+            "viscoelastic relaxation of a spring",
             {"stiffness": _BARE, "time_constant": "time constant {}"},
         ),
         {"stiffness": _STIFFNESS, "time_constant": ("s", "s")},
@@ -162,7 +162,7 @@ LAW_WORDS: Mapping[str, LawWords] = {
         {"gap": ("m", "rad")},
         "actuator",
     ),
-    "added_stiffness": LawWords(EffectWords("a spring that came in", {"stiffness": "{}"}), {"stiffness": _STIFFNESS}),
+    "added_stiffness": LawWords(EffectWords("an added spring", {"stiffness": "{}"}), {"stiffness": _STIFFNESS}),
     "force_offset": LawWords(EffectWords("an offset of the force", {"offset": "{}"}), {"offset": _FORCE}, "actuator"),
     "force_gain_drift": LawWords(
         EffectWords("a force gain that drifts", {"change": "by {} from beginning to end"}, shares=("change",)),
@@ -171,7 +171,7 @@ LAW_WORDS: Mapping[str, LawWords] = {
     "force_quantization": LawWords(
         EffectWords("a command in steps", {"step": "of {}"}), {"step": _FORCE}, place="actuator"
     ),
-    "sensor_noise": LawWords(EffectWords("a sensor that is noisier", {"rms": "by {} rms"}), {}, place="sensor"),
+    "sensor_noise": LawWords(EffectWords("a noisier sensor", {"rms": "by {} rms"}), {}, place="sensor"),
     "sensor_play": LawWords(EffectWords("play before the sensor", {"gap": "a gap of {}"}), {}, place="sensor"),
     "sensor_asymmetry": LawWords(EffectWords("a sensor that reads more to one side (square)"), place="sensor"),
 }

@@ -49,7 +49,7 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 ROUNDS = 8
 """Most passes of the coordinate search over a law's nonlinear parameters."""
-NEEDLESS = "a law of the command leaves as little without it"
+NEEDLESS = "a law of the command reaches as small an error without it"
 CURVED = "quadratic_damping"
 """Law of the motion that resembles an actuator's curve when the speed follows the command."""
 HOLDS_AT_REST = (*SLIDING, "presliding_hysteresis")
@@ -276,10 +276,11 @@ def _why_not(law: CommandLaw, gain: float, low: float, alike: tuple[str, ...]) -
     """Reason not to name the law, as a sentence; empty where it is to be named."""
     if gain < COMMAND_LAW_LEAVES or low <= 0:
         return (
-            f"in the command's place it takes {100 * max(gain, 0.0):.0f} % of what laws of the motion leave, not most"
+            f"in place of the command it explains {100 * max(gain, 0.0):.0f} % of the error that laws of the motion "
+            "leave, and not most of it"
         )
     # A curve of the command and a force that changes with the distance are different physics.
     different = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.factor_at is not None]
     if different or len(alike) >= LARGEST_CLASS:
-        return f"these data cannot tell it from {', '.join(alike)}"
+        return f"these data cannot distinguish it from {', '.join(alike)}"
     return "" if law.effect in EFFECTS_BY_NAME or law.formula else "hapteq cannot simulate it yet"

@@ -23,7 +23,7 @@ from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, STILL_SHARE
 DEAD_BAND = "force_deadband"
 EQUIVALENT_LAWS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND: "coulomb_friction"}
 """For each law, the law that explains the same motion where inertia is negligible."""
-BACKWARDS = "it never moves backwards"
+BACKWARDS = "the motion never changes direction"
 """Reason, in a message, for a law that is not named."""
 
 
@@ -33,7 +33,7 @@ def doubt_laws_of_actuator(balance: Balance) -> Balance:
     laws = tuple(_doubt_law(each, balance) for each in balance.laws)
     through = [each.law.effect for each in balance.named if not each.has_column]
     if through and not any(each.named and not each.has_column for each in laws):
-        why = f"it was found behind {through[0]}, which these data leave in doubt"
+        why = f"it was found together with {through[0]}, which these data do not confirm"
         laws = tuple(replace(each, why_not=each.why_not or why) for each in laws)
     return replace(balance, laws=laws)
 
@@ -54,7 +54,7 @@ def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
         if has_friction and not _reverses(regression, judged.law.channel):
             return _mark_alike(judged, "force_nonlinearity", BACKWARDS)
     if effect in EQUIVALENT_LAWS and not _has_inertia(regression, balance.chosen.laws):
-        return _mark_alike(judged, EQUIVALENT_LAWS[effect], "no inertia shows")
+        return _mark_alike(judged, EQUIVALENT_LAWS[effect], "the inertia is negligible in this recording")
     return judged
 
 
@@ -71,7 +71,7 @@ def _rests_within(regression: Regression) -> bool:
 def _mark_alike(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:
     """The law with a reason not to name it, and with its equivalent (`twin`) added to its class."""
     alike = tuple(dict.fromkeys((twin, *judged.alike)))
-    return replace(judged, alike=alike, why_not=f"these data cannot tell it from {twin}, for {why}")
+    return replace(judged, alike=alike, why_not=f"these data cannot distinguish it from {twin}, because {why}")
 
 
 def _reverses(regression: Regression, channel: int) -> bool:

@@ -40,8 +40,8 @@ from analysis.diagnosis.settings import (
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
-MENDS_SHAPE = "it acts like a named law, and may only mend its shape"
-NOT_ALONE = ("its gain is too small to be named", "it gains too unevenly from stretch to stretch")
+MENDS_SHAPE = "it acts like a named law, and may only correct the shape of that law"
+NOT_ALONE = ("its gain is too small to be named", "its gain varies too much from stretch to stretch of the recording")
 BY_CONDITION = {"condition_dependent_friction", "condition_dependent_damping"}
 """Laws of one condition that may form a class, although other friction acts differently."""
 PLAYED_AS = {"drifting_friction": "coulomb_friction"}
@@ -186,12 +186,12 @@ def _judge_law(
     values = dict(zip(laws, values_of(regression, laws), strict=True))[number]
     alike, likely = _indistinguishable_effects(regression, rest, number, (without, held))
     taken = float(np.sqrt(max(float((without - held).sum()), 0.0) / _signal_power(regression)))
-    small = f"it takes {100 * taken:.1f} % of the force, less than such recordings are sure of"
+    small = f"it explains {100 * taken:.1f} % of the force, less than such recordings can confirm"
     why_not = _why_not(law, values, (gain, low, share, explained), alike) or (small if taken < LAW_OF_SIGNAL else "")
     times = force_ratio(regression, laws, number)
     possible = values is not None and times <= LARGEST_LAW_FORCE
     if not why_not and times > LARGEST_LAW_FORCE:
-        why_not = f"its force would be {times:.0f} times what was recorded, and other terms would cancel it"
+        why_not = f"its force would be {times:.0f} times the recorded force, almost cancelled by other terms"
     chosen = ""
     if not why_not and law.effect in PLAYED_AS:
         alike = (law.effect, *(effect for effect in alike if effect != PLAYED_AS[law.effect]))
@@ -247,22 +247,23 @@ def _why_not(
     """Reason not to name the law, as a sentence; empty where it is to be named."""
     gain, low, share, explained = numbers
     if law.linear:
-        return "a linear model of a higher order: part of the first model, no missing physics"
+        return "it is a linear model of a higher order: part of the first model and no missing physics"
     if values is None:
         return "its parameters have signs that such physics cannot have"
     if low <= 0:
-        return "its gain on held-out data is not larger than what varies between stretches"
+        return "its gain on held-out data is not larger than its variation between stretches of the recording"
     if share < LAW_OF_CEILING and gain < FURTHER_LAW_OF_ALL:
-        return f"it takes {100 * share:.1f} % of what all laws together take"
+        return f"it explains {100 * share:.1f} % of what all laws together explain"
     if explained < NAMED_OF_CEILING:
         return (
-            f"with it, {100 * (1 - explained):.0f} % of what all laws together take are left: the main part is another"
+            f"even with it, {100 * (1 - explained):.0f} % of what all laws together explain remain: the main cause is "
+            "another"
         )
     family = family_of(law.effect) | (BY_CONDITION if law.effect in BY_CONDITION else set())
     of_other_family = [effect for effect in alike if effect not in family]
     others = [effect for effect in alike if law.effect not in special_cases(effect)]
     if of_other_family or (len(others) >= LARGEST_CLASS and not {law.effect, *others} <= DRY_FRICTIONS):
-        return f"these data cannot tell it from {', '.join(of_other_family or alike)}"
+        return f"these data cannot distinguish it from {', '.join(of_other_family or alike)}"
     played = law.formula is not None or not {law.effect, PLAYED_AS.get(law.effect)}.isdisjoint(EFFECTS_BY_NAME)
     return "" if played else "hapteq cannot simulate it yet"
 
@@ -286,7 +287,11 @@ def _judge_further_laws(
         errors = _held_out_errors(regression, laws)
         gain, low = gain_with_bound(held, errors)
         values, share = values_of(regression, laws)[-1] or {}, float((held - errors).sum()) / room
-        why = "it takes too little beside what is named" if chosen.laws else NOT_ALONE[gain > FURTHER_LAW_GAIN]
+        why = (
+            "it explains too little in addition to the named laws"
+            if chosen.laws
+            else NOT_ALONE[gain > FURTHER_LAW_GAIN]
+        )
         if gain > 0 and low > 0:
             law, possible = regression.laws[number], force_ratio(regression, laws, number) <= LARGEST_LAW_FORCE
             found.append(JudgedLaw(number, law, values, gain, low, share, (), 0.0, why, possible=possible))

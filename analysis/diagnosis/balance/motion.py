@@ -121,7 +121,7 @@ def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tup
     a record contains no motion."""
     signals = [motion_signal(record.recording) for record in records]
     if not signals or any(signal is None for signal in signals):
-        raise NoMotionError("no response is a motion")
+        raise NoMotionError("no response is a position, velocity or acceleration")
     moved = [signal for signal in signals if signal is not None]
     order = DERIVATIVE_OF_QUANTITY[moved[0].quantities[0]]
     rate_hz = records[0].recording.sample_rate_hz

@@ -81,7 +81,7 @@ def search_structures(
     """Beam search for the sum of at most three laws with the least cross-validated error. without: effects that are
     left out. beside: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
     if not any(each.valid_samples(each.fit).any() for each in motions):
-        raise NoMotionError("too little of the motion is to be fitted to")
+        raise NoMotionError("too few samples with motion are available for the fit")
     scales = [scales_of(motions, c, rotational) for c in range(len(motions[0].channels))]
     turns = any(each.turns for each in scales)
     held = {(law.key, law.numbers) for law in (beside.laws if isinstance(beside, BaseTerms) else ())}

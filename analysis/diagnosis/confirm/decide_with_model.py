@@ -51,7 +51,7 @@ def decide_with_model(
     if result.judgement.named or result.found.barred:
         return ResultWithModel(result, balances)
     if known_noise and near_noise:
-        why_not = "the noise is known here, and what it leaves is more than noise"
+        why_not = "the noise is known here, and the residual with it is larger than the noise"
         return ResultWithModel(
             replace(result, unconfirmed=(*result.unconfirmed, *_list_unconfirmed(result, why_not))), balances
         )
@@ -71,27 +71,27 @@ def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
     """Reason not to name the effects that were found, as a sentence; empty where they are named."""
     context, found = result.context, result.found
     if not found.steps:
-        return "it takes too little of the error to be added"
+        return "it explains too little of the error to be added"
     whole = held_out_gain(context.whole, found.plain, found.after)
     before = context.with_test_score(found.steps[-2]) if len(found.steps) > 1 else found.plain
     last = held_out_gain(context.whole, before, found.after)
     if whole is None or last is None:
-        return "too little was held out to confirm it"
+        return "too little data was held out to confirm it"
     if min(whole.low, last.low) <= 0:
-        return "its gain on held-out data is not larger than what varies between stretches"
+        return "its gain on held-out data is not larger than its variation between stretches of the recording"
     if min(whole.gain, last.gain) < FURTHER_LAW_OF_ALL:
         return (
             f"on held-out data it explains {100 * min(whole.gain, last.gain):.0f} % of the error's power, "
             f"and {100 * FURTHER_LAW_OF_ALL:.0f} % are required"
         )
     if context.tuning.is_at_bound(found.after.fitted.deviations):
-        return "with it, a parameter of the model is fitted at the end of its tolerance"
+        return "with it, the fit moves a parameter of the model to the limit of its tolerance"
     rival = _best_rival(context, result)
     if rival is not None and _not_better(context, rival, found.after):
-        return f"these data cannot tell it from {rival.newest.replace('_', ' ')}"
+        return f"these data cannot distinguish it from {rival.newest.replace('_', ' ')}"
     claims = found.after.fitted.hypothesis.claims
     if whole.gain < NAMED_OF_CEILING and not all(_is_named_by_balance(claim, balances) for claim in claims):
-        return "it takes less than half of the error's power, and the force balance does not confirm it"
+        return "it explains less than half of the error's power, and the force balance does not confirm it"
     return ""
 
 
@@ -150,5 +150,5 @@ def _list_unconfirmed(result: SearchResult, why_not: str) -> tuple[Unconfirmed, 
 def _why_behind(gain: HeldOutGain) -> str:
     """Reason, as a sentence, why a candidate other than the best is not named."""
     if gain.low <= 0:
-        return "its gain on held-out data is not larger than what varies between stretches"
-    return "another leaves less of what was fitted to"
+        return "its gain on held-out data is not larger than its variation between stretches of the recording"
+    return "another candidate has a smaller error on the data that were fitted"

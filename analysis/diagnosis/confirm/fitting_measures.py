@@ -24,8 +24,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 ABOUT_MEAN = (
-    "The fitted model holds no constants: one was added to the command, with which its mean error on what was fitted "
-    "to is zero. Weights, offsets of sensor and amplifier, and the point that the device works at are all in it."
+    "The fitted model contains no constants, so a constant was added to the command that makes the mean error on the "
+    "fitted data zero. It includes weights, offsets of sensor and amplifier, and the operating point of the device."
 )
 
 

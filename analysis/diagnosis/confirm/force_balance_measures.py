@@ -25,8 +25,8 @@ from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelErr
 from equalizer.signals.recording import Recording
 
 BALANCE_PREDICTS_BETTER = (
-    "Forces are predicted with the linear parameters of the force balance and a constant, because their error is "
-    "smaller than with the model that was fitted to spectra."
+    "Forces are predicted with the linear parameters of the force balance and a constant, because this gives a "
+    "smaller error than the model that was fitted to spectra."
 )
 
 

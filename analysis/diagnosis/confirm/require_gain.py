@@ -22,8 +22,8 @@ CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
 SHOWN_BY_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples")
 """Effects of a sensor that its signal shows without a model."""
 ONLY_BESIDE_CALIBRATION = (
-    "the model was fitted to these recordings, and a law of the motion that the catalogue lacks may look like it; a "
-    "calibrated model, or recordings of the device without the fault, would tell"
+    "the model was fitted to these recordings, and a law of the motion that the catalogue lacks may have the same "
+    "effect; a calibrated model, or recordings of the device without the fault, would distinguish them"
 )
 """Reason not to name an effect of actuator or sensor where the model was fitted to the same recordings."""
 BESIDE_DIVERGENCE = (

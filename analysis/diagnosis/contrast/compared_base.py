@@ -139,7 +139,7 @@ def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> C
     masks = tuple(tuple(_keep_settled(mask, gap_reach) for mask in side) for side in valid)
     fewest = max(FEWEST_ROWS, 2 * rows[0][0].shape[1])
     if any(sum(int(mask.sum()) for mask in side) < fewest for side in masks):
-        raise ValueError("too few rows are left of one set to be compared by")
+        raise ValueError("too few samples of one of the two sets remain for a comparison")
     all_rows = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
     columns = np.sqrt(np.mean(all_rows**2, axis=0))
     columns = np.where(columns > 0, columns, 1.0)

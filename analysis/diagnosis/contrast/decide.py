@@ -38,8 +38,8 @@ SAME = {
 """Faults with the same effect on the signals: the two delays in a recording of one response, and an offset of the
 command and a constant force in any recording."""
 
-FINER = "it holds the named fault as a special case, and is not sure to leave less"
-BEHIND = "another explains more of what sets these recordings apart"
+FINER = "it contains the named fault as a special case, and its error is not significantly smaller"
+BEHIND = "another fault explains more of the difference between these recordings"
 """Reasons, in messages, why a rival of the named fault is not named."""
 
 
@@ -82,13 +82,16 @@ def decide(found: Comparison, responses: int) -> Decision:
     elsewhere = [rival.fault.axis for rival in alike if rival.fault.effect == best.fault.effect]
     why_not = ""
     if ahead:
-        why_not = f"{noun_of(ahead[0].fault.effect)} explains more, and is not sure itself"
+        why_not = f"{noun_of(ahead[0].fault.effect)} explains more, but is not significant itself"
     elif best.share < FAULT_MAIN_PART:
-        why_not = f"it explains {100 * best.share:.0f} % of what sets these recordings apart: the main part is another"
+        why_not = (
+            f"it explains {100 * best.share:.0f} % of the difference between these recordings: the main cause is "
+            "another"
+        )
     elif len(names) >= LARGEST_FAULT_CLASS:
-        why_not = "these data cannot tell it from " + ", ".join(names)
+        why_not = "these data cannot distinguish it from " + ", ".join(names)
     elif elsewhere:
-        why_not = f"these data cannot tell whether it is on {best.fault.axis} or on {', '.join(elsewhere)}"
+        why_not = f"these data do not show whether it is on {best.fault.axis} or on {', '.join(elsewhere)}"
     behind = tuple((rival, FINER if _refines(rival, best) else BEHIND) for rival in rivals)
     if why_not:
         return Decision(None, (), 0.0, ((best, why_not), *behind, *others))
@@ -127,15 +130,18 @@ def _why_not(weighed: JudgedFault, differ: bool) -> str:
     more than stretches of a single set do. If not, the fault must gain about equally in all blocks, which excludes slow
     changes during a recording."""
     if weighed.gain < LEAST_FAULT_GAIN or weighed.gain_low <= 0:
-        return "its gain is not larger than what varies between stretches"
+        return "its gain is not larger than its variation between stretches of the recordings"
     steady = weighed.gain_low >= FAULT_STEADY * weighed.gain and not weighed.fault.varies
     if not differ and not steady:
         return "stretches of one set differ as much as the sets do"
     if weighed.gain <= FAULT_BEYOND * weighed.usual:
-        return f"it gains {weighed.usual:.2g} between stretches of one kind, too, and {weighed.gain:.2g} here"
+        return (
+            f"its gain between stretches of one set is {weighed.usual:.2g} already, and {weighed.gain:.2g} between "
+            "the two sets"
+        )
     main = next(iter(weighed.values))
     if abs(_distance_from_none(weighed, main)) <= BOUND * weighed.spread[main]:
-        return "the interval of its parameter holds none"
+        return "the confidence interval of its parameter includes the value without the fault"
     return ""
 
 

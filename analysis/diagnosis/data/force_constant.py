@@ -34,7 +34,7 @@ def with_force_constant(recording: Recording, constants: Sequence[float]) -> tup
     if len(constants) not in (1, len(command.channels)):
         raise NoForceConstant(f"{len(constants)} force constants were given, for {len(command.channels)} commands")
     if not all(np.isfinite(constant) and constant for constant in constants):
-        raise NoForceConstant("a force constant is a number other than 0")
+        raise NoForceConstant("a force constant must be a number other than 0")
     quantity, unit = CONVERTED[moved]
     each = np.broadcast_to(np.asarray(constants, dtype=np.float64), (len(command.channels),))
 

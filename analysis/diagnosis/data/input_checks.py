@@ -34,7 +34,7 @@ class NothingToDiagnose(ListedProblemsError):  # noqa: N818 - an answer that a u
 
 
 def require_alike(
-    recordings: Sequence[Recording], names: Sequence[str], what_now: str = "diagnose them one by one"
+    recordings: Sequence[Recording], names: Sequence[str], what_now: str = "diagnose them one at a time"
 ) -> None:
     """Requires recordings with the same channels, units and rate. Raises NothingToDiagnose."""
     if not recordings:
@@ -74,13 +74,13 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str], sho
             problems += few
         elif (fitted := samples_to_fit(recordings)) < LEAST_SAMPLES_TO_FIT:
             problems.append(
-                f"only {fitted} samples of what may be fitted to hold a response, and a position where there is one; "
-                "the rest of it is missing, or has the role of a test"
+                f"only {fitted} samples that may be fitted have a response (and a position, if one was recorded); the "
+                "others are missing or have the role of a test"
             )
         elif not few and (sure := response_significance(recordings)) is not None and sure < ANSWER_DEVIATIONS:
             problems.append(
-                "the responses have nothing to do with the commands: what they share is no more than noise shares with "
-                "anything, so the recording is noise, of another device, or its command was not played"
+                "the responses are not related to the commands: their coherence is no larger than that of noise, so "
+                "the recording is noise or of another device, or its command was not played"
             )
     if problems:
         raise NothingToDiagnose(tuple(problems))
@@ -101,12 +101,12 @@ def _shortness(recordings: Sequence[Recording]) -> Iterator[str]:
     if is_too_short_to_name(recordings):
         known = _count_answered_samples(recordings)
         yield (
-            f"{known} samples, {known / recordings[0].sample_rate_hz:.3g} s, are too short a recording to name physics "
-            f"by; at least {SHORTEST_S:g} s or {SHORTEST_SAMPLES} samples are needed, one part to fit and one to test"
+            f"{known} samples, {known / recordings[0].sample_rate_hz:.3g} s, are too short to identify physics; at "
+            f"least {SHORTEST_S:g} s or {SHORTEST_SAMPLES} samples are needed, one part to fit and one to test"
         )
     elif (cycles := sum(_command_cycles(recording) for recording in recordings)) < LEAST_CYCLES:
         yield (
-            f"the recording holds about {cycles:.2g} cycles of what was commanded, which is too short; at least "
+            f"the recording holds about {cycles:.2g} cycles of the command, which is too short; at least "
             f"{LEAST_CYCLES:g} are needed, one part to fit and one to test"
         )
 
@@ -150,8 +150,8 @@ def _gaps(command: Signal, name: str) -> Iterator[str]:
     if missing:
         first = int(np.argmax((~np.isfinite(command.samples)).any(axis=1)))
         yield (
-            f"{name} misses the command in {missing} samples (the first is {first}), so it is not known what "
-            "the device was told; cut the recording there, or let its import bridge them (gap_s of the clock)"
+            f"{name} has no command in {missing} samples (the first is {first}), so the command to the device is not "
+            "known there; cut the recording there, or let its import bridge them (gap_s of the clock)"
         )
 
 
@@ -178,7 +178,7 @@ def _constant_signals(recordings: Sequence[Recording]) -> Iterator[str]:
         signals = [found for recording in recordings if (found := getattr(recording, side)) is not None]
         for name, empty in unusable_channels(signals):
             if empty:
-                yield f"{side} {name} holds no number, only missing values"
+                yield f"{side} {name} contains only missing values"
             elif side == "response":
                 yield f"{side} {name} never changes: it was not connected, or nothing moved"
 
@@ -228,7 +228,7 @@ def _impossible_model_values(model: MechanicalModel) -> Iterator[str]:
     for name in ("mass", "damping", "stiffness", "input", "output"):
         size = float(np.abs(getattr(model, name)).max())
         if size > LARGEST_VALUE:
-            yield f"the model's {name} holds {size:.3g}, which no device has"
+            yield f"the model's {name} contains {size:.3g}, which no device has"
     if (lightest := float(np.linalg.eigvalsh(model.mass)[0])) < 1 / LARGEST_VALUE:
         yield f"the model's lightest motion has a mass of {lightest:.3g}, which no device has"
 
@@ -238,14 +238,14 @@ def _find_unconnected_channels(model: MechanicalModel, recording: Recording) -> 
     idle = [name for name, column in zip(recording.command.channels, model.input.T, strict=True) if not column.any()]
     unconnected = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
     if idle:
-        yield f"the model's input lets {', '.join(idle)} drive nothing"
+        yield f"in the model's input matrix {', '.join(idle)} drive no coordinate"
     elif (apart := int(np.linalg.matrix_rank(model.input))) < model.inputs:
         yield (
             f"the model's {model.inputs} inputs drive only {apart} motion{'s' if apart != 1 else ''}, so they cannot "
-            "be distinguished; make one command of those that push the same"
+            "be distinguished; combine the commands that push the same motion into one"
         )
     if unconnected:
-        yield f"the model's output lets {', '.join(unconnected)} see nothing"
+        yield f"in the model's output matrix {', '.join(unconnected)} measure no coordinate"
 
 
 def _instability(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
@@ -253,8 +253,8 @@ def _instability(model: MechanicalModel, recordings: Sequence[Recording]) -> Ite
     longest_s = max(len(recording) / recording.sample_rate_hz for recording in recordings)
     if fastest * longest_s > MOST_GROWTH:
         yield (
-            f"the model is unstable: undisturbed it grows e-fold in {1 / fastest:.3g} s; damping and stiffness must "
-            "not be negative"
+            f"the model is unstable: without a force its motion grows e-fold in {1 / fastest:.3g} s; damping and "
+            "stiffness must not be negative"
         )
 
 

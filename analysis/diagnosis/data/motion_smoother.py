@@ -200,4 +200,4 @@ def _steady_covariance(advance: FloatArray, observed: FloatArray, process_noise:
             break
         if np.abs(more).max() <= 1e-10 * np.abs(found).max():
             return np.asarray(found)
-    raise np.linalg.LinAlgError("a filter for the motion does not settle")
+    raise np.linalg.LinAlgError("a filter for the motion does not converge")

@@ -96,9 +96,9 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
     rivals, judged = _rivals(context, known), judge(checked)
     reasons = (*_reasons_of_rivals(context, known, found, rivals), *_reasons_of_fit(found, checked))
     if is_open:
-        reasons = (*reasons, "these recordings leave its parameters as good as open")
+        reasons = (*reasons, "these recordings hardly determine its parameters")
     if not judged.named:
-        reasons = (*reasons, "what was kept for the test does not bear it out")
+        reasons = (*reasons, "the held-out data do not confirm it")
     if reasons:
         return replace(result, unconfirmed=(*result.unconfirmed, *_candidates(context, found, reasons)))
     remarks = (proof_sentence(context, checked, rivals, found.chosen_of),)
@@ -114,16 +114,16 @@ def _reasons_of_rivals(
         rivals = [rival for rival in rivals if not does_as_well_with_less(context, found, rival)]
     yield from reasons_against(context, found, rivals)
     if not all(leaves_far_less(found.found.after, rival) for rival in rivals):
-        yield "what the catalogue names leaves hardly more"
+        yield "the effects of the catalogue reach almost as small an error"
 
 
 def _reasons_of_fit(found: Discovery, checked: Explanation) -> Iterator[str]:
     """Reasons, as sentences, from the fit itself: it ended early, or its held-out error is too large."""
     if not all(each.complete for each in found.rounds):
-        yield "the time ended before other laws were fitted"
+        yield "the time limit was reached before other laws were fitted"
     held_out = float(np.nanmax(checked.after.score.test, initial=0.0))
     if held_out > NAMED_ERROR and not holds_elsewhere(checked):
-        yield f"on what was kept for the test it leaves {held_out:.3g} times the noise"
+        yield f"on held-out data its error is {held_out:.3g} times the noise"
 
 
 def _needs_law(result: SearchResult) -> bool:

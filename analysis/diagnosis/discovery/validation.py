@@ -29,12 +29,13 @@ from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray
 
 SAME_KIND = (
-    "nothing that was kept for the test is of another kind than what it was found in: louder, or on several axes"
+    "the held-out data contain no other kind of excitation than the data in which it was found, such as a stronger "
+    "one or one on several axes"
 )
 
 HALF_TAKEN = (
-    "the model's own coupled damping or stiffness, which acts on both axes alike, can take half of such a force: a "
-    "force on one axis and an antisymmetric pair of half its size do as well"
+    "the model's own coupled damping or stiffness, which acts on both axes alike, can explain half of such a force: "
+    "a force on one axis and an antisymmetric pair of half its size fit equally well"
 )
 
 
@@ -91,8 +92,8 @@ def _reasons_against(context: SearchContext, of: Discovery, rivals: Sequence[Fit
         taken, by_chance = found.shares_above_noise
         if 1 - taken > LAW_PLACEBO * (1 - by_chance):
             yield (
-                f"it takes {100 * taken:.0f} % of the missing force that is no noise, and the same search takes "
-                f"{100 * by_chance:.0f} % of one that is shuffled in time"
+                f"it explains {100 * taken:.0f} % of the missing force above the noise, and the same search explains "
+                f"{100 * by_chance:.0f} % of the force when it is shuffled in time"
             )
         yield from _equally_good_laws(context, of, number)
     inputs = context.whole.records[0].recording.command.channels
@@ -118,9 +119,12 @@ def _insignificant_gain(
     """Whether the gain on held-out data is not significant, by a bootstrap interval over stretches."""
     ahead = held_out_gain(context.whole, rival[0], law)
     if ahead is None:
-        yield "too little was held out to confirm it"
+        yield "too little data was held out to confirm it"
     elif ahead.low <= 0:
-        yield f"what it gains on held-out data over {rival[1]} is not larger than what varies between stretches"
+        yield (
+            f"its gain on held-out data over {rival[1]} is not larger than its variation between stretches of the "
+            "recording"
+        )
 
 
 def _equally_good_laws(context: SearchContext, of: Discovery, number: int) -> Iterator[str]:
@@ -142,7 +146,7 @@ def _equally_good_laws(context: SearchContext, of: Discovery, number: int) -> It
         parted = ahead is not None and ahead.low > 0
         if not parted and not _predict_the_same(of.found.retuned, law, rival):
             names = law_of_sum(each, context.measure.records[0].recording).variables
-            yield f"a law of {' and '.join(names)} does as well"
+            yield f"a law of {' and '.join(names)} fits equally well"
 
 
 def _predict_the_same(without: FittedCandidate, law: FittedCandidate, other: FittedCandidate) -> bool:
@@ -192,7 +196,7 @@ def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
     kinds, axes = {kind for kind, _, _ in found}, {driven for _, driven, _ in found}
     strongest = max(level for _, _, level in found)
     said = [
-        (any(level > LOUDER * strongest for _, _, level in sealed), "louder commands"),
+        (any(level > LOUDER * strongest for _, _, level in sealed), "stronger commands"),
         (any(driven not in axes and len(driven) > 1 for _, driven, _ in sealed), "axes driven together"),
         (any(kind not in kinds for kind, _, _ in sealed), "another kind of command"),
     ]
@@ -212,18 +216,18 @@ def proof_sentence(
     whole, after = context.whole, found.after
     laws = [law for law in laws_of(after.fitted.hypothesis) if law is not None]
     where = conjoin(held_out_kinds(whole.records))
-    said = f"The formula was tested on {where}, which nothing was fitted to: {_error_sentence(context, found, after)}"
+    said = f"The formula was tested on {where}, to which nothing was fitted: {_error_sentence(context, found, after)}"
     closest = min((_held_out_error_share(context, found, rival) for rival in rivals), default=None)
     if closest is not None:
-        said += f", the best law of the catalogue {100 * closest:.3g} %"
+        said += f", that of the best law of the catalogue {100 * closest:.3g} %"
     if chosen_of > 1:
-        said += f". Of {chosen_of} formulas that fitted alike it is the one that these bear out"
+        said += f". Of {chosen_of} formulas that fitted equally well, it is the one that these data confirm"
     visited = _range_of_motion(context, found, {name for law in laws for name in law.variables})
-    return f"{said}. What it says beyond {conjoin(visited)} is not known." if visited else f"{said}."
+    return f"{said}. Beyond {conjoin(visited)} the formula is not tested." if visited else f"{said}."
 
 
 def _error_sentence(context: SearchContext, found: Explanation, law: FittedCandidate) -> str:
-    return f"there it leaves {100 * _held_out_error_share(context, found, law):.3g} % of the re-tuned model's error"
+    return f"there its error is {100 * _held_out_error_share(context, found, law):.3g} % of the re-tuned model's error"
 
 
 def _held_out_error_share(context: SearchContext, found: Explanation, law: FittedCandidate) -> float:

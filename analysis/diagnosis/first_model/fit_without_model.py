@@ -66,7 +66,7 @@ def first_model_of(
     fit to spectra, which takes longer. recordings: in the form of `one_motion_per_force`. Raises NothingToDiagnose
     where no model can be fitted."""
     _require_no_weight(recordings)
-    on_progress("weighing laws in the force balance", 0.0)
+    on_progress("testing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(without), time_left, map_)
     free = is_read_as_free(recordings[0])
     if (

@@ -118,7 +118,8 @@ def _pushes(sweep: str, level: float, half: FloatArray, fade: int) -> tuple[Expe
             "sweep",
         ),
         Experiment(
-            f"{RELEASES} releases: a push that grows slowly to {level:.3g}, to either side in turn, and ends at once",
+            f"{RELEASES} releases: a force that grows slowly to {level:.3g}, in alternating directions, and ends "
+            "abruptly",
             np.outer(_releases(level, samples), along),
             "step",
         ),
