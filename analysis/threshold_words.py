@@ -33,19 +33,20 @@ class ThresholdWords:
 
 
 CUT_END = (
-    "On a stronger device the value would be higher; a bound it is not, the true threshold may lie to either side."
+    "On a stronger device the value would be higher; it is not a bound, because the true threshold may lie to either "
+    "side."
 )
 REVERSALS = ThresholdWords(
     means="reversal means",
     cut="which cut off peaks of the staircase",
     cut_note=f"cut: the cap cut off peaks of the staircase. {CUT_END}",
-    too_low="reversal means near the cap are too low before they are cut, and a cut mean is no clean bound",
+    too_low="reversal means near the cap are too low before they are cut, and a cut mean is not a bound of the threshold",
     measured_in="the trials of the averaged reversals",
-    levels="A staircase stops going down where answers happen to be wrong, so the lowest points lie somewhat below the "
-    "curve of a model that is right.",
+    levels="A staircase stops descending where answers happen to be wrong, so the lowest points lie somewhat below the "
+    "curve even of a correct model.",
     track="Level of every counted trial, right and wrong answers, and the reversals; the black ones are averaged into "
     "the threshold (solid line).",
-    sensitivity="A staircase holds d' of the answers near 1.6 for any cue.",
+    sensitivity="A staircase keeps d' of the answers near 1.6 for any cue.",
 )
 
 
@@ -57,11 +58,11 @@ def _psi(rule: StaircaseRule) -> ThresholdWords:
         cut="above which they lie by Psi's posterior with a probability over 10 %",
         cut_note="cut: by Psi's posterior the threshold lies above the cap with a probability over 10 %; the value is "
         "the posterior's mean, at most the cap.",
-        too_low="a posterior mean is drawn towards the cap before it is cut, and a cut one is no clean bound",
+        too_low="a posterior mean is biased towards the cap before it is cut, and a cut one is not a bound of the "
+            "threshold",
         measured_in=f"the last {last} trials of each run, taken in proportion to the threshold" if last > 1
         else "the last trial of each run, taken in proportion to the threshold",
-        levels="Levels followed the answers, so the lowest points lie somewhat beside the curve of a model that is "
-        "right.",
+        levels="Levels followed the answers, so the lowest points deviate somewhat from the curve even of a correct model.",
         track="Level of every counted trial, chosen by Psi, with right and wrong answers; the line is the threshold, "
         "the mean of the posterior after the last answer.",
         sensitivity="Levels follow the answers, so d' of the answers hardly depends on the cue.",

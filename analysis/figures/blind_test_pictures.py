@@ -55,11 +55,12 @@ def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
     )
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
     return Picture(
-        "detection", "From which strength on an effect is named",
-        "Each mark is a device with one concealed effect. Invisible: the re-tuned model errs by at most 1.25 times "
-        "the noise, so there is nothing to be explained; in the set: named as inseparable from what was named. Bars: "
-        "strength from which an ideal observer, who compares the same device with and without the effect, detects it: "
-        "re-tuning hides nothing from it (line fit to the logarithms of the changes that the effects cause).",
+        "detection", "Strength from which an effect is named",
+        "Each mark is a device with one concealed effect. Invisible: the error of the re-tuned model is at most 1.25 "
+        "times the noise, so there is nothing to explain; in the set: named as indistinguishable from the named "
+        "effect. Bars: strength from which an ideal observer, who compares the same device with and without the "
+        "effect, detects it: no re-tuning can hide the effect from it (line fit to the logarithms of the changes "
+        "that the effects cause).",
         figure,
         alternative=" ".join(f"{s.effect}: {', '.join(f'{x:.2f} {how}' for x, how in s.draws)}." for s in strips),
     )  # fmt: skip

@@ -32,8 +32,8 @@ def power_picture(
     """Picture of power and coverage with its caption. points: at least one, each of one sample size. effect_db: true
     threshold at the first frequency of pair_hz minus that at the second; 0: the power is the type-1 error. means: noun
     for the thresholds of runs, in the plural."""
-    found = "finds the difference" if effect_db else "finds a difference that is not there (type-1 error)"
-    aim = "the power that is usually asked for" if effect_db else "the level of the test"
+    found = "finds the difference" if effect_db else "finds a difference that does not exist (type-1 error)"
+    aim = "the usual target of the power" if effect_db else "the level of the test"
     return Picture(
         name="power",
         title=f"Of {points[0].studies} simulated studies of each size, with a difference of {effect_db:g} dB "

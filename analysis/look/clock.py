@@ -36,14 +36,14 @@ def check_clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Che
                 CLOCK,
                 "notice",
                 "No time is known: samples are numbered, and the rate of 1 Hz is nominal.",
-                "Nothing that depends on speed, frequency or delay can be said of it.",
+                "Speeds, frequencies and delays cannot be determined.",
             ),
         )
     if recording.time_s is None:
         checks = (*_check_resampling(recording), *_rate_checks(recording.sample_rate_hz))
         return checks or (Check(CLOCK, "fine", _clock_source(recording)),)
     found = tuple(check for start, stop in stretches for check in _stamp_checks(recording, start, stop))
-    return found or (Check(CLOCK, "fine", "All stamps are in their places."),)
+    return found or (Check(CLOCK, "fine", "All time stamps are evenly spaced."),)
 
 
 def rate_objection(rate_hz: float) -> str:
@@ -73,7 +73,9 @@ def _check_resampling(recording: Recording) -> tuple[Check, ...]:
     notes = origin.get("notes", ()) if isinstance(origin, dict) else ()
     uneven = [str(note) for note in notes if "uneven stamps" in str(note)] if isinstance(notes, list) else []
     return tuple(
-        Check(CLOCK, "notice", f"The import has evened it out: {note}", "Trust phases far below half the rate only.")
+        Check(
+            CLOCK, "notice", f"The import has evened it out: {note}", "Use phases only far below half the sample rate."
+        )
         for note in uneven
     )
 
@@ -118,15 +120,13 @@ def _gap_check(steps: np.ndarray, gaps: np.ndarray, stamps: np.ndarray, rate_hz:
 def _jitter_check(jitter: float, most: float, step_s: float) -> Check | None:
     """jitter, most: rms and largest deviation, in sample periods of step_s seconds."""
     text = (
-        f"Time stamps lie {jitter * step_s * 1e6:.3g} us rms off their places ({jitter:.1%} of a step), "
+        f"Time stamps deviate by {jitter * step_s * 1e6:.3g} us rms from even spacing ({jitter:.1%} of a step), "
         f"{most * step_s * 1e6:.3g} us at most."
     )
     if jitter > WILD:
         return Check(CLOCK, "wrong", text, "Import with the stamps as the clock, and resample.")
     if jitter > JITTER:
-        return Check(
-            CLOCK, "notice", text, "Expect noise beside strong lines; resample by the stamps where it matters."
-        )
+        return Check(CLOCK, "notice", text, "Expect noise near strong lines; resample by the stamps where it matters.")
     return Check(CLOCK, "fine", text)
 
 

@@ -36,7 +36,7 @@ def _check_missing(channel: Channel, rate_hz: float) -> Check:
     return Check(
         MISSING,
         "wrong" if count > _MANY * len(lost) else "notice",
-        f"{channel.label} misses {count} of {len(lost)} samples, the first at {first / rate_hz:.4g} s; the longest gap "
+        f"{channel.label} lacks {count} of {len(lost)} samples, the first at {first / rate_hz:.4g} s; the longest gap "
         f"is {longest} samples.",
         "Cut the gaps out with segments, or record again; analyses that need every sample refuse them by name.",
     )
@@ -54,8 +54,8 @@ def _constant_check(channel: Channel) -> Check:
     """The check of a constant channel: a notice for a command, "wrong" for a sensor."""
     text = f"{channel.label} is {channel.format(float(channel.known[0]))} throughout."
     if channel.role == "command":
-        return Check(CONSTANT, "notice", text, "Nothing can be said of what it drives; leave it out, or drive it.")
-    return Check(CONSTANT, "wrong", text, "Check the cable and the map: a sensor that works is never so still.")
+        return Check(CONSTANT, "notice", text, "Its effect cannot be determined; leave it out, or record it driven.")
+    return Check(CONSTANT, "wrong", text, "Check the cable and the map: a working sensor is never exactly constant.")
 
 
 def check_copied_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:

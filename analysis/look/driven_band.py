@@ -120,7 +120,7 @@ def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tupl
             DRIVEN,
             "notice",
             f"command '{name}' is not driven.",
-            "What it would move cannot be told; leave it out, or record it driven.",
+            "Its effect cannot be determined; leave it out, or record it driven.",
         )
         for name in idle
     ]

@@ -32,14 +32,14 @@ LATE = 0.6
 """Largest lag (samples) that is not reported: a zero-order hold of the force delays the acceleration by half a sample,
 and a backward difference delays a derivative by as much."""
 _FILTERED = (
-    "It is later as well as smaller, as behind a sensor's filter or a flexible part between both: model that, or "
-    "compare them below it. A wrong unit or factor would delay nothing."
+    "It is delayed as well as smaller, as by a sensor's filter or a flexible part between both: model this, or "
+    "compare the channels only below its corner frequency. A wrong unit or factor would cause no delay."
 )
 _CAUSES = (
     (1000.0, "mm taken for m, or ms for s"), (180 / np.pi, "degrees taken for radians"), (9.80665, "g for m/s^2"),
     (2 * np.pi, "turns taken for radians, or Hz for rad/s"), (60.0, "per minute taken for per second"),
     (30 / np.pi, "rpm taken for rad/s"), (25.4, "inches for millimetres"), (1 / 0.0254, "inches for metres"),
-    (1 / 0.3048, "feet for metres"), (2.0, "a range or a count that is twice"),
+    (1 / 0.3048, "feet for metres"), (2.0, "a range or a count that is wrong by a factor of two"),
 )  # fmt: skip
 """Factors of common unit errors, and their descriptions."""
 
@@ -130,7 +130,7 @@ def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
     )
     off = abs(abs(agreed.gain) - 1)
     if agreed.gain < 0:
-        return Check(KINEMATICS, "wrong", text, f"Turn the sign of one of them{_cause_text(agreed.gain)}.")
+        return Check(KINEMATICS, "wrong", text, f"Reverse the sign of one of them{_cause_text(agreed.gain)}.")
     if off > FAR and agreed.gain < 1 and agreed.lag_samples > LATE and not _cause_text(agreed.gain):
         # A wrong unit or factor causes no delay; a gain below 1 with a lag is typical of a filter or a flexible part.
         return Check(KINEMATICS, "notice", text, _FILTERED)
@@ -139,7 +139,12 @@ def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
     if off > CLOSE:
         return Check(KINEMATICS, "notice", text, "Check the calibration of both, and filters between them.")
     if abs(agreed.lag_samples) > LATE:
-        return Check(KINEMATICS, "notice", text, "A filter or a transfer delays one of them; shift it, or model it.")
+        return Check(
+            KINEMATICS,
+            "notice",
+            text,
+            "A filter or the data transfer delays one of them; correct the time shift, or model it.",
+        )
     return Check(KINEMATICS, "fine", text)
 
 

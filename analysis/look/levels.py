@@ -110,4 +110,4 @@ def _proportion_check(alike: Sequence[tuple[float, SegmentLevel]], response: int
         return Check(LEVELS, "fine", text)
     large = abs(change) > UNEVEN
     do = "The device is far from linear: friction, stops, hardening or saturation." if large else ""
-    return Check(LEVELS, "notice", text, do or "The device, or its noise, is not quite in proportion.")
+    return Check(LEVELS, "notice", text, do or "The device is slightly nonlinear, or noise contributes to the rms.")

@@ -48,7 +48,7 @@ def check_resolution(channels: Sequence[Channel]) -> tuple[Check, ...]:
     Commands are left out: they may have few values by design."""
     found = [_resolution_check(channel) for channel in channels if channel.role in _SENSORS]
     known = tuple(check for check in found if check is not None)
-    return known or (Check(RESOLUTION, "fine", "No step of a converter matters in any sensor."),)
+    return known or (Check(RESOLUTION, "fine", "No sensor is limited by the resolution of its converter."),)
 
 
 def _resolution_check(channel: Channel) -> Check | None:
@@ -57,12 +57,15 @@ def _resolution_check(channel: Channel) -> Check | None:
     steps = rms(channel.known) / step if step else UNSEEN
     if steps >= UNSEEN:
         return None
-    text = f"{channel.label} moves in steps of {channel.format(step)}; its rms is {steps:.3g} of them."
+    text = f"{channel.label} has a resolution of {channel.format(step)}; its rms is {steps:.3g} of these steps."
     if steps < COARSE:
         return Check(RESOLUTION, "wrong", text, "Use a finer sensor or range, or move more: rounding hides the motion.")
     if steps < ROUGH:
         return Check(
-            RESOLUTION, "notice", text, "Do not differentiate it without a filter; expect rounding as a floor."
+            RESOLUTION,
+            "notice",
+            text,
+            "Do not differentiate it without a filter; expect rounding noise as a lower bound of the error.",
         )
     return Check(RESOLUTION, "fine", text)
 

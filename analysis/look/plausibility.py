@@ -32,7 +32,7 @@ STRONG = 0.5
 def check_units(channels: Sequence[Channel]) -> tuple[Check, ...]:
     """A check of each channel whose values are doubtful in its unit; a single "fine" check where none is."""
     found = tuple(check for channel in channels if (check := _unit_check(channel)))
-    return fine_if_none(UNITS, found, "All sizes are possible in their units.")
+    return fine_if_none(UNITS, found, "All amplitudes are plausible in their units.")
 
 
 def _unit_check(channel: Channel) -> Check | None:
@@ -45,7 +45,8 @@ def _unit_check(channel: Channel) -> Check | None:
             UNITS,
             "notice",
             f"{channel.label} has no unit: its scale is not known.",
-            "State the unit in the map; masses, dampings and stiffnesses are found in its terms otherwise.",
+            "State the unit in the map; otherwise masses, damping and stiffnesses are relative to this channel's "
+            "scale.",
         )
     peak, moves = float(np.max(np.abs(known))), rms(known)
     if peak > _LARGEST.get(channel.unit, np.inf):
@@ -72,7 +73,7 @@ def check_offsets(channels: Sequence[Channel]) -> tuple[Check, ...]:
         if channel.role in ("command", "response") and channel.unit not in ("m", "rad", "m/s", "rad/s")
         if (check := _offset_check(channel))
     )
-    return fine_if_none(OFFSETS, found, "No command and no force, acceleration or voltage stands beside zero.")
+    return fine_if_none(OFFSETS, found, "No command, force, acceleration or voltage has a large offset.")
 
 
 def _offset_check(channel: Channel) -> Check | None:
@@ -82,11 +83,16 @@ def _offset_check(channel: Channel) -> Check | None:
     if not known.size or moves == 0 or abs(float(known.mean())) < STRONG * moves:
         return None
     mean = float(known.mean())
-    text = f"{channel.label} stands {channel.format(mean)} beside zero ({abs(mean) / moves:.3g} times its rms)."
+    text = f"The mean of {channel.label} is {channel.format(mean)} ({abs(mean) / moves:.3g} times its rms)."
     if channel.unit == "m/s^2" and abs(abs(mean) / G - 1) < 0.03:
         return Check(OFFSETS, "fine", f"{text} That is gravity.")
     if channel.role == "command":
-        return Check(OFFSETS, "notice", text, "Linear models know no offset: say the working point, or take it off.")
+        return Check(
+            OFFSETS,
+            "notice",
+            text,
+            "Linear models contain no offset: state the operating point, or subtract the offset.",
+        )
     return Check(
-        OFFSETS, "notice", text, "Take it off where it is the sensor's; keep it where it is gravity or a load."
+        OFFSETS, "notice", text, "Subtract it if it is an offset of the sensor; keep it if it is gravity or a load."
     )

@@ -92,7 +92,7 @@ def repeat_checks(recording: Recording, repeats: Repeats) -> tuple[Check, ...]:
             )
         )
     if not repeats.noise:
-        none = "Nothing repeats, so noise cannot be distinguished from what a model lacks."
+        none = "Nothing repeats, so noise cannot be distinguished from errors of a model."
         wrong += [] if wrong else [Check(REPEATS, "notice", none, "Record some periods more than once.")]
         return tuple(wrong)
     return (*wrong, *_noise_checks(recording, repeats.noise))
@@ -104,7 +104,7 @@ def _noise_checks(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[C
     sentence = conjoin([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
     noisy = [name for k, name in enumerate(channels) if shares[:, k].min() > LOUD]
     text = f"Between repeats (up to {max(each.periods for each in noise)}) remain at least {sentence}, rms."
-    do = f"{conjoin(noisy)} hardly repeat: average more periods, or drive more." if noisy else ""
+    do = f"{conjoin(noisy)} hardly repeat: average more periods, or drive the device more strongly." if noisy else ""
     return (Check(REPEATS, "notice" if noisy else "fine", text, do),)
 
 

@@ -17,7 +17,7 @@ from analysis.wording import capitalise, conjoin
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule
 
-UNSETTLED = "The search ended before it had settled: do not use these numbers."
+UNSETTLED = "The fit did not converge: do not use these numbers."
 TUKEY = "{means} in newtons, one-way; Tukey's interval and p, which hold for all pairs together."
 NO_MODEL = "The model needs answers of two participants, at two frequencies."
 NO_DIFFERENCE = (

@@ -128,11 +128,11 @@ def sensor_frame(recording: Recording) -> FloatArray | None:
     try:
         rotation = np.asarray(stated, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise ValueError("the sensor's frame is no matrix of numbers") from error
+        raise ValueError("the sensor's frame is not a matrix of numbers") from error
     if rotation.shape != (3, 3):
         raise ValueError(f"the sensor's frame has the shape {rotation.shape}; it must be (3, 3)")
     if not np.allclose(rotation @ rotation.T, np.eye(3), atol=ORTHONORMAL):
-        raise ValueError("the sensor's frame is no rotation: its rows must be perpendicular and of length 1")
+        raise ValueError("the sensor's frame is not a rotation: its rows must be perpendicular and of length 1")
     if np.linalg.det(rotation) < 0.0:
         raise ValueError("the sensor's frame is a reflection, not a rotation: an axis of it has the wrong sign")
     return rotation

@@ -40,8 +40,8 @@ def _population_of(subject: str, session: str, rows: list[Trial]) -> Population:
     if len(kinds) > 1:
         named = " and ".join(kind.value for kind in Population if kind in kinds)
         raise ValueError(
-            f"session {session} of {subject} mixes trials of {named} (column felt): one session holds one kind; "
-            "analyse it after the wrong rows are explained and taken out"
+            f"session {session} of {subject} mixes trials of {named} (column felt): a session contains trials of one "
+            "kind only; find the cause, remove the wrong rows, and analyse it again"
         )
     return kinds.pop()
 

@@ -35,7 +35,7 @@ def repeat_warning(trials: Sequence[Trial]) -> str:
         return ""
     return (
         f"Trials were often made void at will ({OFTEN_WORDS}: asked for again, paused, left, answered outside the "
-        f"time). Each gives another look at what was unsure, so that thresholds may be too low by some dB: "
+        "time). Each gives another presentation of an uncertain stimulus, so thresholds may be too low by some dB: "
         f"{conjoin([*people, *runs])}."
     )
 

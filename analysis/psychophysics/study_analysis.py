@@ -190,8 +190,8 @@ def _single_population(trials: Sequence[Trial]) -> Population | None:
     parts = split_by_population(trials)
     if len(parts) > 1:
         raise ValueError(
-            f"trials of {' and '.join(kind.value for kind in parts)} cannot enter one analysis; "
-            "analyse each kind by itself"
+            f"trials of {' and '.join(kind.value for kind in parts)} cannot enter one analysis; analyse each kind "
+            "separately"
         )
     return next(iter(parts), None)
 
@@ -268,14 +268,14 @@ def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
         )
     agree = (anova.p < 0.05) == (within.p < 0.05)
     return (
-        "The published analysis is one-way: it takes every threshold as that of another person, so that differences "
+        "The published analysis is one-way: it treats every threshold as that of another person, so differences "
         f"between people count as error: {f_text(anova.df_between, anova.df_within, anova.f)}, {p_text(anova.p)}. "
-        "Every participant took every frequency; the analysis within participants takes those differences out "
+        "Every participant was tested at every frequency; the analysis within participants removes those differences "
         f"({_write_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
-        f"{f_text(within.df_conditions, within.df_error, within.f)}, Greenhouse-Geisser epsilon "
-        f"{within.epsilon:.2f}, {p_text(within.p)}. "
+        f"{f_text(within.df_conditions, within.df_error, within.f)}, Greenhouse-Geisser epsilon {within.epsilon:.2f}, "
+        f"{p_text(within.p)}. "
         + ("Both agree at the 5 % level. " if agree else "They disagree at the 5 % level. ")
-        + "The second one fits the design; the first is here to compare with the published result."
+        + "The second matches the design; the first is given for comparison with the published result."
     )
 
 

@@ -50,7 +50,7 @@ def study_warnings(
     """All warnings about the direction thresholds. trials: of the test phase. rows, table: thresholds of runs and table
     of thresholds in newtons, computed from these trials."""
     if not rows:
-        return ("No test trial is there, so there is no threshold of direction.",)
+        return ("There are no test trials, so there is no threshold of direction.",)
     candidates = (
         _warn_of_stopped(rows, protocol.staircase),
         _incomplete_warning(rows, protocol.staircase),
@@ -108,8 +108,8 @@ def _warn_of_stopped(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
         return ""
     return (
         f"{_count_text(stopped, 'run')} stopped by the limit of {rule.trial_limit} trials, without a threshold: "
-        f"{conjoin(stopped)}. The limit stops those who cannot tell the directions far more often than those who can, "
-        "so the means that are left are too low."
+        f"{conjoin(stopped)}. The limit stops participants who cannot discriminate the directions far more often than "
+        "others, so the remaining means are too low."
     )
 
 
@@ -190,7 +190,7 @@ def _bias_warning(rows: Sequence[Threshold]) -> str:
     ]
     if not leaning:
         return ""
-    return f"A bias towards one of the two answers, which raises a threshold, shows in {conjoin(leaning)}."
+    return f"A bias towards one of the two answers, which raises a threshold, was found in {conjoin(leaning)}."
 
 
 def _leans(row: Threshold, criterion: float) -> bool:
@@ -215,8 +215,9 @@ def _drift_warning(trials: Iterable[Trial]) -> str:
     if not drifting:
         return ""
     return (
-        f"A bias towards one of the two answers changed from run to run of a session (p < {DRIFT_LEVEL:g} each, beside "
-        f"what differs between runs without an order), which raises thresholds if strong: {conjoin(drifting)}."
+        f"A bias towards one of the two answers changed from run to run of a session (p < {DRIFT_LEVEL:g} each, in "
+        "addition to the variation between runs without a trend), which raises thresholds if strong: "
+        f"{conjoin(drifting)}."
     )
 
 
@@ -234,7 +235,9 @@ def _warn_of_spoiled(trials: Iterable[Trial]) -> str:
 
 def _warn_of_flagged(trials: Iterable[Trial]) -> str:
     count = sum(trial.status is TrialStatus.FLAGGED for trial in trials)
-    return f"{count} trial{'s' if count != 1 else ''} flagged: counted, but the stimulus is worth a look." * bool(count)
+    return f"{count} trial{'s' if count != 1 else ''} flagged: counted, but their stimuli should be checked." * bool(
+        count
+    )
 
 
 def _warn_of_unmeasured(trials: Iterable[Trial]) -> str:
@@ -278,9 +281,9 @@ def _below_detection_warning(table: ThresholdTable, felt: ThresholdTable) -> str
     if not found:
         return ""
     return (
-        f"The direction was told at a level below that at which the vibration was felt: {conjoin(found)}. Two runs of "
-        f"one threshold differ by {REPEAT_SD_DB:g} dB (standard deviation); more than twice that asks for another cue "
-        "than touch, or a lapse of attention in the detection run."
+        f"The direction was identified at a level below the detection threshold of the vibration: {conjoin(found)}. "
+        f"Two runs of one threshold differ by {REPEAT_SD_DB:g} dB (standard deviation); a difference of more than "
+        "twice that suggests another cue than touch, or a lapse of attention in the detection run."
     )
 
 

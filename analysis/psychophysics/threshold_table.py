@@ -47,8 +47,8 @@ class ThresholdTable:
         if not causes:
             return ""
         return (
-            f"Without coverage: {' and '.join(causes)}. Means near the cap come out too low, and the stated confidence "
-            "of intervals and effect sizes does not hold."
+            f"Without coverage: {' and '.join(causes)}. Means near the cap are too low, and the stated confidence of "
+            "intervals and effect sizes does not hold."
         )
 
     def gaps(self) -> tuple[tuple[str, float], ...]:

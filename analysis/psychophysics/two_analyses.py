@@ -23,8 +23,9 @@ NOTABLE_DB = 1.0
 SIMULATED_RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0, 10)), 13, 10)
 """The published staircase and cap, with which `measured_coverage` was simulated: its counts hold for no other rule."""
 NOTHING_DECLARED = (
-    "The protocol declares no primary analysis, contrast, sample size or exclusions; the hierarchical model is put "
-    "first because it needs the fewest excuses near the cap, and a choice made after the data is no declaration."
+    "The protocol declares no primary analysis, contrast, sample size or exclusions; the hierarchical model is given "
+    "first because it needs the fewest assumptions near the cap; a choice made after the data were seen is not a "
+    "declaration."
 )
 NEAR_CAP = (
     'Near the cap the published intervals do not hold what they say, and the published "not significant" says little.'
@@ -46,8 +47,8 @@ def declaration_text(declared: AnalysisSettings) -> str:
         return NOTHING_DECLARED
     if declared.primary == "undeclared":
         primary = (
-            "The protocol declares no primary analysis. The hierarchical model is put first because it needs the "
-            "fewest excuses near the cap; a choice made after the data is no declaration."
+            "The protocol declares no primary analysis. The hierarchical model is given first because it needs the "
+            "fewest assumptions near the cap; a choice made after the data were seen is not a declaration."
         )
     else:
         named = "Its interval" if declared.interval == "undeclared" else f"Declared interval ({declared.interval})"
@@ -81,7 +82,7 @@ def comparison_text(
     if primary is None:
         return (
             "The hierarchical model needs answers of two participants, at two frequencies; these data have fewer, so "
-            "the published analysis stands alone."
+            "only the published analysis is given."
         )
     missing = [f"{frequency_hz:g} Hz" for frequency_hz in primary.missing_hz]
     left_out = f"The model leaves {conjoin(missing)} out, where there is no answer yet." if missing else ""
@@ -107,17 +108,17 @@ def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: Stair
     against = f"{primary.frequencies_hz[0]:g} Hz"
     pairs = [(contrast, by_frequency.get(contrast.frequency_hz)) for contrast in primary.contrasts]
     if not pairs:
-        return f"The model tells no difference to {against}."
+        return f"The model gives no difference to {against}."
     if not any(mean for _, mean in pairs):
-        return f"{capitalise(named)} tell no difference to {against} yet that could be held against the model's."
+        return f"{capitalise(named)} give no difference to {against} yet that could be compared with the model's."
     apart = [
-        f"at {contrast.frequency_hz:g} Hz {format_signed(contrast.difference_db, 1)} dB against "
+        f"at {contrast.frequency_hz:g} Hz {format_signed(contrast.difference_db, 1)} dB compared with "
         f"{format_signed(mean.difference_db, 1)} dB"
         for contrast, mean in pairs
         if mean is not None and abs(contrast.difference_db - mean.difference_db) >= NOTABLE_DB
     ]
     if apart:
-        return f"Differences to {against} by the model and by {named} are apart: {conjoin(apart)}."
+        return f"Differences to {against} by the model and by {named} differ: {conjoin(apart)}."
     return f"Differences to {against} by the model and by {named} agree within {NOTABLE_DB:g} dB."
 
 

@@ -17,14 +17,15 @@ from analysis.figures.picture import Picture
 from analysis.reports.page import Page, Section, Table, render_page
 
 HOW = (
-    "Each device is simulated by a bench of its own: integrator, step, friction law, sensor chain and small extras "
-    "that no label names. It shares no code with the catalogue of the diagnosis. The model that comes with a recording "
-    "is calibrated within its tolerances, or re-tuned to the device as it is, so that it hides what it can.",
-    "Labels were hashed with a salt before the first diagnosis (labels.sha256). The diagnosis ran in processes of its "
-    "own that were given the open folder alone, could not import the bench, and could open no file beside it. "
-    "Afterwards every label, recording and model was compared with its hash.",
-    "Detectable is what the re-tuned model leaves: more than 1.25 times the noise in some channel, on samples that "
-    "nothing was fitted to. A diagnosis that broke down counts as a miss.",
+    "Each device is simulated by a separate bench with its own integrator, step, friction law, sensor chain and "
+    "small extras that no label names. It shares no code with the catalogue of the diagnosis. The model that comes "
+    "with a recording is calibrated within its tolerances, or re-tuned to the device with the concealed effect, so "
+    "that it hides the effect as far as possible.",
+    "Labels were hashed with a salt before the first diagnosis (labels.sha256). The diagnosis ran in separate "
+    "processes that were given the open folder only; they could not import the bench and could not open any other "
+    "file. Afterwards every label, recording and model was compared with its hash.",
+    "An effect is detectable where the error of the re-tuned model is more than 1.25 times the noise in some "
+    "channel, on held-out samples. A diagnosis that failed counts as a miss.",
 )
 
 

@@ -18,7 +18,7 @@ from analysis.wording import NONE, conjoin, format_signed, number, p_value
 from protocols.definition.staircase_rule import StaircaseRule
 
 _MEANING = (
-    "A device seldom delivers both directions alike. A participant may notice another difference in place of the "
+    "A device seldom delivers both directions equally. A participant may notice another difference instead of the "
     "direction: the amplitude along the direction (intensity), the harmonics (spectrum), or the motion across the "
     "direction (coupling). Each is in dB; harmonics and motion across count by the most that they can add to the "
     "amplitude."

@@ -20,9 +20,9 @@ _WORDS: Mapping[Kind, str] = {
 _TREND_WORDS = {
     "falls": "falls as the level rises",
     "rises": "rises with the level",
-    "rises from nothing": "is there only at higher levels",
-    "stays": "keeps its share at all levels",
-    "": "is there, at too few levels to say how it grows",
+    "rises from nothing": "appears only at higher levels",
+    "stays": "has the same share at all levels",
+    "": "is present, at too few levels to determine how it grows",
 }
 _LEAST_RESPONSE = 0.1
 """Response relative to the largest of its quantity, input and level, below which a channel has no row. By hand."""
@@ -53,7 +53,7 @@ def _trend_paragraphs(cells: Sequence[Distortion]) -> tuple[str, ...]:
         if trend.present:
             groups.setdefault((trend.kind, trend.level_dependence), []).append(trend)
     if not groups:
-        return ("No distortion stands out of the noise: from repeats and silent lines the device looks linear.",)
+        return ("No distortion exceeds the noise: by repeats and silent lines the device appears linear.",)
     return tuple(
         f"{_WORDS[kind]}{' distortion' if kind != 'varying' else ''} {_TREND_WORDS[series]}: "
         f"{conjoin([f'{each.output} driven by {each.input}' for each in trends])}."

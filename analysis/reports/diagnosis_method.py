@@ -8,23 +8,23 @@ from analysis.wording import conjoin
 
 # Parts of the sentences; free simulation is the output error, predicted force the equation error (inverse dynamics).
 _FREE = (
-    "The model was played from rest by the recorded commands alone, and its answer compared with what was measured, "
-    "sample by sample (free simulation)."
+    "The model was simulated from rest with the recorded commands only, and its response was compared with the "
+    "measured one, sample by sample (free simulation)."
 )
 _FORCE = (
-    "Played freely, a model of this device drifts away. Instead, the force that it needs for the measured motion was "
-    "compared with the force that was commanded (predicted force)."
+    "In a free simulation a model of this device drifts away. Instead, the force that it needs for the measured "
+    "motion was compared with the commanded force (predicted force)."
 )
 _HOW = {
     "repeats": "from what differs between repeats of the same excitation",
-    "rest": "from what is heard while nothing is driven",
-    "quiet band": "from the frequencies above all that was driven",
+    "rest": "from the signals while nothing is driven",
+    "quiet band": "from the frequencies above the driven band",
 }
 """How the noise was measured, by `NoiseFloor.how`."""
 _ROLES = (
     ("fit", "were fitted to"),
-    ("choose", "served to choose between explanations"),
-    ("test", "were sealed and only looked at in the end"),
+    ("choose", "were used to choose between explanations"),
+    ("test", "were held out and used only for the final test"),
 )
 """Use of each set of samples, by its key in `Findings.split_s`."""
 
@@ -50,12 +50,12 @@ def _error_paragraph(found: Findings) -> str:
         how = _FORCE
     else:
         how = (
-            "Played freely, a model of this device drifts away. Instead, it was played over "
-            f"{measure}, each begun from the measured state, and compared sample by sample."
+            f"In a free simulation a model of this device drifts away. Instead, it was simulated over {measure}, each "
+            "started from the measured state, and compared sample by sample."
         )
     return (
         f"{how} Errors in per cent are root-mean-square over the channels, each divided by its own rms; errors in "
-        "units of the noise are root-mean-square of one channel, divided by the rms of what does not repeat in it."
+        "units of the noise are root-mean-square of one channel, divided by the rms of its noise."
     )
 
 
@@ -80,20 +80,21 @@ def _choice_paragraphs(found: Findings) -> tuple[str, ...]:
         return ()
     bound = RETUNING_BOUND if found.tuning is None else found.tuning.bound
     return (
-        "First the model's own parameters were re-tuned, each held by the stated standard deviation of its calibration "
-        f"and moved by at most {bound:g} of them. Then every effect of the catalogue was tried wherever it "
-        "could be, with starting values from what was still unexplained; the likeliest were fitted together with the "
-        "model's parameters, and the best was kept where it earned its place on data that it was not fitted to. The "
-        f"same was done for a further effect, at most three. A share of {100 * MODEL_FLOOR:g} % of each channel's "
-        "signal counts as noise, because no model is better than that.",
+        "First the model's own parameters were re-tuned, each held by the stated standard deviation of its "
+        f"calibration and moved by at most {bound:g} of them. Then every effect of the catalogue was tried at every "
+        "possible place, with starting values from the residual; the most likely were fitted together with the "
+        "model's parameters, and the best was kept if it lowered the error sufficiently on data to which it was not "
+        f"fitted. This was repeated for further effects, at most three in all. A share of {100 * MODEL_FLOOR:g} % of "
+        "each channel's signal counts as noise, because no model is better than that.",
     )
 
 
 def _map_paragraph() -> str:
     """Significance in the map of the mismatch: false discovery rate, closed testing."""
     return (
-        "In the map, what recordings in which nothing is missing have counts as no mismatch; what "
-        "the most complete model errs by on held-out data of the same channel, in the same octave and those beside it, "
-        "counts as its usual error. Significant is what is larger beyond all that and noise, with false "
-        f"discoveries held at {100 * FALSE_DISCOVERY_RATE:g} % by closed testing: channel, then band, then level."
+        "In the map, an error that clean recordings (without missing physics) also have counts as no mismatch; the "
+        "error of the most complete model on held-out data of the same channel, in the same octave and the "
+        "neighbouring ones, counts as its usual error. A residual is significant where it exceeds these and the "
+        f"noise, with the false discovery rate held at {100 * FALSE_DISCOVERY_RATE:g} % by closed testing: channel, "
+        "then band, then level."
     )

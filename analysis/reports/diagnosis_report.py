@@ -104,7 +104,7 @@ def _candidate_sections(found: Findings) -> list[Section]:
 def _black_box_sections(found: Findings) -> list[Section]:
     text = black_box_sentence(found.black_box, bool(found.diagnosis.effects))
     paragraphs = tuple(filter(None, (*describe_ceiling(found.reached), text)))
-    return [Section("A black box beside it", paragraphs=paragraphs)] if paragraphs else []
+    return [Section("Comparison with a black box", paragraphs=paragraphs)] if paragraphs else []
 
 
 _NO_MAP = "There is no map: the noise of this recording is not known."
@@ -129,7 +129,7 @@ def _effect_section(found: Findings, number: int, pictures: Sequence[Picture]) -
         paragraphs += [f"Equation: {placed.equation}.", f"Source: {placed.source}."]
     rivals = rival_sentences(effect)
     if not rivals and not inseparable_sentence(effect):
-        paragraphs.append("No rival came near.")
+        paragraphs.append("No rival fits nearly as well.")
     return Section(
         capitalise(effect_title(effect, _has_single_input(found))),
         paragraphs=tuple(paragraphs),
@@ -161,7 +161,7 @@ def _error_section(found: Findings, pictures: Sequence[Picture]) -> Section:
 
 def _remainder_section(found: Findings, pictures: Sequence[Picture]) -> Section:
     left = found.diagnosis.remainder
-    tables = (mismatch_table("What is left", left, found.is_timed),) if left else ()
+    tables = (mismatch_table("Remaining mismatch", left, found.is_timed),) if left else ()
     return Section(
         "What is still unexplained",
         paragraphs=(remainder_sentence(found.diagnosis, device_of(found)),),
@@ -171,8 +171,8 @@ def _remainder_section(found: Findings, pictures: Sequence[Picture]) -> Section:
 
 
 _UNMOVED = {
-    False: "None had to move by more than the standard deviation of its calibration.",
-    True: "None had to move by more than what the first fit left open.",
+    False: "No parameter changed by more than the standard deviation of its calibration.",
+    True: "No parameter changed by more than the tolerance of the first fit.",
 }
 """Key: whether the model was fitted to the recordings first."""
 

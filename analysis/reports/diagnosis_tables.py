@@ -23,9 +23,9 @@ _MOST_PLACES = 12
 """Most rows of the table of mismatches."""
 _SHARE = (
     "In order of how much of the channel's whole signal is missing. Share: mismatch over signal there; where a state "
-    "is named, of the mismatch's power that sits in it."
+    "is named, the share of the mismatch's power that occurs in it."
 )
-_PARTS: Mapping[str, str] = {"fit": "the data that were fitted to", "test": "held-out data"}
+_PARTS: Mapping[str, str] = {"fit": "the fitted data", "test": "held-out data"}
 """Part of the data, and its text."""
 
 
@@ -69,11 +69,11 @@ def candidate_table(found: Findings) -> Table | None:
     )
     if not rows:
         return None
-    header = ("Candidate", "Numbers", "Held-out gain", "Of what all laws take", "Why it is not named")
+    header = ("Candidate", "Numbers", "Held-out gain", "Of what all laws explain", "Reason not to name it")
     note = (
-        "Held-out gain: share of the error's power that goes on data that nothing was fitted to, beside the other laws "
-        "of the best sum. The next column: the same as a share of what all laws together take of the error of mass, "
-        "damping and stiffness alone."
+        "Held-out gain: share of the error's power that the law explains on held-out data, in addition to the other "
+        "laws of the best sum. The next column gives the same as a share of what all laws together explain of the "
+        "error of mass, damping and stiffness alone."
     )
     return Table("The best candidates, not confirmed", header, rows, (note,))
 
@@ -149,7 +149,7 @@ def tabulate_retuned(found: Findings) -> Table | None:
         for before, after in zip(alone, final, strict=True)
     )
     header = ("Number", "Re-tuned", "Standard deviations", "With what was found", "Standard deviations")
-    return Table("Every number that was left open, by how much it moved", header, rows, folded=True)
+    return Table("Every free parameter, by the size of its change", header, rows, folded=True)
 
 
 def _stage_error_text(errors: Errors, stage: str) -> str:

@@ -134,4 +134,4 @@ def _order_tables(order: OrderReport | None) -> tuple[Table, ...]:
     )
     noise = f"The noise alone gives {100 * order.held_out_noise:.2f} %."
     header = ("Order", "Error on held-out lines", "Multiplications per tick", "With a full matrix")
-    return (Table("What an order buys and costs", header, rows, notes=(noise,)),)
+    return (Table("Error and cost by order", header, rows, notes=(noise,)),)

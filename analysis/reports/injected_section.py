@@ -50,9 +50,9 @@ def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
     return Section(
         "Faults injected into real recordings",
         paragraphs=(
-            "Two stretches were cut from a recording. One was left as it is, and served as the clean one; into the "
-            "other a fault of mechanism, actuator or sensor was put, drawn and sealed beforehand, or nothing. The "
-            "diagnosis was given the model that knows what is really there, both stretches, and nothing else.",
+            "Two stretches were cut from a recording. One was left unchanged and served as the clean recording; into "
+            "the other a fault of mechanism, actuator or sensor, drawn and sealed beforehand, was injected, or none. "
+            "The diagnosis was given the model of the real device, both stretches, and nothing else.",
             f"A fault is detectable where it changes the held-out error of a base model, fitted to the clean stretch "
             f"alone, by a factor of {DETECTABLE} or more, up or down.",
         ),

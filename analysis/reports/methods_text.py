@@ -76,8 +76,9 @@ def _task(protocol: StudyProtocol) -> str:
         f"{middle}°. The direction was {_DRAWS[protocol.schedule.directions]}. The participant said "
         f"which of the two it was, {limit}, and {text} whether that was right."
         + (
-            " A void trial came again with the same stimulus: after pauses and faults, and where the participant asked "
-            f"for it, at most {trial.repeats_per_run} times in a run. (Sessions begun before this rule drew a new one.)"
+            " A void trial was presented again with the same stimulus: after pauses and faults, and where the "
+            f"participant asked for it, at most {trial.repeats_per_run} times in a run. (Sessions begun before this "
+            "rule drew a new one.)"
         )
         + (
             " For every second participant the numbers 1 and 2 changed places; the table of trials has the angle."
@@ -128,11 +129,10 @@ def _staircase(rule: StaircaseRule) -> str:
     if rule.is_bayesian:
         early = f", or once its standard deviation was below {rule.bayesian.spread_db:g} dB"
         return (
-            f"The level began at {rule.start_n:g} N; each later one was that which was expected to tell most of "
-            "threshold and slope, from all answers of the run before it (Psi: Kontsevich and Tyler 1999; Weibull "
-            f"curve, 2 % lapses, flat prior). It never passed {rule.cap_n:g} N. "
-            f"A run ended after {rule.bayesian.trials} trials"
-            f"{early if rule.bayesian.spread_db else ''}."
+            f"The level began at {rule.start_n:g} N; each later level was the one that was expected to give the most "
+            "information on threshold and slope, given all previous answers of the run (Psi: Kontsevich and Tyler "
+            f"1999; Weibull curve, 2 % lapses, flat prior). It never passed {rule.cap_n:g} N. A run ended after "
+            f"{rule.bayesian.trials} trials{early if rule.bayesian.spread_db else ''}."
         )
     phases = conjoin([f"{phase.step_db:g} dB for {phase.reversals} reversals" for phase in rule.steps])
     up = "every wrong answer" if rule.up_after_wrong == 1 else f"{rule.up_after_wrong} wrong answers in a row"
@@ -160,11 +160,10 @@ def _threshold(rule: StaircaseRule) -> str:
             f"above it with a probability over {MAYBE_ABOVE:g}. {_SENSITIVITY}"
         )
     return (
-        "The threshold is the arithmetic mean, in newtons, of the levels at the last "
-        f"{rule.averaged_reversals} reversals. It was recomputed from the answers, and every level on record was "
-        "checked against the rule. It is marked as cut by the cap when at least one of these reversals is a peak at "
-        "the cap, which a stronger device would have let rise further; a bound of the true threshold it is not. "
-        f"{_SENSITIVITY}"
+        f"The threshold is the arithmetic mean, in newtons, of the levels at the last {rule.averaged_reversals} "
+        "reversals. It was recomputed from the answers, and every level on record was checked against the rule. It "
+        "is marked as cut by the cap when at least one of these reversals is a peak at the cap, which a stronger "
+        f"device would have let rise further; it is not a bound of the true threshold. {_SENSITIVITY}"
     )
 
 
@@ -174,8 +173,8 @@ def _side_procedures(protocol: StudyProtocol) -> tuple[str, ...]:
     sentences = []
     if demo.level_n:
         sentences.append(
-            f"Before anything was asked, both directions were played at every frequency, labelled, for "
-            f"{demo.seconds:g} s each at {levels_words(demo)}."
+            f"Before the first answer, both directions were played at every frequency, labelled, for {demo.seconds:g} "
+            f"s each at {levels_words(demo)}."
         )
     if protocol.gate.radius_mm:
         sentences.append(f"A trial began with the handle within {protocol.gate.radius_mm:g} mm of its place.")

@@ -37,9 +37,9 @@ RUN_MEANING = (
 )
 """Note on the thresholds of single runs."""
 SINGLE_MEANING = (
-    "From the answers at this frequency alone. What a run does not tell is averaged over usual people: slopes within a "
-    "factor of 1.5, response biases within 0.3 d', few lapses. Above the cap, or below the levels played (right "
-    "answers only): no size, a one-sided bound."
+    "From the answers at this frequency alone. What a run does not determine is averaged over typical participants: "
+    "slopes within a factor of 1.5, response biases within 0.3 d', few lapses. Above the cap, or below the levels "
+    "played (right answers only): no size, a one-sided bound."
 )
 """Note on thresholds by likelihood where there is no model of all answers."""
 TOBIT_MEANING = (
@@ -105,7 +105,7 @@ def _overall(primary: PrimaryAnalysis) -> str:
         f"{number(primary.frequency_sd_db, 1)} dB more from frequency to frequency. Median slope "
         f"{number(primary.slope)} ({primary.family.value}), lapse rate {number(100 * primary.lapse, 1)} %, response "
         f"bias {number(primary.criterion_sd)} (standard deviation, in units of d')."
-        + ("" if primary.converged else " The search ended before it had settled: do not use these numbers.")
+        + ("" if primary.converged else " The fit did not converge: do not use these numbers.")
         + describe_undetermined(primary)
         + far_above_words(primary)
     )
@@ -117,7 +117,7 @@ def far_above_words(primary: PrimaryAnalysis) -> str:
     if len(primary.far_above_hz) < 2:
         return ""
     names = conjoin([f"{frequency_hz:g} Hz" for frequency_hz in primary.far_above_hz])
-    return f" At {names} the medians lie at more than twice the cap: nothing is known of the differences between these."
+    return f" At {names} the medians lie at more than twice the cap: the differences between these are not known."
 
 
 def describe_undetermined(primary: PrimaryAnalysis) -> str:
@@ -133,8 +133,8 @@ def describe_undetermined(primary: PrimaryAnalysis) -> str:
     if not at_bound:
         return ""
     return (
-        f" The answers do not tell how much people differ in their {conjoin(at_bound)}: the search ended at its bound. "
-        "Do not use the median slope, nor single curves."
+        f" The answers do not determine how much people differ in their {conjoin(at_bound)}: the search ended at its "
+        "bound. Do not use the median slope, nor single curves."
     )
 
 
@@ -241,7 +241,7 @@ def run_words(run: RunLikelihood) -> tuple[str, str]:
 def _persons(primary: PrimaryAnalysis) -> Table:
     """Table of the model's estimates per person: thresholds in N, slope, criterion (shrunk towards the population)."""
     return Table(
-        caption="People, as the model sees them (N)",
+        caption="Thresholds of the participants by the model (N)",
         header=("Participant", *(f"{f:g} Hz" for f in primary.frequencies_hz), "Slope", "Criterion"),
         rows=tuple(
             (
@@ -255,7 +255,10 @@ def _persons(primary: PrimaryAnalysis) -> Table:
             )
             for person in primary.persons
         ),
-        notes=("Drawn towards the other people's where a person's own answers say little.",),
+        notes=(
+            "Shrunk towards the other participants' thresholds where a participant's own answers carry little "
+            "information.",
+        ),
         folded=True,
     )
 
@@ -270,8 +273,8 @@ def _goodness(primary: PrimaryAnalysis) -> Table:
             for b in primary.goodness.bins
         ),
         notes=(
-            "Levels follow answers and persons were fitted to theirs, so single shares are off by up to three standard "
-            "errors where all is well. Look for departures with a shape.",
+            "Levels follow answers and persons were fitted to theirs, so single shares deviate by up to three "
+            "standard errors even where the model is right. Look for systematic departures.",
         ),
         folded=True,
     )

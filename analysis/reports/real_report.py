@@ -51,8 +51,8 @@ def render_real_report(
     return render_page(
         Page(
             title="Diagnosis of real recordings",
-            summary=f"{len(answers)} recordings of real devices were compared with simple models; in {named} of them "
-            "physics was named. What is left, and what speaks against each answer, is said beside it.",
+            summary=f"{len(answers)} recordings of real devices were compared with simple models; in {named} of them physics "
+            "was named. The remaining error and the objections to each answer are given with it.",
             banner=_banner(troubles),
             sections=tuple(sections),
             generated=generated,

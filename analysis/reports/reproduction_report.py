@@ -13,9 +13,10 @@ from analysis.reports.page import Page, Section, Table, render_page
 from analysis.wording import NONE, number
 
 BANNER = (
-    "Everything here was simulated: the device, and those who answered. The simulation was set up to show the features "
-    "that the paper reports, so that they come out here confirms nothing about the paper or about a real omega.3. What "
-    "is shown is that the methods run from end to end, and where they lead on something of this kind."
+    "Everything here was simulated: the device, and those who answered. The simulation was set up to show the "
+    "features that the paper reports, so their appearance here confirms nothing about the paper or about a real "
+    "omega.3. It shows only that the methods run from end to end, and which results they give on a device of this "
+    "kind."
 )
 
 _SAYS: dict[bool | None, str] = {True: "yes", False: "no", None: "–"}
@@ -36,11 +37,11 @@ _ROW_NOTES = (
     "scaled by their mean gain first.",
 )
 _BASELINE_NOTES = (
-    "Swept sines, as in the figure. Every row but the last of 'edge' and 'in the hand' knows only what was identified "
+    "Swept sines, as in the figure. Every row but the last of 'edge' and 'in the hand' uses only what was identified "
     "at the centre without a hand. 'Nothing' commands the wanted number of m/s² in N, so its flatness is a gain that "
-    "was never set; 'static gain' sets it. The rigid-body model is fitted to the whole band here; the raw estimate is "
-    "the measured response, inverted line by line. Cost: multiplications and additions per sample, of a form that runs "
-    "sample by sample.",
+    "was never set; 'static gain' sets it. The rigid-body model is fitted to the whole band here; the raw estimate "
+    "is the measured response, inverted line by line. Cost: multiplications and additions per sample, of a form that "
+    "runs sample by sample.",
 )
 
 
@@ -110,7 +111,7 @@ def _overview(reproduction: Reproduction) -> Section:
     )
     sentence = (
         f"Of {len(compared)} things that the paper says of its figures and that can be compared by a rule, {agreeing} "
-        "came out as published. The rules are ours and stand below each table."
+        "came out as published. The rules are ours and are given below each table."
     )
     named = " These did not:" if otherwise else ""
     return Section("What came out", paragraphs=(sentence + named,), points=otherwise)

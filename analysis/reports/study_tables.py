@@ -64,7 +64,7 @@ def group_table(analysis: StudyAnalysis) -> Table:
         ),
         rows=tuple(rows),
         notes=(
-            "Comparison intervals are for comparing means with each other; they are no confidence intervals.",
+            "Comparison intervals are for comparing means with each other; they are not confidence intervals.",
             *_coverage(analysis),
         ),
     )
@@ -160,7 +160,7 @@ def within_table(analysis: StudyAnalysis) -> Table:
     )
 
 
-TURNS = "Reversals at the cap: of the averaged ones. Pushes: how often the rule asked for more than the cap."
+TURNS = "Reversals at the cap: of the averaged ones. Pushes: how often the rule required more than the cap."
 """Note below the table of runs, for staircases."""
 
 

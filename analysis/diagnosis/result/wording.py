@@ -42,8 +42,8 @@ from analysis.wording import capitalise, conjoin, end_sentence, p_text
 _PLACES_NAMED = 3
 """Largest number of places of a remaining mismatch that a sentence lists."""
 _NOT_MORE = (
-    "What is left is no more than the noise seems to be; only repeats of a drive would show that nothing else is "
-    "missing."
+    "The residual is no larger than the estimated noise; only repeated periods of the excitation could show that "
+    "nothing else is missing."
 )
 
 
@@ -70,7 +70,7 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedParameter] = (),
     named = conjoin([effect_title(effect, single) for effect in diagnosis.effects])
     how = "" if device is None else device.noise
     if diagnosis.verdict == "no_mismatch":
-        return f"The model answers as the device does: {one_error('as it was given', errors.before, errors, how)}."
+        return f"The model agrees with the device: {one_error('as given', errors.before, errors, how)}."
     if diagnosis.verdict == "parameters":
         off = (
             f": {conjoin([number.text for number in moved])}"
@@ -78,7 +78,7 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedParameter] = (),
             else ", each within its calibration's standard deviation"
         )
         fall = fall_text(errors, ("before", "as given"), ("retuned", "re-tuned"), how)
-        return f"No physics is missing; parameters of the model are off{off}. {capitalise(fall)}."
+        return f"No physics is missing; parameters of the model are wrong{off}. {capitalise(fall)}."
     if diagnosis.effects:
         fall = capitalise(fall_text(errors, better_model(errors), ("after", "with it"), how))
         if not significant(diagnosis.remainder):
@@ -140,8 +140,8 @@ def _inseparable(effect: NamedEffect) -> str:
         )
     )  # fmt: skip
     return (
-        f"These data cannot tell {noun_of(effect.effect)} from {conjoin([noun_of(other.effect) for other in others])}: "
-        f"{both} named (probabilities: {odds})."
+        f"These data do not distinguish {noun_of(effect.effect)} from "
+        f"{conjoin([noun_of(other.effect) for other in others])}: {both} named (probabilities: {odds})."
     )
 
 
@@ -150,7 +150,7 @@ def remainder_sentence(diagnosis: Diagnosis, device: Device | None = None) -> st
     begins with the largest share of the signal, and the number of the others."""
     left = significant(diagnosis.remainder)
     if not left:
-        return "Nothing significant is left unexplained."
+        return "No significant mismatch remains."
     more = len(left) - _PLACES_NAMED
     rest = f"; and {more} smaller {'place' if more == 1 else 'places'}" if more > 0 else ""
     return f"Still unexplained: {'; '.join(place_of(row, device) for row in left[:_PLACES_NAMED])}{rest}."
@@ -179,9 +179,9 @@ def next_experiment_sentence(diagnosis: Diagnosis) -> str:
     wanted = diagnosis.next_experiment
     if wanted is None:
         alike = any(rival.inseparable for effect in diagnosis.effects for rival in effect.rivals)
-        return "No further recording is foreseen to tell apart what these data cannot." if alike else ""
+        return "No further recording was found that would distinguish what these data do not." if alike else ""
     named, *rivals = (noun_of(name) for name in wanted.splits) if wanted.splits else ("",)
-    splits = f"would tell {named} from {conjoin(rivals)}" if rivals else "would help"
+    splits = f"would distinguish {named} from {conjoin(rivals)}" if rivals else "would help"
     subject = "The recordings" if "; then " in wanted.command else "The recording"
     return f"{subject} that {splits}: {wanted.command}. {capitalise(end_sentence(wanted.why))}"
 
@@ -189,8 +189,8 @@ def next_experiment_sentence(diagnosis: Diagnosis) -> str:
 def share_sentence(effect: NamedEffect) -> str:
     """Sentences on an effect's share of the mismatch after re-tuning, its probability, and its held-out gain."""
     return (
-        f"It accounts for {100 * effect.share:.3g} % of the mismatch that re-tuning leaves; "
-        f"the probability that this is its name is {probability_text(effect.probability)}.{gain_sentence(effect)}"
+        f"It accounts for {100 * effect.share:.3g} % of the mismatch after re-tuning; the probability that this "
+        f"effect is the cause is {probability_text(effect.probability)}.{gain_sentence(effect)}"
     )
 
 
@@ -200,7 +200,7 @@ def gain_sentence(effect: NamedEffect) -> str:
     if gain is None or gain.ci95 is None:
         return ""
     low, high = (share_text(max(end, 0.0)) for end in gain.ci95)
-    return f" On held-out data it takes {share_text(max(gain.value, 0.0))} of the error's power ({low} to {high})."
+    return f" On held-out data it explains {share_text(max(gain.value, 0.0))} of the error's power ({low} to {high})."
 
 
 def summary_lines(found: Findings) -> tuple[str, ...]:

@@ -126,7 +126,7 @@ def _sentence(what: str, crashes: Iterable[Crash]) -> str:
     noun = noun_of(what)
     name = noun if what in noun or noun == what.replace("_", " ") else f"{noun} ({what})"
     at = conjoin([f"{doing} ({said})" for doing, said in own])
-    return f"{capitalise(name)} was left out where the program crashed at {at}: this answer was found without it."
+    return f"{capitalise(name)} was left out because of a program error at {at}: the result was obtained without it."
 
 
 def _effect_of(item: object) -> str:

@@ -288,7 +288,7 @@ def _exchange_and_prune(
     nothing = replace(found, after=found.retuned, steps=())
     exchanged = exchange_effects(context, found, catalogue, progress, time_left)
     newest = found.steps[-1].newest if found.steps else ""
-    return context.guard.part(newest, "its last look", lambda: prune(context, exchanged, time_left), nothing)
+    return context.guard.part(newest, "the final check", lambda: prune(context, exchanged, time_left), nothing)
 
 
 def _judge_with_prediction(context: SearchContext, found: Explanation) -> Judgement:

@@ -7,8 +7,7 @@ from itertools import count
 from analysis.diagnosis.types import Mapper, TimeBudget
 
 OUT_OF_TIME = (
-    "The time for the search ran out before it was done: a further effect, or a better fit of the last one, was not "
-    "looked for."
+    "The time limit of the search was reached: a further effect, or a better fit of the last one, was not searched for."
 )
 
 

@@ -33,27 +33,27 @@ from analysis.diagnosis.settings import (
 from equalizer.signals.signal import FloatArray
 
 TEST_HALF_USED = (
-    "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
-    "such stretch was used to find it, the second half to confirm it."
+    "The held-out data show a mismatch that the rest of the recording does not contain: the first half of each "
+    "held-out stretch was used to find its cause, the second half to confirm it."
 )
 TEST_PARTS_USED = (
-    "What was kept for the test shows something that the rest of the recording does not hold, and only in places: "
-    "every other of many equal parts of each such stretch was used to find it, those between to confirm it. They are "
-    "of the same motion, so that this test is weaker than one of another recording."
+    "The held-out data show a mismatch that the rest of the recording does not contain, and only in places: every "
+    "other one of many equal parts of each held-out stretch was used to find its cause, the parts between to confirm "
+    "it. Both are from the same motion, so that this test is weaker than one of another recording."
 )
 MILDER_TEST_USED = (
-    "What was kept for the test shows something that the rest of the recording does not hold: all but the loudest of "
-    "it was used to find it, the loudest to confirm it."
+    "The held-out data show a mismatch that the rest of the recording does not contain: all but the strongest part "
+    "of these data was used to find its cause, the strongest part to confirm it."
 )
-NOT_SHOWN = "What was kept for the test shows a mismatch that the rest of the recording does not hold."
+NOT_SHOWN = "The held-out data show a mismatch that the rest of the recording does not contain."
 ONLY_REFINES = (
-    "What explains it best is a law that was to be left out. Laws that hold it as a special case explain it as well, "
-    "but what they add to it does not show, so none of them is named."
+    "The best explanation is a law that was excluded from the search. Laws that contain it as a special case explain "
+    "the mismatch equally well, but their additional terms are not significant, so none of them is named."
 )
 MODEL_MOVED = (
     f"The model's own parameters were allowed to move by up to {WIDER_RETUNING_BOUND:g} standard deviations of their "
-    "calibration: within fewer, nothing as plain explains the recordings. The model may have been fitted to a device "
-    "that had the missing physics already."
+    "calibration: within a smaller range, no equally simple explanation was found. The model may have been fitted to "
+    "a device that already had the missing physics."
 )
 
 
@@ -116,7 +116,7 @@ def search_remarks(found: Explanation) -> tuple[str, ...]:
     early = (OUT_OF_TIME,) if found.ended_early else ()
     barred = (ONLY_REFINES,) if found.barred else ()
     undetermined = (
-        f"An explanation by {noun_of(name)} is not named: these recordings leave its parameters as good as open."
+        f"An explanation by {noun_of(name)} is not named: these recordings hardly determine its parameters."
         for name in dict.fromkeys(found.undetermined)
     )
     return (*early, *barred, *undetermined)

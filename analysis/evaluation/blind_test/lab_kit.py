@@ -31,7 +31,7 @@ class Change:
 
 
 CHANGES: tuple[Change, ...] = (
-    Change(NOTHING, "Take everything off and put it back, as if something were changed.", (), ""),
+    Change(NOTHING, "Remove all attachments and mount them again, as if something were changed.", (), ""),
     Change(
         "added_mass",
         "Screw 20 to 100 g to the handle, close to its middle, and weigh them beforehand.",

@@ -42,7 +42,7 @@ class FigureFindings:
 
     figure: Annotated[int, Field(ge=1, le=5)]
     title: str
-    source: Annotated[str, Field(description="Where in the paper.")]
+    source: Annotated[str, Field(description="Place in the paper.")]
     published: Annotated[str, Field(description="What the figure shows there, in our words.")]
     findings: tuple[Finding, ...]
     differs: Annotated[tuple[str, ...], Field(description="What is different here, and why; one sentence or two each.")]
@@ -76,8 +76,10 @@ class UsedModel:
 
     name: str
     expected_error: Annotated[float, Field(description="Relative, with misfit and scatter; not below the others.")]
-    held_out_error: Annotated[float | None, Field(description="On what was kept for a test; null without a test.")]
-    held_out_noise: Annotated[float | None, Field(description="Of what was kept; null where it is not known.")]
+    held_out_error: Annotated[float | None, Field(description="On the held-out record; null without one.")]
+    held_out_noise: Annotated[
+        float | None, Field(description="Noise of the held-out record; null where it is not known.")
+    ]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -90,7 +92,7 @@ class Reproduction:
     band_hz: Annotated[tuple[float, float], Field(description="In which the device was equalized.")]
     order: Annotated[int, Field(description="Of the identified models.")]
     figures: tuple[FigureFindings, ...]
-    played: Annotated[tuple[PlayedRow, ...], Field(description="Rows of figure 5, and what stands beside them.")]
+    played: Annotated[tuple[PlayedRow, ...], Field(description="Rows of figure 5, and further rows for comparison.")]
     baselines: Annotated[
         tuple[PlayedRow, ...], Field(description="Other ways of driving the device: centre, edge, in a simulated hand.")
     ] = ()

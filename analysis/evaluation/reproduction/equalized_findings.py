@@ -89,13 +89,13 @@ def find_equalized(
 
 
 _DIFFERS = (
-    "Measured is the handle's true acceleration, which only a simulation can tell; the paper's curves are those of its "
-    "accelerometer, whose mounting error would be in them.",
-    "The simulated drives have Coulomb friction of about 0.2 N, which no linear model holds. Swept sines, as in the "
-    "paper, drive one frequency at a time and far above it; a signal of all frequencies at once is weaker at each and "
-    "pays more. Both are in the table, beside a twin of the device without friction.",
-    "The accelerometer's mounting is off by about 1° and 1 %, and a model identified from it holds that: coupling of "
-    "the true motion cannot fall much below −30 dB, with or without friction.",
+    "The measured quantity is the true acceleration of the handle, which is known only in a simulation; the paper's "
+    "curves are those of its accelerometer, whose mounting error would be in them.",
+    "The simulated drives have Coulomb friction of about 0.2 N, which no linear model contains. Swept sines, as in "
+    "the paper, drive one frequency at a time and far above it; a signal of all frequencies at once is weaker at "
+    "each frequency and is affected more. Both are in the table, together with a copy of the device without friction.",
+    "The accelerometer's mounting is off by about 1° and 1 %, and a model identified from it contains this error: "
+    "coupling of the true motion cannot fall much below −30 dB, with or without friction.",
     "How much a place in the workspace changes the response is a matter of our geometry; the paper does not say how "
     "far off the centre its third row was taken. The fourth row is ours.",
 )

@@ -24,9 +24,10 @@ LARGE = 3.0
 """Ratio of the gain to its median from 15 to 60 Hz, above which a resonance counts as large."""
 
 _GEOMETRY = (
-    "Link lengths, inertias, friction and modes of the omega.3 are not public. The simulated device is of its size; a "
-    "mode near 11 Hz, modes from 80 Hz on and friction that rules below 10 Hz were put in because the paper reports "
-    "them. Their heights, widths and couplings are ours, and the curves are not to be laid over the published ones."
+    "Link lengths, inertias, friction and modes of the omega.3 are not public. The simulated device is of its size; "
+    "a mode near 11 Hz, modes from 80 Hz on and friction that dominates below 10 Hz were put in because the paper "
+    "reports them. Their heights, widths and couplings are ours, and the curves must not be compared point by point "
+    "with the published ones."
 )
 
 
@@ -45,15 +46,15 @@ def response_findings(
         figure=4,
         title="Transfer functions from every force to every acceleration",
         source="Figure 4 and section III B",
-        published="Swept sines of 30 s from 1 to 500 Hz, one axis after the other and repeated, an accelerometer on "
-        "the handle, a weak spring of about 3.5 Hz instead of a hand. The paper sees a resonance near 11 Hz that "
-        "couples the axes, large resonances and coupling from about 80 Hz, a slope below 10 Hz that it puts down to "
+        published="Swept sines of 30 s from 1 to 500 Hz, one axis after the other and repeated, an accelerometer on the "
+        "handle, a weak spring of about 3.5 Hz instead of a hand. The paper sees a resonance near 11 Hz that couples "
+        "the axes, large resonances and coupling from about 80 Hz, a slope below 10 Hz that it attributes to "
         "friction and damping, and too little energy below 3.5 Hz. It sets the onset of coupling at about 10 Hz.",
         findings=tuple(finding for finding in findings if finding is not None),
         differs=(
             _GEOMETRY,
-            "The paper reads the onset off its curves; here a rule finds it, with an interval that holds the noise "
-            "alone.",
+            "The paper reads the onset off its curves; here a rule finds it, with an interval that accounts for "
+            "noise alone.",
         ),
         remarks=response.remarks,
     )

@@ -26,9 +26,9 @@ LIMIT_RULE = (
 _DIFFERS = (
     "No person took part: the participants are simulated, and how their thresholds rise with frequency was set "
     "beforehand so that a study of ten resembles the published one in its main lines. That it does is no evidence "
-    "about people; "
-    "what is tried out here is the procedure, the analysis and the figure.",
-    "The paper prints no threshold as a number, so levels are not compared, only what its text says of them.",
+    "about people; this is a test of the procedure, the analysis and the figure.",
+    "The paper prints no threshold as a number, so levels are not compared, only the statements of its text about "
+    "them.",
     "As in the paper, thresholds that the cap cut off enter means as plain numbers, and means near the cap are too "
     "low.",
 )
@@ -84,7 +84,7 @@ def study_findings(analysis: StudyAnalysis) -> FigureFindings:
     ]
     return FigureFindings(
         figure=2,
-        title="Thresholds for telling two directions apart",
+        title="Thresholds for discriminating two directions",
         source="Figure 2 and section III A",
         published="Ten participants, five frequencies, a staircase each. The paper sees performance fall from 5 to "
         "15 Hz and again to 25 Hz, without significance, a significantly higher mean and a wide spread at 35 Hz, where "

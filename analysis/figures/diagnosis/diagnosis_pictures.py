@@ -41,7 +41,7 @@ def diagnosis_drawings(found: Findings) -> list[Part]:
         ("the figure of signatures", lambda: signature_pictures(found.signatures)),
         ("the figure of rivals", lambda: rivals_pictures(found.explanation, found.axes or ("x", "y", "z"))),
         ("the figure of held-out errors", lambda: [held_out_picture(*held)] if held[0] or held[2] else []),
-        ("the spectrum of what is left", lambda: _remainder(found)),
+        ("the spectrum of the residual", lambda: _remainder(found)),
     ]
     return [Part(name, "its drawing", partial(_with_time_labels, draw, found.is_timed), ()) for name, draw in drawn]
 

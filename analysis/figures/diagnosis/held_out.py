@@ -53,14 +53,15 @@ def held_out_picture(
     where = ""
     if excerpt is not None:
         where = (
-            f"Left: {excerpt.series.channels[excerpt.channel]} in {excerpt.series.name}, where what was found changes "
-            "the prediction most; below, what each prediction leaves, over twice the noise to either side (grey). "
+            f"Left: {excerpt.series.channels[excerpt.channel]} in {excerpt.series.name}, where the effects found "
+            "change the prediction most; below, the residual of each prediction, with plus and minus twice the noise "
+            "(grey). "
         )
     return Picture(
         name="held-out",
-        title="Held-out data: as given, re-tuned, with what was found",
-        caption=f"{where}{'Right: e' if where else 'E'}rror of each channel over all held-out samples in units of its "
-        "noise; at the line there is nothing but noise. Nothing was fitted to or chosen by these data.",
+        title="Held-out data: as given, re-tuned, with the effects found",
+        caption=f"{where}{'Right: e' if where else 'E'}rror of each channel over all held-out samples in units of its noise; "
+        "the line marks noise alone. These data were used neither for fitting nor for model selection.",
         figure=draw_held_out(excerpt, noise_rms, errors),
         alternative=_alternative_text(errors),
     )
@@ -154,7 +155,7 @@ def _draw_excerpt(above: Axes, below: Axes, excerpt: Excerpt, noise_rms: Mapping
     above.tick_params(labelbottom=False)
     above.set_xlim(float(seconds[0]), float(seconds[-1]))
     above.set_ylabel(f"{name} ({shown.unit})", fontsize=9.5)
-    below.set_ylabel(f"left over ({small.unit})", fontsize=9.5)
+    below.set_ylabel(f"residual ({small.unit})", fontsize=9.5)
     below.set_xlabel("Time (s)", fontsize=9.5)
 
 

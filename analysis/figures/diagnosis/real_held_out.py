@@ -24,8 +24,8 @@ def real_picture(answer: RealAnswer) -> Picture:
     return Picture(
         name=f"held-out-{_plain_name(answer.folder)}-{_plain_name(answer.recording)}",
         title=f"Held-out data of {answer.recording}",
-        caption="Left: where what was found changes the prediction most. Right: errors on all held-out data as a share "
-        "of the signal, logarithmic; shorter is better.",
+        caption="Left: where the effects found change the prediction most. Right: errors on all held-out data as a share of "
+        "the signal, logarithmic; shorter is better.",
         figure=_draw_answer(answer.excerpt, rows),
         alternative=text or "Nothing was held out.",
     )
@@ -40,7 +40,7 @@ def error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
     every = (
         ("as given", errors.before, ORANGE),
         ("re-tuned", errors.retuned, RETUNED.colour),
-        ("with what was found", errors.after if answer.effects else None, AFTER.colour),
+        ("with the effects found", errors.after if answer.effects else None, AFTER.colour),
         ("black box", answer.black_box, GREEN),
         ("noise alone", errors.noise, GREY),
     )

@@ -27,9 +27,9 @@ def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
     """Picture of the residual spectra, with its caption and its text for screen readers."""
     return Picture(
         name="remainder",
-        title="What is left over on held-out data",
-        caption="Amplitude densities in sixths of an octave. Where the solid line lies on the grey band, all but noise "
-        "is explained; where it lies above, something is not.",
+        title="Residual on held-out data",
+        caption="Amplitude densities in sixths of an octave. Where the solid line lies on the grey band, the residual is "
+        "noise; where it lies above, a mismatch remains.",
         figure=draw_remainder(spectra),
         alternative=" ".join(_alternative_text(each) for each in spectra),
     )

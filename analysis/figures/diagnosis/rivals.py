@@ -25,8 +25,8 @@ from equalizer.signals.signal import FloatArray
 
 MOST_RIVALS = 8
 """Largest number of explanations that are drawn in a figure."""
-_SEEN = "The data that were fitted to and chosen by; rivals are not tried on held-out data."
-_BOTH = "Filled: the data that were fitted to and chosen by; open: held-out data, by which nothing was chosen."
+_SEEN = "Errors on the data that were used for fitting and model selection; rivals are not evaluated on held-out data."
+_BOTH = "Filled: data that were used for fitting and model selection; open: held-out data, which were used for neither."
 _ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
 
@@ -66,9 +66,9 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
                 Picture(
                     name=f"rivals-{number}",
                     title=f"What was tried for the {_ORDINALS[several.index(number)]} effect"
-                    + ("" if held else "; none earned its place"),
-                    caption="Error in units of the noise, mean over the channels, of each explanation after its fit, "
-                    "together with what had been found before. "
+                    + ("" if held else "; none was accepted"),
+                    caption="Error in units of the noise, mean over the channels, of each explanation after its fit, in "
+                    "addition to the effects found before. "
                     + (_BOTH if any(np.isfinite(each.test) for each in tried) else _SEEN)
                     + " Dashed: the re-tuned model alone.",
                     figure=draw_rivals(tried, retuned, held),

@@ -19,10 +19,10 @@ from analysis.wording import capitalise, typeset
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
 
-_ROUNDED = " A missing force is known only as fast as noise lets it be, so that corners look rounder than they are."
+_ROUNDED = " Noise limits the bandwidth of the missing force, so corners look rounder than they are."
 """Sentence of the caption where the ordinate is an estimated missing force, whose bandwidth the noise limits."""
 
-_BEYOND = " Shaded: no recording came there; what the formula says there is not known."
+_BEYOND = " Shaded: outside the recorded range, where the formula is not tested."
 """Sentence of the caption where the law is drawn beyond the recorded range, as an extrapolation."""
 
 
@@ -31,9 +31,9 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
     return tuple(
         Picture(
             name=f"signature-{number}",
-            title=f"What shows {noun_of(signature.effect)}{f' ({signature.axis})' if signature.axis else ''}",
-            caption="Dots: what the model, with all else that was found, fails to explain without this effect, mean "
-            "per bin; bars: two standard errors. "
+            title=f"Signature of {noun_of(signature.effect)}{f' ({signature.axis})' if signature.axis else ''}",
+            caption="Dots: residual of the model with all other effects found but without this one, mean per bin; bars: two "
+            "standard errors. "
             + (
                 "Line: the formula."
                 if signature.effect == DISCOVERED_LAW

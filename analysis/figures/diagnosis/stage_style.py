@@ -35,7 +35,7 @@ class Stage:
 
 BEFORE = Stage("before", "as given", ORANGE, (0, (1.2, 1.2)), 1.4)
 RETUNED = Stage("retuned", "re-tuned", PURPLE, (0, (4, 1.6)), 1.4)
-AFTER = Stage("after", "with what was found", BLUE, "-", 1.4)
+AFTER = Stage("after", "with the effects found", BLUE, "-", 1.4)
 STAGES = (BEFORE, RETUNED, AFTER)
 MEASURED = Line2D([], [], color=BLACK, linewidth=2.6, alpha=0.35, label="measured")
 """Legend entry of the measured signal."""

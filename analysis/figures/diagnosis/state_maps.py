@@ -32,22 +32,22 @@ def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
     along = f" along {first.axis}" if len(maps) > 1 else ""
     others = [f"{share_text(each.share)} along {each.axis}" for each in maps[1:]]
     beside = f" Not drawn: {conjoin(others)}." if others else ""
-    left = f" Blue: mean of what is left {first.completed}." if first.completed else ""
+    left = f" Blue: mean of the residual force {first.completed}." if first.completed else ""
     states = Picture(
         name="state-map",
-        title=f"The force that is missing{along}, over the states of motion",
-        caption=f"What {first.model} {'lack' if ' and ' in first.model else 'lacks'} as a force on the device; grey: "
-        f"single samples; black: mean per bin, with two standard errors.{left} A flat line at zero says that nothing "
-        f"depends on that state. Rms: {share_text(first.share)} of the force.{beside}",
+        title=f"Missing force{along} over the states of motion",
+        caption=f"Force on the device that {first.model} {'lack' if ' and ' in first.model else 'lacks'} ; grey: single "
+        f"samples; black: mean per bin, with two standard errors.{left} A flat line at zero means that the missing "
+        f"force does not depend on that state. Rms: {share_text(first.share)} of the force.{beside}",
         figure=_draw_states(first),
         alternative=" ".join(_alternative_text(view, first.unit) for view in first.views),
     )
     text = f", and {first.completed}" if first.completed else ""
     loops = Picture(
         name="state-loops",
-        title=f"The force{along} over a stretch of the motion",
-        caption=f"About one period, where the travel is widest: the force as it was, as {first.model} would need it"
-        f"{text}. The area inside a loop over the position is work that is lost.",
+        title=f"Force{along} during part of the motion",
+        caption="About one period, where the travel is largest: the measured force, and the force computed from "
+        f"{first.model}{text}. The area inside a loop over the position is the dissipated work.",
         figure=_draw_loops(first),
         alternative=_loop_text(first),
     )
@@ -69,7 +69,7 @@ def _draw_states(maps: StateMaps) -> Figure:
         Line2D([], [], color=BLACK, marker="o", linestyle="", markersize=3.5, label="missing, mean"),
     ]
     if maps.completed:
-        handles.append(Line2D([], [], color=BLUE, linewidth=1.8, label=f"left {maps.completed}"))
+        handles.append(Line2D([], [], color=BLUE, linewidth=1.8, label=f"residual {maps.completed}"))
     figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=9, frameon=False)
     return figure
 
@@ -151,4 +151,4 @@ def _loop_text(maps: StateMaps) -> str:
         for words, values in kinds
         if len(values)
     ]
-    return f"Distance from the measured force in this stretch, rms over the force's own: {'; '.join(left)}."
+    return f"Error of the computed force in this stretch, rms relative to the measured force: {'; '.join(left)}."

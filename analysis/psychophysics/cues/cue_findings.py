@@ -142,8 +142,8 @@ def gap_text(gaps: Sequence[CueGap]) -> str:
         for each in gaps
     ]
     return (
-        f"Whether direction was the cue is judged by the trials measured for it. Not measured: {conjoin(parts)}. "
-        "All other analyses take these trials, too."
+        f"Whether direction was the cue is judged by the trials measured for it. Not measured: {conjoin(parts)}. All "
+        "other analyses include these trials, too."
     )
 
 

@@ -28,7 +28,7 @@ CONFIDENCE = 0.95
 FAR_ABOVE_DB = 6.0
 """Of two medians that both lie this far above the cap no difference is reported: the right answers are hardly more than
 chance at all levels, the sizes are extrapolated, and their differences have no known error."""
-FAR_ABOVE = "Two medians or more lie at more than twice the cap: nothing is known of their differences."
+FAR_ABOVE = "Two medians or more lie at more than twice the cap: their differences are not known."
 
 
 @dataclass(frozen=True, slots=True)

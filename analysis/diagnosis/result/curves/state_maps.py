@@ -33,7 +33,7 @@ LOOP_SAMPLES = 2000
 """Largest number of samples of a loop."""
 LOOP_PERIODS = 1.1
 """Length of a loop in periods of the motion's strongest line, so that it closes."""
-NAMED, NOT_CONFIRMED = "with what is named", "with the best candidates, not confirmed"
+NAMED, NOT_CONFIRMED = "with the named effects", "with the best candidates, not confirmed"
 """Texts for the laws that complete the model."""
 
 
