@@ -40,7 +40,8 @@ REVERSALS = ThresholdWords(
     means="reversal means",
     cut="which cut off peaks of the staircase",
     cut_note=f"cut: the cap cut off peaks of the staircase. {CUT_END}",
-    too_low="reversal means near the cap are too low before they are cut, and a cut mean is not a bound of the threshold",
+    too_low="reversal means near the cap are too low before they are cut, and a cut mean is not a bound of the "
+    "threshold",
     measured_in="the trials of the averaged reversals",
     levels="A staircase stops descending where answers happen to be wrong, so the lowest points lie somewhat below the "
     "curve even of a correct model.",
@@ -62,7 +63,8 @@ def _psi(rule: StaircaseRule) -> ThresholdWords:
             "threshold",
         measured_in=f"the last {last} trials of each run, taken in proportion to the threshold" if last > 1
         else "the last trial of each run, taken in proportion to the threshold",
-        levels="Levels followed the answers, so the lowest points deviate somewhat from the curve even of a correct model.",
+        levels="Levels followed the answers, so the lowest points deviate somewhat from the curve even of a correct "
+        "model.",
         track="Level of every counted trial, chosen by Psi, with right and wrong answers; the line is the threshold, "
         "the mean of the posterior after the last answer.",
         sensitivity="Levels follow the answers, so d' of the answers hardly depends on the cue.",

@@ -38,9 +38,9 @@ def frequency_bands_picture(
     return Picture(
         name="frequency-bands",
         title="Frequency bands",
-        caption="Above: response across over response along when one axis is driven, for the worst axis. Coupling onset: "
-        f"{onset.rule}; the mark's width is its 95 % interval. Below: what the device does, what the person feels, "
-        "and how each band is driven. " + " ".join(f"{band.name.capitalize()}: {band.why}" for band in bands),
+        caption="Above: response across over response along when one axis is driven, for the worst axis. Coupling "
+        f"onset: {onset.rule}; the mark's width is its 95 % interval. Below: what the device does, what the person "
+        "feels, and how each band is driven. " + " ".join(f"{band.name.capitalize()}: {band.why}" for band in bands),
         figure=draw_frequency_bands(response, onset, bands, direction_limit_hz),
     )
 

@@ -117,8 +117,8 @@ def _spectra_picture(found: Overview, name: str) -> Picture:
     return Picture(
         name=name,
         title="Spectra",
-        caption=f"Mean of {found.spectra.windows} windows of {1 / step_hz:.3g} s (Hann window, half overlap, linear trend "
-        "removed). Shade: from the lowest to the highest frequency that a command was driven at.",
+        caption=f"Mean of {found.spectra.windows} windows of {1 / step_hz:.3g} s (Hann window, half overlap, linear "
+        "trend removed). Shade: from the lowest to the highest frequency that a command was driven at.",
         figure=figure,
     )
 
@@ -164,9 +164,9 @@ def _coherence_picture(found: Overview, name: str) -> Picture:
     return Picture(
         name=name,
         title="Coherence",
-        caption="Share of each response's power that all commands together explain linearly (multiple coherence), less the "
-        "share that this number of windows explains by chance. Shade: driven band; outside it (faint) chance and "
-        "noise dominate.",
+        caption="Share of each response's power that all commands together explain linearly (multiple coherence), "
+        "less the share that this number of windows explains by chance. Shade: driven band; outside it (faint) "
+        "chance and noise dominate.",
         figure=figure,
     )
 
@@ -222,8 +222,8 @@ def _derivatives_picture(found: Overview, name: str) -> Picture:
     return Picture(
         name=name,
         title="Derivatives",
-        caption="The stretch with the most motion: the recorded signal, and central differences of the position or speed of "
-        "the same motion.",
+        caption="The stretch with the most motion: the recorded signal, and central differences of the position or "
+        "speed of the same motion.",
         figure=figure,
     )
 

@@ -19,10 +19,10 @@ def model_order_picture(report: OrderReport, chosen: int) -> Picture:
     return Picture(
         name="model-order",
         title="Error and cost of the model by its order",
-        caption=f"Left: singular values of the data, in units of the noise; states above {VISIBLE:g} times the noise (dashed) "
-        "are seen. Right: error on held-out lines, with its lower bound, the noise (dashed), and the multiplications "
-        f"per tick. This model has order {chosen}; of those tried, the lowest that is as good as the best is "
-        f"{report.suggested_order}.",
+        caption=f"Left: singular values of the data, in units of the noise; states above {VISIBLE:g} times the noise "
+        "(dashed) are seen. Right: error on held-out lines, with its lower bound, the noise (dashed), and the "
+        f"multiplications per tick. This model has order {chosen}; of those tried, the lowest that is as good as the "
+        f"best is {report.suggested_order}.",
         figure=draw_model_order(report, chosen),
     )
 

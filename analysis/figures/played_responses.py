@@ -31,10 +31,10 @@ def played_responses_picture(rows: Sequence[PlayedResponse]) -> Picture:
     return Picture(
         name="equalized-response",
         title="What is played, with and without the equalizer",
-        caption="Columns: the axis along which an acceleration was wanted, a swept sine. Thick: the response along it, which "
-        "should be 0 dB; thin: the response across it. True acceleration of the simulated handle, line by line. The "
-        "first row is a force, scaled by its mean gain; the last row is ours: models of other places, their forces "
-        "blended.",
+        caption="Columns: the axis along which an acceleration was wanted, a swept sine. Thick: the response along "
+        "it, which should be 0 dB; thin: the response across it. True acceleration of the simulated handle, line by "
+        "line. The first row is a force, scaled by its mean gain; the last row is ours: models of other places, "
+        "their forces blended.",
         figure=draw_played_responses(rows),
     )
 
@@ -44,10 +44,10 @@ def friction_picture(rows: Sequence[PlayedResponse]) -> Picture:
     return Picture(
         name="equalized-friction",
         title="What friction costs",
-        caption="The same as above. First a swept sine, then all frequencies at once with the same peak force, so that each "
-        "has less: friction, which no linear model contains, makes the lines scatter. Last, the same on a copy of "
-        "the simulated device without friction, with a model identified on that; the remaining coupling is the "
-        "accelerometer's mounting error.",
+        caption="The same as above. First a swept sine, then all frequencies at once with the same peak force, so "
+        "that each has less: friction, which no linear model contains, makes the lines scatter. Last, the same on a "
+        "copy of the simulated device without friction, with a model identified on that; the remaining coupling is "
+        "the accelerometer's mounting error.",
         figure=draw_played_responses(rows),
     )
 

@@ -118,8 +118,8 @@ def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
     together = primary and Picture(
         name="psychometric",
         title="Psychometric functions, all people together",
-        caption=f"{points}Levels are relative to each person's threshold by the model of all answers, whose curve is drawn. "
-        f"{threshold_words(analysis.protocol.staircase).levels}",
+        caption=f"{points}Levels are relative to each person's threshold by the model of all answers, whose curve is "
+        f"drawn. {threshold_words(analysis.protocol.staircase).levels}",
         figure=draw_people_curves(answers, primary),
     )
     return [
@@ -149,11 +149,11 @@ def _medians_picture(primary: PrimaryAnalysis, cap_n: float) -> Picture:
     return Picture(
         name="medians",
         title="Thresholds by the model of all answers",
-        caption=f"Black: the median participant with its {100 * primary.confidence:g} % interval. Above the cap no size is "
-        "known: an arrow from the one-sided bound, and people, hollow, on one line. An interval without an upper "
-        "mark continues above the axis. Lines join the thresholds of one person as estimated by the model: shrunk "
-        "towards the others where their own answers carry little information. Diamond and thick line on the cap: the "
-        "direction limit and its interval, between the frequencies played alone.",
+        caption=f"Black: the median participant with its {100 * primary.confidence:g} % interval. Above the cap no "
+        "size is known: an arrow from the one-sided bound, and people, hollow, on one line. An interval without an "
+        "upper mark continues above the axis. Lines join the thresholds of one person as estimated by the model: "
+        "shrunk towards the others where their own answers carry little information. Diamond and thick line on the "
+        "cap: the direction limit and its interval, between the frequencies played alone.",
         figure=draw_medians(primary, cap_n),
     )
 

@@ -28,7 +28,8 @@ NOTHING_DECLARED = (
     "declaration."
 )
 NEAR_CAP = (
-    'Near the cap the published intervals do not hold what they say, and the published "not significant" says little.'
+    "Near the cap the published intervals do not have their stated coverage, and the published 'not significant' is "
+    "weak evidence."
 )
 
 

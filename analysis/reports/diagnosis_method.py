@@ -22,7 +22,7 @@ _HOW = {
 }
 """How the noise was measured, by `NoiseFloor.how`."""
 _ROLES = (
-    ("fit", "were fitted to"),
+    ("fit", "were used for the fit"),
     ("choose", "were used to choose between explanations"),
     ("test", "were held out and used only for the final test"),
 )

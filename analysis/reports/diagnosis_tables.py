@@ -17,7 +17,7 @@ from analysis.diagnosis.unit_wording import error_text, probability_text, share_
 from analysis.reports.page import Table
 from analysis.wording import NONE, capitalise, end_sentence, format_signed, p_value
 
-_STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With what was found"))
+_STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With the effects found"))
 """Attribute of each stage of the model, and its heading."""
 _MOST_PLACES = 12
 """Most rows of the table of mismatches."""
@@ -148,7 +148,7 @@ def tabulate_retuned(found: Findings) -> Table | None:
         (before.name, before.size, format_signed(before.deviations), after.size, format_signed(after.deviations))
         for before, after in zip(alone, final, strict=True)
     )
-    header = ("Number", "Re-tuned", "Standard deviations", "With what was found", "Standard deviations")
+    header = ("Number", "Re-tuned", "Standard deviations", "With the effects found", "Standard deviations")
     return Table("Every free parameter, by the size of its change", header, rows, folded=True)
 
 

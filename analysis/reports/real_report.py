@@ -51,8 +51,8 @@ def render_real_report(
     return render_page(
         Page(
             title="Diagnosis of real recordings",
-            summary=f"{len(answers)} recordings of real devices were compared with simple models; in {named} of them physics "
-            "was named. The remaining error and the objections to each answer are given with it.",
+            summary=f"{len(answers)} recordings of real devices were compared with simple models; in {named} of them "
+            "physics was named. The remaining error and the objections to each answer are given with it.",
             banner=_banner(troubles),
             sections=tuple(sections),
             generated=generated,
@@ -64,7 +64,17 @@ def render_real_report(
 def overview_table(answers: Sequence[RealAnswer]) -> Table:
     """Table of all recordings: verdict, named effects, held-out errors of each model as shares of the signal, and
     seconds."""
-    header = ("recording", "verdict", "named", "as given", "re-tuned", "with what was found", "black box", "noise", "s")
+    header = (
+        "recording",
+        "verdict",
+        "named",
+        "as given",
+        "re-tuned",
+        "with the effects found",
+        "black box",
+        "noise",
+        "s",
+    )
     return Table("Errors on held-out data, shares of the signal", header, tuple(_row(answer) for answer in answers))
 
 
@@ -136,7 +146,7 @@ def _tables(real_answer: RealAnswer) -> tuple[Table, ...]:
         )
         for each in every
     )
-    header = ("held-out stretch", "signal", "re-tuned", "with what was found", "ratio")
+    header = ("held-out stretch", "signal", "re-tuned", "with the effects found", "ratio")
     return (Table("Root-mean-square errors, stretch by stretch", header, rows),)
 
 

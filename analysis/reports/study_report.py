@@ -37,8 +37,8 @@ from analysis.reports.study_tables import (
 
 _BANNERS = {
     Population.PEOPLE: "",
-    Population.SIMULATED: "Simulated participants: no person took part. These numbers test the method and the program; they are no "
-    "evidence about human perception.",
+    Population.SIMULATED: "Simulated participants: no person took part. These numbers test the method and the "
+    "program; they are no evidence about human perception.",
     Population.NOT_FELT: "Nothing was felt: people answered while a simulated device moved nothing. These numbers are "
     "a rehearsal and must not be used as measurements of people.",
 }

@@ -144,8 +144,8 @@ EFFECT = Effect(
     name="backlash",
     equation="F = contact_stiffness (|r| - gap / 2) + contact_damping d|r|/dt where |r| > gap / 2, r = motor - handle",
     source="Nordin and Gutman 2002, Automatica 38:1633",
-    signature="the handle feels no drive until the gap is crossed, then a blow: short peaks that no waveform predicts, "
-    "most of all at low levels",
+    signature="the drive does not act on the handle until the gap is crossed, then there is an impact: short peaks "
+    "that no waveform predicts, most of all at low levels",
     parameters=(
         Parameter("gap", 1e-9, 1e3, none=0.0, step=0.03),
         Parameter("motor_mass", 1e-9, 1e6, none=None, step=0.05),

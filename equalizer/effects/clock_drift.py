@@ -103,8 +103,8 @@ EFFECT = Effect(
     name="clock_drift",
     equation="y(t) = x(t (1 + ppm 1e-6))",
     source="IEEE Std 1139, fractional frequency offset of an oscillator",
-    signature="what is measured comes later and later, or earlier and earlier, than predicted, by an amount that grows "
-    "evenly with time",
+    signature="the measured response is later (or earlier) than predicted, by an amount that grows in proportion to "
+    "time",
     parameters=(
         Parameter("ppm", -LARGEST_PPM, LARGEST_PPM, none=0.0, scale="linear", step=0.1),
         Parameter("interpolated", 0.0, 1.0, none=None, scale="linear", step=0.05),

@@ -48,8 +48,8 @@ EFFECT = Effect(
     name="cross_axis_sensitivity",
     equation="y_i = x_i + from_next x_(i+1) + from_after_next x_(i+2)",
     source="IEEE Std 1293, single-axis accelerometers: cross-axis sensitivity",
-    signature="one channel reads a constant share of others at every frequency and level and they none of it, while "
-    "the position agrees",
+    signature="one channel contains a constant share of other channels at every frequency and level, and they "
+    "contain no share of it, while the position agrees",
     parameters=tuple(Parameter(name, -LARGEST, LARGEST, none=0.0, scale="linear", step=1e-3) for name in FROM),
     acts=OnResponse(_mix_channels, stage=-1),
     starts=_starts,

@@ -44,7 +44,7 @@ EFFECT = Effect(
     name="gravity_torque",
     equation="F = -torque sin(x + angle)",
     source="a pendulum; Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, chapter 6",
-    signature="the missing torque goes with the sine of the angle and repeats with each turn, at every level",
+    signature="the missing torque is proportional to the sine of the angle and repeats with each turn, at every level",
     parameters=(
         Parameter("torque", 1e-9, 1e6, none=0.0),
         Parameter("angle", -1e3, 1e3, none=None, scale="linear", step=0.02),

@@ -131,8 +131,8 @@ EFFECT = Effect(
     name="mains_hum",
     equation="y = x + amplitude sin(2 pi frequency t + phase)",
     source="IEC 61000-4-30: frequency of the mains",
-    signature="a tone goes through the whole response, at rest as in motion, that nothing commanded, while the "
-    "position agrees",
+    signature="the whole response contains a tone that was not commanded, at rest as in motion, while the position "
+    "agrees",
     parameters=(
         Parameter("amplitude", 1e-12, 1e9, none=0.0),
         Parameter("frequency", 0.1, 1e5, none=None, scale="linear", step=1e-4),

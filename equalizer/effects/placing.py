@@ -92,8 +92,8 @@ def _place_effect(effect: ModelEffect, channels: Channels) -> PlacedEffect:
     entry = EFFECTS.get(effect.kind)
     if entry is None:
         raise PlacingError(
-            f"no simulation plays '{effect.kind}'{suggest_word(effect.kind, tuple(EFFECTS))}; "
-            f"it plays {', '.join(EFFECTS)}"
+            f"no simulation of '{effect.kind}' exists{suggest_word(effect.kind, tuple(EFFECTS))}; simulated are "
+            f"{', '.join(EFFECTS)}"
         )
     for parameter in entry.parameters:
         value = effect.parameters.get(parameter.name, 0.0)

@@ -54,7 +54,8 @@ EFFECT = Effect(
     name="pose_dependent_inertia",
     equation="F = -per_m M (x dv/dt + speed_share v^2), M the mass along the axis; speed_share is 1/2 by Lagrange",
     source="Spong, Hutchinson, Vidyasagar, Robot Modeling and Control, chapter 7",
-    signature="the missing force goes with position times acceleration; its even harmonics rise with the level",
+    signature="the missing force is proportional to position times acceleration; its even harmonics rise with the "
+    "level",
     parameters=(
         Parameter("per_m", -1e6, 1e6, none=0.0, scale="signed"),
         Parameter("speed_share", -0.5, 1.5, none=None, scale="linear", step=0.02),

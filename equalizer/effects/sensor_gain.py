@@ -38,7 +38,7 @@ EFFECT = Effect(
     name="sensor_gain",
     equation="y = gain x",
     source="Analog Devices ADXL335 data sheet: sensitivity 270 to 330 mV/g, in proportion to the supply",
-    signature="the response is off by one factor at every frequency and level, while the position agrees",
+    signature="the response is wrong by one factor at every frequency and level, while the position agrees",
     parameters=(Parameter("gain", 0.01, 100.0, none=1.0),),
     acts=OnResponse(_scale_response),
     starts=_starts,

@@ -35,8 +35,8 @@ EFFECT = Effect(
     name="sensor_nonlinearity",
     equation="y = x + cubic x^3",
     source="IEEE Std 1293, single-axis accelerometers: third-order coefficient of the model equation",
-    signature="what the response is off by grows with its cube at every frequency, with odd harmonics that rise with "
-    "the level, while the position agrees",
+    signature="the error of the response grows with the cube of the response at every frequency, with odd harmonics "
+    "that rise with the level, while the position agrees",
     parameters=(Parameter("cubic", -1e12, 1e12, none=0.0, scale="signed"),),
     acts=OnResponse(_add_cubic),
     starts=_starts,

@@ -33,7 +33,7 @@ class Law:
         if self.acts_on not in KINDS:
             raise LawError(f"a law acts on {', '.join(KINDS)}; not on '{self.acts_on}'")
         if not self.axis:
-            raise LawError("the law says no axis that it acts at; state its axis")
+            raise LawError("the law does not state the axis on which it acts; state its axis")
         used = {node.place for node in nodes(self.tree) if isinstance(node, Free)}
         if used != set(range(len(self.numbers))):
             names = ", ".join(f"p{place}" for place in sorted(used)) or "none"

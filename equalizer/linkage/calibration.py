@@ -133,11 +133,11 @@ def check_reading(reading: LinkageReading, gravity_known: bool = True) -> Iterat
     vectors = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
     for name, values in (vectors | {"Jacobian": jacobian, "inertia": inertia}).items():
         if not np.isfinite(values).all():
-            yield f"at {where} the {name} holds what is no number"
+            yield f"at {where} the {name} contains a value that is not a number"
     if not (np.isfinite(jacobian).all() and np.isfinite(inertia).all()):
         return
     if np.isinf(reading.gravity_n).any() or (gravity_known and np.isnan(reading.gravity_n).any()):
-        yield f"at {where} the gravity force is no number"
+        yield f"at {where} the gravity force is not a number"
     condition = float(np.linalg.cond(jacobian))
     if not condition <= MOST_CONDITION:
         yield f"at {where} the Jacobian is singular, or nearly so (condition {condition:.3g})"
@@ -148,7 +148,7 @@ def check_reading(reading: LinkageReading, gravity_known: bool = True) -> Iterat
     if masses[0] <= 0:
         yield f"at {where} the inertia is not positive definite: {masses[0]:.3g} kg along a direction"
     elif not MASSES_KG[0] <= masses[0] <= masses[-1] <= MASSES_KG[1]:
-        yield f"at {where} the inertia is {masses[0]:.3g} to {masses[-1]:.3g} kg; no handle weighs that"
+        yield f"at {where} the inertia is {masses[0]:.3g} to {masses[-1]:.3g} kg, which is not plausible for a handle"
 
 
 def inertia_about(calibration: LinkageCalibration, place_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -169,5 +169,5 @@ def inertia_about(calibration: LinkageCalibration, place_m: FloatArray) -> tuple
             linear = [powers.index((axis == 0, axis == 1, axis == 2)) for axis in range(3)]
             return found[powers.index((0, 0, 0))].reshape(3, 3), found[linear].reshape(3, 3, 3) / reach_m
     raise ValueError(
-        f"{len(away)} positions do not tell how the inertia changes: read at least eight, not in one plane"
+        f"{len(away)} positions do not determine how the inertia changes: read at least eight, not in one plane"
     )

@@ -87,8 +87,9 @@ def asymmetry_words(asymmetry: FloatArray, where_m: FloatArray, line_deg: FloatA
     order = np.argsort(asymmetry)
     if len(warnings) == 2 and asymmetry[order[0]] < ODD_SHARE * asymmetry[order[1]]:
         warnings.append(
-            f"The line at {line_deg[order[0]]:.0f} degrees holds and the other two do not: the arm in that line is "
-            "unlike the others. Directions mirrored about that line meet the same mass still."
+            f"The line at {line_deg[order[0]]:.0f} degrees is a line of symmetry and the other two are not: the arm "
+            "in that line differs from the others. Directions mirrored about that line still have the same apparent "
+            "mass."
         )
     return tuple(warnings)
 

@@ -133,7 +133,7 @@ def _shape_problems(model: IdentifiedModel) -> Iterator[str]:
     for name, shape in {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}.items():
         matrix: FloatArray = getattr(model, name)
         if matrix.shape != shape:
-            yield f"{name} has shape {matrix.shape}, but {shape} goes with order {n}, {m} inputs and {p} outputs"
+            yield f"{name} has shape {matrix.shape}, but order {n}, {m} inputs and {p} outputs require {shape}"
         elif not np.isfinite(matrix).all():
             yield f"{name} holds values that are not finite numbers"
 

@@ -59,13 +59,13 @@ def quality_sentence(quality: ModelQuality | None) -> str:
         return NOT_STORED
     if quality.held_out_error is None:
         return (
-            f"No recording was kept for a test; against the lines that it was fitted to, the model errs by "
+            "No recording was held out for a test; on the lines to which it was fitted, the error of the model is "
             f"{100 * quality.expected_error:.2f} % (misfit {100 * quality.misfit_error:.2f} % beyond their noise)."
         )
     noise = "" if quality.held_out_noise is None else f", noise of the record {100 * quality.held_out_noise:.2f} %"
     return (
-        f"Measured on {quality.held_out_s or 0:g} s kept for a test, the model errs by "
-        f"{100 * quality.held_out_error:.2f} %{noise}; expected with misfit and scatter: "
+        f"Measured on {quality.held_out_s or 0:g} s held out for a test, the error of the model is "
+        f"{100 * quality.held_out_error:.2f} %{noise}; expected from misfit and scatter: "
         f"{100 * quality.expected_error:.2f} %."
     )
 

@@ -76,7 +76,7 @@ def resample(samples: Samples, grid: Grid, method: Method) -> FloatArray:
         )
     good = np.isfinite(samples.values)
     if good.sum() < 2:
-        raise ValueError("all samples but one are missing; two are the least")
+        raise ValueError("all samples but one are missing; at least two are needed")
     if method == "held":
         index = np.searchsorted(samples.times_s, times_s + near, side="right") - 1
         found: FloatArray = samples.values[np.maximum(index, 0)].copy()

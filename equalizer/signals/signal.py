@@ -88,7 +88,9 @@ def _fold_equal_words(name: str, words: str | tuple[str, ...], channels: int) ->
     if isinstance(words, str):
         return words
     if len(words) != channels:
-        raise ValueError(f"{len(words)} words of {name} for {channels} channels; one for all, or one per channel")
+        raise ValueError(
+            f"{len(words)} entries of {name} for {channels} channels; give one for all, or one per channel"
+        )
     return words[0] if len(set(words)) == 1 else tuple(words)
 
 

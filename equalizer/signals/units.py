@@ -194,9 +194,9 @@ def _parse_factors(text: str) -> list[tuple[str, int]]:
     found = [_parse_power(factor, 1, text) for factor in numerator.split()]
     for part in denominators:
         if len(part.split()) != 1:
-            raise _NotAUnitError(text, " (after each slash stands exactly one symbol, as in N m s/rad or m/s/V)")
+            raise _NotAUnitError(text, " (each slash must be followed by exactly one symbol, as in N m s/rad or m/s/V)")
         if "-" in part:
-            raise _NotAUnitError(text, " (after a slash an exponent has no minus, as in m/s^2)")
+            raise _NotAUnitError(text, " (an exponent after a slash must not be negative, as in m/s^2)")
         found.append(_parse_power(part.strip(), -1, text))
     if not numerator.strip():
         raise _NotAUnitError(text, "")

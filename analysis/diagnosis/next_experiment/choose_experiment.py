@@ -131,8 +131,8 @@ def as_document(best: ExperimentSet, names: Sequence[str]) -> NextExperiment | N
     return NextExperiment(
         command="; then ".join([f"record {first}", *more]),
         splits=(names[0], *dict.fromkeys(names[1 + number] for number in best.discriminated)),
-        why=f"{where} their predictions differ by more than noise and tolerances can explain: the log likelihood of the "
-        f"true effect would exceed that of the others by at least {best.gain:.3g}{said}",
+        why=f"{where} their predictions differ by more than noise and tolerances can explain: the log likelihood of "
+        f"the true effect would exceed that of the others by at least {best.gain:.3g}{said}",
     )
 
 

@@ -46,9 +46,9 @@ def response_findings(
         figure=4,
         title="Transfer functions from every force to every acceleration",
         source="Figure 4 and section III B",
-        published="Swept sines of 30 s from 1 to 500 Hz, one axis after the other and repeated, an accelerometer on the "
-        "handle, a weak spring of about 3.5 Hz instead of a hand. The paper sees a resonance near 11 Hz that couples "
-        "the axes, large resonances and coupling from about 80 Hz, a slope below 10 Hz that it attributes to "
+        published="Swept sines of 30 s from 1 to 500 Hz, one axis after the other and repeated, an accelerometer on "
+        "the handle, a weak spring of about 3.5 Hz instead of a hand. The paper sees a resonance near 11 Hz that "
+        "couples the axes, large resonances and coupling from about 80 Hz, a slope below 10 Hz that it attributes to "
         "friction and damping, and too little energy below 3.5 Hz. It sets the onset of coupling at about 10 Hz.",
         findings=tuple(finding for finding in findings if finding is not None),
         differs=(

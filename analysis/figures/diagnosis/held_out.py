@@ -60,8 +60,8 @@ def held_out_picture(
     return Picture(
         name="held-out",
         title="Held-out data: as given, re-tuned, with the effects found",
-        caption=f"{where}{'Right: e' if where else 'E'}rror of each channel over all held-out samples in units of its noise; "
-        "the line marks noise alone. These data were used neither for fitting nor for model selection.",
+        caption=f"{where}{'Right: e' if where else 'E'}rror of each channel over all held-out samples in units of its "
+        "noise; the line marks noise alone. These data were used neither for fitting nor for model selection.",
         figure=draw_held_out(excerpt, noise_rms, errors),
         alternative=_alternative_text(errors),
     )

@@ -64,10 +64,10 @@ def mismatch_map_picture(maps: Maps, number: int, unit: str) -> Picture:
     return Picture(
         name=f"mismatch-map-{number + 1}",
         title=f"Where model and device disagree, driven by {input_}",
-        caption="Residual relative to that of noise alone: 1 is noise. Framed: significantly larger than the noise and the "
-        "model's error elsewhere, at a false discovery rate of 1 %. Rows: measured channels; columns: octaves, by "
-        f"their lower edge{_level_text(maps, input_, unit)}; grey: not driven there; without a number: below "
-        f"{_NUMBERED:g}." + _group_text(maps, input_),
+        caption="Residual relative to that of noise alone: 1 is noise. Framed: significantly larger than the noise "
+        "and the model's error elsewhere, at a false discovery rate of 1 %. Rows: measured channels; columns: "
+        f"octaves, by their lower edge{_level_text(maps, input_, unit)}; grey: not driven there; without a number: "
+        f"below {_NUMBERED:g}." + _group_text(maps, input_),
         figure=draw_mismatch_map(maps, input_, unit),
         folded=number > 0,
         bitmap=number == 0,

@@ -24,8 +24,8 @@ def real_picture(answer: RealAnswer) -> Picture:
     return Picture(
         name=f"held-out-{_plain_name(answer.folder)}-{_plain_name(answer.recording)}",
         title=f"Held-out data of {answer.recording}",
-        caption="Left: where the effects found change the prediction most. Right: errors on all held-out data as a share of "
-        "the signal, logarithmic; shorter is better.",
+        caption="Left: where the effects found change the prediction most. Right: errors on all held-out data as a "
+        "share of the signal, logarithmic; shorter is better.",
         figure=_draw_answer(answer.excerpt, rows),
         alternative=text or "Nothing was held out.",
     )

@@ -28,8 +28,8 @@ def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
     return Picture(
         name="remainder",
         title="Residual on held-out data",
-        caption="Amplitude densities in sixths of an octave. Where the solid line lies on the grey band, the residual is "
-        "noise; where it lies above, a mismatch remains.",
+        caption="Amplitude densities in sixths of an octave. Where the solid line lies on the grey band, the "
+        "residual is noise; where it lies above, a mismatch remains.",
         figure=draw_remainder(spectra),
         alternative=" ".join(_alternative_text(each) for each in spectra),
     )

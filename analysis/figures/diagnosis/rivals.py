@@ -67,8 +67,8 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
                     name=f"rivals-{number}",
                     title=f"What was tried for the {_ORDINALS[several.index(number)]} effect"
                     + ("" if held else "; none was accepted"),
-                    caption="Error in units of the noise, mean over the channels, of each explanation after its fit, in "
-                    "addition to the effects found before. "
+                    caption="Error in units of the noise, mean over the channels, of each explanation after its fit, "
+                    "in addition to the effects found before. "
                     + (_BOTH if any(np.isfinite(each.test) for each in tried) else _SEEN)
                     + " Dashed: the re-tuned model alone.",
                     figure=draw_rivals(tried, retuned, held),

@@ -32,8 +32,8 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
         Picture(
             name=f"signature-{number}",
             title=f"Signature of {noun_of(signature.effect)}{f' ({signature.axis})' if signature.axis else ''}",
-            caption="Dots: residual of the model with all other effects found but without this one, mean per bin; bars: two "
-            "standard errors. "
+            caption="Dots: residual of the model with all other effects found but without this one, mean per bin; "
+            "bars: two standard errors. "
             + (
                 "Line: the formula."
                 if signature.effect == DISCOVERED_LAW

@@ -70,8 +70,8 @@ def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -
     above_noise = _is_above_noise(lines, local, smooth, rule)
     if not above_noise.any():
         raise ValueError(
-            f"coupling cannot be judged: at no line is the noise small against {100 * rule.threshold:g} % of the "
-            "response; record more periods, or with a stronger excitation"
+            f"coupling cannot be judged: at no line is the noise small compared with {100 * rule.threshold:g} % of "
+            "the response; record more periods, or with a stronger excitation"
         )
     found = _find_onset(lines.frequency_hz[above_noise], worst_coupling(smooth[above_noise]), rule)
     if found is None:

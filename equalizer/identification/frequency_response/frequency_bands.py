@@ -48,6 +48,6 @@ def frequency_bands(
 _METHODS = (
     ("low", "closed loop, rigid model", "Feedback is stable, the person acts at these speeds, and axes do not mix."),
     ("middle", "all axes equalized together", "Directions are felt, but the device mixes its axes."),
-    ("high", "each axis by itself", "Directions are hardly felt, so the axis may be chosen to spare a motor."),
+    ("high", "each axis separately", "Directions are hardly felt, so the axis may be chosen to spare a motor."),
 )
 """Name, control method and reason of each band, from low to high."""

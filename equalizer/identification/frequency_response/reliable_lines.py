@@ -47,11 +47,11 @@ def judge_lines(
     if by_spring.any():
         remarks.append(
             f"Below {rules.spring_margin * spring_hz:.2f} Hz lines are not reliable: the virtual spring "
-            f"({spring_hz:g} Hz) takes most of the excitation away there."
+            f"({spring_hz:g} Hz) absorbs most of the excitation there."
         )
     unexcited = ~excited & ~by_spring
     if unexcited.any():
-        remarks.append(f"Not reliable for want of excitation in every direction: {_spans(frequency_hz, unexcited)}.")
+        remarks.append(f"Not reliable, because not every direction was excited: {_spans(frequency_hz, unexcited)}.")
     worst = np.min(np.where(np.isnan(coherence), 1.0, coherence), axis=1, initial=1.0)
     noisy = (worst < rules.least_coherence) & excited & ~by_spring
     if noisy.any():

@@ -74,8 +74,8 @@ def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSett
     remarks = list(found.remarks)
     if found.experiments and all(experiment.periods == 1 for experiment in found.experiments) and found.periodic:
         remarks.append(
-            "No experiment has two counted periods: errors were judged by the scatter from line to line, and by the "
-            "noise at rest where that is larger."
+            "No experiment has two counted periods: errors were estimated from the scatter from line to line, and by "
+            "the noise at rest where that is larger."
         )
     if any(recording.excitation is None and spring_frequency_hz([recording.meta]) for recording in recordings):
         remarks.append(
@@ -156,7 +156,7 @@ def _check_alike(recordings: Sequence[Recording]) -> None:
         ):
             if wanted != found:
                 raise TransferEstimateError(
-                    f"recording {number} has the {what} {found}, but the first has {wanted}; estimate them apart"
+                    f"recording {number} has the {what} {found}, but the first has {wanted}; estimate them separately"
                 )
 
 
@@ -168,7 +168,7 @@ def _refuse_still_outputs(recordings: Sequence[Recording]) -> None:
     names = ", ".join(name for name, is_still in zip(recordings[0].response.channels, still, strict=True) if is_still)
     if names:
         raise TransferEstimateError(
-            f"nothing at all comes from {names}, not even noise: check the sensor and record again"
+            f"there is no signal from {names}, not even noise: check the sensor and record again"
         )
 
 
@@ -183,6 +183,6 @@ def _unit(signal: Signal) -> str:
 def _too_few_experiments_text(inputs: int, found: ExperimentSet) -> str:
     return (
         f"{inputs} inputs need {inputs} independent experiments at each line, but the {len(found.experiments)} that "
-        "were found are not: at no line do they drive the inputs in so many directions. Record every axis by itself, "
-        "or as many multisines with phases of their own as there are inputs"
+        "were found are not: at no line do they drive the inputs in so many directions. Record every axis "
+        "separately, or as many multisines with independent phases as there are inputs"
     )

@@ -33,8 +33,8 @@ SIMPLER = 1.02
 BELOW_JOINT = 0.5
 """Share of the band's upper end up to which a model without the joint is fitted first."""
 ALLOWED = (
-    "What is left on lines that were not fitted is no more than noise, what differs between levels, and the share that "
-    "no linear model is expected to explain."
+    "The residual on held-out lines is no larger than the noise, the variation between levels, and the share that no "
+    "linear model is expected to explain."
 )
 """Reason for the end of growth where the error on held-out lines is below `REACHED`."""
 JOINT_BEGUN = (1.1, 1.6)
@@ -116,8 +116,8 @@ def _grow_structure(
             full = best.structure.modes >= limits.most_modes
             allowed = f"{limits.most_modes} modes, the most that are allowed, are used, and n" if full else "N"
             return best, (
-                f"{allowed}othing more explains {LEAST_GAIN:.0%} of what is left on lines that were not fitted, and "
-                "more than noise does."
+                f"{allowed}o further term explains {LEAST_GAIN:.0%} of the residual on held-out lines, and more than "
+                "noise does."
             )
     return best, ALLOWED
 

@@ -37,7 +37,7 @@ def refuse_unsuitable(recordings: Sequence[Recording]) -> None:
         ):
             if each != found:
                 raise MechanicalFitRefused(
-                    f"recording {number} has the {what} {found}, the first {each}; fit them apart"
+                    f"recording {number} has the {what} {found}, the first {each}; fit them separately"
                 )
     quantities = set(first.response.quantities)
     if len(quantities) > 1 or not quantities <= set(DERIVATIVE_OF_QUANTITY):
@@ -61,7 +61,7 @@ def _refuse_samples(recordings: Sequence[Recording]) -> None:
         for name, empty in unusable_channels([getattr(recording, side) for recording in recordings]):
             if empty:
                 raise MechanicalFitRefused(
-                    f"{side} {name} holds no number, only missing values; leave it out, or import it again"
+                    f"{side} {name} contains only missing values; leave it out, or import it again"
                 )
             raise MechanicalFitRefused(
                 f"{side} {name} is constant throughout, so nothing can be inferred from it; "
@@ -74,8 +74,9 @@ def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
     relative to the response, by channel and, last, over all."""
     if error[:-1].min() > ALL_NOISE:
         raise MechanicalFitRefused(
-            f"the commands do not tell what {', '.join(channels)} will do: a fitted model leaves "
-            f"{error[:-1].min():.0%} of the best channel; the recording is noise, or of something else"
+            f"the commands do not predict {', '.join(channels)}: a fitted model has an error of "
+            f"{error[:-1].min():.0%} of the signal in the best channel; the recording is noise, or its commands and "
+            "responses are not of the same device"
         )
 
 

@@ -70,7 +70,7 @@ def _add_modes(
         better = more.left_out < (1 - LEAST_GAIN) * best.left_out
         tried.append(_record_trial(more, structure, better))
         if not better:
-            why = f"One more frequency explains less than {LEAST_GAIN:.0%} of what is left on lines not fitted."
+            why = f"One more frequency explains less than {LEAST_GAIN:.0%} of the residual on held-out lines."
             return best, tried, why
         best = more
     return best, tried, f"{most} frequencies, the most that are allowed, were used."

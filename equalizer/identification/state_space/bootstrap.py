@@ -52,7 +52,7 @@ def response_deviation(model: IdentifiedModel, frequency_hz: FloatArray) -> Floa
     """Standard error of each entry of the response, (lines, p, m): rms deviation of the model's samples from the model.
     Raises ValueError for a model without samples."""
     if model.samples is None:
-        raise ValueError("the model holds no samples of its uncertainty; identify it again with draws > 0")
+        raise ValueError("the model contains no samples of its uncertainty; identify it again with draws > 0")
     middle = model_response(model, frequency_hz)
     squares = [np.abs(model_response(model.with_parameters(row), frequency_hz) - middle) ** 2 for row in model.samples]
     return np.asarray(np.sqrt(np.mean(squares, axis=0)), dtype=np.float64)

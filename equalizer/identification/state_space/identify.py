@@ -154,8 +154,8 @@ def _make_starts(
     except np.linalg.LinAlgError as problem:
         order = settings.order
         raise IdentificationRefused(
-            f"order {order} asks more of the {len(lines)} lines in the band than can be distinguished; "
-            f"choose a lower order, such as {max(order // 4 * 2, 2)}"
+            f"order {order} has more parameters than the {len(lines)} lines in the band can determine; choose a lower "
+            f"order, such as {max(order // 4 * 2, 2)}"
         ) from problem
 
 

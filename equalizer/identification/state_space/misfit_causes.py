@@ -41,27 +41,27 @@ def fit_remarks(
     ]
     if bound_costs:
         found.append(
-            f"a pole sits on the bound of the decay, {bound_s:g} s, and without it the fit would improve beyond "
-            "noise: something rings longer, or the transient of a start is in a sweep without two counted periods; "
+            f"a pole is at the bound of the decay, {bound_s:g} s, and without it the fit would improve beyond noise: "
+            "a resonance rings longer, or a sweep without two counted periods contains the transient of its start; "
             "record three periods of every sweep, or raise --longest-decay"
         )
     if cost > UNEXPLAINED and not bound_costs:
-        left = f"the model leaves {np.sqrt(cost):.2g} times the noise"
+        left = f"the residual of the model is {np.sqrt(cost):.2g} times the noise"
         if misfit.smooth is None:
             found.append(
-                f"{left}: the order {order} may be too low, or the device is not linear, as with friction; without two "
-                "counted periods of every sweep the lines do not tell which"
+                f"{left}: the order {order} may be too low, or the device is not linear, as with friction; without "
+                "two counted periods of every sweep the lines do not show which"
             )
         elif misfit.smooth >= SMOOTH:
             found.append(
-                f"{left}, and what is left runs smoothly from line to line, as a linear answer does: the order {order} "
-                "may be too low; weak friction can do this too, and then a higher order does not help"
+                f"{left}, and it varies smoothly from line to line, as that of a linear response does: the order "
+                f"{order} may be too low; weak friction can do this too, and then a higher order does not help"
             )
         else:
             found.append(
-                f"{left}, and what is left scatters from line to line, as no linear answer does: a higher order does "
-                "not help; the device is not linear (friction does this, clipping, a grip that moves), or it changed "
-                "from one sweep to the next; the lines do not tell which"
+                f"{left}, and it scatters from line to line, as that of a linear response does not: a higher order "
+                "does not help; the device is not linear (friction does this, clipping, a grip that moves), or it "
+                "changed from one sweep to the next; the lines do not show which"
             )
     return found
 
@@ -83,13 +83,13 @@ def held_out_remarks(
     fit, test = (_largest_amplitude(recordings, test=test) for test in (False, True))
     if min(fit, test) > 0 and max(fit, test) > LEVEL_RATIO * min(fit, test):
         found.append(
-            f"The test errs more than the fit, and was played at another level (up to {test:.3g} N, the fit {fit:.3g} "
-            "N): the answer may depend on the amplitude, as with friction."
+            "The error on the test is larger than that of the fit, and the test was played at another level (up to "
+            f"{test:.3g} N, the fit {fit:.3g} N): the response may depend on the amplitude, as with friction."
         )
     else:
         found.append(
-            "The test errs more than the fit explains, at the same level: the device differed between the two, or "
-            "its answer depends on the kind of signal; these recordings do not tell which."
+            "The error on the test is larger than the fit explains, at the same level: the device differed between "
+            "the two, or its response depends on the kind of signal; these recordings do not show which."
         )
     return tuple(found)
 

@@ -54,8 +54,8 @@ def _refuse_mixed_responses(responses: Sequence[FrequencyResponse]) -> None:
         for name in ("sample_rate_hz", "input_channels", "output_channels", "input_unit", "output_unit"):
             if getattr(other, name) != getattr(first, name):
                 raise IdentificationRefused(
-                    f"the records differ in {name} ({getattr(first, name)} and {getattr(other, name)}); "
-                    f"identify each by itself or convert one"
+                    f"the records differ in {name} ({getattr(first, name)} and {getattr(other, name)}); identify each "
+                    "separately or convert one"
                 )
 
 
@@ -65,8 +65,8 @@ def _refuse_unexcited_inputs(responses: Sequence[FrequencyResponse], settings: I
     names = ", ".join(name for name, is_missing in zip(responses[0].input_channels, missing, strict=True) if is_missing)
     if names and not missing.all():
         raise IdentificationRefused(
-            f"nothing tells what {names} does: as many experiments as inputs are needed, "
-            f"{len(missing)} here; record one sweep per input"
+            f"the response to {names} is not determined: as many experiments as inputs are needed, {len(missing)} "
+            "here; record one sweep per input"
         )
 
 
@@ -76,7 +76,7 @@ def _refuse_dead_outputs(responses: Sequence[FrequencyResponse], settings: Ident
     names = ", ".join(name for name, is_dead in zip(responses[0].output_channels, dead, strict=True) if is_dead)
     if names and any(len(answer) for answer in answers):
         raise IdentificationRefused(
-            f"nothing at all comes from {names}, not even noise: check the sensor and record again"
+            f"there is no signal from {names}, not even noise: check the sensor and record again"
         )
 
 
@@ -120,8 +120,8 @@ def _refuse_noise(lines: WeightedLines, settings: IdentificationSettings) -> Non
     if ratio < LEAST_SIGNAL_TO_NOISE * np.sqrt(np.log(lines.response[0].size) + 1):
         low, high = settings.band_hz
         raise IdentificationRefused(
-            f"the band {low:g} to {high:g} Hz holds noise only: its typical line stands {ratio:.1f} times above the "
-            f"noise; excite it more strongly or for longer (twice the time gives 3 dB)"
+            f"the band {low:g} to {high:g} Hz contains only noise: its typical line is {ratio:.1f} times the noise; "
+            "excite it more strongly or for longer (twice the time gives 3 dB)"
         )
 
 

@@ -53,9 +53,9 @@ class TwoModels:
         (low, high), (lowest, highest) = self.narrow.band_hz, self.wide.band_hz
         if not (lowest <= high and highest >= LEAST_REACH * high and low > 2 * EDGE_ROOM_HZ):
             raise ValueError(
-                f"bands of {low:g} to {high:g} Hz and {lowest:g} to {highest:g} Hz do not add up: the wider one must "
-                f"begin at {high:g} Hz or below and reach {LEAST_REACH * high:g} Hz or more, the narrower one begin "
-                f"above {2 * EDGE_ROOM_HZ:g} Hz"
+                f"bands of {low:g} to {high:g} Hz and {lowest:g} to {highest:g} Hz cannot be combined: the wider one "
+                f"must begin at {high:g} Hz or below and reach {LEAST_REACH * high:g} Hz or more, the narrower one "
+                f"begin above {2 * EDGE_ROOM_HZ:g} Hz"
             )
         origins = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
         if origins[0] != origins[1] and None not in origins[0] + origins[1]:

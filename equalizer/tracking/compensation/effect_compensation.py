@@ -70,7 +70,7 @@ def compensate(
     that differ, an amplitude that is not above zero, and an axis that the model does not have.
     """
     if forces.shape != wanted.shape:
-        raise ValueError(f"forces of shape {forces.shape} do not go axis by axis with what is wanted, {wanted.shape}")
+        raise ValueError(f"forces of shape {forces.shape} do not match the wanted accelerations, {wanted.shape}")
     if identified_with_n is not None and not identified_with_n > 0:
         raise ValueError(f"identified_with_n is {identified_with_n}; it must be a force above zero")
     rate_hz = model.sample_rate_hz

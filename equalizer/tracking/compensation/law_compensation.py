@@ -129,7 +129,7 @@ def _tabulate_to(law: Law, meant: FloatArray) -> tuple[FloatArray, FloatArray]:
     first = next(tables)
     if not _is_rising(first[1]):
         raise ValueError(
-            f"the command map {law.text} falls somewhere, so it has no inverse; leave it out of what is compensated"
+            f"the command map {law.text} decreases somewhere, so it has no inverse; leave it out of what is compensated"
         )
     for commands, forces in takewhile(lambda table: _is_rising(table[1]), chain((first,), tables)):
         if forces[0] <= meant.min() and meant.max() <= forces[-1]:

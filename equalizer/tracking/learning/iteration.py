@@ -39,7 +39,7 @@ class Verdict(Enum):
     """Decision after each measurement: to continue, or the reason to stop, with a text for the user as value."""
 
     CONTINUE = "play the forces and measure"
-    AT_FLOOR = "what is left cannot be distinguished from the measured noise"
+    AT_FLOOR = "the residual cannot be distinguished from the measured noise"
     DIVERGING = "each correction made it worse; the best forces so far are kept"
     BEST_KEPT = "further corrections gain nothing; the best forces so far are kept"
 
@@ -155,7 +155,7 @@ def begin(repetition: Repetition, first: FloatArray | None = None) -> IterationS
     if repetition.level == 0:
         low, high = repetition.band_hz
         raise ValueError(
-            f"what is wanted has nothing in the band of {low:g} to {high:g} Hz; give a trajectory within it"
+            f"the wanted trajectory has no content in the band of {low:g} to {high:g} Hz; give a trajectory within it"
         )
     forces = repetition.invert(repetition.wanted) if first is None else np.asarray(first, dtype=np.float64)
     peak = float(np.linalg.norm(forces, axis=1).max())

@@ -62,8 +62,8 @@ def require_under_cap(forces: FloatArray, cap_n: float, sample_rate_hz: float) -
         scale = np.floor(peaks.largest_scale * 1e4) / 1e4
         raise ForceLimitError(
             f"the forces reach {peaks.peak_n:.3g} N at {peaks.at_sample / sample_rate_hz:.3f} s, above the cap of "
-            f"{peaks.cap_n:g} N ({peaks.share_over:.1%} of the time above it); nothing was clipped. What is wanted "
-            f"fits when scaled by {scale:.4f} or less; or ask for the constrained solution, which states its loss",
+            f"{peaks.cap_n:g} N ({peaks.share_over:.1%} of the time above it); nothing was clipped. The trajectory "
+            f"fits when scaled by {scale:.4g} or less; or use the constrained solution, which states its loss",
             peaks,
         )
     return peaks

@@ -114,7 +114,7 @@ def free_decay_weight(problem: TrackingProblem) -> FloatArray:
     Q½ C. A final state that differs by d from the intended state causes, with the intended forces from then on (zero
     after a transient, periodic after a fade-in), output errors with the cost d' P_N d. Raises TrackingError for an
     unstable model."""
-    _require_stable(problem, "what rings after the end never dies away")
+    _require_stable(problem, "the motion after the end does not decay")
     return np.asarray(solve_discrete_lyapunov(problem.A.T, problem.C.T @ problem.Q @ problem.C))
 
 

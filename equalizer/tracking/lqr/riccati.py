@@ -27,8 +27,8 @@ NO_CURVATURE = (
 )
 
 NOT_STATIONARY = (
-    "there are no stationary gains: what the forces cannot reach must die away by itself, and with a delay or without "
-    "feedthrough the force weight must be above zero"
+    "there are no stationary gains: states that the forces cannot control must decay without control, and with a "
+    "delay or without feedthrough the force weight must be above zero"
 )
 NEGLIGIBLE = 1e-14
 """Rank tolerance, relative to the norm of the effects of a force: below it, what these add to the effects of the forces

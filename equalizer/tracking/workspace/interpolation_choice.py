@@ -106,7 +106,9 @@ def _choose_by_checks(
 ) -> InterpolationChoice:
     """Modal interpolation where its largest error over all checks is smaller than that of blended forces."""
     if not checks:
-        reason = "forces are blended, because no model lies between the others to check anything better by"
+        reason = (
+            "forces are blended, because no model lies between the others with which a better method could be tested"
+        )
         return InterpolationChoice("blended forces", reason, checks, workspace, None)
     blended = max(check.blended_error for check in checks)
     modal_errors = [check.modal_error for check in checks if check.modal_error is not None]
