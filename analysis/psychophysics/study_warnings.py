@@ -235,7 +235,7 @@ def _warn_of_spoiled(trials: Iterable[Trial]) -> str:
 
 def _warn_of_flagged(trials: Iterable[Trial]) -> str:
     count = sum(trial.status is TrialStatus.FLAGGED for trial in trials)
-    return f"{count} trial{'s' if count != 1 else ''} flagged: counted, but their stimuli should be checked." * bool(
+    return f"{count} trial{'s' if count != 1 else ''} flagged: counted, but the stimulus should be checked." * bool(
         count
     )
 

@@ -27,7 +27,7 @@ def test_the_expected_error_is_below_nothing_that_was_seen(misfit, scatter, held
 
 def test_a_model_that_was_not_tested_says_so_and_gives_its_misfit():
     said = quality_sentence(model_quality(0.08, 0.002, None))
-    assert said.startswith("No recording was kept for a test") and "misfit 8.00 %" in said
+    assert said.startswith("No recording was held out for a test") and "misfit 8.00 %" in said
     assert quality_brief(model_quality(0.08, 0.002, None)) == "not tested, misfit 8 %"
 
 

@@ -81,7 +81,7 @@ def test_a_missing_unit_is_said_to_be_missing():
 
 
 def test_a_product_after_a_stroke_is_refused_because_it_can_be_read_two_ways():
-    with pytest.raises(UnknownUnitError, match="after each slash stands exactly one symbol"):
+    with pytest.raises(UnknownUnitError, match="each slash must be followed by exactly one symbol"):
         parse_unit("N/m s")
 
 

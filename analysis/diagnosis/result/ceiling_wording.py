@@ -59,7 +59,11 @@ def _describe_ceiling_of_axis(reached: BalanceErrors, single: bool) -> str:
     named = f"with the named laws it is {error_text(reached.named)}" if reached.any_named else "no law is named"
     if reached.any_named and reached.named <= reached.ceiling * (1 + SAME):
         return f"{alone}, {named}, and all laws together reach no smaller error."
-    share = f", which is {share_text(reached.share)} of that reduction" if reached.named < reached.linear else ""
+    share = (
+        f", which is {share_text(reached.share)} of that reduction of the error's power"
+        if reached.named < reached.linear
+        else ""
+    )
     return (
         f"{alone}; with all laws together it is {error_text(reached.ceiling)}, a bound that a sum of a few laws can "
         f"hardly reach; {named}{share}."

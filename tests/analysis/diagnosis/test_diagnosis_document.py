@@ -61,9 +61,9 @@ def test_the_ways_to_measure_errors(error):
     ("place", "value", "problem"),
     [
         (("verdict",), "maybe", "verdict: Input should be 'no_mismatch', 'parameters', 'explained'"),
-        (("verdict",), "parameters", "the verdict 'parameters' goes with no effects"),
-        (("verdict",), "partly_explained", "the verdict 'partly_explained' goes with a remainder"),
-        (("effects",), [], "the verdict 'explained' goes with one effect or more"),
+        (("verdict",), "parameters", "the verdict 'parameters' requires an empty list of effects"),
+        (("verdict",), "partly_explained", "the verdict 'partly_explained' requires a remainder"),
+        (("effects",), [], "the verdict 'explained' requires one effect or more"),
         (("mismatch", 0, "share"), 1.2, "mismatch.0.share: Input should be less than or equal to 1"),
         (("mismatch", 0, "p_value"), -0.1, "mismatch.0.p_value: Input should be greater than or equal to 0"),
         (("mismatch", 0, "band_hz"), [6.0, 0.5], "mismatch.0: band_hz must rise from 0 or more, not [6.0, 0.5]"),
@@ -76,7 +76,7 @@ def test_the_ways_to_measure_errors(error):
         (("effects", 0, "parameters", "level", "unit"), "", "effects.0.parameters.level.unit: String should have at"),
         (("fit", "fit", "after"), -1.0, "fit.fit.after: Input should be greater than or equal to 0"),
         (("error",), "by eye", "error: String should match pattern"),
-        (("sure",), True, "sure: this key is not known here"),
+        (("sure",), True, "sure: this key is unknown"),
     ],
 )
 def test_what_is_no_diagnosis_is_refused_by_its_place(place, value, problem):
@@ -93,7 +93,7 @@ def test_a_key_that_is_left_out_is_missing():
 
 def test_an_unexplained_mismatch_is_there():
     document = {**DOCUMENT, "verdict": "unexplained", "effects": [], "mismatch": []}
-    with pytest.raises(DiagnosisError, match="the verdict 'unexplained' goes with a mismatch"):
+    with pytest.raises(DiagnosisError, match="the verdict 'unexplained' requires a mismatch"):
         diagnosis_from_json(document)
 
 
@@ -116,7 +116,7 @@ def test_a_law_without_a_name_goes_to_json_and_back():
 @pytest.mark.parametrize(
     ("effect", "problem"),
     [
-        ({**DISCOVERED, "effect": "cogging"}, "cogging has a name, and so no law"),
+        ({**DISCOVERED, "effect": "cogging"}, "cogging is an effect of the catalogue, so it must not have a law"),
         ({**DISCOVERED, "law": None}, "discovered_law lacks its law"),
         (
             {**DISCOVERED, "law": {**LAW, "expression": "-4.1*vy.T"}},

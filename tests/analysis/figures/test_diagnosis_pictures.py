@@ -54,7 +54,7 @@ def test_the_map_has_a_row_of_panels_per_level_and_a_column_per_stage():
     axes = draw_mismatch_map({"before": cells, "retuned": cells, "after": cells}, "fx", "N").axes[0]
     panels = next(collection for collection in axes.collections if isinstance(collection, PolyCollection))
     assert len(panels.get_paths()) == 9
-    assert around(axes) == ["as given", "re-tuned", "with what was found", "at 0.5 N", "at 1.5 N", "at 3 N"]
+    assert around(axes) == ["as given", "re-tuned", "with the effects found", "at 0.5 N", "at 1.5 N", "at 3 N"]
     assert [label.get_text() for label in axes.get_xticklabels()] == ["4", "8"] * 3
 
 

@@ -80,4 +80,4 @@ def test_the_step_of_a_converter_is_found(recording, noise, steps, level):
 
 def test_an_analog_channel_has_no_step(recording, noise):
     (check,) = check_resolution(channels_of(recording(noise(), noise(seed=2))))
-    assert (check.level, check.seen) == ("fine", "No step of a converter matters in any sensor.")
+    assert (check.level, check.seen) == ("fine", "No sensor is limited by the resolution of its converter.")

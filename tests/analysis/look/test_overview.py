@@ -11,7 +11,7 @@ def test_an_intact_recording_has_no_findings(sound):
     found = overview("sound", sound)
     assert not [check for check in found.checks if check.level == "wrong"]
     assert [check.seen for check in found.checks if check.level == "notice"] == [
-        "Nothing repeats, so noise cannot be distinguished from what a model lacks."
+        "Nothing repeats, so noise cannot be distinguished from errors of a model."
     ]
     assert [(band.command, round(band.low_hz)) for band in found.bands] == [("f1", 0)]
     assert found.coherences[0].share > 0.95

@@ -178,10 +178,10 @@ def test_a_sensor_that_is_turned_is_turned_back():
 @pytest.mark.parametrize(
     ("stated", "cause"),
     [
-        ([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]], "no rotation"),
+        ([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]], "not a rotation"),
         ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], r"shape \(2, 3\)"),
-        ({"x": 1.0}, "no matrix of numbers"),
-        ([[float("nan")] * 3] * 3, "no rotation"),
+        ({"x": 1.0}, "not a matrix of numbers"),
+        ([[float("nan")] * 3] * 3, "not a rotation"),
         ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]], "a reflection"),
     ],
 )

@@ -28,7 +28,7 @@ def test_a_clean_study_has_no_warning(able, protocol):
 
 
 def test_no_trial_is_reported(protocol):
-    assert warnings([], protocol) == ("No test trial is there, so there is no threshold of direction.",)
+    assert warnings([], protocol) == ("There are no test trials, so there is no threshold of direction.",)
 
 
 def test_a_run_that_was_broken_off_is_named(able, protocol):
@@ -68,7 +68,7 @@ def test_a_run_that_the_trial_limit_stopped_is_never_dropped_in_silence(simulate
     analysis = analyse_study(trials, limited)
     (stopped,) = [sentence for sentence in analysis.warnings if "limit of 90 trials" in sentence]
     assert stopped.startswith("4 runs are stopped by the limit of 90 trials, without a threshold: s01 at 45 Hz (")
-    assert "the means that are left are too low" in stopped
+    assert "the remaining means are too low" in stopped
     assert not any("not complete" in sentence for sentence in analysis.warnings)
     assert "4 are missing because of the trial limit" in analysis.table.coverage
 
@@ -80,7 +80,7 @@ def test_a_response_bias_is_named(able, protocol):
         for trial in able
     ]
     (bias,) = warnings(leaning, protocol)
-    assert bias.startswith("A bias towards one of the two answers, which raises a threshold, shows in s01 at ")
+    assert bias.startswith("A bias towards one of the two answers, which raises a threshold, was found in s01 at ")
     assert "(criterion −" in bias
 
 
@@ -103,7 +103,7 @@ def test_spoiled_flagged_and_unmeasured_trials_are_counted(able, protocol):
     able[5] = replace(able[5], status=TrialStatus.UNMEASURED, delivered_mps2=None)
     assert warnings([*able, spoiled], protocol) == (
         "1 spoiled presentation, played again; the answers do not count.",
-        "1 trial flagged: counted, but the stimulus is worth a look.",
+        "1 trial flagged: counted, but the stimulus should be checked.",
         "1 counted trial without a measured acceleration: answered before a full period of the steady stimulus was "
         "recorded, or the recording was lost. The answers count.",
     )
@@ -157,7 +157,7 @@ def with_detection(full_protocol, simulate):
 def test_a_direction_below_the_detection_threshold_is_named(able, full_protocol, with_detection):
     (sentence,) = warnings(with_detection(able, 2.0), full_protocol)
     assert sentence.startswith(
-        "The direction was told at a level below that at which the vibration was felt: s01 at 35"
+        "The direction was identified at a level below the detection threshold of the vibration: s01 at 35"
     )
     assert "differ by 2.4 dB" in sentence
 

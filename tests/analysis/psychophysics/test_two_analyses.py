@@ -36,7 +36,7 @@ def test_numbers_simulated_with_the_published_rule_are_said_of_no_other(analysis
     assert comparison_text(*parts, SIMULATED_RULE) == analysis.compared
     for other in (replace(SIMULATED_RULE, cap_n=2.0), replace(SIMULATED_RULE, down_after_right=2)):
         said = comparison_text(*parts, other)
-        assert "Near the cap the published intervals do not hold" in said
+        assert "Near the cap the published intervals do not have" in said
         assert "Measured near the cap" not in said
 
 
@@ -64,7 +64,7 @@ def test_frequencies_far_above_the_cap_are_not_compared_and_the_report_says_so(p
     declared = replace(protocol, analysis=AnalysisSettings("hierarchical", (45.0, 35.0)))
     analysis = analyse_study(simulate_study(true_n=(0.3, 0.4, 0.6, guessing, guessing)), declared)
     page = html.unescape(render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z"))
-    said = "At 35 Hz and 45 Hz the medians lie at more than twice the cap: nothing is known of the differences"
+    said = "At 35 Hz and 45 Hz the medians lie at more than twice the cap: the differences between these are not known"
     assert said in page
     by_model = analysis.declared_result.results[0]
     assert by_model.p is None and by_model.notes == (FAR_ABOVE,)
@@ -73,7 +73,7 @@ def test_frequencies_far_above_the_cap_are_not_compared_and_the_report_says_so(p
 @pytest.mark.slow
 def test_where_all_guess_no_difference_is_told(protocol, simulate_study):
     analysis = analyse_study(simulate_study(true_n=(float("inf"),) * 5), protocol)
-    assert "The model tells no difference to 5 Hz." in analysis.compared
+    assert "The model gives no difference to 5 Hz." in analysis.compared
     assert "Both agree" not in analysis.compared and "they disagree" not in analysis.compared
 
 
@@ -95,7 +95,7 @@ def test_far_below_the_cap_the_two_agree(simulate_study, protocol):
 def test_one_participant_leaves_the_published_analysis_alone(simulate_study, protocol):
     alone = analyse_study(simulate_study(subjects=1), protocol)
     assert alone.primary is None
-    assert "stands alone" in alone.compared
+    assert "only the published analysis is given" in alone.compared
     assert comparison_text(None, (), alone.comparisons, alone.table, SIMULATED_RULE) == alone.compared
 
 

@@ -61,7 +61,7 @@ def test_the_verdict_comes_first_then_the_map_then_a_section_per_effect(page):
         "Diagnosis of small", "What the model lacks", "Where model and device disagree",
         "What kind of distortion the device shows", "Dry friction on the x drive",
         "What else was tried", "How well it predicts", "What is still unexplained", "The model's own parameters",
-        "A black box beside it", "The next recording", "Remarks", "How this was done", "Where this comes from",
+        "Comparison with a black box", "The next recording", "Remarks", "How this was done", "Where this comes from",
     ]  # fmt: skip
     assert page[0].index("Missing in the model: dry friction on the x drive. The error") < page[0].index("<h2")
 
@@ -117,7 +117,8 @@ def test_candidates_and_classes_are_on_the_page_and_only_where_there_are_some(fr
     text, headings = rendered(replace(told(friction_found, effects=(alike,), candidates=(other,)), reached=reached))
     assert "What else may be missing" in headings.found
     for piece in ("The weight of a body off its axis (a pendulum)", "500 mN m, hanging", "34 %", "Too little.",
-                  "Friction whose law these data leave open", "that is 67 % of the way"):  # fmt: skip
+                  "Friction whose law these data do not determine", "which is 67 % of that reduction of the error's "
+                  "power"):  # fmt: skip
         assert piece in text
         assert piece not in page[0]
     assert "What else may be missing" not in page[1].found
@@ -136,7 +137,7 @@ def test_wrong_parameters_are_said_with_their_numbers(friction_found):
     moved = final_moved_parameters(bare)
     assert moved
     text, _ = rendered(bare)
-    assert f"No physics is missing; parameters of the model are off: {moved[0].text}" in text
+    assert f"No physics is missing; parameters of the model are wrong: {moved[0].text}" in text
 
 
 def test_channels_stand_in_their_units_with_the_noise_beside(friction_found):
@@ -177,9 +178,9 @@ def test_every_open_number_is_listed_with_how_far_it_moved(friction_found):
 @pytest.mark.parametrize(
     ("error", "words"),
     [
-        ("free simulation", "played from rest by the recorded commands alone"),
+        ("free simulation", "simulated from rest with the recorded commands only"),
         ("predicted force", "the force that it needs for the measured motion"),
-        ("windows of 1 s", "played over windows of 1 s, each begun from the measured state"),
+        ("windows of 1 s", "simulated over windows of 1 s, each started from the measured state"),
     ],
 )
 def test_the_method_says_how_errors_were_measured(friction_found, error, words):
@@ -188,7 +189,7 @@ def test_the_method_says_how_errors_were_measured(friction_found, error, words):
 
 def test_the_method_says_how_the_time_was_split_and_the_noise_found(friction_found):
     said = " ".join(method_paragraphs(friction_found))
-    assert "6 s were fitted to, 3 s served to choose between explanations and 3 s were sealed" in said
+    assert "6 s were used for the fit, 3 s were used to choose between explanations and 3 s were held out" in said
     assert "The noise was measured from what differs between repeats" in said
 
 
@@ -208,7 +209,7 @@ def test_a_number_at_the_end_of_its_range_is_doubted(friction_found):
     most = {"level": placed.effect.parameters[0].upper}
     wild = replace(friction_found, named=(PlacedEffect(placed.effect, placed.sites, most),))
     (said,) = implausible_sentences(wild)
-    assert said.startswith("The level of dry friction ran into the end of what was allowed (")
+    assert said.startswith("The level of dry friction reached the limit of its allowed range (")
 
 
 def test_an_interval_that_holds_no_effect_is_doubted(friction_found):
@@ -216,14 +217,12 @@ def test_an_interval_that_holds_no_effect_is_doubted(friction_found):
     faint = replace(effect, parameters={"level": Estimate(0.01, "N", (-0.01, 0.03))})
     (said,) = implausible_sentences(told(friction_found, effects=(faint,)))
     assert (
-        said == "The interval of dry friction, 0.01 N [−0.01, 0.03], holds no effect at all: the data hardly bear it."
+        said == "The interval of dry friction, 0.01 N [−0.01, 0.03], includes the value without the effect: the data "
+        "hardly support it."
     )
 
 
 def test_an_improved_model_that_makes_energy_is_doubted(friction_found):
     model = replace(friction_found.improved, damping=np.array([[-1.0]]))
     (said,) = implausible_sentences(replace(friction_found, improved=model))
-    assert (
-        said
-        == "The improved model's damping is negative in one direction: in it, the device would gain energy by itself."
-    )
+    assert said == "The improved model's damping is negative in one direction: in it, the device would generate energy."

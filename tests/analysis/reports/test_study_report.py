@@ -136,7 +136,7 @@ def test_nothing_usable_is_reported(report):
     html = report([])
     parsed(html)
     assert "There is no run to analyse." in html
-    assert "No test trial is there, so there is no threshold of direction." in html
+    assert "There are no test trials, so there is no threshold of direction." in html
     assert "<table>" not in html
 
 

@@ -47,7 +47,7 @@ def test_like_arms_mirror_and_an_odd_one_is_named():
     odd, where = line_asymmetry(readings(np.array([1e-3, 1.3e-3, 1e-3])), AZIMUTHS)
     assert odd[1] < 1e-12 and odd[0] > 0.05 and odd[2] > 0.05
     warnings = asymmetry_words(odd, where, ARMS_DEG)
-    assert len(warnings) == 3 and "The line at 210 degrees holds" in warnings[-1]
+    assert len(warnings) == 3 and "The line at 210 degrees is a line of symmetry" in warnings[-1]
     assert asymmetry_words(shares, where, ARMS_DEG) == ()
 
 
@@ -96,14 +96,14 @@ def test_a_jacobian_is_told_from_another_by_differences():
 
 
 SPOILT = {
-    "inertia holds what is no number": {"inertia_kg": np.full((3, 3), np.nan)},
-    "Jacobian holds what is no number": {"jacobian": np.full((3, 3), np.inf)},
-    "joint angles holds what is no number": {"joint_angle_rad": np.array([0.0, np.nan, 0.0])},
-    "gravity force is no number": {"gravity_n": np.array([0.0, np.nan, 0.0])},
+    "inertia contains a value that is not a number": {"inertia_kg": np.full((3, 3), np.nan)},
+    "Jacobian contains a value that is not a number": {"jacobian": np.full((3, 3), np.inf)},
+    "joint angles contains a value that is not a number": {"joint_angle_rad": np.array([0.0, np.nan, 0.0])},
+    "gravity force is not a number": {"gravity_n": np.array([0.0, np.nan, 0.0])},
     "singular": {"jacobian": np.ones((3, 3))},
     "not symmetric": {"inertia_kg": 0.3 * np.eye(3) + 0.01 * np.eye(3, k=1)},
     "not positive definite": {"inertia_kg": np.diag([0.3, 0.3, -0.3])},
-    "no handle weighs that": {"inertia_kg": 300.0 * np.eye(3)},
+    "not plausible for a handle": {"inertia_kg": 300.0 * np.eye(3)},
 }
 
 
@@ -150,5 +150,5 @@ def test_inertia_and_its_slopes_are_those_of_the_formula():
 
 def test_positions_in_a_plane_tell_no_slopes():
     flat = [each for each in readings() if each.position_m[0] == 0.0]
-    with pytest.raises(ValueError, match="do not tell how the inertia changes"):
+    with pytest.raises(ValueError, match="do not determine how the inertia changes"):
         inertia_about(calibration(flat), np.zeros(3))

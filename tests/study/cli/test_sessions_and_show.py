@@ -118,9 +118,9 @@ def test_a_diagnosis_is_shown_in_words(run, tmp_path):
     path.write_text(json.dumps(document))
     code, out, _ = run("show", path)
     assert code == 0
-    assert out.startswith("The model answers as the device does")
+    assert out.startswith("The model agrees with the device")
     assert "repeats allow" in out
-    assert json.loads(run("show", path, "--json")[1])["verdict"].startswith("The model answers as the device does")
+    assert json.loads(run("show", path, "--json")[1])["verdict"].startswith("The model agrees with the device")
     assert run("show", tmp_path) == (0, out, "")
 
 

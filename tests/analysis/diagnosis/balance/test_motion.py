@@ -115,7 +115,7 @@ def test_a_motion_is_of_the_lowest_derivative_and_moves(recording_of):
     assert motion_signal(replace(both, position=position)).channels == ("x",)
     assert motion_signal(both).quantities == ("acceleration",)
     still = recording_of(course(2), np.ones((COUNT, 1)), RATE_HZ)
-    with pytest.raises(NoMotionError, match="no response is a motion"):
+    with pytest.raises(NoMotionError, match="no response is a position, velocity or acceleration"):
         motion_of(still)
 
 

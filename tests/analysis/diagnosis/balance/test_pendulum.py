@@ -57,4 +57,4 @@ def test_a_weight_that_a_spring_would_have_to_cancel_is_not_named(recording_of, 
     recording = recording_of(force[:, None], angle[:, None], RATE_HZ, unit="rad", meta={"imposed": "position"})
     (found,) = balance_of(recording)
     law = next(each for each in found.laws if each.law.effect == "gravity_torque")
-    assert "times what was recorded" in law.why_not
+    assert "times the recorded force" in law.why_not

@@ -139,8 +139,8 @@ def searched(after, rival=None):
         (candidate(0.3 * NOISE), candidate(0.3 * NOISE, "backlash"), "cannot tell it from backlash"),
         (candidate(0.95 * NOISE), None, "and 30 % are required"),
         (candidate(0.8 * NOISE), None, "the force balance does not confirm it"),
-        (candidate(1.2 * NOISE), None, "what varies between stretches"),
-        (candidate(0.3 * NOISE, deviations=(4.0,)), None, "at the end of its tolerance"),
+        (candidate(1.2 * NOISE), None, "variation between stretches"),
+        (candidate(0.3 * NOISE, deviations=(4.0,)), None, "to the limit of its tolerance"),
     ],
 )
 def test_a_rival_or_a_poor_prediction_is_an_objection_to_a_name(monkeypatch, after, rival, said):

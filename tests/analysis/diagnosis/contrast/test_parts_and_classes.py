@@ -42,7 +42,7 @@ def test_sparse_losses_leave_most_rows_to_compare_by(lost, rig):
 def test_a_side_with_too_few_rows_is_not_compared(rig):
     clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
     bare = replace(other[0], known=np.arange(rig.COUNT) < 60)
-    with pytest.raises(ValueError, match="too few rows"):
+    with pytest.raises(ValueError, match="too few samples"):
         compare_base(next(bases_of(clean, other))[0][0], clean, (bare,))
 
 

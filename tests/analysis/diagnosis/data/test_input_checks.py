@@ -74,7 +74,7 @@ def test_a_gap_in_the_command_is_named_by_its_place():
     gap = recording().command.samples.copy()
     gap[70:80] = np.nan
     said = refusal(require_something, [with_samples(recording(), "command", gap)], ["a.h5"])
-    assert "a.h5 misses the command in 10 samples (the first is 70)" in said
+    assert "a.h5 has no command in 10 samples (the first is 70)" in said
 
 
 def test_a_command_that_never_changes_excites_nothing():
@@ -93,7 +93,7 @@ def test_too_few_samples_and_too_few_cycles_are_too_short():
     assert "100 samples are too short" in refusal(require_something, [recording(samples=100)], ["a"])
     t = np.arange(5000)[:, None] / 5000
     slow = with_samples(recording(), "command", np.sin(2 * np.pi * 1.5 * t))
-    assert "cycles of what was commanded, which is too short" in refusal(require_something, [slow], ["a"])
+    assert "cycles of the command, which is too short" in refusal(require_something, [slow], ["a"])
 
 
 def test_random_levels_that_change_their_side_once_hold_many_cycles_and_a_step_holds_none():
@@ -102,7 +102,7 @@ def test_random_levels_that_change_their_side_once_hold_many_cycles_and_a_step_h
     answered = with_samples(recording(), "response", 4 * levels[:, None])
     require_something([with_samples(answered, "command", levels[:, None])], ["a"])
     step = with_samples(recording(), "command", (np.arange(5000) > 2000.0)[:, None].astype(float))
-    assert "cycles of what was commanded, which is too short" in refusal(require_something, [step], ["a"])
+    assert "cycles of the command, which is too short" in refusal(require_something, [step], ["a"])
 
 
 def test_where_only_the_test_holds_a_response_nothing_can_be_fitted():
@@ -111,7 +111,7 @@ def test_where_only_the_test_holds_a_response_nothing_can_be_fitted():
     missing = whole.response.samples.copy()
     missing[:4000] = np.nan
     gaps = with_samples(replace(whole, segments=roles), "response", missing)
-    assert "only 0 samples of what may be fitted to hold a response" in refusal(require_something, [gaps], ["a"])
+    assert "only 0 samples that may be fitted have a response" in refusal(require_something, [gaps], ["a"])
     missing[:2000] = whole.response.samples[:2000]
     require_something([with_samples(gaps, "response", missing)], ["a"])
 
@@ -125,7 +125,7 @@ def test_a_recording_counts_once():
 
 def test_a_second_is_too_short_where_it_holds_few_samples_and_enough_where_it_holds_many():
     said = refusal(require_something, [recording(samples=500)], ["a"])
-    words = "500 samples, 1 s, are too short a recording to name physics by; at least 1.5 s or 2000 samples are needed"
+    words = "500 samples, 1 s, are too short to identify physics; at least 1.5 s or 2000 samples are needed"
     assert words in said
     assert require_something([recording(samples=4000, rate_hz=4000.0)], ["a"]) == ()
     assert require_something([recording(samples=800)], ["a"]) == ()
@@ -146,7 +146,7 @@ def test_a_rate_too_slow_for_the_model_is_refused():
 def test_a_recording_that_is_all_noise_is_refused():
     rng = np.random.default_rng(5)
     noise = with_samples(recording(), "response", rng.standard_normal((5000, 1)))
-    assert "the responses have nothing to do with the commands" in refusal(require_something, [noise], ["a"])
+    assert "the responses are not related to the commands" in refusal(require_something, [noise], ["a"])
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_a_recording_that_is_all_noise_is_refused():
         (model(axes=3), "the model has 3 outputs, but the recording has 1 response channel (ax)"),
         (model(quantity="velocity"), "the model answers with velocity, but the recording's response is acceleration"),
         (model(rotational=True), "the model is rotational (kg m^2, N m, rad), but the recording is translational"),
-        (model(damping=-1.0), "the model is unstable: undisturbed it grows e-fold in 0.5 s"),
+        (model(damping=-1.0), "the model is unstable: without a force its motion grows e-fold in 0.5 s"),
         (model(stiffness=-100.0), "the model is unstable"),
     ],
     ids=["inputs", "outputs", "quantity", "rotational", "damping", "stiffness"],

@@ -103,8 +103,8 @@ def test_a_proved_law_explains(seed=7):
     assert seen.judgement.verdict == "explained"
     assert [claim.effect.name for claim in seen.found.after.fitted.hypothesis.claims] == ["discovered_law"]
     assert has_law(seen)
-    assert "louder commands and another kind of command" in seen.remarks[0]
-    assert "beyond vx = ±" in seen.remarks[0]
+    assert "stronger commands and another kind of command" in seen.remarks[0]
+    assert "Beyond vx = ±" in seen.remarks[0]
 
 
 def test_without_a_test_of_another_kind_a_law_is_a_candidate(seed=8):

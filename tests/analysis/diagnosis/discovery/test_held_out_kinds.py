@@ -35,7 +35,7 @@ def test_rest_tells_nothing():
 
 def test_louder_joint_and_other_commands_are_reported():
     fitted = ("multisine", 1.0, (0,), "fit"), ("multisine", 1.0, (1,), "fit")
-    assert said(*fitted, ("multisine", 3.0, (0,), "test")) == ("louder commands",)
+    assert said(*fitted, ("multisine", 3.0, (0,), "test")) == ("stronger commands",)
     assert "axes driven together" in said(*fitted, ("multisine", 0.9, (0, 1), "test"))
     assert "another kind of command" in said(*fitted, ("sweep", 0.9, (0,), "test"))
 

@@ -27,15 +27,15 @@ def named(*channels):
 def test_a_clear_name_counts_more_than_the_course(name, quantity, course):
     quantities, said = named((name, *PLAIN, course))
     assert quantities == (quantity,)
-    assert said.startswith(f"By name alone, {name} was taken for a")
-    assert quantity in said and "say so in the map (quantity)" in said
+    assert said.startswith(f"From the name alone, {name} was taken for a")
+    assert quantity in said and "state that in the map (quantity)" in said
 
 
 @pytest.mark.parametrize("name", ["y", "tacho", "CH1", "current", "temperature"])
 def test_another_name_leaves_it_to_the_course(name):
     quantities, said = named((name, *PLAIN, PLACE))
     assert quantities == ("position",)
-    assert f"Nothing says what {name} measures" in said
+    assert f"The recording does not state what {name} measures" in said
 
 
 def test_what_a_name_says_of_several_is_said_of_each_and_the_others_stay_open():

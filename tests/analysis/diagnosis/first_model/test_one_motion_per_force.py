@@ -159,7 +159,7 @@ def test_the_sign_of_an_absolute_speed_is_restored(seed):
     (found,), (said,) = one_motion_per_force((of([("u", "voltage", "V", push)], [("w", "speed", "m/s", seen)]),))
 
     assert np.linalg.norm(found.response.samples[:, 0] - speed) < 0.1 * np.linalg.norm(speed)
-    assert "sensor tells the amount alone" in said
+    assert "sensor measures the absolute value only" in said
 
 
 def test_a_speed_in_one_direction_is_not_taken_for_an_absolute_speed():

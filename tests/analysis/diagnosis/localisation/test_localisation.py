@@ -38,21 +38,24 @@ def test_distortion_is_told_per_channel_and_level(friction_found):
 
 def test_the_entry_is_reported_with_what_comes_next():
     assert entry_sentence(EntryPoint((ALONG_X, ALONG_ALL, OF_AX), MOVED, 1200)) == (
-        "What re-tuning leaves enters as a force along x (the drive, the mechanism and a hand all push there, and "
-        "these channels cannot tell which does): 90 % of it, at the median of 1200 frequency lines; "
-        "next comes an error of the ax channel with 40 % (p < 0.0001 that it is as good). The position shows it, too: "
-        "the device itself moves otherwise, and no sensor of the response is at fault."
+        "The mismatch after re-tuning enters as a force along x (the drive, the mechanism and a hand all act there, "
+        "and these channels do not distinguish them): this explains 90 % of it, at the median of 1200 frequency "
+        "lines; the next best entry is an error of the ax channel with 40 % (p < 0.0001 for its being equally good). "
+        "The position shows the mismatch, too: the motion of the device itself differs from the model, and no sensor "
+        "of the response is at fault."
     )
     as_good = replace(OF_AX, p_value=0.3)
-    assert "would explain it about as well (40 %, p = 0.3000)" in entry_sentence(
+    assert "would explain it about equally well (40 %, p = 0.3000)" in entry_sentence(
         EntryPoint((ALONG_X, as_good), None, 60)
     )
 
 
 def test_a_sensor_is_said_to_be_one():
     said = entry_sentence(EntryPoint((OF_AX, ALONG_X), AT_SENSOR, 60))
-    assert said.startswith("What re-tuning leaves enters as an error of the ax channel: 40 % of it")
-    assert said.endswith("the fault is in how the response is measured, not in how the device moves.")
+    assert said.startswith(
+        "The mismatch after re-tuning enters as an error of the ax channel: this explains 40 % of it"
+    )
+    assert said.endswith("the fault is in the measurement of the response, not in the motion of the device.")
 
 
 @pytest.mark.parametrize("entry", [None, EntryPoint((), None, 0), EntryPoint((ALONG_X,), None, 39)])

@@ -53,7 +53,7 @@ def test_what_an_intact_device_differs_by_is_named_only_without_clean_recordings
     assert (named(known), known.diagnosis.verdict) == ([], "no_mismatch")
     assert not any(cell.significant for cell in known.maps["before"])
     assert known.remarks[0].startswith(
-        "What a device in order differs by from its re-tuned model was learned from 2 clean"
+        "The difference between a device without faults and its re-tuned model was estimated from 2 clean"
     )
 
 
@@ -118,7 +118,7 @@ def test_the_shares_of_a_channel_are_those_of_the_mismatch(diagnosed):
 
 def test_recordings_that_can_only_be_compared_otherwise_teach_nothing():
     require_alike("windows of 1 s", "windows of 1 s")
-    said = r"can only be compared by free simulation, those to diagnose by predicted force, so that one says nothing"
+    said = r"can only be compared by free simulation, those to diagnose by predicted force, so their errors are not comparable"
     with pytest.raises(NothingLearned, match=said):
         require_alike("free simulation", "predicted force")
 
@@ -128,5 +128,5 @@ def test_what_was_learned_is_reported_and_where_it_is_much_that_too():
     little = clean_floor_sentence(CleanFloor(channels=(0.1, 0.004), recordings=2), ("ax", "x"))
     assert "from 2 clean recordings: ax 10 % and x 0.4 % of the channel's signal" in little
     assert "times 1.5" in little
-    assert "That is much" not in little
-    assert "That is much" in clean_floor_sentence(CleanFloor(channels=(0.4,), recordings=1), ("ax",))
+    assert "This is a large difference" not in little
+    assert "This is a large difference" in clean_floor_sentence(CleanFloor(channels=(0.4,), recordings=1), ("ax",))

@@ -41,8 +41,9 @@ def of_class(effect, *others, **changes):
 def test_where_nothing_is_named_the_verdict_says_the_best_candidate_with_its_numbers_and_why_not():
     said = verdict_sentence(diagnosis("unexplained", (DRY, STICKY)), device=DEVICE)
     assert said.endswith(
-        "Best candidate, not confirmed: dry friction on the x drive, 0.211 N. It would take 40 % of the error's power "
-        "on held-out data, 62 % of what all laws together take. Why it is not named: the main part is another."
+        "Best candidate, not confirmed: dry friction on the x drive, 0.211 N. It would explain 40 % of the error's "
+        "power on held-out data, 62 % of what all laws together explain. Reason not to name it: the main part is "
+        "another."
     )
 
 
@@ -54,7 +55,7 @@ def test_no_candidate_is_said_to_be_best_where_something_is_named_or_nothing_is_
 def test_each_candidate_is_said_once():
     nothing, something = diagnosis("unexplained", (DRY, STICKY)), diagnosis("partly_explained", (STICKY,), (NAMED,))
     (other,) = candidate_sentences(nothing, DEVICE)
-    assert other.startswith("Not confirmed: a spring that gives way in time (viscoelastic relaxation) on the x drive, ")
+    assert other.startswith("Not confirmed: viscoelastic relaxation of a spring on the x drive, ")
     assert "120 N/m, time constant 20.0 ms." in other
     assert candidate_sentences(something, DEVICE) == (other,)
 
@@ -84,9 +85,9 @@ def test_a_class_is_called_by_what_its_laws_have_in_common():
     friction = of_class("coulomb_friction", "stribeck_friction", "presliding_hysteresis")
     assert effect_title(friction, True) == "friction (dry friction, or 2 laws like it) on the x drive"
     assert inseparable_sentence(friction) == (
-        "Friction whose law these data leave open: dry friction, friction that is larger at rest (Stribeck) or dry "
-        "friction with elastic presliding would each explain it as well on held-out data. The parameters are those of "
-        "dry friction."
+        "Friction whose law these data do not determine: dry friction, friction that is larger at rest (Stribeck) or "
+        "dry friction with elastic presliding would each explain it equally well on held-out data. The parameters "
+        "are those of dry friction."
     )
     late = of_class(
         "amplifier_lag", "transport_delay", place="actuator", parameters={"time_constant": Estimate(1e-3, "s")}
@@ -107,12 +108,12 @@ def test_an_effect_without_a_class_is_called_by_its_own_name():
 
 def test_the_share_of_the_ceiling_is_one_of_powers():
     (said,) = describe_ceiling((BalanceErrors("x", 0.5, 0.3, 0.1, True),))
-    assert "alone leave 50 % of the force, and all laws together 10 %" in said
-    assert said.endswith("what is named leaves 30 %; that is 67 % of the way.")
+    assert "alone is 50 % of the force; with all laws together it is 10 %" in said
+    assert said.endswith("with the named laws it is 30 %, which is 67 % of that reduction of the error's power.")
     (nothing,) = describe_ceiling((BalanceErrors("x", 0.5, 0.5, 0.1, False),))
     assert nothing.endswith("no law is named.")
     (best,) = describe_ceiling((BalanceErrors("x", 0.5, 0.1, 0.1, True),))
-    assert best.endswith("what is named leaves 10 %, and all laws together leave no less.")
+    assert best.endswith("with the named laws it is 10 %, and all laws together reach no smaller error.")
     assert describe_ceiling((BalanceErrors("x", 0.5, 0.5, 0.1, False),) * 2)[0].startswith(
         "In the force balance along x,"
     )

@@ -23,17 +23,17 @@ def test_numbers_of_the_model_that_moved_too_far_are_doubted():
     (far,) = doubtful_sentences((replace(MOVED, deviations=-3.4),))
     assert far.startswith("The damping fx was moved by 3.4 standard deviations of its calibration: either")
     (edge,) = doubtful_sentences((replace(MOVED, deviations=4.0, at_bound=True),))
-    assert "of its calibration, as far as it may: either" in edge
+    assert "of its calibration, to the limit of its allowed range: either" in edge
 
 
 def test_a_model_that_was_fitted_here_has_no_calibration_to_leave():
     assert describe_retuning((MOVED,), fitted=True) == (
-        "Fitted once more, these parameters of the first model moved by more than was left open at first: "
+        "In the final fit, these parameters of the first model changed by more than the tolerance of the first fit: "
         "damping fx +0.350 N s/m."
     )
     assert doubtful_sentences((replace(MOVED, deviations=-3.4),), fitted=True) == ()
     (edge,) = doubtful_sentences((replace(MOVED, deviations=4.0, at_bound=True),), fitted=True)
-    assert "calibration" not in edge and edge.startswith("As far as they may")
+    assert "calibration" not in edge and edge.startswith("These parameters of the first model reached the limit")
 
 
 def test_many_doubtful_numbers_are_counted_in_one_sentence():

@@ -139,17 +139,17 @@ def test_no_mismatch_remains_where_none_is_reported():
     noise = replace(PLACE, p_value=0.4)
     left = diagnosis("partly_explained", (DRY,), remainder=(noise,), errors=Errors(0.5, 0.36, 0.0026, 0.0114))
     said = verdict_sentence(left)
-    assert remainder_sentence(left) == "Nothing significant is left unexplained."
+    assert remainder_sentence(left) == "No significant mismatch remains."
     assert "a mismatch remains" not in said
     assert "not all" not in said
-    assert said.endswith("only repeats of a drive would show that nothing else is missing.")
+    assert said.endswith("only repeated periods of the excitation could show that nothing else is missing.")
 
 
 def test_an_error_is_not_counted_in_noise_that_no_repeats_show():
     device = Device(True, LINEAR, "quiet band")
     said = verdict_sentence(diagnosis("partly_explained", (DRY,), remainder=(PLACE,)), device=device)
     assert "times" not in said
-    assert "noise as it is above the driven band would leave 2.65 %" in said
+    assert "noise at the level measured above the driven band would leave 2.65 %" in said
     unknown = verdict_sentence(diagnosis("unexplained"), device=Device(True, LINEAR, "unknown"))
     assert "what noise alone would leave is not known" in unknown
 
@@ -157,7 +157,7 @@ def test_an_error_is_not_counted_in_noise_that_no_repeats_show():
 def test_wrong_parameters_are_another_answer_than_missing_physics():
     said = verdict_sentence(diagnosis("parameters"), (MOVED,))
     assert said.startswith(
-        "No physics is missing; parameters of the model are off: damping fx +0.350 N s/m (2.1 standard deviations)."
+        "No physics is missing; parameters of the model are wrong: damping fx +0.350 N s/m (2.1 standard deviations)."
     )
     assert "falls from 50 % of the signal (as given) to 36 % (re-tuned)" in said
 
@@ -165,8 +165,8 @@ def test_wrong_parameters_are_another_answer_than_missing_physics():
 def test_without_a_mismatch_the_model_is_confirmed():
     clean = Errors(0.027, 0.027, 0.027, 0.0265)
     assert verdict_sentence(diagnosis("no_mismatch", mismatch=(), errors=clean)) == (
-        "The model answers as the device does: as it was given, its error on held-out data is 2.7 % of the signal, "
-        "1.02 times what noise alone would leave (2.65 %)."
+        "The model agrees with the device: as given, its error on held-out data is 2.7 % of the signal, 1.02 times "
+        "what noise alone would leave (2.65 %)."
     )
 
 
@@ -205,12 +205,12 @@ def test_of_two_that_cannot_be_told_apart_both_are_named():
 
 def test_share_and_probability_are_reported():
     assert share_sentence(DRY) == (
-        "It accounts for 90 % of the mismatch that re-tuning leaves; the probability that this is its name is 0.68."
+        "It accounts for 90 % of the mismatch after re-tuning; the probability that this effect is the cause is 0.68."
     )
 
 
 def test_what_is_left_is_named_by_its_first_places():
-    assert remainder_sentence(diagnosis("explained", (DRY,))) == "Nothing significant is left unexplained."
+    assert remainder_sentence(diagnosis("explained", (DRY,))) == "No significant mismatch remains."
     places = tuple(replace(PLACE, share=share) for share in (0.8, 0.1, 0.3, 0.2, 0.05))
     said = remainder_sentence(diagnosis("partly_explained", (DRY,), remainder=places))
     assert said.startswith(
@@ -223,11 +223,11 @@ def test_the_next_recording_says_what_it_would_tell_apart():
     wanted = NextExperiment("hapteq record slow.toml --out slow.h5", ("coulomb_friction", "stribeck_friction"),
                             "only slow motion shows the hump")  # fmt: skip
     assert next_experiment_sentence(diagnosis("explained", (DRY,), next_=wanted)) == (
-        "The recording that would tell dry friction from friction that is larger at rest (Stribeck): hapteq "
+        "The recording that would distinguish dry friction from friction that is larger at rest (Stribeck): hapteq "
         "record slow.toml --out slow.h5. Only slow motion shows the hump."
     )
     assert next_experiment_sentence(diagnosis("explained", (DRY,))) == (
-        "No further recording is foreseen to tell apart what these data cannot."
+        "No further recording was found that would distinguish what these data do not."
     )
     assert next_experiment_sentence(diagnosis("explained", (replace(DRY, rivals=()),))) == ""
 
@@ -235,16 +235,16 @@ def test_the_next_recording_says_what_it_would_tell_apart():
 @pytest.mark.parametrize(
     ("test", "physics", "end"),
     [
-        (0.02, 0.05, "The black box predicts better: the data hold something that was not named."),
+        (0.02, 0.05, "The black box predicts better: the data contain structure that no named effect explains."),
         (0.05, 0.02, "The physics predicts better."),
-        (0.05, 0.05, "the physics leaves 5 %: no better."),
+        (0.05, 0.05, "the physics has 5 %: the black box does not predict better."),
     ],
 )
 def test_a_black_box_that_beats_the_physics_is_said_to(test, physics, end):
     said = black_box_sentence(BlackBox("ARX", 12, test, physics), named=True)
-    assert said.startswith("A black box (ARX, 12 parameters), fitted to the same samples, leaves")
+    assert said.startswith("A black box (ARX, 12 parameters), fitted to the same samples, has an error of")
     assert said.endswith(end)
-    assert "the re-tuned model leaves" in black_box_sentence(BlackBox("ARX", 12, test, physics), named=False)
+    assert "the re-tuned model has" in black_box_sentence(BlackBox("ARX", 12, test, physics), named=False)
 
 
 def test_held_out_data_that_do_not_confirm_are_said_not_to():
@@ -252,8 +252,8 @@ def test_held_out_data_that_do_not_confirm_are_said_not_to():
     assert confirmation_sentence(fit, ERRORS) == ""
     assert confirmation_sentence(fit, replace(ERRORS, after=0.4)).startswith("The held-out data do not confirm this")
     assert confirmation_sentence(fit, replace(ERRORS, after=0.06)) == (
-        "The held-out data confirm this only in part: 2.26 times the noise is left there, 1.02 times the noise on what "
-        "was fitted."
+        "The held-out data confirm this only in part: the error is 2.26 times the noise there and 1.02 times the "
+        "noise on the fitted data."
     )
     assert confirmation_sentence(fit, Errors(None, None, None, None)) == ""
 

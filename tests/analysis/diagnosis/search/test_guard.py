@@ -45,7 +45,7 @@ def test_each_item_that_crashes_is_dropped_and_named_once():
 
     assert list(guard.over(map, "its fit")(work, effects)) == ["coulomb_friction"]
     assert len(guard.crashes) == 2 and len(guard.sentences) == 1
-    assert guard.part("coulomb_friction", "its last look", broken, "instead") == "instead"
+    assert guard.part("coulomb_friction", "the final check", broken, "instead") == "instead"
     assert len(guard.sentences) == 2
 
 

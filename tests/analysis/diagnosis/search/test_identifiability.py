@@ -100,7 +100,7 @@ def test_it_is_said_that_numbers_were_left_open(rubbing, monkeypatch):
     seen = search_effects(rubbing, [EFFECTS["coulomb_friction"]], lambda what, share: None)
     assert (seen.judgement.verdict, seen.judgement.named) == ("unexplained", False)
     assert seen.remarks == (
-        "An explanation by dry friction is not named: these recordings leave its parameters as good as open.",
+        "An explanation by dry friction is not named: these recordings hardly determine its parameters.",
     )
 
 

@@ -70,7 +70,7 @@ def test_lines_that_are_too_noisy_are_not_judged():
 
 
 def test_all_lines_too_noisy_is_refused_with_what_would_do():
-    with pytest.raises(ValueError, match="at no line is the noise small against 25 % .*record more periods"):
+    with pytest.raises(ValueError, match="at no line is the noise small compared with 25 % .*record more periods"):
         coupling_onset(response_of(0.05 + 0 * LINES, LINES, noise=1.0))
 
 

@@ -32,7 +32,7 @@ def test_pure_noise_is_refused_whether_or_not_its_size_is_told(measuring, told):
     frequency = np.arange(4.6, 38, 0.1)
     real, imaginary = np.random.default_rng(2).standard_normal((2, len(frequency), 3, 3))
     noise = measuring.response_of(frequency, real + 1j * imaginary, 2.0 if told else np.nan)
-    assert "holds noise only" in refusal(noise)
+    assert "contains only noise" in refusal(noise)
 
 
 def test_no_response_at_all(good):
@@ -77,7 +77,7 @@ def test_an_input_that_no_experiment_drove(good):
 
 def test_an_output_that_no_line_has(good):
     silent = replace(good, response=good.response * np.array([1.0, 0.0, 1.0])[:, None])
-    assert f"nothing at all comes from {good.output_channels[1]}, not even noise" in refusal(silent)
+    assert f"there is no signal from {good.output_channels[1]}, not even noise" in refusal(silent)
 
 
 def test_an_order_beyond_what_the_lines_carry(plants, measuring):
@@ -90,7 +90,7 @@ def test_an_order_beyond_what_the_lines_carry(plants, measuring):
 def test_an_order_whose_subspace_cannot_be_told_apart(plants, measuring):
     many = measuring.exact(measuring.small_plant(plants), np.arange(4.6, 38, 0.2), 1e-3)
     text = refusal(many, replace(SETTINGS, order=200))
-    assert "order 200 asks more of the 167 lines in the band than can be distinguished" in text
+    assert "order 200 has more parameters than the 167 lines in the band can determine" in text
     assert "choose a lower order, such as 100" in text
 
 

@@ -11,7 +11,7 @@ from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.signals.recording import Segment
 
 QUICK = IdentificationSettings(order=12, draws=0, longer_horizons=(0,), record_horizons=())
-ORDER, NOT_LINEAR, BOUND = "the order 12 may be too low", "the device is not linear", "sits on the bound of the decay"
+ORDER, NOT_LINEAR, BOUND = "the order 12 may be too low", "the device is not linear", "is at the bound of the decay"
 
 
 def recorded(plants, synthetic, device, periods=3):
@@ -31,13 +31,13 @@ def said_of(recording) -> str:
 
 def test_friction_is_distinguished_from_an_order_that_is_too_low(plants, rubbing, synthetic):
     said = said_of(recorded(plants, synthetic, rubbing.rubbing(modes_of(plants, 0.06), 0.2)))
-    assert NOT_LINEAR in said and "the lines do not tell which" in said
+    assert NOT_LINEAR in said and "the lines do not show which" in said
     assert ORDER not in said and BOUND not in said and "relaxed" not in said
 
 
 def test_without_two_counted_periods_friction_and_order_are_not_told_apart(plants, synthetic):
     said = said_of(recorded(plants, synthetic, plants.omega_like(), periods=1))
-    assert "or the device is not linear, as with friction" in said and "do not tell which" in said
+    assert "or the device is not linear, as with friction" in said and "do not show which" in said
 
 
 def test_an_order_that_is_too_low_is_not_taken_for_friction(plants, synthetic):
@@ -63,7 +63,7 @@ def test_three_periods_relax_what_rings(plants, synthetic):
 
 
 @pytest.mark.parametrize(
-    ("level", "told"), [(3.0, "the answer may depend on the amplitude"), (1.0, "do not tell which")]
+    ("level", "told"), [(3.0, "the response may depend on the amplitude"), (1.0, "do not show which")]
 )
 def test_a_test_that_errs_more_than_the_fit_names_no_more_than_is_known(plants, synthetic, level, told):
     commands = np.random.default_rng(1).standard_normal((8000, 3))

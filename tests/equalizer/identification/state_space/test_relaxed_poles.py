@@ -65,7 +65,7 @@ def test_a_bound_that_was_asked_for_is_kept_and_what_it_costs_is_reported(plants
     found = identify(measuring.noisy(plant, LINES, NOISE, 1), replace(QUICK, longest_decay_s=0.5))
     assert found.model.spectral_radius <= np.exp(-1 / 500) * (1 + 1e-12)
     assert found.bound_costs
-    assert found.remarks[0].startswith("a pole sits on the bound of the decay, 0.5 s")
+    assert found.remarks[0].startswith("a pole is at the bound of the decay, 0.5 s")
     assert "friction" not in " ".join(found.remarks) and "order" not in " ".join(found.remarks)
     rms, _ = measuring.errors_of(found.model, plant, GRID)
     assert rms > 0.02

@@ -126,7 +126,7 @@ def test_a_force_beyond_saturation_gets_the_smallest_range_of_commands():
 
 def test_a_map_that_falls_among_the_commands_needed_is_refused():
     strong = PUSHED * (2.0 / np.abs(PUSHED[:, 1]).max())
-    with pytest.raises(ValueError, match="falls somewhere, so it has no inverse"):
+    with pytest.raises(ValueError, match="decreases somewhere, so it has no inverse"):
         compensate(strong, WANTED, MODEL, physics(found("1.0*sin(fy)", "command")), None)
 
 

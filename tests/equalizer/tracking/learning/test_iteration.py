@@ -246,7 +246,7 @@ def test_first_forces_above_the_cap_are_refused(repetition, wanted):
 
 
 def test_what_has_nothing_in_the_band_is_refused(repetition, wanted):
-    with pytest.raises(ValueError, match="nothing in the band of 5 to 35 Hz"):
+    with pytest.raises(ValueError, match="no content in the band of 5 to 35 Hz"):
         begin(Repetition(0 * wanted, repetition.invert, RATE_HZ, BAND_HZ))
 
 

@@ -75,5 +75,5 @@ def test_nor_are_there_stationary_ones(device_model):
 def test_a_growing_motion_that_no_force_reaches_has_no_stationary_gains(model_of):
     model = model_of(2, 0)
     unreached = replace(model, A=np.diag([1.1, 0.5]), B=np.vstack([np.zeros(3), np.ones(3)]))
-    with pytest.raises(TrackingError, match="there are no stationary gains: .* must die away by itself"):
+    with pytest.raises(TrackingError, match="there are no stationary gains: .* must decay without control"):
         stationary_gains(make_tracking_problem(unreached, TrackingWeights()))

@@ -80,7 +80,7 @@ def test_a_device_that_stands_turned_has_its_lines_turned(calibrated):
 
 def test_an_arm_unlike_the_others_is_named_and_no_simulation_pretends_to_have_it(calibrated):
     written = calibrated(odd_arm=0.3)
-    assert len(written.warnings) == 3 and "The line at -150 degrees holds" in written.warnings[-1]
+    assert len(written.warnings) == 3 and "The line at -150 degrees is a line of symmetry" in written.warnings[-1]
     assert sorted(np.round(written.calibration.asymmetry, 2))[0] == 0.0
     assert fit_linkage(written.calibration).inertia_misfit > 0.02
 
@@ -100,10 +100,10 @@ def test_what_is_out_of_reach_is_filled_in_by_mirror_lines(calibrated, tmp_path)
 FAULTS = {
     ("bad_jacobian", 1): "differs from finite differences of its own positions by 170%",
     ("bad_jacobian", 2): "the Jacobian is singular",
-    ("bad_jacobian", 3): "the Jacobian holds what is no number",
+    ("bad_jacobian", 3): "the Jacobian contains a value that is not a number",
     ("bad_inertia", 1): "the inertia is not symmetric",
     ("bad_inertia", 2): "the inertia is not positive definite",
-    ("bad_inertia", 3): "the inertia holds what is no number",
+    ("bad_inertia", 3): "the inertia contains a value that is not a number",
     ("frame_off_m", 0.01): "another position for the handle than its joint angles",
     ("calibrated", 0): "does not know where its handle is",
     ("unplugged", 1): "No device of the vendor answers",

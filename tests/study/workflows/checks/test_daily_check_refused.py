@@ -130,7 +130,7 @@ def test_what_was_played_otherwise_is_not_compared(two_days, device_like, record
     weaker = replace(baseline, segments=(replace(first, amplitude=0.7 * first.amplitude), *others))
     with pytest.raises(DeviceError, match="a sine of 0.84 N.* was played instead of a sine of 1.2 N"):
         compare_recordings(baseline, weaker)
-    with pytest.raises(DeviceError, match="5 pieces were played, 6 at the acceptance"):
+    with pytest.raises(DeviceError, match="5 segments were played now, but 6 at the acceptance"):
         compare_recordings(baseline, replace(baseline, segments=tuple(others)))
 
     def never(notice: str) -> None:

@@ -117,7 +117,7 @@ def test_a_motion_beside_the_force_of_another_recording_is_not_explained(tmp_pat
     plain, other = (recorded(device(0.4, 6.0, 900.0), seed) for seed in (1, 2))
     mixed = replace(plain, command=other.command)
     assert min(choose_structure([mixed], "massless", lambda share: None).fit.held_out) > 0.9
-    with pytest.raises(StudyError, match="nothing to do with the commands"):
+    with pytest.raises(StudyError, match="not related to the commands"):
         fitted(tmp_path, mixed, "mass-spring")
 
 

@@ -23,6 +23,6 @@ def test_the_weight_stays_in_the_file(heavy):
 
 
 def test_no_model_is_fitted_to_a_device_with_a_weight_on(heavy):
-    with pytest.raises(StudyError, match="a model that is fitted to it would hold the weight") as refused:
+    with pytest.raises(StudyError, match="a model that is fitted to it would include the weight") as refused:
         fit_linear_model(read_input([heavy], 1), lambda share: None)
     assert "Give a model of the device alone with --model" in str(refused.value)

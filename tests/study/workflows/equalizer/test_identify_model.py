@@ -80,7 +80,7 @@ def test_what_is_said_is_what_was_measured(device):
     found = summary(device)
     assert found["held_out_error"] == pytest.approx(found["held_out_noise"], rel=0.2)
     first, *rest = summary_lines(device)
-    assert f"the model errs by {100 * found['held_out_error']:.2f} %, noise of the record" in first
+    assert f"the error of the model is {100 * found['held_out_error']:.2f} %, noise of the record" in first
     assert "friction" not in first + " ".join((*rest, *device.remarks))
     assert "Order 20, 5 to 35 Hz, stable" in " ".join(rest)
 
@@ -97,7 +97,7 @@ def test_the_file_keeps_how_good_the_model_is(device):
 def test_the_page_shows_transfer_functions_bands_and_the_choice_of_order(device, tmp_path):
     page = report_identification(device, tmp_path / "page", lambda share: None)
     text = page.read_text()
-    for heading in ("Transfer functions", "Resonances", "Coupling begins at", "What an order buys and costs"):
+    for heading in ("Transfer functions", "Resonances", "Coupling begins at", "Error and cost by order"):
         assert heading in text
     assert {path.name for path in (tmp_path / "page" / "figures").iterdir()} >= {
         "transfer-functions.png", "frequency-bands.svg", "model-order.png",
@@ -171,5 +171,5 @@ def test_an_output_that_answers_nothing_is_named(plants, tmp_path, hangs_at):
     samples = np.array(whole.response.samples)
     samples[:, 2] = hangs_at
     write_recording(tmp_path / "silent.h5", replace(whole, response=replace(whole.response, samples=samples)))
-    with pytest.raises(StudyError, match="Nothing at all comes from az, not even noise"):
+    with pytest.raises(StudyError, match="There is no signal from az, not even noise"):
         identify_model(IdentifyPlan((tmp_path / "silent.h5",), tmp_path / "m.h5"), lambda share: None)

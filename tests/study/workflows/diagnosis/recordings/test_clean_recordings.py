@@ -30,7 +30,7 @@ def test_without_a_model_the_clean_recordings_are_what_one_is_fitted_to(files, f
     wanted = plan(files, tmp_path / "out", model=None, clean=(tmp_path / "clean.h5",))
     found = find_answer(wanted, quiet, engine)
     assert engine.model.name == "fitted to the clean recordings"
-    assert found.findings.remarks[0].startswith("No model was given. A linear one was fitted to the clean recordings")
+    assert found.findings.remarks[0].startswith("No model was given. A linear model was fitted to the clean recordings")
 
 
 def test_a_recording_cannot_be_diagnosed_and_be_clean(files, findings, tmp_path):

@@ -45,7 +45,7 @@ def test_a_recording_that_is_too_short_or_all_noise_is_named(files, findings, tm
     noise = np.random.default_rng(1).standard_normal(recording.response.samples.shape)
     write_recording(tmp_path / "noise.h5", replace(recording, response=replace(recording.response, samples=noise)))
     assert (
-        "nothing to do with the commands"
+        "not related to the commands"
         in refused_with(files, findings, tmp_path, sources=(tmp_path / "noise.h5",)).happened
     )
 
@@ -81,9 +81,9 @@ def test_few_cycles_are_a_remark_where_no_model_is_given_and_else_refused(tmp_pa
     count, channels = recording.command.samples.shape
     slow = np.sin(2 * np.pi * 1.5 * np.arange(count) / count)[:, None] * np.ones(channels)
     write_recording(tmp_path / "slow.h5", replace(recording, command=replace(recording.command, samples=slow)))
-    with pytest.raises(StudyError, match="cycles of what was commanded"):
+    with pytest.raises(StudyError, match="cycles of the command"):
         read_input((tmp_path / "slow.h5",), seed=1)
-    assert any("cycles of what was commanded" in said for said in read_input((tmp_path / "slow.h5",), 1, True).remarks)
+    assert any("cycles of the command" in said for said in read_input((tmp_path / "slow.h5",), 1, True).remarks)
 
 
 def test_names_of_files_and_effects_keep_their_letters(files, findings, tmp_path, made):

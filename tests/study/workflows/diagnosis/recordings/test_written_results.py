@@ -66,7 +66,7 @@ def test_without_a_model_a_linear_one_is_fitted_first_and_reported(files, findin
     found = diagnose_recordings(alone, lambda what, share: shares.append(share), engine)
     assert shares == sorted(shares) and (shares[0], shares[-1]) == (0.0, 1.0)
     assert 0.1 < engine.model.mass[0, 0] < 0.5
-    assert found.findings.remarks[0].startswith("No model was given. A linear one was fitted")
+    assert found.findings.remarks[0].startswith("No model was given. A linear model was fitted")
     assert "No model was given" in (tmp_path / "out" / "report.html").read_text()
 
 

@@ -92,7 +92,7 @@ def test_the_cap_holds_for_all_bands_together(plants, plan, tmp_path):
 
 
 def test_bands_that_do_not_add_up_are_refused(plan):
-    assert "do not add up" in refusal(with_models(plan, "centre", "centre")).happened
+    assert "cannot be combined" in refusal(with_models(plan, "centre", "centre")).happened
     assert "3 models are of one place" in refusal(with_models(plan, "centre", "centre", "wide")).happened
 
 

@@ -96,15 +96,15 @@ def test_nothing_is_overwritten_and_folders_are_not_made(plan, tmp_path):
 
 
 def test_what_was_measured_of_the_model_comes_before_what_it_predicts(plants, plan, tmp_path):
-    quality = ModelQuality(0.13, 0.12, 0.001, 0.13, 0.004, 10.0, ("A pole sits on the bound of the decay.",))
+    quality = ModelQuality(0.13, 0.12, 0.001, 0.13, 0.004, 10.0, ("A pole is at the bound of the decay.",))
     write_identified_model(tmp_path / "poor.h5", model_of(plants.omega_like(), quality=quality))
     done = equalize_trajectory(replace(plan, models=(tmp_path / "poor.h5",)))
     first, cause, predicted, *_ = summary_lines(done)
     assert first == (
-        "Measured on 10 s kept for a test, the model errs by 13.00 %, noise of the record 0.40 %; expected with misfit "
-        "and scatter: 13.00 %."
+        "Measured on 10 s held out for a test, the error of the model is 13.00 %, noise of the record 0.40 %; "
+        "expected from misfit and scatter: 13.00 %."
     )
-    assert cause == "A pole sits on the bound of the decay."
+    assert cause == "A pole is at the bound of the decay."
     assert predicted.startswith("As the model itself predicts: error 0.")
     assert list(summary(done))[1] == "quality"
     assert summary(done)["quality"]["held_out_error"] == 0.13
@@ -117,6 +117,8 @@ def test_of_several_models_the_nearest_and_the_worst_are_reported(plants, plan, 
     models = (tmp_path / "near.h5", tmp_path / "far.h5")
     done = equalize_trajectory(replace(plan, models=models, at_m=(0.005, 0.0, 0.0)))
     first, second, *_ = summary_lines(done)
-    assert first.startswith("Of the nearest model: No recording was kept for a test")
-    assert second.startswith("Of the worst of the 2 models: Measured on 5 s kept for a test, the model errs by 20.00 %")
+    assert first.startswith("Of the nearest model: No recording was held out for a test")
+    assert second.startswith(
+        "Of the worst of the 2 models: Measured on 5 s held out for a test, the error of the model is 20.00 %"
+    )
     assert summary(done)["quality"]["expected_error"] == 0.2
