@@ -132,7 +132,7 @@ class _ImpactSearch:
             from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
             from analysis.diagnosis.search.impacts import explain_impacts
 
-            self._progress("searching for rattling play", 0.9)
+            self._progress("looking for rattling play", 0.9)
             floors, time_left = self._fitting.chosen.floors, self._settings.time_left
             found = explain_impacts(seen.context, seen.found, floors, self._catalogue, time_left)
             self._found, self._steps = None, len(seen.found.steps)

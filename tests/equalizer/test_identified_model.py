@@ -41,8 +41,8 @@ def test_parameters_go_out_and_in_row_by_row(model):
 @pytest.mark.parametrize(
     ("changes", "problem"),
     [
-        ({"A": np.eye(3)}, "B has shape (2, 1), but (3, 1) goes with order 3, 1 inputs and 1 outputs"),
-        ({"C": np.ones((1, 3))}, "C has shape (1, 3), but (1, 2) goes with order 2, 1 inputs and 1 outputs"),
+        ({"A": np.eye(3)}, "B has shape (2, 1), but order 3, 1 inputs and 1 outputs require (3, 1)"),
+        ({"C": np.ones((1, 3))}, "C has shape (1, 3), but order 2, 1 inputs and 1 outputs require (1, 2)"),
         ({"D": np.array([[np.nan]])}, "D holds values that are not finite numbers"),
         ({"input_channels": ("fx", "fy")}, "input_channels names 2 channels, but the matrices have 1"),
         ({"output_unit": ""}, "output_unit: the unit is missing; allowed are"),

@@ -24,7 +24,7 @@ def test_channels_may_differ_in_quantity_and_unit():
 
 
 def test_a_list_of_the_wrong_length_is_refused():
-    with pytest.raises(ValueError, match="3 words of unit for 2 channels; one for all, or one per channel"):
+    with pytest.raises(ValueError, match="3 entries of unit for 2 channels; give one for all, or one per channel"):
         signal(unit=("m", "m", "rad"))
 
 

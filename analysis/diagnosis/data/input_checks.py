@@ -238,14 +238,14 @@ def _find_unconnected_channels(model: MechanicalModel, recording: Recording) -> 
     idle = [name for name, column in zip(recording.command.channels, model.input.T, strict=True) if not column.any()]
     unconnected = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
     if idle:
-        yield f"in the model's input matrix {', '.join(idle)} drive no coordinate"
+        yield f"in the model's input matrix no coordinate is driven by {', '.join(idle)}"
     elif (apart := int(np.linalg.matrix_rank(model.input))) < model.inputs:
         yield (
             f"the model's {model.inputs} inputs drive only {apart} motion{'s' if apart != 1 else ''}, so they cannot "
             "be distinguished; combine the commands that push the same motion into one"
         )
     if unconnected:
-        yield f"in the model's output matrix {', '.join(unconnected)} measure no coordinate"
+        yield f"in the model's output matrix no coordinate is measured by {', '.join(unconnected)}"
 
 
 def _instability(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:

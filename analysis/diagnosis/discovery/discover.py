@@ -95,7 +95,7 @@ def discover(
     steps: list[FittedCandidate] = []
     enough = EXPLAINED_ERROR if alone else NOISE_ALONE
     while len(rounds) < most and time_left() and base.score.worst_channel > enough:
-        progress("searching for a law outside the catalogue", 0.6 + 0.1 * len(rounds))
+        progress("looking for a law outside the catalogue", 0.6 + 0.1 * len(rounds))
         found = _find_next_law(context, base.fitted, time_left, alone)
         if found is None or not is_worthwhile(base, found.fitted_candidates[0]):
             break

@@ -79,8 +79,8 @@ def choose_structure(
         return Choice(best, tried, text, remains(None, best))
     best = choose_plainest(fits)
     reason = (
-        f"{best.kind} is the structure of fewest parameters whose error power no other structure lowers by "
-        f"{100 * RICHER_STRUCTURE_GAIN:.0f} % or more in every fold."
+        f"{best.kind} is the structure of fewest parameters; no structure with more parameters lowers its "
+        f"cross-validated error power significantly (by more than {100 * RICHER_STRUCTURE_GAIN:.0f} %)."
     )
     return _with_modes(Choice(best, tried, reason, remains(given, best)), recordings, on_progress)
 

@@ -150,7 +150,7 @@ def add_effects(
     within_time, barred, ended_early = replace(context, map_=limit_map(context.map_, time_left)), "", found.ended_early
     open_ended = not context.certain and not found.barred and not ended_early
     while open_ended and len(steps) < most and is_worth_searching(context, found, base):
-        step = Step(f"searching for the {_ORDINALS[len(steps)]} effect", 0.1 + 0.3 * len(steps), progress)
+        step = Step(f"looking for the {_ORDINALS[len(steps)]} effect", 0.1 + 0.3 * len(steps), progress)
         try:
             resumed = len(rounds) > len(steps)
             if resumed:

@@ -178,7 +178,7 @@ def _may_exchange(context: SearchContext, found: Explanation, time_left: TimeBud
 
 def _again(progress: Progress) -> Step:
     """The step of the work that the progress display shows for an exchange."""
-    return Step("searching again for the first effect", 0.8, progress)
+    return Step("looking again for the first effect", 0.8, progress)
 
 
 def _exchange_first(

@@ -70,7 +70,7 @@ def test_the_ways_to_measure_errors(error):
         (("mismatch", 0, "amplitude"), "1.5", "mismatch.0.amplitude: Input should be a valid number"),
         (("effects", 0, "probability"), 97.0, "effects.0.probability: Input should be less than or equal to 1"),
         (("effects", 0, "effect"), "Coulomb friction", "effects.0.effect: String should match pattern"),
-        (("effects", 0, "place"), "sensor", "effects.0: coulomb_friction sits in the mechanism, not in the sensor"),
+        (("effects", 0, "place"), "sensor", "effects.0: coulomb_friction belongs to the mechanism, not to the sensor"),
         (("effects", 0, "parameters"), {}, "effects.0: coulomb_friction lacks its main parameter, level (N)"),
         (("effects", 0, "parameters", "level", "ci95"), [0.3, 0.2], "effects.0.parameters.level: ci95 must rise"),
         (("effects", 0, "parameters", "level", "unit"), "", "effects.0.parameters.level.unit: String should have at"),
@@ -122,7 +122,7 @@ def test_a_law_without_a_name_goes_to_json_and_back():
             {**DISCOVERED, "law": {**LAW, "expression": "-4.1*vy.T"}},
             "'vy.T' at character 6 is not part of the language",
         ),
-        ({**DISCOVERED, "law": {**LAW, "variables": ["vx"]}}, "needs vy; its variables say otherwise"),
+        ({**DISCOVERED, "law": {**LAW, "variables": ["vx"]}}, "needs vy, but its variables list others"),
         ({**DISCOVERED, "law": {**LAW, "acts_on": "motion"}}, "Input should be 'force', 'command' or 'response'"),
     ],
 )

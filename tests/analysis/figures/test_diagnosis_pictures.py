@@ -212,7 +212,7 @@ def test_a_round_that_brought_nothing_is_folded_and_reports_it(friction_found):
     explanation = replace(friction_found.explanation, steps=())
     (picture,) = rivals_pictures(explanation, ("x",))
     assert picture.folded
-    assert picture.title == "What was tried for the first effect; none earned its place"
+    assert picture.title == "What was tried for the first effect; none was accepted"
     assert picture.figure.axes[0].get_yticklabels()[0].get_fontweight() != "bold"
 
 

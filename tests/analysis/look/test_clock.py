@@ -29,7 +29,7 @@ def test_jitter_is_measured(recording):
     off = 1e-4 * np.random.default_rng(1).uniform(-1, 1, N)
     found = only(check_clock(stamped(recording, np.arange(N) / 1000.0 + off), [(0, N)]), "from even spacing")
     assert found.level == "notice"
-    assert float(found.seen.split("lie ")[1].split(" us")[0]) == pytest.approx(1e2 / np.sqrt(3), rel=0.05)
+    assert float(found.seen.split("deviate by ")[1].split(" us")[0]) == pytest.approx(1e2 / np.sqrt(3), rel=0.05)
 
 
 @pytest.mark.parametrize(("ppm", "level"), [(20, "fine"), (800, "notice"), (20_000, "wrong"), (-800, "notice")])

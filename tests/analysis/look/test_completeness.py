@@ -17,7 +17,7 @@ def test_missing_samples_are_counted(recording, random):
     response[[100, 101, 102, 400]] = np.nan
     (check,) = check_missing_samples(channels_of(recording(random(2), response)), 1000.0)
     assert check.level == "notice"
-    assert check.seen == ("response 'a1' misses 4 of 1000 samples, the first at 0.1 s; the longest gap is 3 samples.")
+    assert check.seen == ("response 'a1' lacks 4 of 1000 samples, the first at 0.1 s; the longest gap is 3 samples.")
 
 
 def test_many_missing_samples_are_wrong_and_none_are_fine(recording, random):

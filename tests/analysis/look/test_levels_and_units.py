@@ -65,7 +65,7 @@ def test_an_accelerometer_in_g_is_recognised_by_gravity(recording, noise, rest, 
 def test_offsets_are_reported_and_gravity_is_known(recording, noise):
     found = check_offsets(channels_of(recording(noise() - noise().mean() + 2.0, 9.81 + noise(seed=2))))
     assert [check.level for check in found] == ["notice", "fine"]
-    assert "command 'f1' stands 2 N beside zero" in found[0].seen
+    assert "The mean of command 'f1' is 2 N (" in found[0].seen
     assert "gravity" in found[1].seen
     assert check_offsets(channels_of(recording(noise(), noise(seed=2))))[0].level == "fine"
 
@@ -75,7 +75,7 @@ def test_the_step_of_a_converter_is_found(recording, noise, steps, level):
     step = 1.0 / steps
     (check,) = check_resolution(channels_of(recording(noise(), np.round(noise(seed=2) / step) * step)))
     assert check.level == level
-    assert f"in steps of {step:.3g} m/s^2" in check.seen
+    assert f"has a resolution of {step:.3g} m/s^2" in check.seen
 
 
 def test_an_analog_channel_has_no_step(recording, noise):

@@ -59,7 +59,7 @@ def test_a_frequency_with_broken_runs_alone_has_no_reversal_means_to_compare(tri
     broken = [t for t in trials if t.frequency_hz != 5.0 or t.trial <= 8]
     analysis = analyse_study(broken, protocol)
     assert analysis.primary.missing_hz == () and analysis.mean_contrasts == ()
-    assert "Reversal means tell no difference to 5 Hz yet" in analysis.compared
+    assert "Reversal means give no difference to 5 Hz yet" in analysis.compared
     assert "agree within" not in analysis.compared
 
 

@@ -25,7 +25,7 @@ def analysis(simulate_study, protocol):
 def test_what_the_cap_hides_is_reported(analysis):
     by_model, by_means = analysis.primary.contrasts[3], analysis.mean_contrasts[3]
     assert by_model.difference_db > by_means.difference_db + 3.0
-    assert "are apart: at " in analysis.compared
+    assert "differ: at " in analysis.compared
     assert "45 Hz" in analysis.compared
     for name in ("means", "tukey", "one-way"):
         assert coverage_sentence(MEASURED, name) in analysis.compared

@@ -136,7 +136,7 @@ def searched(after, rival=None):
     [
         (candidate(0.3 * NOISE), None, ""),
         (candidate(0.3 * NOISE), candidate(0.6 * NOISE, "backlash"), ""),
-        (candidate(0.3 * NOISE), candidate(0.3 * NOISE, "backlash"), "cannot tell it from backlash"),
+        (candidate(0.3 * NOISE), candidate(0.3 * NOISE, "backlash"), "cannot distinguish it from backlash"),
         (candidate(0.95 * NOISE), None, "and 30 % are required"),
         (candidate(0.8 * NOISE), None, "the force balance does not confirm it"),
         (candidate(1.2 * NOISE), None, "variation between stretches"),

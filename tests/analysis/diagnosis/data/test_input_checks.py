@@ -84,7 +84,7 @@ def test_a_command_that_never_changes_excites_nothing():
 
 def test_a_response_without_a_number_and_one_that_never_changes_are_named():
     missing = with_samples(recording(), "response", np.full((5000, 1), np.nan))
-    assert "response ax holds no number" in refusal(require_something, [missing], ["a"])
+    assert "response ax contains only missing values" in refusal(require_something, [missing], ["a"])
     dead = with_samples(recording(), "response", np.zeros((5000, 1)))
     assert "response ax never changes" in refusal(require_something, [dead], ["a"])
 
@@ -186,9 +186,9 @@ def test_numbers_that_no_device_reaches_are_refused():
     ("changes", "words"),
     [
         ({"mass": [[1e-300]]}, "the model's lightest motion has a mass of 1e-300, which no device has"),
-        ({"stiffness": [[1e300]]}, "the model's stiffness holds 1e+300, which no device has"),
-        ({"input": [[0.0]]}, "the model's input lets fx drive nothing"),
-        ({"output": [[0.0]]}, "the model's output lets ax see nothing"),
+        ({"stiffness": [[1e300]]}, "the model's stiffness contains 1e+300, which no device has"),
+        ({"input": [[0.0]]}, "in the model's input matrix no coordinate is driven by fx"),
+        ({"output": [[0.0]]}, "in the model's output matrix no coordinate is measured by ax"),
     ],
     ids=["mass", "stiffness", "input", "output"],
 )

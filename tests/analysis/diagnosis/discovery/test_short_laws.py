@@ -60,7 +60,7 @@ def test_two_effects_keep_their_names(seed=12):
     result, said = searched(recorded((CUBE, DRAG_2), seed))
     assert names_of(result) == {"hardening_stiffness", "quadratic_damping"}
     assert result.judgement.verdict == "explained"
-    assert "searching for a law outside the catalogue" in said
+    assert "looking for a law outside the catalogue" in said
 
 
 @pytest.mark.parametrize("seed", [pytest.param(13, marks=pytest.mark.slow), 20])
@@ -69,7 +69,7 @@ def test_an_effect_that_fits_keeps_its_name(seed):
     result, said = searched(recorded((CUBE,), seed))
     assert names_of(result) == {"hardening_stiffness"}
     assert result.judgement.verdict == "explained"
-    assert ("searching for a law outside the catalogue" in said) == (seed == 13)
+    assert ("looking for a law outside the catalogue" in said) == (seed == 13)
 
 
 @pytest.mark.slow
@@ -78,7 +78,7 @@ def test_the_same_samples_are_searched_for_laws_once(seed=14):
     context, known = arena_of(recorded((DRAG_15,), seed))
     laws = LawSearch(lambda what, share: said.append(what), always)
     once, again = (laws.add_any(SearchResult(context, known, judge(known))) for _ in range(2))
-    assert said.count("searching for a law outside the catalogue") == 1
+    assert said.count("looking for a law outside the catalogue") == 1
     assert laws_of(once.found.after.fitted.hypothesis) == laws_of(again.found.after.fitted.hypothesis)
 
 
@@ -118,7 +118,7 @@ def test_a_short_law_is_found_once_for_both_questions(seed=11):
     laws = LawSearch(lambda what, share: said.append(what), always)
     result = SearchResult(context, known, judge(known))
     assert laws.add_short(result).judgement.verdict == laws.add_any(result).judgement.verdict == "explained"
-    assert said.count("searching for a law outside the catalogue") == 1
+    assert said.count("looking for a law outside the catalogue") == 1
 
 
 @pytest.mark.parametrize(("leaves", "begun"), [(1e-4, False), (LAW_ALONE_LEAVES, True)])

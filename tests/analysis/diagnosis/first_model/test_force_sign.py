@@ -38,7 +38,7 @@ def test_a_response_of_which_nothing_says_what_it_is_is_taken_for_what_its_cours
         assert (found, said) == (recording, ())
     else:
         assert found.response.quantities == (quantity,)
-        assert "Nothing says what y measures" in said[0]
+        assert "The recording does not state what y measures" in said[0]
 
 
 def test_what_an_imposed_motion_meets_is_a_force_where_nothing_says_so():

@@ -65,12 +65,12 @@ def test_where_too_little_is_there_no_entry_is_reported(entry):
 
 def test_states_are_said_with_share_and_chance():
     assert states_sentence([StateMismatch("ax", "fx", (1.0, 256.0), RUBS)]) == (
-        "It is tied to a state: ax, driven by fx, by the sign of v (86 % of what is missing, p < 0.0001)."
+        "The mismatch depends on a state: ax, driven by fx, by the sign of v (86 % of the mismatch, p < 0.0001)."
     )
     assert states_sentence([]) == ""
 
 
 def test_the_page_gets_both_sentences(friction_found):
     entry, states = localisation_sentences(friction_found.local)
-    assert entry.startswith("What re-tuning leaves enters as a force along x")
+    assert entry.startswith("The mismatch after re-tuning enters as a force along x")
     assert "by the sign of v" in states

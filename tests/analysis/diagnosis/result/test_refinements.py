@@ -24,7 +24,7 @@ def test_refinements_leave_the_class_and_are_said_once():
     assert found.class_ == ()
     assert class_noun(found) == "dry friction"
     said = inseparable_sentence(found)
-    assert said.endswith("refine it, and bring nothing on held-out data.") and said.count(".") == 1
+    assert said.endswith("are refinements of this law and bring no gain on held-out data.") and said.count(".") == 1
     assert "Stribeck" in said and rival_sentences(found) == ()
     assert not any(rival.inseparable for rival in found.rivals)
 

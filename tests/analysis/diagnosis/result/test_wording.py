@@ -197,7 +197,7 @@ def test_rivals_come_with_why_they_were_passed_over():
 
 def test_of_two_that_cannot_be_told_apart_both_are_named():
     assert inseparable_sentence(DRY) == (
-        "These data cannot tell dry friction from friction that is larger at rest (Stribeck): both are named "
+        "These data do not distinguish dry friction from friction that is larger at rest (Stribeck): both are named "
         "(probabilities: dry friction 0.68, friction that is larger at rest (Stribeck) 0.30)."
     )
     assert inseparable_sentence(replace(DRY, rivals=())) == ""
@@ -273,7 +273,8 @@ def test_faults_of_a_whole_sensor_need_no_place():
 def test_numbers_that_are_off_by_little_are_said_to_be():
     said = verdict_sentence(diagnosis("parameters"))
     assert said.startswith(
-        "No physics is missing; parameters of the model are off, each within its calibration's standard deviation. The"
+        "No physics is missing; parameters of the model are wrong, each within its calibration's standard deviation. "
+        "The"
     )
 
 

@@ -222,7 +222,7 @@ def test_modes_that_the_sensor_sees_otherwise_are_fitted_by_shapes_of_their_own(
 def test_pure_noise_is_refused(seed):
     rng = np.random.default_rng(seed)
     source = recording(rng.standard_normal((4000, 1)), rng.standard_normal((4000, 1)))
-    with pytest.raises(MechanicalFitRefused, match="do not tell what r0 will do"):
+    with pytest.raises(MechanicalFitRefused, match="do not predict r0"):
         fit_mechanical_model([source])
 
 
@@ -232,7 +232,7 @@ def test_what_cannot_be_fitted_is_refused_by_name():
     refusals = {
         "too short": recording(commands[:40], response[:40]),
         "command x is constant": recording(np.ones_like(commands), response),
-        "response r0 holds no number": recording(commands, np.full_like(response, np.nan)),
+        "response r0 contains only missing values": recording(commands, np.full_like(response, np.nan)),
         "2 commands and 1 responses": recording(np.tile(commands, 2), response),
     }
     for words, bad in refusals.items():

@@ -71,7 +71,7 @@ def test_an_input_that_no_experiment_drove(good):
     values = good.response.copy()
     values[:, :, 2] = np.nan
     text = refusal(replace(good, response=values))
-    assert "nothing tells what z does" in text
+    assert "the response to z is not determined" in text
     assert "record one sweep per input" in text
 
 

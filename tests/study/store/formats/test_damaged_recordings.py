@@ -93,7 +93,7 @@ def test_one_text_may_name_all_channels(written, said, read):
         (attribute("unit", "furlong", "response"), "response, channel 'ax': 'furlong' is not a unit known here"),
         (attribute("unit", "", "response"), "response, channel 'ax': the unit is missing; allowed are"),
         (attribute("unit", "V", "command"), "command, channel 'fx': the quantity 'force' cannot be in V"),
-        (attribute("unit", ["m", "m", "m"], "position"), "position: 3 words of unit for 2 channels"),
+        (attribute("unit", ["m", "m", "m"], "position"), "position: 3 entries of unit for 2 channels"),
         (dataset("time_s", np.zeros((200, 1))), "time_s has shape (200, 1); it must be (samples)"),
         (dataset("time_s", np.zeros(200)), "time_s does not grow at sample 1"),
         (

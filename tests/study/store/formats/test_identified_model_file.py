@@ -98,7 +98,7 @@ def test_nothing_existing_is_overwritten_unless_asked_for(written, model):
         ("provenance", "{", "the attribute 'provenance' is not JSON"),
         ("provenance", "[]", "the attribute 'provenance' is []; it must be a JSON object"),
         ("A", None, "the dataset 'A' is missing"),
-        ("B", np.ones((3, 2)), "B has shape (3, 2), but (4, 2) goes with order 4"),
+        ("B", np.ones((3, 2)), "B has shape (3, 2), but order 4"),
     ],
 )
 def test_every_fault_of_a_file_is_named(written, name, value, problem):

@@ -222,4 +222,6 @@ def test_a_recording_whose_units_nothing_says_gets_a_model_and_what_was_assumed_
     done = fit_first_model(FirstModelPlan((tmp_path / "bare.h5",), tmp_path / "m.toml"), lambda share: None)
     assert done.choice.fit.kind == "mass-spring"
     assert done.choice.fit.parameters[0].value == pytest.approx(0.4, rel=0.02)
-    assert any("Nothing says what x measures: it was taken for a position" in remark for remark in done.remarks)
+    assert any(
+        "The recording does not state what x measures; it was taken for a position" in remark for remark in done.remarks
+    )

@@ -49,7 +49,9 @@ def test_each_effect_is_a_sentence_with_its_interval(view):
 
 def test_a_rival_says_why_not_and_what_cannot_be_told_apart_stands_beside_the_name(view):
     assert view.rivals == ("A spring that hardens with displacement (probability < 0.01): No level bends it.",)
-    assert view.sentences[1].startswith("These data cannot tell dry friction from friction that is larger at rest")
+    assert view.sentences[1].startswith(
+        "These data do not distinguish dry friction from friction that is larger at rest"
+    )
 
 
 def test_tables_have_a_header_and_a_row_each(view):
