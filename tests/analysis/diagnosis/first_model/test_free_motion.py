@@ -88,7 +88,7 @@ def test_a_decay_in_an_unknown_unit_is_read_as_a_position_and_named():
     response = replace(counted.response, quantity="1", unit="1", channels=("diode",))
     unknown = replace(counted, response=response)
     assert "coulomb_friction" in names_of(diagnose_values(unknown))
-    assert "diode measures: it was taken for a position that moves freely" in one_motion_per_force([unknown])[1][0]
+    assert "diode measures; it was taken for a position that moves freely" in one_motion_per_force([unknown])[1][0]
 
 
 @pytest.mark.parametrize(("quantity", "unit"), [("temperature", "K"), ("current", "A")])
