@@ -199,21 +199,15 @@ def choose_plainest(fits: Sequence[StructureFit]) -> StructureFit:
 def _refuse(given: BalancedRecordings, kind: Kind) -> None:
     """Raise StructureRefused where the force balance of these recordings cannot determine the structure."""
     if given.untimed and kind != "massless":
-        raise StructureRefused(
-            "no time is known, and hence neither speeds nor accelerations: only massless can be fitted"
-        )
+        raise StructureRefused("no time is known, hence no speeds or accelerations: only massless can be fitted")
     if kind == "two-mode":
         raise StructureRefused("it is fitted to spectra")
     if given.free and kind == "massless":
         raise StructureRefused("a body in free motion has a mass")
     if given.turns and kind != "motor":
-        raise StructureRefused(
-            "the shaft turns through whole revolutions, so no spring holds it: only motor can be fitted"
-        )
+        raise StructureRefused("the shaft makes whole turns, so no spring holds it: only motor can be fitted")
     if kind == "gravity" and not given.rotational:
-        raise StructureRefused(
-            "along a straight line the weight is a constant force and not a spring: gravity applies to pendulums only"
-        )
+        raise StructureRefused("along a line the weight is a constant force, not a spring: use gravity for pendulums")
 
 
 def _model(given: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalModel:
@@ -301,7 +295,5 @@ def _remarks(given: BalancedRecordings, kind: Kind) -> tuple[str, ...]:
         )
     if kind == "massless":
         timed = "" if not given.untimed else " No time is known: samples are numbered, and damping is not fitted."
-        return (
-            f"The mass in the file is a lower bound that the forces do not determine; simulations need a mass.{timed}",
-        )
+        return (f"The mass in the file is a lower bound that the forces do not determine.{timed}",)
     return ()
