@@ -46,12 +46,12 @@ BALANCE_REMARK = (
 )
 UNTIMED_REMARK = (
     "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "
-    "The mass in the file is a floor that no force shows; damping and mass are not known."
+    "The mass in the file is a lower bound that the forces do not determine; damping and mass are not known."
 )
 
 FREE_REMARK = (
     "No model was given. A damper and a spring per axis were fitted first to the force per unit mass that the free "
-    "motion shows; the mass in the file is a floor."
+    "motion shows; the mass in the file is a lower bound."
 )
 
 
