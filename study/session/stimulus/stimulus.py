@@ -29,7 +29,12 @@ def direction_vector(directions: TestDirections, direction: int) -> FloatArray:
     number."""
     if direction not in (1, 2):
         raise ValueError(f"there are directions 1 and 2, not {direction}")
-    angle = math.radians(direction_angle_deg(directions, direction))
+    return vector_at_angle(directions, direction_angle_deg(directions, direction))
+
+
+def vector_at_angle(directions: TestDirections, angle_deg: float) -> FloatArray:
+    """Unit vector (3,) at this angle (degrees) in the plane of the directions."""
+    angle = math.radians(angle_deg)
     first, second = AXES[directions.plane]
     vector = np.zeros(3)
     vector[first], vector[second] = math.cos(angle), math.sin(angle)

@@ -9,7 +9,6 @@ from contextlib import contextmanager
 
 from pydantic import TypeAdapter
 
-from protocols.procedure.schedule import label_of
 from protocols.trial import VoidCause
 from study.devices.clock import Clock
 from study.devices.device import DeviceInfo
@@ -23,11 +22,10 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.facts.sensor_facts import SensorFacts
-from study.session.state.due_trial import labels_are_swapped
 from study.session.state.fold import apply
 from study.session.state.state import SessionState
 from study.session.stimulus.delivered import measure_delivered
-from study.session.stimulus.stimulus import direction_vector
+from study.session.stimulus.stimulus import vector_at_angle
 from study.session.views.count_text import answers_are
 from study.store.disk.privacy import close_data_folder, close_to_others
 from study.store.disk.provenance import versions
@@ -206,8 +204,8 @@ def _from_recording(
         return None
     saved, recording = found
     logged = state.answered.health if state.answered is not None else None
-    direction = label_of(presented.direction, labels_are_swapped(state.protocol, state.opened))
-    vector = direction_vector(state.protocol.directions, direction)
+    # The angle that was played: of a detection trial, `direction` is the number of the interval.
+    vector = vector_at_angle(state.protocol.directions, presented.angle_deg)
     trusted = recording.meta.get("acceleration_trusted", True)
     values = measure_delivered(recording, vector, presented.frequency_hz) if trusted else None
     return TrialMeasured(

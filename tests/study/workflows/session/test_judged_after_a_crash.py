@@ -1,0 +1,42 @@
+"""A trial whose program died between its answer and its measurement, judged when the session is resumed."""
+
+from dataclasses import replace
+
+import pytest
+
+from protocols.definition.exposure import DetectionSettings
+from protocols.trial import Phase, TrialStatus
+from study.session.facts.events import TrialPresented
+from study.session.stimulus.stimulus import direction_angle_deg
+from study.store.sessions.event_log import read_log
+
+
+def cut_after_answer(folder, presented: TrialPresented, session_logs) -> None:
+    """Leave what a kill right after the answer to this trial leaves; its recording reached the disk."""
+    events = read_log(folder.log).events
+    at = events.index(presented)
+    answered = next(i for i in range(at, len(events)) if events[i].event == "answer_given")
+    session_logs.cut(folder.path, answered + 1)
+
+
+def test_a_detection_trial_is_measured_along_the_direction_that_was_played(sitter, session_logs):
+    """Its answer is an interval, whose number says nothing of the direction."""
+    detection = DetectionSettings(frequencies_hz=(35.0,), interval_s=0.4, gap_s=0.2)
+    sitter.protocol = replace(sitter.protocol, detection=detection)
+    sitter.text += "\n[detection]\nfrequencies_hz = [35.0]\ninterval_s = 0.4\ngap_s = 0.2\n"
+    done = sitter.whole()
+    directions = sitter.protocol.directions
+    presented = next(
+        event
+        for event in read_log(done.folder.log).events
+        if isinstance(event, TrialPresented)
+        and event.phase is Phase.DETECTION
+        and event.angle_deg != direction_angle_deg(directions, event.direction)
+    )
+    place = (presented.run, presented.trial, presented.attempt)
+    (before,) = [t for t in done.state.trials if (t.run, t.trial, t.attempt) == place]
+    cut_after_answer(done.folder, presented, session_logs)
+    (after,) = [t for t in sitter.resumed(done.folder).state.trials if (t.run, t.trial, t.attempt) == place]
+    assert after.status is TrialStatus.FLAGGED
+    assert after.delivered_mps2 == pytest.approx(before.delivered_mps2, rel=1e-5)
+    assert after.off_axis_mps2 == pytest.approx(before.off_axis_mps2, rel=1e-4)
