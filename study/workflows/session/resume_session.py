@@ -43,6 +43,9 @@ from study.workflows.session.prepare_sitting import does_not_take_part
 from study.workflows.trial.judge_trial import Judgement, judge
 from study.workflows.trial.trial_facts import health_from_log
 
+RECORDING_LOST = "its recording was lost when the program ended"
+"""Remark on a trial that counts without one, or reason why it is void."""
+
 
 @contextmanager
 def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> Iterator[OpenedSession]:
@@ -146,7 +149,8 @@ def _judge_late(
 
     A recording exists only if the trial was judged to count. Without a usable recording, the trial is judged by the
     device's counters that were logged with the answer. Without these (older logs) the answer counts as unmeasured: to
-    drop answers after they were seen would bias the result.
+    drop answers after they were seen would bias the result. If the protocol needs the accelerometer, a trial without a
+    usable recording is void.
     """
     try:
         late = _from_recording(state, presented, folder, clock)
@@ -162,6 +166,8 @@ def _without_recording(state: SessionState, presented: TrialPresented, clock: Cl
     verdict = Judgement("", ())
     if health is not None and logged is not None:
         verdict = judge(health, state.protocol.measurement, logged.felt_whole)
+    if state.protocol.measurement.accelerometer_needed and not verdict.spoiled:
+        verdict = Judgement(RECORDING_LOST, (), VoidCause.NO_ACCELERATION)
     missed_ticks = health.missed_ticks if health is not None else None
     late_ticks, latest_s = (logged.late_ticks, logged.latest_s) if logged is not None else (None, None)
     vibrated_s = health.ticks / state.opened.device.sample_rate_hz if health is not None else None
@@ -185,7 +191,7 @@ def _without_recording(state: SessionState, presented: TrialPresented, clock: Cl
         trial=presented.trial,
         attempt=presented.attempt,
         status="unmeasured",
-        flags=("its recording was lost when the program ended", *verdict.flags),
+        flags=(RECORDING_LOST, *verdict.flags),
         missed_ticks=missed_ticks,
         late_ticks=late_ticks,
         latest_s=latest_s,

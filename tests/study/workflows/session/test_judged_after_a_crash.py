@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from protocols.definition.exposure import DetectionSettings
-from protocols.trial import Phase, TrialStatus
-from study.session.facts.events import TrialPresented
+from protocols.trial import Phase, TrialStatus, VoidCause
+from study.session.facts.events import TrialMeasured, TrialPresented
 from study.session.stimulus.stimulus import direction_angle_deg
 from study.store.sessions.event_log import read_log
 
@@ -40,3 +40,22 @@ def test_a_detection_trial_is_measured_along_the_direction_that_was_played(sitte
     assert after.status is TrialStatus.FLAGGED
     assert after.delivered_mps2 == pytest.approx(before.delivered_mps2, rel=1e-5)
     assert after.off_axis_mps2 == pytest.approx(before.off_axis_mps2, rel=1e-4)
+
+
+@pytest.mark.parametrize(("needed", "status"), [(False, TrialStatus.UNMEASURED), (True, TrialStatus.SPOILED)])
+def test_a_trial_without_its_recording_is_void_where_the_accelerometer_is_needed(sitter, session_logs, needed, status):
+    measurement = replace(sitter.protocol.measurement, accelerometer_needed=needed)
+    sitter.protocol = replace(sitter.protocol, measurement=measurement)
+    sitter.text = sitter.text.replace(
+        "[measurement]\n", f"[measurement]\naccelerometer_needed = {str(needed).lower()}\n"
+    )
+    done = sitter.whole()
+    (measured,) = [e for e in read_log(done.folder.log).events if isinstance(e, TrialMeasured)][-1:]
+    presented = [e for e in read_log(done.folder.log).events if isinstance(e, TrialPresented)][-1]
+    cut_after_answer(done.folder, presented, session_logs)
+    (done.folder.path / measured.recording).unlink()
+    place = (presented.run, presented.trial, presented.attempt)
+    resumed = sitter.resumed(done.folder).state
+    (after,) = [t for t in resumed.trials if (t.run, t.trial, t.attempt) == place]
+    assert (after.status, after.void_cause) == (status, VoidCause.NO_ACCELERATION if needed else None)
+    assert resumed.closed
