@@ -64,7 +64,7 @@ class RepeatedTrajectory:
     order: RepeatOrder
     repeated: Repeated
     tested: Convergence | None
-    """Convergence test at gain 1; None for a single model that does not state its uncertainty."""
+    """Convergence test with `gain`; None for a single model that does not state its uncertainty."""
     gain: float
     """Upper bound of the gain beta of the corrections, dimensionless."""
 
@@ -86,8 +86,7 @@ def repeat_trajectory(
             "Scale the accelerations, or leave out --constrain or --repeat.",
         )
     spring = find_acting_spring(solved.models)
-    tested = convergence_at(solved.models.at, plan.weight, spring)
-    gain = _gain(tested)
+    gain, tested = _test_gain(solved, spring)
     repeat_plan = RepeatPlan(
         wanted=solved.wanted,
         inverse=inverse_at(solved.models.at, plan.weight),
@@ -170,19 +169,22 @@ def _require_repeatable(models: PlaybackModels) -> None:
     require_device_alone(models)
 
 
-def _gain(tested: Convergence | None) -> float:
-    """Gain of the corrections: `SAFE_SHARE` of the largest gain that converges, at most 1; 1 without a test. Raises
-    StudyError for a gain below `LOWEST_GAIN`."""
+def _test_gain(solved: EqualizedTrajectory, spring: VirtualSpring) -> tuple[float, Convergence | None]:
+    """Gain of the corrections: `SAFE_SHARE` of the largest gain that converges, at most 1; 1 without a test. And the
+    convergence test with this gain. Raises StudyError for a gain below `LOWEST_GAIN`."""
+    at, weight = solved.models.at, solved.plan.weight
+    tested = convergence_at(at, weight, spring)
     if tested is None:
-        return 1.0
+        return 1.0, None
     gain = min(1.0, SAFE_SHARE * tested.safe_beta)
     if gain < LOWEST_GAIN:
         raise not_repeated(
             f"Repeats would not converge: at {tested.worst_hz:.1f} Hz {tested.surviving.max():.2f} of an error can "
-            "survive each, by what the device may be within the models.",
+            "survive each with gain 1, by what the device may be within the models; a safe gain is below "
+            f"{LOWEST_GAIN:g}.",
             "Record and identify at the place itself, or with more sweeps.",
         )
-    return gain
+    return gain, convergence_at(at, weight, spring, gain)
 
 
 def _initial_forces(solved: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSpring) -> FloatArray | None:
