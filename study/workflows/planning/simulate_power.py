@@ -81,7 +81,7 @@ def simulate_power(
     path = out / FINISHED_NAME
     done = _read_finished(path, plan)
     todo = [(n, first) for n in plan.people for first in range(0, plan.studies, CHUNK) if (n, first) not in done]
-    finished = sum(map(len, done.values()))
+    finished = sum(len(verdicts) for (people, _), verdicts in done.items() if people in plan.people)
     on_finished(finished)
     for piece, verdicts in run_pieces(executor, judge_piece, ((piece, (plan, piece)) for piece in todo)):
         done[piece] = verdicts
