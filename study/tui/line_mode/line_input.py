@@ -26,8 +26,11 @@ class LineInput:
         ready, _, _ = select.select([self._descriptor], [], [], timeout_s)
         if not ready:
             return None
-        if not self._read_available():
+        if self._read_available():
+            return self._take_line()
+        if not self._line_is_left():
             raise EOFError
+        self._pending += b"\n"
         return self._take_line()
 
     def has_ended(self) -> bool:
@@ -36,7 +39,7 @@ class LineInput:
             if not select.select([self._descriptor], [], [], 0.0)[0]:
                 return False
             self._read_available()
-        return b"\n" not in self._pending
+        return not self._line_is_left()
 
     def forget(self) -> None:
         """Drop lines that were typed at a terminal before now. Lines of a pipe are kept."""
@@ -53,6 +56,11 @@ class LineInput:
         self._over = not data
         self._pending += data
         return not self._over
+
+    def _line_is_left(self) -> bool:
+        """Whether a line is left at the end of the input. The last one of a pipe needs no line end, as for other
+        programs; what a person typed without Enter is no line."""
+        return b"\n" in self._pending or (self._pending != b"" and not self.interactive)
 
     def _take_line(self) -> str | None:
         """Remove the first whole line from the buffer; None if there is none."""
