@@ -52,7 +52,7 @@ def hold_session_lock(folder: Path) -> Iterator[None]:
 @contextmanager
 def hold_places_lock(data: Path) -> Iterator[None]:
     """Hold the lock under which a place in the balanced order of conditions is assigned. Waits while another program
-    holds it; raises StudyError after `PATIENCE_S`."""
+    holds it; raises StudyError after `PATIENCE_S`, and where the data folder cannot be written to."""
     lock = FileLock(data / PLACES_NAME, mode=PRIVATE_FILE)
     try:
         lock.acquire(timeout=PATIENCE_S)
@@ -63,6 +63,13 @@ def hold_places_lock(data: Path) -> Iterator[None]:
             "End the program that holds it.",
             saved="The forms are on disk; no trial was played.",
         ) from held
+    except OSError as problem:
+        raise StudyError(
+            "The data folder cannot be written to",
+            f"{data}: {problem.strerror or problem}.",
+            "Check the permissions of the folder.",
+            saved="The forms are on disk; no trial was played.",
+        ) from problem
     try:
         yield
     finally:
