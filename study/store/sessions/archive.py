@@ -64,6 +64,11 @@ class SessionFolder:
         """Whether the session was withdrawn, or its withdrawal has begun."""
         return self.tombstone.exists() or self.withdrawal.exists()
 
+    @property
+    def erased_words(self) -> str:
+        """How far a withdrawal has come."""
+        return "not all data are erased yet" if self.withdrawal.exists() else "the data were erased"
+
 
 def withdrawal_file(data: Path, subject: str) -> Path:
     """Path of the withdrawal record of a participant."""
@@ -76,7 +81,7 @@ class SessionWithdrawnError(StudyError):
     def __init__(self, folder: SessionFolder) -> None:
         super().__init__(
             "This session was withdrawn",
-            f"The participant of {folder.name} withdrew; the data were erased.",
+            f"The participant of {folder.name} withdrew; {folder.erased_words}.",
             f"Nothing can be done with it; hapteq validate {folder.path} says whether anything is left.",
         )
 

@@ -23,7 +23,7 @@ def check_code(data: Path, subject: str, simulated: bool) -> None:
         if folder.withdrawn:
             raise WrongUseError(
                 f"{subject} withdrew",
-                f"The participant of {folder.name} withdrew, and the data were erased.",
+                f"The participant of {folder.name} withdrew, and {folder.erased_words}.",
                 "Use a new code: this one is not given again.",
             )
         begun = read_begun_participant(folder)

@@ -45,6 +45,9 @@ def test_a_withdrawn_session_says_so(tmp_path):
     folder.tombstone.write_text("{}")
     with pytest.raises(StudyError, match="withdrew; the data were erased"):
         find_session("P01_001", tmp_path)
+    folder.withdrawal.write_text("{}")
+    with pytest.raises(StudyError, match="withdrew; not all data are erased yet"):
+        find_session("P01_001", tmp_path)
 
 
 def test_a_data_folder_that_cannot_be_made_is_said_so(tmp_path):
