@@ -16,6 +16,8 @@ from study.store.sessions.archive import FOLDER
 
 WRITTEN_ELSEWHERE = "written_elsewhere.txt"
 """Name of the file in the data folder; one absolute path per line."""
+LINE_BREAK = "\0"
+"""Replaces a line break within a path; no path contains this character."""
 
 
 def note_written(source: Path, out: Path, always: bool = False) -> None:
@@ -32,7 +34,7 @@ def note_written(source: Path, out: Path, always: bool = False) -> None:
     found = not always and beside is not None and (len(beside) < 2 or FOLDER.fullmatch(beside[0]) is not None)
     if found or out in known:
         return
-    text = "".join(f"{path}\n" for path in (*known, out))
+    text = "".join(str(path).replace("\n", LINE_BREAK) + "\n" for path in (*known, out))
     with suppress(CannotWriteError):
         # fsencode keeps the bytes of a name as the system has them: they need not be UTF-8.
         write_atomically(data / WRITTEN_ELSEWHERE, os.fsencode(text), overwrite=True)
@@ -44,6 +46,7 @@ def folders_written_elsewhere(data: Path) -> tuple[Path, ...]:
     if not is_real_file(note):
         return ()
     try:
-        return tuple(Path(line) for line in os.fsdecode(read_regular(note, DOCUMENT_BYTES)).split("\n") if line)
+        lines = os.fsdecode(read_regular(note, DOCUMENT_BYTES)).split("\n")
     except OSError:
         return ()
+    return tuple(Path(line.replace(LINE_BREAK, "\n")) for line in lines if line)
