@@ -30,7 +30,11 @@ from study.store.disk.provenance import gather_provenance
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import read_recording
-from study.workflows.equalizer.recordings_without_effects import removable_effects, remove_effects
+from study.workflows.equalizer.recordings_without_effects import (
+    reasons_not_removed,
+    removable_effects,
+    remove_effects,
+)
 from study.workflows.free_name import require_free
 
 NEAR_M = 0.001
@@ -71,12 +75,15 @@ class IdentifiedDevice:
     model: IdentifiedModel
     tested: HeldOut | None
     """Held-out test on recordings processed like the fitted ones; None where no segment was kept for it."""
+    not_removed: tuple[str, ...] = ()
+    """Sentences on the effects of the mechanical model that stay in the recordings."""
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences for the user on the quality of the model and on the estimate."""
+        """Sentences for the user on the quality of the model, on the estimate and on effects that were not removed."""
         known = self.model.quality.remarks if self.model.quality else ()
-        return (*known, *(as_sentence(remark) for remark in self.estimate.remarks))
+        left = (f"Not taken off the recordings: {sentence}" for sentence in self.not_removed)
+        return (*known, *(as_sentence(remark) for remark in self.estimate.remarks), *left)
 
 
 def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> IdentifiedDevice:
@@ -106,7 +113,8 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     except ValueError as problem:
         raise _no_model(f"{problem}.") from problem
     write_identified_model(plan.out, model)
-    return IdentifiedDevice(plan, recordings, found.estimate, found.fitted, found.identified, model, tested)
+    left = () if physics is None else reasons_not_removed(physics)
+    return IdentifiedDevice(plan, recordings, found.estimate, found.fitted, found.identified, model, tested, left)
 
 
 def _quality(found: IdentifiedRecordings, recordings: Sequence[Recording], tested: HeldOut | None) -> ModelQuality:

@@ -25,8 +25,8 @@ def remove_effects(recordings: Sequence[Recording], physics: MechanicalModel, pa
     StudyError if no effect can be removed, or a recording has no excitation, missing samples, or a response that is not
     the acceleration of each command."""
     if not removable_effects(physics):
-        left = "".join(f" {effect.kind}: {reason_not_compensated(effect)}." for effect in physics.effects)
-        raise _not_removable(f"{path.name} names no effect that can be taken off a recording.{left}")
+        left = " ".join(reasons_not_removed(physics))
+        raise _not_removable(f"{path.name} names no effect that can be taken off a recording. {left}".rstrip())
     try:
         return tuple(subtract_effects(recording, physics, excitation_band_hz(recording)) for recording in recordings)
     except ValueError as problem:
@@ -40,6 +40,12 @@ def removable_effects(physics: MechanicalModel) -> list[str]:
         for effect in physics.effects
         if not reason_not_compensated(effect)
     ]
+
+
+def reasons_not_removed(physics: MechanicalModel) -> tuple[str, ...]:
+    """A sentence for each effect that stays in the recordings."""
+    reasons = ((effect.kind, reason_not_compensated(effect)) for effect in physics.effects)
+    return tuple(f"{kind}: {reason}." for kind, reason in reasons if reason)
 
 
 def _numbers(effect: ModelEffect) -> str:

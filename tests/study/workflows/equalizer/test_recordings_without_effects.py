@@ -107,6 +107,17 @@ def test_physics_that_name_nothing_to_take_off_are_refused_with_the_reason(folde
     )
 
 
+def test_what_stays_in_the_recordings_is_told(folder, tmp_path):
+    friction = ModelEffect("coulomb_friction", None, {"level": LEVEL_N})
+    teeth = ModelEffect("cogging", None, {"amplitude": 0.1, "pitch": 0.01})
+    write_mechanical_model(tmp_path / "known.toml", mechanical(friction, teeth))
+    recordings = tuple(folder / f"{number}.h5" for number in range(3))
+    plan = IdentifyPlan(recordings, tmp_path / "m.h5", order=6, smooth=False, physics=tmp_path / "known.toml")
+    told = identify_model(plan, lambda share: None).remarks
+    (said,) = [sentence for sentence in told if sentence.startswith("Not taken off the recordings: ")]
+    assert "cogging: amplitude and pitch do not say where" in said
+
+
 def test_an_effect_on_an_axis_that_is_not_there_is_refused(folder, tmp_path):
     said = refused(folder, tmp_path, mechanical(ModelEffect("coulomb_friction", "q", {"level": 0.1})))
     assert "coulomb_friction is on the axis 'q'" in said.happened
