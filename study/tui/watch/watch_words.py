@@ -138,8 +138,8 @@ def device_words(view: WatchView) -> str:
         return "not read now"
     if view.live.fault:
         return f"FAULT: {view.live.fault}"
-    late = f", {view.live.missed_ticks} late ticks" if view.live.missed_ticks else ""
-    return ("simulated" if view.simulated else "no fault") + late
+    parts = ["simulated"] * view.simulated + [f"{view.live.missed_ticks} missed ticks"] * (view.live.missed_ticks > 0)
+    return ", ".join(parts) or "no fault"
 
 
 def drift_words(view: WatchView) -> str:

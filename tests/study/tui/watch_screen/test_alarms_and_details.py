@@ -123,7 +123,7 @@ FINISHED = {"standing": "finished", "reason": "all runs are done", "open_trial":
         (FINISHED, "✓ FINISHED P01_001 all runs are done"),
         ({"standing": "not running", "reason": "gone"}, "! NOT RUNNING P01_001 gone"),
         ({"live": replace(LIVE, sensor_clipped=True)}, "3.3 m/s² CLIPPED"),
-        ({"live": replace(LIVE, missed_ticks=3)}, "no fault, 3 late ticks"),
+        ({"live": replace(LIVE, missed_ticks=3)}, "Device 3 missed ticks"),
         ({"live": replace(LIVE, handle_ready=False, offset_mm=14.0)}, "14.0 mm: OUT of place"),
         ({"live": replace(LIVE, fault="lost")}, "FAULT: lost"),
         ({"live": None}, "Handle not read now"),
