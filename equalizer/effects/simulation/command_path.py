@@ -64,7 +64,9 @@ def drive_actuators(
         time_constant_s = 1 / (2 * np.pi * known.bandwidth_hz)
         mean, end = lag_mean(mean, step_s, time_constant_s), lag_at_end(mean, step_s, time_constant_s)
     if known.delay_s > 0:
-        mean, end = delay_mean(mean, step_s, known.delay_s), delay_at_end(end, step_s, known.delay_s)
+        # After a lag, the force is not held over a step: within one, it is interpolated between the ends.
+        delay_end = delay_mean if known.bandwidth_hz > 0 else delay_at_end
+        mean, end = delay_mean(mean, step_s, known.delay_s), delay_end(end, step_s, known.delay_s)
     if known.limit > 0:
         mean, end = np.clip(mean, -known.limit, known.limit), np.clip(end, -known.limit, known.limit)
     return ActuatorForce(mean, end, commands.mean)

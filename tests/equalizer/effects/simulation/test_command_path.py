@@ -65,6 +65,14 @@ def test_a_free_mass_shows_the_force_of_its_very_instant():
     np.testing.assert_allclose(played.response[:, 0], exact, atol=1e-12)
 
 
+@pytest.mark.parametrize("delay_s", [0.4e-3, 0.5e-3, 2.7e-3])
+def test_a_lagged_force_comes_late_by_a_part_of_a_step_too(delay_s):
+    played = simulate_mechanism(free_mass(bandwidth_hz=100.0, delay_s=delay_s), np.ones((50, 1)), 1000.0)
+    since_s = np.maximum(np.arange(50) / 1000 - delay_s, 0.0)
+    exact = (1 - np.exp(-2 * np.pi * 100 * since_s)) / 2
+    np.testing.assert_allclose(played.response[:, 0], exact, atol=2e-3)
+
+
 def test_what_a_model_knows_of_its_actuator_comes_after_what_it_lacks():
     sites = PlacedEffect(SATURATION, (0,), {"limit": 0.5})
     commands = np.vstack([np.zeros((3, 1)), np.ones((47, 1))])
