@@ -70,7 +70,7 @@ def resumable(happened: str, saved: str, also: tuple[type[UserInterruptError], .
         yield
     except caught as interruption:
         raise UserInterruptError(
-            "Interrupted", happened, "Run the same command again: it goes on where it stopped.", saved
+            "Interrupted", happened, "Run the same command again: it continues where it stopped.", saved
         ) from interruption
 
 

@@ -61,8 +61,8 @@ class SpringSettings:
         Field(
             ge=0,
             le=20,
-            description="Virtual damping beside the spring. Default 0, because the device's own friction is enough and "
-            "differentiated encoders are noisy.",
+            description="Virtual damping in addition to the spring. Default 0, because the device's own friction is "
+            "enough and differentiated encoders are noisy.",
         ),
     ] = 0.0
 
@@ -85,8 +85,8 @@ class SafetySettings:
         Field(
             gt=0,
             le=6.0,
-            description="Norm of the whole command: stimulus, spring and damper. This is what a hand may feel; "
-            "6 N at the most in any protocol. Direction is kept at the cap.",
+            description="Norm of the whole command: stimulus, spring and damper. This is what a hand may feel; 6 N "
+            "at the most in any protocol. At the cap the direction of the force is kept.",
         ),
     ]
     feedback_cap_n: Annotated[
@@ -94,9 +94,10 @@ class SafetySettings:
         Field(
             gt=0,
             le=6.0,
-            description="Norm of the spring's force, of the damper's, and of both together; never above total_cap_n. "
-            "Default 1.5: the room that the shipped protocols leave between stimulus and total, so that a lean never "
-            "reduces a stimulus, and a wrong position that cannot be told pulls with no more. Measured: 1.35 N.",
+            description="Norm of the spring's force, of the damper's, and of both together; never above "
+            "total_cap_n. Default 1.5: the room that the shipped protocols leave between stimulus and total, so "
+            "that leaning on the spring never reduces a stimulus, and the pull at a wrong position that is not "
+            "detected is limited to it. Measured: 1.35 N.",
         ),
     ] = 1.5
     longest_trial_s: Annotated[
@@ -105,7 +106,7 @@ class SafetySettings:
             gt=0,
             le=600,
             description="A stimulus is released after this time, answered or not; such a trial is void. Default 120, "
-            "because an untimed task still must not hold a force on an empty chair.",
+            "because a task without a time limit must still not hold a force after the participant has left.",
         ),
     ] = 120.0
     watchdog_s: Annotated[
@@ -113,13 +114,13 @@ class SafetySettings:
         Field(
             ge=0.3,
             le=5,
-            description="The force fades to zero when the program gives no sign of life for so long. Default 0.5: "
-            "longer than any pause of a busy computer, shorter than a fright.",
+            description="The force fades to zero when the program gives no sign of life for this time. Default 0.5: "
+            "longer than any pause of a busy computer, and short enough not to frighten.",
         ),
     ] = 0.5
     release_s: Annotated[
         float,
-        Field(gt=0, le=1, description="Duration of a fade for safety. Default 0.05: soon gone, without a jerk."),
+        Field(gt=0, le=1, description="Duration of a fade for safety. Default 0.05: short, but without a jerk."),
     ] = 0.05
     plausibility: PlausibilitySettings = Field(default_factory=PlausibilitySettings)
 

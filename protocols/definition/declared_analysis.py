@@ -33,15 +33,15 @@ class AnalysisSettings:
     ] = 0
     exclusions: Annotated[
         tuple[str, ...],
-        Field(max_length=20, description="Whose data are left out, and why, in sentences. Default: none declared."),
+        Field(max_length=20, description="Whose data are excluded, and why, in sentences. Default: none declared."),
     ] = ()
     interval: Annotated[
         Literal["undeclared", "paired_t", "tukey"],
         Field(
-            description="How the 95 % interval of the primary contrast is computed, declared by name. 'paired_t': over "
-            "people's differences in dB (t), which goes with 'hierarchical'; 'tukey': Tukey's of means of runs in "
-            "newtons, which goes with 'published'. Default: undeclared; the interval is then the one that goes with "
-            "primary."
+            description="How the 95 % interval of the primary contrast is computed, declared by name. 'paired_t': "
+            "over people's differences in dB (t), the interval of 'hierarchical'; 'tukey': Tukey's of means of "
+            "runs in newtons, the interval of 'published'. Default: undeclared; the interval is then the one "
+            "that belongs to primary."
         ),
     ] = "undeclared"
 

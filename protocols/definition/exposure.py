@@ -30,7 +30,12 @@ class DetectionSettings:
     ] = 1.5
     gap_s: Annotated[float, Field(ge=0.1, le=10, description="Stillness between the two. Default 0.5.")] = 0.5
     trial_limit: Annotated[
-        int, Field(ge=0, le=1000, description="A run ends after so many trials at the latest. Default 0: a whole one.")
+        int,
+        Field(
+            ge=0,
+            le=1000,
+            description="A run ends after this number of trials at the latest. Default 0: a complete staircase.",
+        ),
     ] = 0
 
 
@@ -43,7 +48,7 @@ class CatchSettings:
         Field(
             ge=0,
             le=100,
-            description="One trial among so many is a catch trial, its place drawn by lot. Default 0: none, as "
+            description="One trial in this number is a catch trial, at a random position. Default 0: none, as "
             "published. 20 costs 5 % more trials.",
         ),
     ] = 0

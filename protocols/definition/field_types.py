@@ -24,7 +24,7 @@ Name = Annotated[
 Title = Annotated[str, Field(min_length=1, max_length=200, description="What reports and lists call it.")]
 Source = Annotated[
     str,
-    Field(max_length=1000, description="Where the numbers come from. Default: empty, for numbers of one's own."),
+    Field(max_length=1000, description="Where the numbers come from. Default: empty, for numbers of your own choice."),
 ]
 Frequency = Annotated[float, Field(ge=0.5, le=500.0)]
 StimulusFrequency = Annotated[float, Field(ge=0.5, le=250.0), AfterValidator(_whole_tenths)]

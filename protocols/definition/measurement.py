@@ -26,8 +26,8 @@ class MeasurementSettings:
         Field(
             ge=0,
             le=1,
-            description="A trial with a larger share of missed 1 kHz ticks is void and comes again. Default 0.02: "
-            "fewer cannot be felt.",
+            description="A trial with a larger share of missed 1 kHz ticks is void and is presented again. Default "
+            "0.02: fewer cannot be felt.",
         ),
     ] = 0.02
     late_ticks_limit: Annotated[
@@ -35,9 +35,9 @@ class MeasurementSettings:
         Field(
             ge=0,
             le=1,
-            description="A trial in which, until the answer, a larger share of ticks was late (their work ended after "
-            "the next was due) or missed is void and comes again: 0.02, say. Default 1: no limit. Devices that wait "
-            "for the computer are never late.",
+            description="A trial in which, until the answer, a larger share of ticks was late (their work ended "
+            "after the next was due) or missed is void and is presented again: 0.02, say. Default 1: no limit. "
+            "Devices that wait for the computer are never late.",
         ),
     ] = 1.0
     longest_late_ms: Annotated[
@@ -45,9 +45,9 @@ class MeasurementSettings:
         Field(
             gt=0,
             le=1000,
-            description="A trial is void and comes again where, until the answer, a tick's work ended later than this "
-            "after it was due, so that the device held its last force: 10, say, a quarter of a period at 25 Hz. "
-            "Default 1000: no limit, for a loop that stands still for 100 ms is lost.",
+            description="A trial is void and is presented again where, until the answer, a tick's work ended later "
+            "than this after it was due, so that the device held its last force: 10, say, a quarter of a period "
+            "at 25 Hz. Default 1000: no limit, for a loop that makes no step for 100 ms is lost.",
         ),
     ] = 1000.0
     lost_packets_limit: Annotated[
@@ -55,15 +55,15 @@ class MeasurementSettings:
         Field(
             ge=0,
             le=1,
-            description="A trial that lacks a larger share of the accelerometer's packets, or of the recorded ticks, "
-            "has no trustworthy acceleration: nothing is said of what was delivered. Default 0.05: what is bridged "
-            "changes an amplitude by less than a percent.",
+            description="A trial that lacks a larger share of the accelerometer's packets, or of the recorded "
+            "ticks, has no trustworthy acceleration, and no delivered amplitude is reported for it. Default "
+            "0.05: gaps of this size change an amplitude by less than a percent.",
         ),
     ] = 0.05
     accelerometer_needed: Annotated[
         bool,
         Field(
-            description="Whether a trial without a trustworthy acceleration is void and comes again, and nothing "
-            "begins on a device without an accelerometer. Default: no, its answer counts."
+            description="Whether a trial without a trustworthy acceleration is void and is presented again, and no "
+            "session begins on a device without an accelerometer. Default: no, its answer counts."
         ),
     ] = False

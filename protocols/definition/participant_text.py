@@ -31,8 +31,8 @@ class TextSettings:
     words: Annotated[
         dict[str, str],
         Field(
-            description="Single texts of one's own, by the keys that `hapteq protocol texts` lists. Where a language "
-            "is named, all its texts are filled in here as the protocol is read. Default: none."
+            description="Your own wording of single texts, by the keys that `hapteq protocol texts` lists. Where a "
+            "language is named, all its texts are filled in here as the protocol is read. Default: none."
         ),
     ] = field(default_factory=dict, hash=False)
 
@@ -63,16 +63,16 @@ class Question:
     ] = ()
     number: Annotated[
         tuple[float, ...],
-        Field(max_length=2, description="Lowest and highest number that is taken, such as [18, 99]. Default: none."),
+        Field(max_length=2, description="Lowest and highest number that is accepted, such as [18, 99]. Default: none."),
     ] = ()
-    unit: Annotated[str, Field(max_length=20, description="Of the number, for tables. Default: none.")] = ""
+    unit: Annotated[str, Field(max_length=20, description="Unit of the number, for tables. Default: none.")] = ""
     scale: Annotated[
         tuple[int, ...],
         Field(max_length=2, description="First and last step of a rating scale, such as [1, 7]. Default: none."),
     ] = ()
     ends: Annotated[
         tuple[Annotated[str, Field(min_length=1, max_length=80)], ...],
-        Field(max_length=2, description="What the two ends of the scale mean. Default: not said."),
+        Field(max_length=2, description="What the two ends of the scale mean. Default: not stated."),
     ] = ()
 
     @property
@@ -93,7 +93,9 @@ class Question:
 def _problems(question: Question) -> tuple[Problem, ...]:
     found = []
     if sum(map(bool, (question.choices, question.number, question.scale))) > 1:
-        found.append(Problem("choices", "stands beside number or scale", "only one of choices, number and scale"))
+        found.append(
+            Problem("choices", "is given together with number or scale", "only one of choices, number and scale")
+        )
     if question.codes and len(question.codes) != len(question.choices):
         wrong = f"has {len(question.codes)} entries for {len(question.choices)} choices"
         found.append(Problem("codes", wrong, "one for each of the choices, or none"))
@@ -106,7 +108,7 @@ def _problems(question: Question) -> tuple[Problem, ...]:
         allowed = f"the first and the last of 2 to {LONGEST_SCALE} steps, none below 0"
         found.append(Problem("scale", f"is {list(scale)}", allowed))
     if question.ends and not (scale and len(question.ends) == 2):
-        found.append(Problem("ends", "does not go with the scale", "two texts, beside a scale"))
+        found.append(Problem("ends", "does not match the scale", "two texts, together with a scale"))
     if question.unit and not question.number:
-        found.append(Problem("unit", "stands without a number", "empty, or beside number"))
+        found.append(Problem("unit", "is given without a number", "empty, or together with number"))
     return tuple(found)

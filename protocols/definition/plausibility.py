@@ -41,8 +41,9 @@ class PlausibilitySettings:
         Field(
             gt=0,
             le=0.5,
-            description="Longest way from one reading to the next, however late that comes. Default 0.05: half a metre "
-            "per second over 0.1 s, the longest gap that a loop survives. Measured: 0.0003 per tick.",
+            description="Largest distance between one reading and the next, however late that comes. Default 0.05: "
+            "half a metre per second over 0.1 s, the longest gap that a loop survives. Measured: 0.0003 per "
+            "tick.",
         ),
     ] = 0.05
     acceleration_mps2: Annotated[
@@ -59,8 +60,8 @@ class PlausibilitySettings:
         Field(
             ge=1e-7,
             le=0.001,
-            description="Resolution of the encoders at the handle; less than half of it is no change. Default 0.00001, "
-            "as the omega.3's data sheet says.",
+            description="Resolution of the encoders at the handle; a difference below half of it counts as no "
+            "change. Default 0.00001, as the omega.3's data sheet says.",
         ),
     ] = 1e-5
     friction_n: Annotated[

@@ -16,9 +16,9 @@ RoveDb = Annotated[
         ge=0,
         le=20,
         description="Width of the range, level_n in its middle, from which each amplitude is drawn evenly in dB, "
-        "for all directions alike. At one fixed level, labels and feedback teach how strong each direction feels: with "
-        "a range of r dB, a difference of d dB between the directions tells at most 50 + 50 d / r % of the trials. "
-        "Default 0: one fixed level, as in protocols of before there was a range.",
+        "for all directions alike. At one fixed level, labels and feedback teach how strong each direction "
+        "feels. With a range of r dB, a difference of d dB between the directions allows at most 50 + 50 d / r "
+        "% right answers by strength alone. Default 0: one fixed level, as in older protocols.",
     ),
 ]
 
@@ -29,7 +29,10 @@ class ConsentSettings:
 
     version: Annotated[
         str,
-        Field(max_length=40, description="Of the wording; logged with the consent. Default: empty, for no wording."),
+        Field(
+            max_length=40,
+            description="Version of the wording; logged with the consent. Default: empty, for no wording.",
+        ),
     ] = ""
     ethics_id: Annotated[
         str,
@@ -60,7 +63,7 @@ class SetupSettings:
     """How a participant sits at the device, asked for and logged at the start of every sitting, and in which state that
     must be."""
 
-    ask: Annotated[bool, Field(description="Whether the set-up is gone through. Default: no.")] = False
+    ask: Annotated[bool, Field(description="Whether the questions on the set-up are asked. Default: no.")] = False
     hearing_masked: Annotated[
         bool,
         Field(description="Ear protection or masking noise is wanted. Default: yes, because a device can be heard."),
@@ -72,13 +75,14 @@ class SetupSettings:
         bool, Field(description="The forearm should rest on something. Default: yes, because tired arms feel less.")
     ] = True
     grip: Annotated[
-        str, Field(max_length=80, description="The grip that is asked for. Default: as published, constant.")
+        str,
+        Field(max_length=80, description="The grip that the participant should use. Default: as published, constant."),
     ] = "constant and comfortable"
     daily_check_needed: Annotated[
         bool,
         Field(
-            description="Whether a real device must have passed `hapteq doctor --daily` on that day, or nothing "
-            "begins. Default: no, a warning says where it has not."
+            description="Whether a session on a real device begins only if that device has passed `hapteq doctor "
+            "--daily` on the same day. Default: no, a warning is shown where it has not."
         ),
     ] = False
 
@@ -91,8 +95,9 @@ class MaskingSettings:
     play: Annotated[
         bool,
         Field(
-            description="Whether the program plays it, from before the demonstration to the end but for pauses, and "
-            "begins no session of a person where it cannot. Default: no, the lab plays the file of `hapteq noise`."
+            description="Whether the program plays the noise, from before the demonstration to the end except in "
+            "pauses, and begins no session of a person where it cannot. Default: no, the lab plays the file of "
+            "`hapteq noise`."
         ),
     ] = False
     level_db: Annotated[
@@ -124,7 +129,9 @@ class DemoSettings:
         float, Field(ge=0, le=3.0, description="Amplitude, in newtons. Default 0: no demonstration.")
     ] = 0.0
     rove_db: RoveDb = 0.0
-    seconds: Annotated[float, Field(ge=0.5, le=20, description="Length of each. Default 2: ten periods at 5 Hz.")] = 2.0
+    seconds: Annotated[float, Field(ge=0.5, le=20, description="Duration of each. Default 2: ten periods at 5 Hz.")] = (
+        2.0
+    )
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -145,7 +152,8 @@ class PracticeSettings:
     ] = 2.0
     rove_db: RoveDb = 0.0
     right_needed: Annotated[
-        int, Field(ge=1, le=50, description="Passed with so many right answers among the last `of_last`. Default 4.")
+        int,
+        Field(ge=1, le=50, description="Passed with this number of right answers among the last `of_last`. Default 4."),
     ] = 4
     of_last: Annotated[
         int, Field(ge=1, le=50, description="See `right_needed`. Default 5: by guessing, 4 of 5 has a chance of 19 %.")
@@ -155,8 +163,8 @@ class PracticeSettings:
         Field(
             ge=1,
             le=200,
-            description="A practice run ends after so many trials, passed or not. Default 10. Not passing excludes "
-            "no participant: at high frequencies it is a finding.",
+            description="A practice run ends after this number of trials, passed or not. Default 10. Not passing "
+            "excludes no participant: at high frequencies it is a finding.",
         ),
     ] = 10
     feedback: Annotated[

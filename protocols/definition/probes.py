@@ -77,8 +77,10 @@ class ProbeSettings:
             wrong = f"holds {max(self.levels_n):g} N, above probe_cap_n"
             refuse([Problem("levels_n", wrong, f"at most {self.probe_cap_n:g} N each")])
         if self.reference_s and not self.levels_n:
-            wrong = "is set without levels_n: only beside a probe with a hand is a free handle seen to be free"
-            refuse([Problem("reference_s", wrong, "0, or levels_n beside it")])
+            wrong = (
+                "is set without levels_n: only by comparison with a probe with a hand can a free handle be recognised"
+            )
+            refuse([Problem("reference_s", wrong, "0, or levels_n in addition")])
         if self.reference_s and self.to_hz < REFERENCE_TO_HZ:
             wrong = f"is {self.to_hz:g} Hz: too low to see by a probe whether the handle is free for the reference"
             refuse([Problem("to_hz", wrong, f"at least {REFERENCE_TO_HZ:g} Hz, or reference_s = 0")])

@@ -38,8 +38,8 @@ class RecordingProtocol:
         Field(
             ge=0.1,
             le=60,
-            description="Rest before, between and after the excitations. Default 1: vibrations have died by then, and "
-            "the sensor's noise is on record.",
+            description="Rest before, between and after the excitations. Default 1: vibrations have decayed by "
+            "then, and the sensor's noise is recorded.",
         ),
     ] = 1.0
     repeats: Annotated[
@@ -47,7 +47,8 @@ class RecordingProtocol:
         Field(
             ge=1,
             le=100,
-            description="How often the whole list is played. Default 1; more tell repeat noise from the device.",
+            description="How often the whole list is played. Default 1; with more, noise can be distinguished from "
+            "the device's response.",
         ),
     ] = 1
     fade_s: Annotated[
@@ -58,7 +59,7 @@ class RecordingProtocol:
         bool,
         Field(
             description="Whether an excitation at which the accelerometer or the total force reaches its limit is "
-            "played again with less. Default true: what was cut off tells nothing about the device."
+            "played again with less. Default true: clipped samples contain no information about the device."
         ),
     ] = True
     least_amplitude_n: Annotated[

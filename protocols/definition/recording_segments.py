@@ -21,7 +21,7 @@ Periods = Annotated[
     Field(
         ge=1,
         le=100,
-        description="Periods played, the transient's included. Default 2: one for the transient, one to count.",
+        description="Periods played, the transient's included. Default 2: one for the transient, one to be evaluated.",
     ),
 ]
 Role = Annotated[
@@ -43,10 +43,12 @@ class SineSegment:
     ]
     amplitude_n: Amplitude
     along: Along
-    duration_s: Annotated[float, Field(gt=0, le=600, description="Counted part of every sinusoid, whole periods.")]
+    duration_s: Annotated[float, Field(gt=0, le=600, description="Evaluated part of every sinusoid, whole periods.")]
     settle_s: Annotated[
         float,
-        Field(ge=0, le=60, description="Played before it and not counted. Default 1: resonances have died by then."),
+        Field(
+            ge=0, le=60, description="Played before it and not evaluated. Default 1: resonances have decayed by then."
+        ),
     ] = 1.0
     role: Role = ""
 
@@ -105,7 +107,8 @@ class MultisineSegment:
         Field(
             ge=0,
             le=2**53,
-            description="Of the phases. Default 1: any number will do, and the same one gives the same excitation.",
+            description="Seed of the phases. Default 1: any number will do, and the same one gives the same "
+            "excitation.",
         ),
     ] = 1
     realisations: Annotated[
@@ -113,8 +116,8 @@ class MultisineSegment:
         Field(
             ge=1,
             le=50,
-            description="How many excitations with phases of their own are played. Default 1; more tell distortion "
-            "from the linear device.",
+            description="How many excitations with different phases are played. Default 1; with more, distortion "
+            "can be distinguished from the linear response.",
         ),
     ] = 1
     role: Role = ""

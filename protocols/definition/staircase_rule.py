@@ -104,8 +104,9 @@ class StaircaseRule:
     reversal: Annotated[
         Literal["level_direction"],
         Field(
-            description="What a reversal is. Default, and the only one offered: a change of the level's direction, the "
-            "first movement being none, because alternating answers alone make no peaks and valleys to average."
+            description="What a reversal is. Default, and the only one offered: a change of the level's direction; "
+            "the first movement is no reversal, because alternating answers alone make no peaks and valleys to "
+            "average."
         ),
     ] = "level_direction"
     at_cap: Annotated[
@@ -120,7 +121,7 @@ class StaircaseRule:
         Literal["newton"],
         Field(
             description="How the peaks and valleys are averaged. Default, and the only one offered: arithmetic mean in "
-            "newtons, the unit of the published figure; the mean in dB is always written beside it."
+            "newtons, the unit of the published figure; the mean in dB is always written in addition."
         ),
     ] = "newton"
     trial_limit: Annotated[

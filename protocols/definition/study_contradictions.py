@@ -54,7 +54,7 @@ def _placement(protocol: StudyProtocol) -> list[Problem]:
     """What the Bayesian placement of levels (Psi) needs: levels as planned, and room for all its trials."""
     problems, trials = [], protocol.staircase.bayesian.trials
     if protocol.stimulus.rove_db and protocol.staircase.is_bayesian:
-        wrong = f"is {protocol.stimulus.rove_db:g} dB, but Psi takes the levels of its answers as they are planned"
+        wrong = f"is {protocol.stimulus.rove_db:g} dB, but Psi assumes that levels are played as planned"
         problems.append(Problem("stimulus.rove_db", wrong, "0, or 0 in staircase.bayesian.trials"))
     # The limit of a training run may be lower: training needs no threshold.
     limits = {

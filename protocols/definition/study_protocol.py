@@ -45,7 +45,7 @@ class StimulusSettings:
             gt=0,
             le=5,
             description="The amplitude rises over this time. Default 0.5: two and a half periods at 5 Hz, so that "
-            "no onset tells the direction.",
+            "no onset reveals the direction.",
         ),
     ] = 0.5
     fade_out_s: Annotated[
@@ -63,8 +63,8 @@ class StimulusSettings:
     onset_polarity: Annotated[
         Literal["random", "positive"],
         Field(
-            description="Sign of the first half-wave. Default: random, so that the first push does not "
-            "tell the direction."
+            description="Sign of the first half-wave. Default: random, so that the first push does not reveal the "
+            "direction."
         ),
     ] = "random"
     rove_db: Annotated[
@@ -73,10 +73,11 @@ class StimulusSettings:
             ge=0,
             le=20,
             description="Width of the range, the staircase's level in its middle, from which the amplitude of every "
-            "trial of a staircase on directions is drawn evenly in dB, for both directions alike: the control against "
-            "telling them by strength. A difference of d dB between the directions then tells at most 50 + 50 d / r % "
-            "of the trials. Half of the range lies above the level, so staircase.cap_n must leave room below "
-            "safety.stimulus_cap_n. Default 0: each trial at the staircase's level, as published.",
+            "trial of a staircase on directions is drawn evenly in dB, for both directions alike: the control "
+            "that directions are not distinguished by strength. A difference of d dB between the directions "
+            "then allows at most 50 + 50 d / r % right answers by strength alone. Half of the range lies above "
+            "the level, so staircase.cap_n must leave room below safety.stimulus_cap_n. Default 0: each trial "
+            "at the staircase's level, as published.",
         ),
     ] = 0.0
 
@@ -102,7 +103,7 @@ class ScheduleSettings:
         Literal["independent", "balanced"],
         Field(
             description="How directions are drawn. Default: independently, because then no run of equal directions "
-            "tells the next one. 'balanced' shows both equally often within every eight trials."
+            "predicts the next one. 'balanced' shows both equally often within every eight trials."
         ),
     ] = "independent"
     labels: Annotated[
@@ -122,7 +123,7 @@ class TrialSettings:
         tuple[int, ...],
         Field(
             max_length=2,
-            description="Numbers of the device's buttons that answer 1 and 2, beside the keys. Default: none.",
+            description="Numbers of the device's buttons that answer 1 and 2, in addition to the keys. Default: none.",
         ),
     ] = ()
 

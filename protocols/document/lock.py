@@ -76,9 +76,9 @@ def lock_from_json(text: str) -> ProtocolLock:
     except (ValueError, RecursionError) as error:
         raise LockError(f"a lock is a JSON document, but this is none: {error}") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise LockError(f'a lock says "format": "{FORMAT}", and this document does not')
+        raise LockError(f'a lock contains "format": "{FORMAT}", and this document does not')
     if document.get("version") != VERSION:
-        raise LockError(f"the lock is of version {document.get('version')}, and this hapteq knows version {VERSION}")
+        raise LockError(f"the lock is of version {document.get('version')}, and this hapteq reads version {VERSION}")
     wrong = [key for key in ("name", "hash", "locked_utc", "hapteq") if not isinstance(document.get(key), str)]
     if wrong:
         raise LockError(f"the lock lacks the text {', '.join(wrong)}")

@@ -20,7 +20,7 @@ def calibrate(
     """Ask the device for Jacobian, inertia and gravity at 185 positions, and compare them about the linkage's three
     mirror lines. Its library computes them: nothing moves, the device stays braked.
 
-    `hapteq twin --calibration CAL.h5` and `--device simulated:CAL.h5` go on with it. (Another calibration, that of the
+    `hapteq twin --calibration CAL.h5` and `--device simulated:CAL.h5` use the result. (Another calibration, that of the
     encoders after each power-up, is `hapteq doctor --calibrate`.)
     """
     from study.cli.progress import late_bar

@@ -13,14 +13,15 @@ from study.cli.session_options import DeviceOption, HandsOffOption
 
 
 def contact(
-    model: Annotated[Path, typer.Argument(metavar="MODEL.h5", help="Of the device alone, from hapteq identify.")],
+    model: Annotated[Path, typer.Argument(metavar="MODEL.h5", help="Model of the device alone, from hapteq identify.")],
     transient: Annotated[
-        Path, typer.Argument(metavar="TRANSIENT.csv", help="time_s,a: acceleration from the contact on, m/s^2.")
+        Path,
+        typer.Argument(metavar="TRANSIENT.csv", help="Columns time_s,a: acceleration in m/s^2 from the contact on."),
     ],
-    normal: Annotated[tuple[float, float, float], typer.Option(help="Of the surface that is touched: x y z.")],
+    normal: Annotated[tuple[float, float, float], typer.Option(help="Normal of the touched surface: x y z.")],
     out: Annotated[Path, typer.Option(help="Folder to write; it must not be there yet, or be empty.")],
     device: DeviceOption = "simulated",
-    scale: Annotated[float, typer.Option(min=1e-6, max=1e6, help="Factor on the recording.")] = 1.0,
+    scale: Annotated[float, typer.Option(min=1e-6, max=1e6, help="Factor by which the transient is multiplied.")] = 1.0,
     weight: Annotated[float, typer.Option(min=0.0, help="Weight of |force|² against |error|², (m/s² per N)².")] = 1e-3,
     cap: Annotated[float, typer.Option(min=0.001, help="Highest force, in newtons.")] = 3.0,
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
@@ -30,7 +31,7 @@ def contact(
     """Play a transient that begins when a contact is felt: nothing may act before it. No person may hold the
     handle; from a script, a real device moves with --hands-off only.
 
-    Writes forces.csv, wanted.csv, measured.csv, contact.json and a picture beside the same as a force with one gain.
+    Writes forces.csv, wanted.csv, measured.csv, contact.json and a picture that compares it with a force of one gain.
     """
     from functools import partial
 

@@ -31,8 +31,8 @@ CleanOption = Annotated[
     list[Path] | None,
     typer.Option(
         metavar="CLEAN.h5",
-        help="A recording of the device when it was in order: what it differed by then is no mismatch; may be "
-        "repeated.",
+        help="A recording of the device when it was in order: differences from the model that it already shows are "
+        "not counted as mismatch; may be repeated.",
     ),
 ]
 

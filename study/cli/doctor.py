@@ -69,7 +69,7 @@ def doctor(
     as_json: JsonOption = False,
 ) -> None:
     """Check the installation, the device with its sensor, and the 1 kHz timing. Nothing moves, unless --accept or
-    --daily asks for it: then it is said before, and confirmed in a terminal or by --hands-off."""
+    --daily requires it: then this is announced, and confirmed in a terminal or by --hands-off."""
     from contextlib import nullcontext
 
     from study.cli.progress import bar

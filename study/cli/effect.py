@@ -14,8 +14,8 @@ def effect(
     out: Annotated[Path, typer.Option(help="The file to write, EFFECT.py; its name is the effect's name.")],
     number: Annotated[int, typer.Option(min=1, help="Which law, where there are several.")] = 1,
 ) -> None:
-    """Write a discovered law as an effect of your own. `hapteq diagnose --effect-file EFFECT.py` then looks for it in
-    other recordings, at every axis."""
+    """Write a discovered law as a file that defines an effect. `hapteq diagnose --effect-file EFFECT.py` then looks for
+    it in other recordings, at every axis."""
     from study.workflows.diagnosis.effect_file import write_entry
 
     entry = write_entry(found, out, number)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from study.workflows.equalizer.repeat_trajectory import RepeatOrder
 
 EarlierOption = Annotated[
-    Path | None, typer.Option("--from", help="Forces of an earlier run with --repeat, to go on from.")
+    Path | None, typer.Option("--from", help="Forces of an earlier run with --repeat, from which to continue.")
 ]
 
 
@@ -32,7 +32,12 @@ def equalize(
     weight: Annotated[float, typer.Option(min=0.0, help="Weight of |force|² against |error|², (m/s² per N)².")] = 1e-3,
     cap: Annotated[float, typer.Option(min=0.001, help="Highest force, in newtons.")] = 3.0,
     constrain: Annotated[
-        bool, typer.Option("--constrain", help="Above the cap: solve under it and state the loss, instead of refusing.")
+        bool,
+        typer.Option(
+            "--constrain",
+            help="If the forces would exceed the cap: compute the best forces under "
+            "the cap and report the loss, instead of refusing.",
+        ),
     ] = False,
     physics: Annotated[
         Path | None, typer.Option(help="Mechanical model whose named effects are compensated, such as friction.")
@@ -47,7 +52,7 @@ def equalize(
     hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Turn wanted accelerations (time_s,ax,ay,az) into forces (time_s,fx,fy,fz), row by row.
+    """Compute the forces (time_s,fx,fy,fz) that give wanted accelerations (time_s,ax,ay,az), row by row.
 
     Models of several places are interpolated at --at; a narrow and a wide one of one place play three bands.
     """
@@ -77,7 +82,7 @@ def _check_arguments(files: list[Path], repeat: int | None, device: str | None, 
     if (repeat is None) != (device is None) or (earlier is not None and repeat is None):
         raise WrongUseError(
             "--repeat and --device need each other",
-            "--repeat and --device go together, and --from only with them.",
+            "--repeat and --device must be given together, and --from only with them.",
             "Give both, such as: hapteq equalize model.h5 wanted.csv --repeat 10 --device simulated --out forces.csv",
         )
 

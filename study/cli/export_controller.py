@@ -16,7 +16,7 @@ def export_controller(
         Path | None, typer.Option(help="Wanted accelerations (time_s,ax,ay,az) to be turned; else a tap along z.")
     ] = None,
     preview: Annotated[
-        float, typer.Option(min=0.0, help="How long ahead a stream is known, in ms; it is played so much later.")
+        float, typer.Option(min=0.0, help="How long ahead a stream is known, in ms; it is played with this delay.")
     ] = 200.0,
     weight: Annotated[float, typer.Option(min=0.0, help="Weight of |force|² against |error|², (m/s² per N)².")] = 1e-3,
     cap: Annotated[float, typer.Option(min=0.001, help="Highest force, in newtons.")] = 3.0,

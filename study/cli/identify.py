@@ -29,9 +29,11 @@ def identify(
     order: Annotated[int, typer.Option(min=2, max=200, help="Number of states; even.")] = 26,
     smooth: SmoothOption = None,
     with_spring: Annotated[
-        bool, typer.Option("--with-spring", help="Take the spring as a part of the device.")
+        bool, typer.Option("--with-spring", help="Treat the virtual spring as a part of the device.")
     ] = False,
-    physics: Annotated[Path | None, typer.Option(help="Mechanical model whose effects are taken off.")] = None,
+    physics: Annotated[
+        Path | None, typer.Option(help="Mechanical model whose effects are subtracted from the recordings.")
+    ] = None,
     longest_decay: Annotated[
         float | None,
         typer.Option(help="Longest decay of a pole, in seconds [default: 0.5, longer where the recordings show it]."),
@@ -41,7 +43,7 @@ def identify(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit a stable model to the band, test it on what was kept for a test, and write it."""
+    """Fit a stable model to the band, test it on held-out data, and write it."""
     from study.cli.progress import bar
     from study.workflows.equalizer.identified_summary import summary, summary_lines
     from study.workflows.equalizer.identify_model import IdentifyPlan, check_free, identify_model

@@ -21,7 +21,7 @@ def import_recording(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write one recording: units in SI, all channels on one rate, clocks aligned; what was done is said.
+    """Write one recording: units in SI, all channels on one rate, clocks aligned. All changes are reported.
 
     Without a map, tables and arrays whose names say units are understood (time [s], fx [N], x_mm, ...), so are files
     that a shipped map fits, and hapteq recordings; for other files a map to be completed is printed.

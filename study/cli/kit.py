@@ -57,7 +57,7 @@ def score(
 ) -> None:
     """Compare the revealed table with the diagnoses. It must be the one that was sealed.
 
-    Without --seal its hash is compared only with the file beside it. A recording without a diagnosis is not right.
+    Without --seal its hash is compared only with the file next to it. A recording without a diagnosis is not right.
     """
     from study.evaluation.kit.score_kit import score_kit, score_lines
 

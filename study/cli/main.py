@@ -35,9 +35,9 @@ WrongCommandLine: Any = next(kind for kind in typer.BadParameter.__mro__ if kind
 
 INTERRUPTED = StudyError(
     "Interrupted",
-    "The command was left before it was done.",
+    "The command was interrupted before it was finished.",
     "Run it again.",
-    saved="Files that it had written are whole; none is half written.",
+    saved="Files that it had written are complete.",
 )
 """Said after Ctrl-C where a command says nothing better."""
 
@@ -53,7 +53,7 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Say the version and exit.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     return None
@@ -121,7 +121,7 @@ def _system_error(problem: OSError) -> StudyError:
         "The system refused",
         f"{problem.strerror or problem}{where}.",
         "Check the permissions and the room on the disk, then run the command again.",
-        saved="What was reported as written before is on disk.",
+        saved="Everything reported as written so far is on disk.",
     )
 
 

@@ -19,7 +19,7 @@ def model(
 ) -> None:
     """Fit masses, dampers and springs to recordings, and write them with tolerances.
 
-    `auto` compares structures by their error on held-out data, and says why it took which.
+    `auto` compares structures by their error on held-out data, and states the reason for its choice.
     """
     from study.cli.progress import late_bar
     from study.workflows.diagnosis.fit_first_model import (

@@ -69,7 +69,9 @@ def power(
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
     scheduler: SchedulerOption = None,
     protocol: Annotated[str, typer.Option(help="Protocol with staircase and frequencies.")] = "direction_threshold",
-    out: Annotated[Path, typer.Option(help="Folder of the results; a broken run goes on there.")] = Path("power"),
+    out: Annotated[Path, typer.Option(help="Folder of the results; an interrupted run is continued there.")] = Path(
+        "power"
+    ),
     curve: CurveOption = "weibull",
     lapse: LapseOption = 0.02,
     people: PeopleOption = "attentive",
@@ -78,7 +80,8 @@ def power(
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of all draws.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate whole studies and count how often each analysis finds the difference. Run again, it goes on."""
+    """Simulate whole studies and count how often each analysis finds the difference. Interrupted, the same
+    command continues."""
     from study.cli.progress import bar
     from study.store.formats.protocol_files import read_study_protocol
     from study.workflows.cluster import cluster_workers
@@ -119,9 +122,12 @@ def _compare(crowd: "Crowd", rule: "StaircaseRule", people: int, seed: int, as_j
         typer.echo(f"{row.rule:42}{numbers}")
     typer.echo(f"{people} people, the same under every rule; errors of single runs in dB, root mean square.")
     if crowd.rove_db:
-        typer.echo(f"Roved by {crowd.rove_db:g} dB, as the protocol says; Psi plays its levels as they are.")
+        typer.echo(f"Roved by {crowd.rove_db:g} dB, as the protocol says; Psi's levels are not roved.")
     if crowd.guessers or crowd.criterion_drift_sd or crowd.unsure or crowd.delivery is not None:
-        typer.echo("Of --people and --delivered nothing is in this comparison: people are attentive and feel commands.")
+        typer.echo(
+            "--people and --delivered have no influence on this comparison: people are attentive and feel "
+            "the commanded force."
+        )
 
 
 def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "Crowd":

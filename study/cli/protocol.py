@@ -73,7 +73,7 @@ def texts(
 def lock(name: NameArgument, data: DataOption = Path("data")) -> None:
     """Fix a protocol before data come in: sessions in the data folder then refuse any other version of it.
 
-    What it declares of the analysis, and what not, is said.
+    The lock states which parts of the analysis the protocol declares.
     """
     from importlib.metadata import version
 

@@ -19,7 +19,7 @@ Found = TypeVar("Found")
 
 
 def prove(
-    out: Annotated[Path, typer.Option(help="Folder of the bank and the results; new, or the one to go on with.")],
+    out: Annotated[Path, typer.Option(help="Folder of the bank and the results; new, or one to be continued.")],
     cases: Annotated[int, typer.Option(min=1, max=100_000, help="How many devices are drawn.")] = 40,
     seed: Annotated[
         int, typer.Option(min=0, callback=check_seed, help="Seed of all draws but the salt of the labels.")
@@ -28,7 +28,8 @@ def prove(
     scheduler: SchedulerOption = None,
     brief: Annotated[bool, typer.Option("--brief", help="Short recordings: a quick look.")] = False,
     controls: Annotated[
-        bool, typer.Option("--controls", help="Also ask what must change, or must not: minutes more.")
+        bool,
+        typer.Option("--controls", help="Also check which answers must change and which must not; takes minutes more."),
     ] = False,
     laws: Annotated[bool, typer.Option("--laws", help="Conceal laws that no catalogue names.")] = False,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the recordings, 1 to 4 MB each.")] = False,
@@ -37,7 +38,7 @@ def prove(
 ) -> None:
     """Conceal physics in simulated devices, seal what it is, diagnose them blind, and count.
 
-    Writes proof.json, proof.csv and report.html. Interrupted, the same command goes on.
+    Writes proof.json, proof.csv and report.html. Interrupted, the same command continues.
     """
     from study.evaluation.bank.proof_summary import blind_test_lines, summary
     from study.evaluation.bank.prove import prove as proved

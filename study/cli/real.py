@@ -35,9 +35,9 @@ def real(
     scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Diagnose a folder of real recordings: what was named, what is left, what an expert would object.
+    """Diagnose a folder of real recordings: what was named, what remains unexplained, what an expert would object.
 
-    Maps that lie beside the recordings are used, else those that come with hapteq. After an interruption, the same
+    Maps in the folder of the recordings are used, else those that come with hapteq. After an interruption, the same
     command goes on.
     """
     import json

@@ -29,7 +29,7 @@ def record(
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
     hands_off: HandsOffOption = False,
 ) -> None:
-    """Record the device's answer to an excitation. Interrupted, what is whole so far is written.
+    """Record the device's answer to an excitation. Interrupted, the pieces that are complete are written.
 
     Where the accelerometer clips, a piece is played again with less force. A real device says first whether a hand
     may be on the handle, and waits for Enter in a terminal; from a script it moves a free handle with --hands-off only.

@@ -29,7 +29,7 @@ def rehearse(
     ] = "person",
     as_json: JsonOption = False,
 ) -> None:
-    """Simulated participants take the whole study, ending with the report. Interrupted, the same command goes on."""
+    """Let simulated participants take the whole study, with its report. Interrupted, the same command continues."""
     from study.cli.progress import bar
     from study.store.formats.protocol_files import read_study_protocol
     from study.workflows.results.analysis_files import ANALYSIS_NAME

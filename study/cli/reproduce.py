@@ -20,9 +20,9 @@ def reproduce(
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw the paper's figures 1 to 5, each beside what the paper reports and what came out here.
+    """Draw the paper's figures 1 to 5, each with the values of the paper and of this run.
 
-    Everything is simulated: device and participants. Interrupted, the same command goes on.
+    Everything is simulated: device and participants. Interrupted, the same command continues.
     """
     import json
 

@@ -23,7 +23,7 @@ def resume(
     hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Go on with a session where it stopped. No answer is lost; a trial without an answer comes again."""
+    """Continue a session where it stopped. No answer is lost; a trial without an answer is presented again."""
     from study.cli.screen import has_screen, open_screen
 
     answer_keys = parse_keys(keys)

@@ -21,7 +21,7 @@ HandsOffOption = Annotated[
     ),
 ]
 KeysOption = Annotated[
-    str, typer.Option(metavar="A,B", help="Keys that answer 1 and 2 beside the digits, such as f,j.")
+    str, typer.Option(metavar="A,B", help="Keys that answer 1 and 2 in addition to the digits, such as f,j.")
 ]
 
 ProtocolOption = Annotated[

@@ -21,7 +21,7 @@ def sessions(
     remarks: Annotated[bool, typer.Option("--remarks", help="Also why a session cannot be used.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """List all sessions, latest first: how they stand, and how far they are."""
+    """List all sessions, latest first: their status and progress."""
     from study.workflows.views.list_sessions import session_lines
 
     lines = session_lines(data)

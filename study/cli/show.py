@@ -115,7 +115,7 @@ def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
     sections = (
         ("Effects", view.sentences),
         ("Candidates, not confirmed", view.candidates),
-        ("Rivals, and why not", view.rivals),
+        ("Rivals, and why rejected", view.rivals),
     )
     for title, sentences in sections:
         if sentences:

@@ -15,7 +15,8 @@ def stream(
     data: DataOption = Path("data"),
 ) -> None:
     """Follow a running session from a second terminal and send each of its facts as an LSL marker, with force,
-    acceleration and motion of each tick beside, until it is finished or Ctrl-C. Needs pip install '.[lsl]'."""
+    acceleration and motion of each tick in further streams, until it is finished or Ctrl-C.
+    Needs pip install '.[lsl]'."""
     from study.errors import StudyError
     from study.session.watching.requests import NoteAsked
     from study.store.sessions.archive import find_session

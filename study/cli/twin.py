@@ -28,7 +28,7 @@ def twin(
     as_json: JsonOption = False,
 ) -> None:
     """Excite the device well above its friction at two levels, fit masses, dampers, cables and modes from the command
-    to the acceleration, take off the damping that is friction's, and write the rest with its tolerances. No person may
+    to the acceleration, subtract the damping that friction adds, and write the model with its tolerances. No person may
     hold the handle; from a script, a real device moves with --hands-off only.
 
     With --calibration the model also says how the inertia changes with the position, and the simulated device has the

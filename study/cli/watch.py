@@ -26,9 +26,11 @@ def watch(
     ] = "",
     data: DataOption = Path("data"),
     plain: Annotated[bool, typer.Option("--plain", help="A line for each event; alarms ring.")] = False,
-    once: Annotated[bool, typer.Option("--once", help="How it stands now, and leave.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="Print the present state and exit.")] = False,
     stop: Annotated[bool, typer.Option("--stop", help="Force off at once; the sitting ends.")] = False,
-    pause: Annotated[bool, typer.Option("--pause", help="Hands free at once; the participant goes on.")] = False,
+    pause: Annotated[
+        bool, typer.Option("--pause", help="Hands free at once; the participant continues the session.")
+    ] = False,
     note: Annotated[str, typer.Option(metavar="TEXT", help="A note for the log.")] = "",
     adverse: Annotated[str, typer.Option(metavar="TEXT", help="An adverse event for the log.")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="With --once: one JSON document on stdout.")] = False,
@@ -122,13 +124,13 @@ def _send_requests(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str
 
     session = SessionFolder(folder)
     if stop:
-        sentence = f"The force is off and the sitting ends. Go on with: hapteq resume {folder}"
+        sentence = f"The force is off and the sitting ends. Continue with: hapteq resume {folder}"
         _ask_for(session, StopAsked("experimenter"), sentence)
     for text, adverse in notes:
         if text:
             write_note(session, text, adverse)
     if pause:
-        _ask_for(session, PauseAsked("experimenter"), "Paused. The participant goes on at their own screen.")
+        _ask_for(session, PauseAsked("experimenter"), "Paused. The participant continues at their own screen.")
 
 
 def _ask_for(session: "SessionFolder", request: "Request", text: str) -> None:

@@ -15,7 +15,8 @@ def withdraw(
 ) -> None:
     """Erase all sessions of a session's participant in this data folder; a tombstone stays.
 
-    Interrupted, the same command goes on. Links are not followed; what is not proved to be the participant's is listed.
+    Interrupted, the same command continues. Links are not followed. Data that are not proved to be the participant's
+    are listed.
     """
     from study.devices.clock import RealClock
     from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, session_to_withdraw

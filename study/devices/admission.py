@@ -82,7 +82,7 @@ def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: Devic
     if info.simulated or not settings.hand_on_handle or 0 < drops_force_after_s <= LONGEST_DROP_S:
         return
     raise DeviceError(
-        "The device was not opened: it has no watchdog of its own",
+        "The device was not opened: it has no watchdog",
         f"If this program were killed, '{info.name}' would hold its last force (drops_force_after_s is "
         f"{drops_force_after_s:g}; it must be above 0 and at most {LONGEST_DROP_S:g}).",
         "Switch the watchdog in the device's firmware on, or use it without a hand on the handle.",
@@ -143,8 +143,8 @@ def _check_info(info: DeviceInfo) -> None:
     for name, value, least, most in ranges:
         if not least <= value <= most:
             raise DeviceError(
-                "The device was not opened: what it says of itself cannot be",
-                f"'{info.name}' says that its {name} is {value:g}; it must lie between {least:g} and {most:g}.",
+                "The device was not opened: it reports implausible properties",
+                f"'{info.name}' reports that its {name} is {value:g}; it must lie between {least:g} and {most:g}.",
                 "Correct the device's driver or its settings.",
             )
 

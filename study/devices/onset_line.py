@@ -99,13 +99,13 @@ class OnsetLine:
         """Send a pulse, and wait at most `PATIENCE_S` until the driver has accepted it. A lost pulse states its
         reason."""
         if self._busy.locked():
-            return self._lost_pulse("the pulse before it still hangs")
+            return self._lost_pulse("the previous pulse has not been finished")
         answer: SimpleQueue[Pulse] = SimpleQueue()
         self._asked.put(answer)
         try:
             return answer.get(timeout=PATIENCE_S)
         except Empty:
-            return self._lost_pulse(f"the line took none within {1000 * PATIENCE_S:g} ms")
+            return self._lost_pulse(f"the line accepted none within {1000 * PATIENCE_S:g} ms")
 
     def close(self) -> None:
         """Lower and close the line; waits at most 1 s for its thread. Never raises."""
@@ -153,7 +153,7 @@ def open_onset_line(settings: PulseSettings) -> OnsetLine:
         raise DeviceError(
             "The line for onset pulses cannot be opened",
             f"{settings.words}: {problem}.",
-            "Plug it in, or take [pulse] out of the device's file (docs/hardware.md).",
+            "Plug it in, or remove [pulse] from the device's file (docs/hardware.md).",
         ) from problem
     return OnsetLine(settings, open_port, line)
 

@@ -135,8 +135,8 @@ def linkage_of(name: str) -> "Iterator[LinkageSource]":
             _unknown_device(name)
             if ":" not in name
             else DeviceError(
-                "This device tells nothing of a linkage",
-                f"{name!r} stands on a file, which holds what is known of it.",
+                "This device has no linkage that can be read",
+                f"{name!r} is made from a file, which contains all that is known of it.",
                 f"Calibrate {SIMULATED} or a device of {', '.join(REAL)}.",
             )
         )
@@ -287,6 +287,6 @@ def accept_device(
     tried = FORCE_N, gone_after_s, COMMANDED_TO_CAP * FORCE_N, most_given_n
     path = write_acceptance(Acceptance(info.name, info.details, operator, today, *tried, *baseline))
     return (
-        f"{info.name}: of {COMMANDED_TO_CAP * FORCE_N:g} N that were asked for with a cap of {FORCE_N:g} N it gave "
+        f"{info.name}: of {COMMANDED_TO_CAP * FORCE_N:g} N that were commanded with a cap of {FORCE_N:g} N it gave "
         f"{most_given_n:.2g} N; a force of {FORCE_N:g} N was gone {1000 * gone_after_s:.0f} ms after the loop; {path}"
     )

@@ -37,8 +37,9 @@ def make_calibrated_rig(path: Path, settings: DeviceSettings, seed: int) -> Comp
     except ValueError as error:
         raise DeviceError(
             "The simulated device cannot be opened",
-            f"It cannot stand in for the calibrated {calibration.device}: {error}.",
-            f"Use --device simulated, whose linkage is its own; `hapteq validate {path}` says what the file holds.",
+            f"It cannot imitate the calibrated {calibration.device}: {error}.",
+            f"Use --device simulated, which needs no calibration; `hapteq validate {path}` says what the file "
+            "contains.",
         ) from error
     return _build_simulated(settings, seed, friction=True, parameters=fitted.parameters)
 

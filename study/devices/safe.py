@@ -250,7 +250,7 @@ class SafeDevice:
         if failure is None:
             return
         happened = f"It stopped answering ({type(failure).__name__}: {failure})."
-        mend = "heck its power and its cable, then open it again; a session goes on with `hapteq resume`."
+        mend = "heck its power and its cable, then open it again; a session is continued with `hapteq resume`."
         if self._runner.force_off:
             raise DeviceError("The device was lost", f"{happened} Its force is off.", f"C{mend}") from failure
         raise DeviceError(

@@ -193,11 +193,11 @@ def _open_time(times: Sequence[ParsedName], rest: Sequence[ParsedName], arrays: 
     single, rates = rates_in(arrays), _rates(arrays)
     bare = [column.header for column in rest if _is_time(column)]
     if len(times) > 1:
-        yield f"which of {' and '.join(repr(column.header) for column in times)} is the time is open"
+        yield f"which of {' and '.join(repr(column.header) for column in times)} is the time is ambiguous"
     elif bare:
         yield f"'{bare[0]}' does not say in which unit the time is (as in '{bare[0]} [s]')"
     elif len(rates) > 1:
-        yield f"which of {' and '.join(map(repr, rates))} is the sample rate is open"
+        yield f"which of {' and '.join(map(repr, rates))} is the sample rate is ambiguous"
     elif not times and not rates and single:
         rate, name = next(iter(single.items()))
         unit = "Hz" if rate == name else "s"

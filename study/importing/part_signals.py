@@ -147,7 +147,7 @@ def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources
         )
     if count < 2:
         raise ImportProblemError(
-            f"{part.file}: nothing is left between {begin_s:g} and {end_s:g} s, where all clocks have samples"
+            f"{part.file}: no sample remains between {begin_s:g} and {end_s:g} s, where all clocks have samples"
         )
     return Grid(begin_s, rate_hz, count)
 

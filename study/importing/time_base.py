@@ -168,7 +168,7 @@ def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
         turn = next((turn for turn in _COUNTERS if abs(back_s + usual_s - turn * unit_s) < 2 * usual_s), 0)
         if turn and stamps_s.max() < turn * unit_s and stamps_s.min() >= 0:
             return (
-                f"{found}, as a counter that begins anew at {turn}; the map's [[clock]] mends it: "
+                f"{found}, as a counter that restarts at {turn}; the map's [[clock]] mends it: "
                 f'time = "{time} + {turn} * cumsum(diff({time}) < 0)"'
             )
         if abs(back_s - _HOUR_S) > _HOUR_S / 60:

@@ -15,7 +15,7 @@ from study.participants.unsure import UnsureRepeater
 OBSERVERS = {
     "ideal": "feels directions as the median participant does, never lapses",
     "lapsing": "like ideal, but answers without attention one time in ten",
-    "biased": "like ideal, but likes to answer 1",
+    "biased": "like ideal, but prefers answer 1",
     "guesser": "tosses a coin",
     "alternator": "says 1, 2, 1, 2",
     "always_1": "says 1 every time",
@@ -24,7 +24,7 @@ OBSERVERS = {
     "intensity_cue": "feels no direction, but notices that direction 1 is delivered 3 dB stronger",
     "delivered": "like ideal, but feels what the device delivered: motion across, harmonics, and numbing count",
     "repeating": "like ideal, but asks for the same trial again when unsure",
-    "criterion_drift": "like ideal, but comes to like answer 2 more and more",
+    "criterion_drift": "like ideal, but increasingly prefers answer 2",
     "drifting": "like ideal, but thresholds rise by 1 dB every 100 trials",
     "scripted": "right or wrong by the trial's number alone",
     "person": "one of the simulated population, picked by the seed",

@@ -139,7 +139,7 @@ def _no_workers_error(address: str) -> StudyError:
     return StudyError(
         "The cluster has no workers any more",
         f"For {WORKER_TIMEOUT_S:g} s the scheduler at {address} had none: they ended, or cannot reach it.",
-        f"Start some: dask worker {address}. Then run the same command again: it goes on where it stopped.",
+        f"Start some: dask worker {address}. Then run the same command again: it continues where it stopped.",
         saved=KEPT,
     )
 
@@ -150,7 +150,7 @@ def _silent_error(address: str, problem: Exception) -> StudyError:
         f"For {WORKER_TIMEOUT_S:g} s the scheduler at {address} named no worker. When last asked: "
         f"{type(problem).__name__}: {problem}".rstrip(" :.")
         + ".",
-        "Look at the scheduler and the network, then run the same command again: it goes on where it stopped.",
+        "Look at the scheduler and the network, then run the same command again: it continues where it stopped.",
         saved=KEPT,
     )
 
@@ -159,7 +159,7 @@ def _undone_error(problem: BaseException) -> StudyError:
     return StudyError(
         "The cluster did not do this",
         f"{type(problem).__name__}: {problem}.",
-        "Look at the scheduler and its workers, then run the same command again: it goes on where it stopped.",
+        "Look at the scheduler and its workers, then run the same command again: it continues where it stopped.",
         saved=KEPT,
     )
 

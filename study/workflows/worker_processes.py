@@ -21,7 +21,7 @@ def worker_processes(workers: int) -> Iterator[ProcessPoolExecutor]:
         raise StudyError(
             "A worker process was killed",
             "It ended without an error of its own: it was killed, or the system lacked memory.",
-            "Run the same command again: it goes on where it stopped. Where memory is short, use fewer --workers.",
+            "Run the same command again: it continues where it stopped. Where memory is short, use fewer --workers.",
             saved="What was finished is kept.",
         ) from died
     finally:

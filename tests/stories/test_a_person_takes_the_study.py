@@ -93,7 +93,7 @@ def test_pasted_answers_answer_one_trial_and_leaving_keeps_them(study, small_fil
     assert terminal.end() == 130
     said = " ".join(terminal.screen.split())
     assert "1 answer is on disk." in said
-    assert "Go on with: hapteq resume" in said
+    assert "Continue with: hapteq resume" in said
 
 
 @pytest.mark.timeout(120)

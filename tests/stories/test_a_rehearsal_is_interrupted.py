@@ -32,7 +32,7 @@ def test_the_same_command_continues(small_file, tmp_path):
     first.type("\x03")
     assert first.end(timeout_s=60) == 130
     said = " ".join(first.screen.split())
-    assert "Run the same command again: it goes on where it stopped." in said
+    assert "Run the same command again: it continues where it stopped." in said
     assert "Traceback" not in said
     first.close()
     again = Terminal(*command)

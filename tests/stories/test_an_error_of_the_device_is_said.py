@@ -9,9 +9,9 @@ from study.cli.main import main
 pytestmark = pytest.mark.real_time
 
 OF_THE_DRIVER = {
-    "motors": ({"scaled_from_n": 0.1}, "Its motors cannot give the force that is asked for"),
-    "silent cap": ({"silently_n": 0.1}, "It says that it gives another force than it was sent"),
-    "silent gain": ({"silent_gain": 0.65}, "It says that it gives another force than it was sent"),
+    "motors": ({"scaled_from_n": 0.1}, "Its motors cannot give the commanded force"),
+    "silent cap": ({"silently_n": 0.1}, "It repeatedly reports another force than the one that it was sent"),
+    "silent gain": ({"silent_gain": 0.65}, "It repeatedly reports another force than the one that it was sent"),
     "speed": ({"off_by": 2}, "moved faster than the device allows"),
     "power": ({"powered": 0}, "its power supply is off"),
     "reading": ({"read_fails": 2}, "dhdGetPosition: communication error"),
@@ -52,6 +52,6 @@ def test_a_fault_of_the_device_is_said_with_what_is_saved_and_what_to_do(stub, s
     assert "answers are on disk" in said or "answer is on disk" in said
     assert "Run hapteq doctor --device omega3, which says what is wrong with it" in said
     (session,) = {log.parent for log in (tmp_path / "data").rglob("events.jsonl")}
-    assert f"Go on with: hapteq resume {session} --device omega3" in said
+    assert f"Continue with: hapteq resume {session} --device omega3" in said
     assert not stub.applied_n.any()
     assert stub.get("peak_n") <= 4.5

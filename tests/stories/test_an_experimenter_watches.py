@@ -63,7 +63,7 @@ def test_a_session_is_watched_noted_paused_and_stopped(started, beside, small_fi
     screen = started("watch", "P07_001")
     screen.wait_for("RUNNING")
     assert beside("watch", "--note", "asks for a lower chair")[0] == 0
-    assert beside("watch", "--pause") == (0, "Paused. The participant goes on at their own screen.")
+    assert beside("watch", "--pause") == (0, "Paused. The participant continues at their own screen.")
     person.wait_for("Pause.*Enter continues")
     screen.wait_for("PAUSED")
     person.type("\n")

@@ -69,13 +69,13 @@ def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
     sensitivity, bias = solution[:3].T, solution[3]
     scale = float(np.linalg.norm(sensitivity, 2))
     if not scale > 0:
-        raise ValueError("no channel answers to gravity: check the wiring")
+        raise ValueError("no channel responds to gravity: check the wiring")
     misfit_g = np.linalg.norm(means - known @ solution, axis=1) / (scale * GRAVITY_MPS2)
     worst = int(np.argmax(misfit_g))
     if misfit_g[worst] > WORST_RESIDUAL:
         raise ValueError(f"'{POSITIONS[worst]}' is off by {misfit_g[worst]:.2f} g: lay the sensor down again")
     if np.linalg.cond(sensitivity) > WORST_CONDITION:
-        raise ValueError("a channel hardly answers to gravity: check its wiring")
+        raise ValueError("a channel hardly responds to gravity: check its wiring")
     deviations = np.concatenate([samples - np.mean(samples, axis=0) for samples in positions])
     noise = np.linalg.solve(sensitivity, deviations.T).T.std(axis=0)
     return Calibration(bias, sensitivity, noise, float(misfit_g.max()))

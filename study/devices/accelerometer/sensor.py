@@ -121,7 +121,7 @@ def silent(seconds: float, spoiled_bytes: int) -> DeviceError:
     received."""
     return DeviceError(
         "The accelerometer is silent",
-        f"Within {seconds:g} s no whole packet came ({spoiled_bytes} bytes that are none).",
+        f"Within {seconds:g} s no whole packet came ({spoiled_bytes} bytes that belong to none).",
         "Another device or another firmware sends there, or the baud rate is wrong: check the port, flash the board."
         if spoiled_bytes
         else "Check its cable and the port, and that the board runs its firmware (docs/hardware.md).",

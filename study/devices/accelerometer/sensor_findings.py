@@ -49,7 +49,7 @@ def _losses(facts: SensorFacts) -> DeviceFinding:
     value = f"{facts.lost} of {came} packets lost, torn or garbled, {facts.spoiled_bytes} bytes that were no packet"
     advice = "Take a short cable and a USB port of the computer itself, no hub; end programs that keep it busy."
     if facts.restarts:
-        value += f"; the board began anew {facts.restarts} times"
+        value += f"; the board restarted {facts.restarts} times"
         advice = "The board loses its power, or its program crashes: check its cable, and flash it again."
     return _finding("Sensor losses", value, not facts.restarts and facts.lost <= FEW_LOST * came, advice)
 
@@ -61,7 +61,7 @@ def _clock(facts: SensorFacts) -> DeviceFinding:
         return _finding("Sensor clock", "it could not be fitted to this computer's", False, advice)
     way = "slow" if facts.drift_ppm > 0 else "fast"
     late_ms = 1000 * facts.longest_delay_s
-    value = f"{abs(facts.drift_ppm):.0f} ppm {way} beside this computer's; packets up to {late_ms:.1f} ms late"
+    value = f"{abs(facts.drift_ppm):.0f} ppm {way} relative to this computer's; packets up to {late_ms:.1f} ms late"
     drifts = abs(facts.drift_ppm) > PLAUSIBLE_PPM
     advice = (
         "No quartz is that far off: check that the firmware's time stamps are in microseconds."
@@ -74,7 +74,9 @@ def _clock(facts: SensorFacts) -> DeviceFinding:
 def _noise(noise_mps2: list[float]) -> DeviceFinding:
     """Finding on the noise of each axis (m/s² rms); exactly zero is a channel without a signal."""
     value = f"{', '.join(f'{axis:.3f}' for axis in noise_mps2)} m/s² rms at rest (x, y, z)"
-    advice = "Let go of the handle and check again. If it stays: check the sensor's capacitors, cable and supply."
+    advice = (
+        "Let go of the handle and check again. If the noise persists: check the sensor's capacitors, cable and supply."
+    )
     if any(axis == 0.0 for axis in noise_mps2):
         value, advice = (
             f"{value}: a channel does not move at all",

@@ -83,8 +83,8 @@ def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_k
         status = handle.status()
         if not status.gives_forces:
             raise DeviceError(
-                f"The {model.name} takes no forces",
-                f"It was told to, and stays off: {status.why_off}.",
+                f"The {model.name} accepts no forces",
+                f"Its motors were switched on, but stay off: {status.why_off}.",
                 "Check that its power supply is on, and press its force button if it has one.",
             )
     except LibraryError as error:

@@ -138,7 +138,7 @@ def _largest_given_n(device: CappedDevice, rig: ForceReporting) -> float:
 
 def _check_given(which: str, given_n: float) -> None:
     """Raise unless the given force is within the cap and large enough for a valid test."""
-    asked = f"{COMMANDED_TO_CAP * FORCE_N:g} N were asked for, and the device gave {given_n:.2f} N"
+    asked = f"{COMMANDED_TO_CAP * FORCE_N:g} N were commanded, and the device gave {given_n:.2f} N"
     if not given_n <= ALLOWED_TO_CAP * FORCE_N:
         raise _not_accepted_error(f"The cap {which} does not hold: {asked}, where {FORCE_N:g} N are allowed.")
     if given_n < LEAST_SHARE * FORCE_N:

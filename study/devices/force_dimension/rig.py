@@ -206,13 +206,13 @@ class ForceDimensionRig:
             return f"The library says: {self._handle.library.last_error(loop_cells.LIBRARY[function])}"
         cap_n, refused_n = self._cells[loop_cells.CAP_N], self._cells[loop_cells.REFUSED_N]
         return {
-            loop_cells.REPEATS: "It repeats its last position again and again",
+            loop_cells.REPEATS: "It repeatedly reports the same position",
             loop_cells.RELEASED: f"It let its force go: {why_off(int(self._cells[loop_cells.OFF_CAUSE]))}",
             loop_cells.REFUSED: f"A force of {refused_n:g} N was refused; at most {cap_n:g} N may be sent",
             loop_cells.LOCKED: "An earlier force is still being sent",
             loop_cells.IS_CLOSED: "It is closed",
-            loop_cells.WEAK: "Its motors cannot give the force that is asked for, and give less",
-            loop_cells.GIVES_ANOTHER: "It says that it gives another force than it was sent, again and again",
+            loop_cells.WEAK: "Its motors cannot give the commanded force, and give less",
+            loop_cells.GIVES_ANOTHER: "It repeatedly reports another force than the one that it was sent",
         }[code]
 
     def _fail(self, happened: str) -> DeviceError:
@@ -222,6 +222,6 @@ class ForceDimensionRig:
             self._failure = DeviceError(
                 f"The {self.info.name} let go",
                 f"{happened}.",
-                "Check its power and its cable, then open it again; a session goes on with `hapteq resume`.",
+                "Check its power and its cable, then open it again; a session is continued with `hapteq resume`.",
             )
         return self._failure

@@ -88,7 +88,7 @@ def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass
 def _unknown_error(model: DeviceModel, what: str, said: str) -> DeviceError:
     """Error for an unknown fact of the device. what: the fact; said: what the library gave instead, as a predicate."""
     return DeviceError(
-        f"The {model.name} does not say its {what}",
+        f"The {model.name} does not report its {what}",
         f"Its library {said}, so no acceptance can be known to hold for it. Nothing has moved.",
         "Switch the device off and on, then try again; else install the vendor's newest SDK or firmware.",
     )

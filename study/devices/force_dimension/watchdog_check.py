@@ -33,12 +33,12 @@ def check_watchdog(
     if drops_after_s <= 0:
         raise _watchdog_error("It has no watchdog, or none that can be set.")
     if not any(_send_zeros(handle, now_s, sleep) for _ in range(ATTEMPTS)):
-        raise _watchdog_error(f"It does not keep taking forces: {handle.status().why_off}.")
+        raise _watchdog_error(f"It does not continue to accept forces: {handle.status().why_off}.")
     silent_since_s = now_s()
     while (status := handle.status()).force_on:
         if now_s() - silent_since_s > drops_after_s + MARGIN_S and handle.status().force_on:
             raise _watchdog_error(
-                f"{1000 * (now_s() - silent_since_s):.0f} ms after the last command it still takes forces."
+                f"{1000 * (now_s() - silent_since_s):.0f} ms after the last command it still accepts forces."
             )
         sleep(EVERY_S)
     took_s = now_s() - silent_since_s

@@ -276,7 +276,7 @@ class RemoteDevice:
             "The device was lost",
             f"The process of its loop is gone: {self._lost}.",
             "Take the hand off the handle until you know that no force is on: the device's own watchdog drops it. Then "
-            "open the device again; a session goes on with `hapteq resume`.",
+            "open the device again; a session is continued with `hapteq resume`.",
         )
 
     def _fault_of_the_lost(self) -> Fault:

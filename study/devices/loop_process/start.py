@@ -72,7 +72,7 @@ class LoopProcess:
                 self._process.wait(DEAD_S)
         code = self._process.returncode
         if code is None:
-            return "was killed, and has not ended even so"
+            return "was killed, but has not ended"
         if self._killed:
             return "and was killed"
         return f"by signal {_signal_name(-code)}" if code < 0 else f"with code {code}"

@@ -218,8 +218,8 @@ def _run_worker(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], ans
 def _processes_ended_error(folder: ProofFolder, missing: int) -> StudyError:
     return StudyError(
         "The processes of the diagnosis ended before their work was done",
-        f"{missing} cases are without an answer; what they said last is in {folder.log}.",
-        "Run the same command again: it goes on where it stopped.",
+        f"{missing} cases have no answer; the last output of the processes is in {folder.log}.",
+        "Run the same command again: it continues where it stopped.",
         saved=f"All answers so far are in {folder.open}.",
     )
 

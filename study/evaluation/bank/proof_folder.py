@@ -74,7 +74,7 @@ def open_proof_folder(path: Path, seed: int, brief: bool, of: str = "") -> Proof
             raise StudyError(
                 "This folder holds another bank",
                 f"{path} was begun with another --seed, other options, or another length of its recordings.",
-                "Choose another folder with --out, or the same options to go on.",
+                "Choose another folder with --out, or the same options to continue.",
                 saved="Nothing was changed.",
             )
         return folder

@@ -60,7 +60,7 @@ def read_answer(place: Path) -> dict[str, Any]:
     except ValueError as problem:
         raise UnusableFileError(place / ANSWER, "answer of a diagnosis", (f"this is not JSON: {problem}",)) from problem
     if not isinstance(document, dict):
-        raise UnusableFileError(place / ANSWER, "answer of a diagnosis", ("it holds no object",))
+        raise UnusableFileError(place / ANSWER, "answer of a diagnosis", ("it contains no JSON object",))
     return document
 
 
@@ -81,7 +81,7 @@ def broken_seal_error(names: list[str], path: Path) -> StudyError:
         "A seal is broken",
         f"Of {len(names)} cases ({', '.join(names[:5])}) in {path} the label, the recording or the model is not what "
         "was sealed before the diagnosis.",
-        "Run the bank again in another folder; this one shows nothing.",
+        "Run the bank again in another folder; this one proves nothing.",
         saved="Nothing was changed.",
     )
 

@@ -54,12 +54,15 @@ def remarks(done: BlindTest) -> Iterator[str]:
         cases = "1 case has no answer" if died == 1 else f"{died} cases have no answer"
         yield (
             f"{cases}, because the processes were killed or took too long: counted as failed diagnoses. Run the same "
-            "command again, which asks anew."
+            "command again to repeat them."
         )
     if set(done.beside) - set(done.engines):
         yield f"Follow-ups and controls were answered by another version of the diagnosis ({', '.join(done.beside)})."
     if len(done.engines) > 1:
-        yield f"The answers come from {len(done.engines)} versions of the diagnosis: run the bank anew for one of them."
+        yield (
+            f"The answers come from {len(done.engines)} versions of the diagnosis: run the bank again, so that all "
+            "are of one version."
+        )
 
 
 def unanswered(done: BlindTest) -> int:

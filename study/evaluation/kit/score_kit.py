@@ -121,8 +121,8 @@ def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
     if seal is None:
         sealed_digest, who = read_sealed_hash(path), f"{beside.name} says"
         how = (
-            f"compared only with {beside.name} beside them, which can be written anew together with the table: give "
-            "--seal the hash that was handed over before the diagnoses"
+            f"compared only with {beside.name} in the same folder, which can be rewritten together with the table: "
+            "give --seal the hash that was handed over before the diagnoses"
         )
     else:
         sealed_digest, who, how = _hash(seal), "--seal gives", "the hash that --seal gives"

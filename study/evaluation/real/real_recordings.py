@@ -88,7 +88,7 @@ def diagnose_folder(
     together with `plan.seconds`."""
     if executor is not None and plan.seconds is not None:
         raise WrongUseError(
-            "Seconds are of this computer's processor",
+            "--seconds counts this computer's processor time",
             "With --seconds and --scheduler together, answers would depend on which worker gave them.",
             "Leave --seconds out: searches then end by a count of evaluations, the same on every machine.",
             saved="Nothing was written.",
@@ -115,7 +115,7 @@ def _take_inventory(plan: RealPlan) -> RealFolder:
     recording."""
     if plan.seconds is not None and not math.isfinite(plan.seconds):
         raise WrongUseError(
-            "That is no number of seconds",
+            "This is not a valid number of seconds",
             f"--seconds is {plan.seconds}.",
             "Give a number of 1 or more, such as 180, or leave it out.",
             saved="Nothing was written.",

@@ -102,6 +102,6 @@ def _foreign(path: Path, why: str) -> StudyError:
     return StudyError(
         "This folder holds another reproduction",
         f"{path} is in the way: {why}.",
-        "Choose another folder with --out, or the same --seed to go on.",
+        "Choose another folder with --out, or the same --seed to continue.",
         saved="Nothing was changed.",
     )

@@ -88,7 +88,7 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
         found = _read(text, layout, {"dtype": str})  # slower, but it finds the invalid field
     if len(found) != len(body):
         number = next((number for number, line in body if line.count('"') % 2), body[0][0])
-        raise ValueError(f"line {number}: a quote is opened and not closed in its line; take it out, or close it")
+        raise ValueError(f"line {number}: a quote is opened and not closed in its line; remove it, or close it")
     made = _table({name: found[name] for name in wanted}, body, layout)
     faulty = {name: problem for name in words if (problem := _number_in_words(found[name], name, body, layout))}
     faulty |= {name: array.item() for name, array in made.by_name.items() if array.dtype.kind == "O"}
@@ -228,7 +228,7 @@ def _comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
         if len(fields) >= width > 1 and is_data:
             raise ValueError(
                 f"line {number} begins with '{line.lstrip()[0]}' as a comment does, but has the fields of a row; "
-                "correct it, or take it out"
+                "correct it, or remove it"
             )
     count = f"{len(found)} comment line{'s' if len(found) > 1 else ''}"
     return (f"Left out: {count} below the first row (line {found[0][0]}).",) if found else ()
@@ -252,12 +252,12 @@ def _mend_row(number: int, line: str, body: list[Line], delimiter: str) -> str:
     if any(_THOUSANDS.fullmatch(field.strip(' "')) for field in re.split(r"[;\t|]", line)):
         return NO_THOUSANDS
     if delimiter in ", " and re.search(rf"(?<![\d.])[1-9]\d{{0,2}}{delimiter}\d{{3}}(?!\d)", line):
-        return f"where '{delimiter}' separates thousands, {NO_THOUSANDS}; else take that line out, or fill it up"
+        return f"where '{delimiter}' separates thousands, {NO_THOUSANDS}; else remove that line, or complete it"
     if delimiter == " " and body[0][0] == number:
-        return "where blanks delimit, put names that hold some in quotes"
+        return "where blanks separate fields, put names that contain blanks in quotes"
     if body[0][0] == number:
-        return "where what stands above is no header, skip_lines and names under [csv] in the map say so"
-    return "take that line out, or fill it up"
+        return "where the line above is no header, state skip_lines and names under [csv] in the map"
+    return "remove that line, or complete it"
 
 
 def _read(text: str, layout: TableLayout, how: dict[str, Any]) -> "pd.DataFrame":

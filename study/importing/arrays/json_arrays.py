@@ -123,8 +123,8 @@ def _arrays_beside_values(entry: Any, place: tuple[str, ...]) -> Iterator[tuple[
     if entry is not None and (not isinstance(entry, str) or is_number(entry.strip(), ".")):
         name = "/".join(place[:-1])
         raise ValueError(
-            f"'{name}' has '{place[-1]}' beside its values, and whether that changes them is open; write the values as "
-            "they are in their unit, and take it out"
+            f"'{name}' has '{place[-1]}' next to its values, and whether it scales them is not stated; write the "
+            "values in their unit, and remove it"
         )
     yield place, np.array(None, dtype=object)
 

@@ -88,7 +88,7 @@ class _Bytes:
             kind, size, begin = kind & 0xFFFF, kind >> 16, self.at + 4
             padded = False
         if size > (4 if not padded else self.left - 8):
-            raise ValueError(f"an element of {size} bytes is longer than what is left of the file")
+            raise ValueError(f"an element of {size} bytes is longer than the rest of the file")
         self.at = self.at + 8 if not padded else begin + size
         if padded and kind != _COMPRESSED:
             self.at = min(begin + -(-size // 8) * 8, len(self.content))
@@ -98,7 +98,7 @@ class _Bytes:
         """Numbers of the next element. Raises ValueError if it is of another data type."""
         kind, found = self.element()
         if kind not in _TYPES:
-            raise ValueError(f"an element of the type {kind} stands where numbers are needed")
+            raise ValueError(f"an element of the type {kind} is found where numbers are needed")
         return np.frombuffer(found.content, np.dtype(self.order + _TYPES[kind]))
 
 
@@ -176,7 +176,7 @@ def _structures(element: _Bytes, count: int, depth: int) -> dict[str, Any]:
         raise ValueError("the names of a structure's fields are damaged")
     words = [names[at : at + length].split(b"\0")[0].decode("utf-8", "replace") for at in range(0, len(names), length)]
     if count * len(words) * 8 > element.left:
-        raise ValueError(f"{count} structures of {len(words)} fields are longer than what is left of the file")
+        raise ValueError(f"{count} structures of {len(words)} fields are longer than the rest of the file")
     every = [{word: _field(element, word, depth) for word in words} for _ in range(count)]
     return every[0] if count == 1 else {str(number): fields for number, fields in enumerate(every, start=1)}
 
@@ -185,10 +185,10 @@ def _cells(element: _Bytes, count: int, depth: int) -> Any:
     """Arrays of a cell, if all hold numbers and have the same number of dimensions and the same shorter side; otherwise
     a placeholder. Raises ValueError where it is damaged."""
     if count * 8 > element.left:
-        raise ValueError(f"a cell of {count} arrays is longer than what is left of the file")
+        raise ValueError(f"a cell of {count} arrays is longer than the rest of the file")
     every = [_field(element, f"{number}", depth) for number in range(1, count + 1)]
     if not every or not all(isinstance(each, np.ndarray) and each.dtype.kind in "fiu" and each.size for each in every):
-        return _no_numbers("a cell, not of arrays of numbers alone")
+        return _no_numbers("a cell that contains more than arrays of numbers")
     if (
         len({(squeezed.ndim, min(squeezed.shape) if squeezed.ndim > 1 else 0) for squeezed in map(np.squeeze, every)})
         > 1

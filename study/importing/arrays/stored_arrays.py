@@ -80,7 +80,7 @@ def _header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
         return np.lib.format.read_array_header_1_0(file)
     if version == (2, 0):
         return np.lib.format.read_array_header_2_0(file)
-    raise ValueError(f"it is of version {version[0]}.{version[1]} of the format, and 1.0 and 2.0 are known here")
+    raise ValueError(f"it is of version {version[0]}.{version[1]} of the format; 1.0 and 2.0 can be read")
 
 
 def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:

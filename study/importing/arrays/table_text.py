@@ -91,8 +91,8 @@ def _decode_other_encoding(data: bytes) -> TableText:
         )
     shown = ", ".join(f"{name}: '{_beyond_ascii(text)}'" for name, text in (sure or readings).items())
     raise ValueError(
-        f"it is no UTF-8 text, and its encoding is open ({shown}); save it as UTF-8, or state the encoding in the map: "
-        f'under [csv], encoding = "{next(iter(sure or readings), "cp1252")}"'
+        f"it is no UTF-8 text, and its encoding is ambiguous ({shown}); save it as UTF-8, or state the encoding in "
+        f'the map: under [csv], encoding = "{next(iter(sure or readings), "cp1252")}"'
     )
 
 

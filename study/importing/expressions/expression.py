@@ -132,7 +132,7 @@ class _Evaluation:
         """Value of a node that must be numbers."""
         value = self.of(node)
         if isinstance(value, str):
-            raise ImportProblemError(f"in '{self.text}' the text '{value}' stands where numbers are needed")
+            raise ImportProblemError(f"in '{self.text}' the text '{value}' is found where numbers are needed")
         numbers: Value = value
         return numbers
 
@@ -153,7 +153,7 @@ class _Evaluation:
             raise
         except ValueError as error:
             raise ImportProblemError(
-                f"in '{self.text}' arrays of the shapes {np.shape(first)} and {np.shape(second)} do not go together"
+                f"in '{self.text}' arrays of the shapes {np.shape(first)} and {np.shape(second)} cannot be combined"
             ) from error
 
     def _count_cost(self, values: Sequence[Value], times: int) -> None:
@@ -215,7 +215,7 @@ class _Evaluation:
             return self._whole_number(node)
         bounds = [None if bound is None else self._whole_number(bound) for bound in (node.lower, node.upper, node.step)]
         if bounds[2] == 0:
-            raise ImportProblemError(f"in '{self.text}' a step of 0 leads nowhere")
+            raise ImportProblemError(f"in '{self.text}' a step of 0 is not allowed")
         return slice(*bounds)
 
     def _whole_number(self, node: ast.expr) -> int:

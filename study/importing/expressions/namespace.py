@@ -83,7 +83,7 @@ class Namespace:
     def _value_of_definition(self, name: str, clock: Clock) -> Value:
         """Value of a definition. Raises ImportProblemError where it needs itself."""
         if name in self._open:
-            raise ImportProblemError(f"the definition of '{name}' needs itself")
+            raise ImportProblemError(f"the definition of '{name}' refers to itself")
         self._open.add(name)
         try:
             with self.budget.deeper(name, 2):

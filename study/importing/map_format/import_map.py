@@ -121,9 +121,7 @@ class PartMap:
     """A stretch of the recording, from one file. Without any, every file is one part, in the order given."""
 
     file: Annotated[str, Field(description='Pattern; each file that fits is one part, in order. Default "*".')] = "*"
-    prefix: Annotated[
-        str, Field(description="Arrays of this part begin so; expressions leave it away. Default: none.")
-    ] = ""
+    prefix: Annotated[str, Field(description="Arrays of this part begin so; expressions omit it. Default: none.")] = ""
     start_s: Annotated[float, Field(ge=0, description="Where to begin, after the first sample. Default 0.")] = 0.0
     stop_s: Annotated[float, Field(ge=0, description="Where to end, after the first sample. Default 0: the end.")] = 0.0
     let: Annotated[dict[str, str], Field(description="Expressions by name, for this part only.")] = field(
@@ -170,7 +168,7 @@ class DiagnosisMap:
 
     model: Annotated[
         str,
-        Field(description="A mechanical model beside the map, or a shipped one. Default: a linear one is fitted."),
+        Field(description="A mechanical model in the map's folder, or a shipped one. Default: a linear one is fitted."),
     ] = ""
     tests: Annotated[
         str, Field(description="Name of the map whose model these recordings only test; they are not diagnosed.")
@@ -224,8 +222,8 @@ class ImportMap:
     part: Annotated[tuple[PartMap, ...], Field(description="Parts, one [[part]] each.")] = ()
     segment: Annotated[tuple[SegmentMap, ...], Field(description="Segments, one [[segment]] each.")] = ()
     csv: Annotated[CsvMap, Field(description="How tables are written.")] = field(default_factory=CsvMap)
-    diagnosis: Annotated[DiagnosisMap, Field(description="What `hapteq real` uses beside the samples.")] = field(
-        default_factory=DiagnosisMap
+    diagnosis: Annotated[DiagnosisMap, Field(description="What `hapteq real` uses in addition to the samples.")] = (
+        field(default_factory=DiagnosisMap)
     )
     meta: Annotated[
         dict[str, Any], Field(description="Anything: place_m, feedback (gains), sensor, grip, operator, notes.")

@@ -91,9 +91,9 @@ def _contradictions(found: ImportMap) -> Iterator[str]:
     keys = [(entry.role, entry.name) for entry in found.channel]
     keys += [(entry.role, entry.name) for entry in found.computed]
     for role, name in sorted({key for key in keys if keys.count(key) > 1}):
-        yield f"{role} '{name}' is there twice"
+        yield f"{role} '{name}' is defined twice"
     for name in sorted({name for name in clocks if clocks.count(name) > 1}):
-        yield f"clock '{name}' is there twice"
+        yield f"clock '{name}' is defined twice"
     for channel in found.channel:
         if channel.clock and channel.clock not in clocks:
             yield f"channel '{channel.name}' is on the clock '{channel.clock}', but there are {', '.join(clocks)}"
@@ -109,9 +109,9 @@ def _segment_contradictions(found: ImportMap) -> Iterator[str]:
         if set(segment.split) - {"fit", "test", ""}:
             yield f"segment[{number}].split names {', '.join(segment.split)}; roles are fit, test, or empty"
         elif segment.split and (segment.role or not 0.999 <= sum(segment.split.values()) <= 1.001):
-            yield f"segment[{number}].split must have shares that make 1, and no `role` beside it"
+            yield f"segment[{number}].split must have shares that sum to 1, and must not be combined with `role`"
         if (segment.start and segment.start_s) or (segment.stop and segment.stop_s):
-            yield f"segment[{number}] says the same in samples and in seconds; one of them"
+            yield f"segment[{number}] is stated in samples and in seconds; state one of them"
 
 
 def _meta(found: ImportMap) -> Iterator[str]:
@@ -156,7 +156,7 @@ def _clock_contradictions(found: ImportMap) -> Iterator[str]:
     for clock in found.clock:
         ways = [bool(clock.time), bool(clock.rate_hz), bool(clock.rate), clock.unknown]
         if sum(ways) > 1:
-            yield f"clock '{clock.name}' says its time more than once; one of time, rate_hz, rate, unknown"
+            yield f"clock '{clock.name}' states its time more than once; state one of time, rate_hz, rate, unknown"
         if sum(ways) == 0:
             yield (
                 f"clock '{clock.name}' has no rate: give its rate_hz, its rate as an expression, or its time stamps; "
@@ -169,6 +169,6 @@ def _clock_contradictions(found: ImportMap) -> Iterator[str]:
         if bool(clock.trigger) != bool(clock.reference_trigger):
             yield f"clock '{clock.name}' needs both trigger and reference_trigger, or neither"
         if clock.align and clock.trigger:
-            yield f"clock '{clock.name}' is aligned twice, by a trigger and by correlation; one of them"
+            yield f"clock '{clock.name}' is aligned twice, by a trigger and by correlation; choose one of them"
         if clock is found.clock[0] and (clock.align or clock.trigger or clock.offset_s):
-            yield f"clock '{clock.name}' is the first, to which the others are aligned; it has no offset of its own"
+            yield f"clock '{clock.name}' is the first, to which the others are aligned; it must have no offset"

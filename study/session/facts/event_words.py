@@ -72,7 +72,7 @@ def _describe(event: Event, presented: dict[_Key, TrialPresented]) -> str:
         case TrialMeasured():
             return _describe_measured(event)
         case TrialSpoiled():
-            return f"{_place_text(event)} is void and comes again: {event.reason}."
+            return f"{_place_text(event)} is void and is presented again: {event.reason}."
         case RestTaken():
             return f"Rested {_seconds(event.rested_s)} before trial {event.trial + 1} of run {event.run + 1}."
         case _:
@@ -145,8 +145,8 @@ def _describe_sitting(event: SessionOpened | SessionResumed | SessionInterrupted
             who = f"simulated participant {event.observer}" if event.observer else "a person"
             return f"Session {event.session} began: {event.subject}, {who}, on {_device(event.device)}."
         case SessionResumed():
-            mended = " A last line that a crash had torn was taken off." if event.mended else ""
-            return f"The session went on, on {_device(event.device)}.{mended}"
+            mended = " An incomplete last line, left by a crash, was removed." if event.mended else ""
+            return f"The session was continued, on {_device(event.device)}.{mended}"
         case SessionInterrupted():
             return f"The sitting ended: {event.reason}. The session can be resumed."
         case SessionClosed():
@@ -197,7 +197,7 @@ def _describe_form(event: FormFilled) -> str:
             return f"The exclusion questions were answered{version}: {outcome}."
         case "setup":
             how = "; ".join(f"{key.replace('_', ' ')}: {_one_line(answer)}" for key, answer in event.answers.items())
-            return f"Set-up. {how[:1].upper()}{how[1:]}." if how else "The set-up was gone through."
+            return f"Set-up. {how[:1].upper()}{how[1:]}." if how else "The questions on the set-up were asked."
         case "questionnaire":
             asked = _count(len(event.answers), "question")
             return f"Before the trials: {asked} answered; the answers stay in the log file."

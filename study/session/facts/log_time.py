@@ -44,7 +44,7 @@ class ClockStep:
         if self.between_sittings:
             return (
                 f"The computer's clock reads {step} earlier than at the last entry of the log. No time counts as "
-                "passed since then: the vibration dose goes on from there."
+                "passed since then: the vibration dose continues from there."
             )
         return f"The computer's clock was set back by {step}. {limits}"
 

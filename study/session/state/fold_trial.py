@@ -131,7 +131,7 @@ def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
     participant asked for a repeat and none is left in this run."""
     presented = _open_trial(state, event)
     if event.cause is VoidCause.ASKED and repeats_left(state) == 0:
-        raise LogContradiction(f"{place_of(event)} was asked for again, where no repeat of this run was left")
+        raise LogContradiction(f"{place_of(event)} was asked for again, although no repeat of this run remained")
     row = replace(
         _with_sensor(state.trials[-1], event.sensor),
         missed_ticks=event.missed_ticks,

@@ -128,7 +128,7 @@ def judge_load(per_processor: float | None) -> DeviceFinding:
     """Verdict on the load average; per_processor: None if unknown. A high load is only a warning, because the measured
     lateness decides."""
     if per_processor is None:
-        return DeviceFinding("Load", "this system does not tell it, so it was not checked", fine=True)
+        return DeviceFinding("Load", "this system does not report it, so it was not checked", fine=True)
     value = f"{per_processor:.0%} of what its processors can do, over the last minute"
     if math.isfinite(per_processor) and per_processor <= LOAD_PER_PROCESSOR:
         return DeviceFinding("Load", value, fine=True)

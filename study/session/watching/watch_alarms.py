@@ -107,7 +107,7 @@ def _gone_alarm(now: Situation) -> Alarm | None:
     if now.standing != "not running":
         return None
     last_utc = max(now.watched.last_utc, now.live.utc if now.live is not None else "")
-    return Alarm("gone", "The program that ran the session is gone. hapteq resume goes on with it.", last_utc)
+    return Alarm("gone", "The program that ran the session is gone. hapteq resume continues the session.", last_utc)
 
 
 def _end_alarm(now: Situation) -> Alarm | None:
@@ -219,7 +219,7 @@ def _drift_alarm(now: Situation) -> Alarm | None:
     beyond = [drift.sentence for drift in now.drifts if drift.beyond]
     if not beyond:
         return None
-    left = f"Device or grip left what the analysis allows: {'; '.join(beyond)}. Pause, and look at both."
+    left = f"Device or grip has changed by more than the analysis allows: {'; '.join(beyond)}. Pause, and look at both."
     return Alarm("drift", left, now.watched.last_utc)
 
 

@@ -66,7 +66,7 @@ def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
             found.append(row_type(**values))
     if problems:
         rest = len(problems) - _SHOWN
-        raise CsvError((*problems[:_SHOWN], *([f"and {rest} problems more like these"] if rest > 0 else [])))
+        raise CsvError((*problems[:_SHOWN], *([f"and {rest} more problems of this kind"] if rest > 0 else [])))
     return tuple(found)
 
 

@@ -30,6 +30,6 @@ class SizeLimit:
         self._declared += size
         if self._declared > self.most_bytes:
             raise DeclaredSizeError(
-                f"{what} is said to hold {size} bytes, and with all before it more than the {self.most_bytes} that are "
+                f"{what} declares {size} bytes, and with all before it more than the {self.most_bytes} that are "
                 "read of a file of this size; save it without compression, or in parts"
             )

@@ -69,7 +69,7 @@ class CannotWriteError(StudyError):
         super().__init__(
             title=f"{path.name} was not written",
             happened=why + ".",
-            saved="Nothing was changed: no half-written file is left, and what stood there before is as it was.",
+            saved="Nothing was changed: no half-written file remains, and existing files are unchanged.",
             do_now=do_now,
         )
 
@@ -136,4 +136,4 @@ def _why_not_written(path: Path, problem: OSError) -> tuple[str, str]:
             return f"{path} is there, and is no folder", "Choose another name for the folder."
         case errno.EISDIR:
             return f"{path} is a folder", "Choose a name for a file."
-    return f"The system says: {problem.strerror or problem}", "Choose another folder, or mend this and do it again."
+    return f"The system says: {problem.strerror or problem}", "Choose another folder, or correct this and try again."

@@ -90,7 +90,7 @@ def privacy_warning(folder: Path, why: str = "") -> str:
         return ""
     mode = stat.S_IMODE(folder.stat().st_mode)
     text = f"Other accounts of this computer have rights to {folder} (mode {mode:03o})."
-    return f"{text}{why and f' A session leaves them: {why}.'} Take them away: chmod 700 {folder}"
+    return f"{text}{why and f' A session leaves them: {why}.'} Remove these rights: chmod 700 {folder}"
 
 
 def data_folder_warning(data: Path) -> str:

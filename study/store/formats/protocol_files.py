@@ -66,7 +66,7 @@ class LockedProtocolChangedError(StudyError):
             title="This protocol is locked, and it is not the locked one",
             happened=f"According to {lock_path}, {error}.",
             saved="Nothing was changed, and no session was begun.",
-            do_now="Restore the locked version, or save yours under a name of its own and lock that.",
+            do_now="Restore the locked version, or save yours under another name and lock that.",
         )
 
 

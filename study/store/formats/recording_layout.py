@@ -22,7 +22,12 @@ LAYOUT = (
     Entry("response", "(n, p) float32 or float64", "what came out, taken at t_k just before `command[k]` is written"),
     Entry("position", "(n, d) float32 or float64", "taken with the response", False),
     Entry("excitation", "(n, m) float32 or float64", "the part of the command that was decided beforehand", False),
-    Entry("condition", "(n, q) float32 or float64", "what was known beside: temperature, pressure, a setting", False),
+    Entry(
+        "condition",
+        "(n, q) float32 or float64",
+        "circumstances that were recorded too: temperature, pressure, a setting",
+        False,
+    ),
     Entry("time_s", "(n) float32 or float64", "time stamps, where the device kept them", False),
     Entry("segments", "rows of `start, stop, kind, amplitude, period, role`", "samples outside are rest", False),
     Entry(

@@ -32,8 +32,8 @@ TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
     "missed_ticks": ("Ticks of the control loop that were missed while the stimulus was played", ""),
     "felt": ("False where a person answered while no device moved; empty for simulated participants", ""),
     "status": (
-        "ok; flagged: counts, but its stimulus deserves a look; unmeasured: counts, but its stimulus was not measured; "
-        "spoiled: void, and presented again; open: not answered yet",
+        "ok; flagged: counts, but its stimulus should be inspected; unmeasured: counts, but its stimulus was not "
+        "measured; spoiled: void, and presented again; open: not answered yet",
         "",
     ),
     "angle_deg": ("Angle of the direction in the plane of the protocol's directions", "deg"),

@@ -82,7 +82,7 @@ class SessionWithdrawnError(StudyError):
         super().__init__(
             "This session was withdrawn",
             f"The participant of {folder.name} withdrew; {folder.erased_words}.",
-            f"Nothing can be done with it; hapteq validate {folder.path} says whether anything is left.",
+            f"Nothing can be done with it; hapteq validate {folder.path} says whether anything remains.",
         )
 
 

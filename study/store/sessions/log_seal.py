@@ -111,7 +111,7 @@ def check_seals(folder: Path, contents: LogContents) -> int:
                 saved="Nothing was changed.",
             )
         if not _is_sealed_prefix(folder, seal, contents.whole[: seal.bytes]):
-            raise _contradiction(folder, contents, f"{path.name} says something else than {LOG_NAME}.")
+            raise _contradiction(folder, contents, f"{path.name} does not match {LOG_NAME}.")
         sealed = max(sealed, seal.lines)
     return sealed
 
@@ -147,8 +147,8 @@ def _contradiction(folder: Path, contents: LogContents, happened: str) -> StudyE
     do_now = f"Restore {LOG_NAME} and the seal from a copy."
     if contents.chain.since:
         do_now += (
-            " The lines of the log match their own checksums: where there is no copy, take the seal out of the folder, "
-            "and hapteq resume writes it again."
+            " The lines of the log match their own checksums: where there is no copy, move the seal out of the "
+            "folder, and hapteq resume writes it again."
         )
     return StudyError(
         "The session log and its seal contradict each other",

@@ -108,7 +108,7 @@ def how_to_finish(folder: SessionFolder) -> str:
     if not left and folder.tombstone.exists() and not folder.withdrawal.exists():
         return ""
     still = f"Still there: {', '.join(left)}. " if left else ""
-    return f"{still}Go on with: hapteq withdraw {folder.name} --data {folder.path.parent}"
+    return f"{still}Continue with: hapteq withdraw {folder.name} --data {folder.path.parent}"
 
 
 def _parse_begun(left: Any) -> SessionParticipant | None:

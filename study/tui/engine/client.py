@@ -145,7 +145,7 @@ def _death(code: int, last_words: str, opened: Opened | None) -> Failed:
         happened += f" Its last words: {last_words}"
     do_now = "Take the hand off the handle until you know that no force is on."
     if opened is not None:
-        do_now += f" Then go on with: hapteq resume {opened.path}"
+        do_now += f" Then continue with: hapteq resume {opened.path}"
     saved = "Every answer that was given is on disk." if opened is not None else ""
     text = ErrorText("The device program ended", happened, saved, do_now, int(ExitCode.DEVICE))
     return Failed(text, opened.path if opened is not None else "")

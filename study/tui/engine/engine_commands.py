@@ -127,7 +127,7 @@ class EngineCommands:
             raise WrongUseError(
                 "This session belongs to a simulated participant",
                 f"'{observer}' began {folder.name}; a person's answers must not be added to it.",
-                f"It goes on by itself with: hapteq resume {folder.path}",
+                f"Continue it with: hapteq resume {folder.path}",
                 saved="Nothing was changed.",
             )
         if still_open := data_folder_warning(folder.path.parent):

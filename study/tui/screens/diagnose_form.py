@@ -28,9 +28,9 @@ Where does a recording differ from a model of the device, and what physics does 
   name that holds some); or the folder of a session, whose trials are taken.
 * **Model**: a mechanical model, MODEL.toml. Left empty, a linear one is fitted to the recordings first; a session on
   the simulated device is compared with its twin.
-* **In order**: recordings of the device when it was in order, where there are any. What it differed by from its model
-  then is no mismatch.
-* **Results**: a folder that is not there yet. Left empty, one beside the recording, or in the session's folder.
+* **In order**: recordings of the device when it was in order, where there are any. Differences from the model that
+  they already show are not counted as mismatch.
+* **Results**: a folder that is not there yet. Left empty, one next to the recording, or in the session's folder.
 
 **F5** begins, **Esc** goes back.
 
@@ -41,7 +41,7 @@ FIELDS = (
     ("sources", "Recordings", "REC.h5, several, or a session's folder"),
     ("model", "Model", "MODEL.toml; empty: none is given"),
     ("clean", "In order", "recordings of it when nothing was missing; may stay empty"),
-    ("out", "Results", "a new folder; empty: beside the recording"),
+    ("out", "Results", "a new folder; empty: next to the recording"),
 )
 """Key, title and hint of each field."""
 

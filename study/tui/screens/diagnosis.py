@@ -31,7 +31,7 @@ Where a model and the device disagree, and why.
 * **Fit**: errors of the given model, after re-tuning its own parameters, and with the effects. *repeats allow* is the
   smallest error that can be reached. *test* is the record that no fit has seen: that line counts.
 * **Mismatch** and **What remains**: where the model is wrong, before and after.
-* **Next**: the recording that would tell rivals apart.
+* **Next**: the recording that would distinguish the rivals.
 
 Arrow keys, PageUp and PageDown scroll. **o** opens the report in the browser. **Esc** goes back.
 
@@ -77,9 +77,11 @@ class DiagnosisScreen(Screen[None]):
                     yield from _compose_section("Effects", view.sentences, "No effect is named.")
                     if view.candidates:
                         yield from _compose_section("Candidates, not confirmed", view.candidates, "")
-                    yield from _compose_section("Rivals, and why not", view.rivals, "No other effect came near.")
                     yield from _compose_section(
-                        "Next", tuple(view.next_experiment.splitlines()), "No further recording is asked for."
+                        "Rivals, and why rejected", view.rivals, "No other effect fitted nearly as well."
+                    )
+                    yield from _compose_section(
+                        "Next", tuple(view.next_experiment.splitlines()), "No further recording is suggested."
                     )
                 with Container(classes="half"):
                     yield from _table("Fit (errors; smaller is better)", view.fit, "No fit is reported.")

@@ -49,7 +49,7 @@ GUIDE = """\
 3  In a second terminal: [b]hapteq watch SESSION[/b]
 4  Afterwards: F3 and Enter for the results.
 
-[b]Standing[/b]
+[b]Status[/b]
 
 ✓  finished: all runs are done
 ◐  unfinished: every answer is safe; r resumes
@@ -65,7 +65,7 @@ HELP = """\
 
 **New session** (F2). Type the participant's code, choose protocol and device, and press F5. A code has 1 to 16 letters
 and digits, with at least one digit, such as P01. Names stay off this computer. A protocol whose stimuli are
-accelerations asks for a model of the device too: one that lies with the data (`hapteq identify` makes it).
+accelerations also needs a model of the device, in the data folder (`hapteq identify` makes it).
 
 **Sessions** (F3), latest first. The arrow keys move, and:
 

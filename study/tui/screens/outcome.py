@@ -24,8 +24,8 @@ HELP = """\
 
 The box says what happened, what is safe on the disk, and what to do now. The keys in the last line do it.
 
-Answers are written to the disk the moment they are given. A trial that was cut short comes again when the session
-is resumed. In a terminal: `hapteq resume SESSION`.
+Answers are written to the disk the moment they are given. A trial that was cut short is presented again when the
+session is resumed. In a terminal: `hapteq resume SESSION`.
 """
 """Help of the panel, in Markdown."""
 

@@ -28,7 +28,7 @@ cross-axis, and its noise are known. Take the sensor with its cable off the hand
 2. **F5** begins. Lay the sensor down as it says, let go of it, press **Enter**, and wait for 2 seconds: it must not
    move.
 3. After the sixth position the table of the lab's file is shown. **Enter** writes it there; the file that was there
-   before stays beside it.
+   before is kept next to it.
 
 A position that does not fit the others is named at the end: begin again with F5. **Esc** stops.
 

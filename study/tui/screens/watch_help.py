@@ -9,11 +9,11 @@ HELP = """\
 You follow a running session. Nothing here changes it, apart from four keys:
 
 * **S** (shift and s) or **F8**: stop. The force is off at once; nothing is asked. The session can be resumed.
-* **p**: pause. Hands free at once; the participant goes on at their own screen.
+* **p**: pause. Hands free at once; the participant continues at their own screen.
 * **n**: a note for the log. **e**: an adverse event (pain, numbness, a fright).
 
 The other keys: **a** says that you have seen the alarms, **d** shows forms, practice and notes, **t** goes through
-light, dark and high contrast, **q** leaves the view; the session goes on.
+light, dark and high contrast, **q** leaves the view; the session continues.
 
 ## What you see
 

@@ -226,9 +226,11 @@ class WatchScreen(Screen[None]):
             unheard = "The session has not answered the stop. Hand off the handle; switch the device off."
             alarms.append(Alarm("stop unheard", unheard, since))
         if self._source.problem:
-            alarms.append(Alarm("no reader", f"This view is not fed any more: {self._source.problem}", since))
+            alarms.append(Alarm("no reader", f"This view receives no more data: {self._source.problem}", since))
         elif self.view is not None and now_s - self._news_s > NO_NEWS_AFTER_S:
-            alarms.append(Alarm("no news", "This view has stood still for seconds; look at the session itself.", since))
+            alarms.append(
+                Alarm("no news", "This view has not been updated for seconds; look at the session itself.", since)
+            )
         return alarms
 
     def _show_alarms(self) -> None:
@@ -245,9 +247,9 @@ class WatchScreen(Screen[None]):
 
     def action_pause(self) -> None:
         if self.view is not None and self.view.standing == "paused":
-            self._show_message("It is paused already; the participant goes on at their own screen.")
+            self._show_message("It is paused already; the participant continues at their own screen.")
             return
-        self._send_request(PauseAsked("experimenter"), "Pause sent. The participant goes on at their own screen.")
+        self._send_request(PauseAsked("experimenter"), "Pause sent. The participant continues at their own screen.")
 
     def action_note(self, adverse: bool) -> None:
         def write(text: str | None) -> None:

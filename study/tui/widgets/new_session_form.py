@@ -117,7 +117,7 @@ class NewSessionForm(Vertical):
     def _model_problem(self) -> str:
         if not self._equalized or self._read_selected("#model"):
             return ""
-        return "This protocol needs a model beside the data: hapteq record, hapteq identify."
+        return "This protocol needs a model, next to the data: hapteq record, hapteq identify."
 
     @property
     def _code(self) -> str:

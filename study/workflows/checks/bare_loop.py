@@ -39,7 +39,7 @@ OVERTIME_S = 30.0
 NAME = "Bare C loop"
 """Name of the finding."""
 ADVICE = (
-    "The computer can do better than this loop did: close other programs, measure again, and report it if it stays."
+    "The computer can do better than this loop did: close other programs, measure again, and report it if it persists."
 )
 """Advice where the device's loop has too many late ticks."""
 

@@ -107,7 +107,7 @@ def _accelerometer(samples: list[Look]) -> DeviceFinding:
 
 
 def _no_accelerometer() -> DeviceFinding:
-    advice = "Trials run all the same; what the device delivered stays unknown. To add one, see `hapteq doctor`."
+    advice = "Trials run all the same; what the device delivers remains unknown. To add one, see `hapteq doctor`."
     return DeviceFinding("Accelerometer", "none is configured", fine=False, advice=advice, warning=True)
 
 
@@ -124,7 +124,8 @@ def _noise(readings_mps2: FloatArray) -> DeviceFinding:
     if rms_mps2 > NOISY_MPS2:
         return _accelerometer_problem(
             f"{rms_mps2:.2f} m/s² rms at rest, more than {NOISY_MPS2:g}",
-            "Let go of the handle and check again. If it stays, check the sensor's cable, shield and mounting.",
+            "Let go of the handle and check again. If the noise persists, check the sensor's cable, shield and "
+            "mounting.",
         )
     return DeviceFinding("Accelerometer", f"{rms_mps2:.2f} m/s² rms at rest", fine=True)
 
@@ -140,7 +141,7 @@ def _rate(info: DeviceInfo) -> DeviceFinding:
 
 
 def _largest_force(info: DeviceInfo, total_cap_n: float | None) -> DeviceFinding:
-    needed = "" if total_cap_n is None else f"; at most {total_cap_n:g} N will be asked for"
+    needed = "" if total_cap_n is None else f"; at most {total_cap_n:g} N will be commanded"
     fine = info.max_force_n > 0 and (total_cap_n is None or info.max_force_n >= total_cap_n)
     advice = "Lower total_cap_n in the protocol's [safety] section, or take a stronger device."
     return DeviceFinding("Largest force", f"{info.max_force_n:g} N{needed}", fine, "" if fine else advice)

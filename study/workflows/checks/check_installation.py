@@ -167,7 +167,7 @@ def _always(requirement: Requirement) -> bool:
 def _colours(kind: str) -> str:
     """Number of colours of a terminal in words, by the environment. kind: value of TERM."""
     if os.environ.get("NO_COLOR"):
-        return "switched off by NO_COLOR; nothing is told by colour alone"
+        return "switched off by NO_COLOR; no information is given by colour alone"
     if os.environ.get("COLORTERM") in ("truecolor", "24bit"):
         return "16 million"
     return "256" if "256color" in kind else f"few (TERM={kind or 'not set'})"

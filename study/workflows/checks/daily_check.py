@@ -168,7 +168,7 @@ def last_check(info: DeviceInfo, needed: bool = False) -> DeviceFinding:
     """
     found = _find_last_check(info)
     if needed and not found.fine:
-        title = "The sitting did not begin: its protocol asks for a daily check that was passed"
+        title = "The sitting did not begin: its protocol requires a passed daily check"
         raise DeviceError(title, f"Daily check: {found.value}.", found.advice)
     return found
 
@@ -196,7 +196,7 @@ def _find_last_check(info: DeviceInfo) -> DeviceFinding:
         if check.passed:
             return DeviceFinding("Daily check", f"nothing changed since the acceptance ({when})", fine=True)
         changed = ", ".join(dict.fromkeys(str(each["kind"]) for each in check.changes if each["changed"]))
-        text = f"{changed} changed since the acceptance" if changed else "measured too inaccurately to tell a change"
+        text = f"{changed} changed since the acceptance" if changed else "measured too inaccurately to detect a change"
         return DeviceFinding("Daily check", f"{text} ({when})", False, advice, True)
     return DeviceFinding("Daily check", "none yet", False, advice, warning=True)
 
@@ -229,7 +229,7 @@ def _read_baseline(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recor
 
 
 def _not_comparable_error(refusal: "NotMeasurableError") -> DeviceError:
-    happened = f"What was recorded does not tell how the device answers: {refusal}."
+    happened = f"The recording does not show how the device responds: {refusal}."
     return DeviceError("The device was not compared", happened, "Check accelerometer and handle, and try again.")
 
 

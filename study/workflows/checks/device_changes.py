@@ -21,7 +21,7 @@ FRICTION_FIRST = "That may come from the friction: mend it first."
 """Advice where gain or response changed together with the friction."""
 TOO_NOISY = "It was measured too inaccurately: close other programs, keep the table still, and check again."
 """Advice where a change could not be told."""
-IF_IT_STAYS = "If it stays, name the cause with `hapteq diagnose`, or accept the device anew."
+IF_IT_STAYS = "If it persists, name the cause with `hapteq diagnose`, or accept the device anew."
 """Added to the advice of `CAUSES`."""
 
 

@@ -33,7 +33,8 @@ def with_clean(found: DiagnosisInput, sources: Sequence[Path], clean: Sequence[P
     if (both := next((path for path in clean if path.resolve() in known), None)) is not None:
         raise StudyError(
             f"{both} cannot be diagnosed and be clean at the same time",
-            "What it differs by from the model would be learned, and then found to be nothing.",
+            "Its differences from the model would be learned as those of a device in order, so that none would be "
+            "found.",
             "Give another recording with --clean, of the device when it was in order.",
             saved="Nothing was written.",
         )

@@ -17,7 +17,7 @@ def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], N
     except KeyboardInterrupt as stopped:
         raise UserInterruptError(
             "The diagnosis was stopped",
-            "It was not at its end.",
+            "It was not finished.",
             "Start it again when there is time.",
             saved="Nothing was written.",
         ) from stopped

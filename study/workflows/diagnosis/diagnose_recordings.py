@@ -143,7 +143,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
         ) from refusal
     except np.linalg.LinAlgError as problem:
         raise not_diagnosable_error(
-            (f"The fits broke down ({problem}): near the given parameters the model runs away from what was recorded",),
+            (f"The fits broke down ({problem}): near the given parameters the simulation diverges",),
             "State narrower tolerances in the model, or give one that is nearer to the device.",
         ) from problem
     findings = replace(
@@ -219,7 +219,7 @@ def _read_effects(paths: Sequence[Path]) -> tuple[LawEntry, ...]:
 def _check_compared(plan: DiagnosePlan, found: DiagnosisInput, model: MechanicalModel) -> None:
     """Raise WrongUseError if the requested comparison is not possible."""
     if plan.compare == "force" and plan.clean:
-        happened = "Beside clean recordings errors are measured by the rule, so that both are measured alike."
+        happened = "With --clean, hapteq chooses the comparison, so that both sets of recordings are measured alike."
     elif plan.compare == "force" and not all(has_motion(each, model) for each in found.recordings):
         happened = "Neither positions nor velocities of every driven axis were measured, so no force can be computed."
     else:
@@ -234,8 +234,8 @@ def check_names(without: Sequence[str]) -> None:
     for name in without:
         if name not in EFFECTS_BY_NAME:
             raise WrongUseError(
-                f"There is no effect '{name}' to do without",
-                f"The catalogue does not know it{suggest_word(name, tuple(EFFECTS_BY_NAME))}.",
+                f"There is no effect '{name}' to exclude",
+                f"The catalogue does not contain it{suggest_word(name, tuple(EFFECTS_BY_NAME))}.",
                 f"Its names are {', '.join(EFFECTS_BY_NAME)}.",
                 saved="Nothing was written.",
             )

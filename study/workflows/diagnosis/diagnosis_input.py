@@ -50,7 +50,7 @@ def read_input(
     folders = [source for source in sources if source.is_dir()]
     if folders and len(sources) > 1:
         raise not_diagnosable_error(
-            (f"{folders[0]} is a folder: a session is diagnosed by itself",), "Give recordings, or one session."
+            (f"{folders[0]} is a folder: a session is diagnosed alone",), "Give recordings, or one session."
         )
     if folders:
         # Imported here, because the modules that read sessions take long to import.
@@ -97,7 +97,7 @@ def _as_forces(
     except NoForceConstant as refusal:
         raise WrongUseError(
             "The force constant cannot be used", f"{begin_sentence(str(refusal))}.",
-            "Leave --force-constant out, or mend it.",
+            "Leave --force-constant out, or correct it.",
             saved="Nothing was written.",
         ) from refusal  # fmt: skip
     return tuple(recording for recording, _ in found), (found[0][1],)

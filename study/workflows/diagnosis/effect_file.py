@@ -56,7 +56,7 @@ def write_entry(found: Path, out: Path, number: int = 1) -> LawEntry:
             "Choose a name of small letters, digits and _ that is not in the catalogue, such as my_effect.py.",
         )
     law = laws[number - 1]
-    signature = f"it goes with {', '.join(law.variables) or 'nothing'} as the formula says"
+    signature = f"it varies with {', '.join(law.variables) or 'nothing'} as the formula states"
     entry = LawEntry(out.stem, law, f"found by hapteq: {found.name}", signature)
     write_text(
         out,

@@ -214,8 +214,8 @@ def _remarks(
     seconds = sum(trial.recording.response.duration_s for trial in taken)
     yield (
         f"{len(taken)} of the {len(found)} trials of {folder.name} were used, {seconds:.0f} s in all, with a hand on "
-        "the handle: they show single frequencies at the levels of the staircases, and nothing slow, nothing strong "
-        "and nothing in between. What shows only there cannot be found here."
+        "the handle: they contain single frequencies at the levels of the staircases, and no slow or strong motion "
+        "and no other frequencies. Effects that show only there cannot be found here."
     )
     if len(usable) < len(found):
         yield (

@@ -44,8 +44,8 @@ def find_references(session: Path) -> SessionReferences | None:
         return None
     what = "the reference" if len(paths) == 1 else f"the {len(paths)} references"
     text = (
-        f"Of {folder.name} {what} without a hand went into the diagnosis, and not its trials, which show single "
-        "frequencies with a hand."
+        f"Of {folder.name} {what} without a hand was diagnosed, and not its trials, which contain single frequencies "
+        "with a hand."
     )
     return SessionReferences(folder.log, paths, (text, *_drifts(folder, folded)))
 
@@ -62,6 +62,4 @@ def _drifts(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
     for event in folded.contents.events[1:]:
         watched = follow(watched, event)
     text = "; ".join(drift.sentence for drift in DriftReader(folder).look(watched.probes))
-    return (
-        f"In its {len(watched.probes)} probes {f'there changed: {text}' if text else 'nothing is seen to change'}.",
-    )
+    return (f"In its {len(watched.probes)} probes {f'there changed: {text}' if text else 'no change was detected'}.",)

@@ -162,7 +162,7 @@ def _check_protocol(plan: TwinPlan, protocol: RecordingProtocol) -> None:
         raise WrongUseError(
             TITLE,
             f"The protocol {plan.protocol} does not play multisines along x, y and z, so that masses and coupling "
-            "cannot be told.",
+            "cannot be identified.",
             "Choose the protocol multisine, or one like it.",
             saved="Nothing moved and nothing was written.",
         )
@@ -221,12 +221,12 @@ def _notes(strong: Recording, fit: MechanicalFit, piece: RigidBody) -> tuple[str
     return (
         f"The model is from the whole command to the acceleration: the virtual spring of {stiffness:.0f} N/m pushed as "
         "a part of the command, so it is not in the model's stiffness.",
-        f"The sensor's bandwidth and range are those of its data sheet; of the current loops {ACTUATOR.bandwidth_hz:g} "
-        "Hz are assumed.",
-        "Cables lie between drives and handle. From force to acceleration nothing tells how the mass is shared between "
-        "their sides: half each is taken.",
-        "Dry friction is no part of a linear model: it reads as extra damping, which shrinks as the force grows. By "
-        f"what changed when the force was lowered to {LOWER_LEVEL:.0%}, "
-        f"{', '.join(f'{each:.3g}' for each in piece.of_friction)} N s/m were friction's, and were taken off.",
+        "The sensor's bandwidth and range are those of its data sheet; for the current loops "
+        f"{ACTUATOR.bandwidth_hz:g} Hz are assumed.",
+        "Cables lie between drives and handle. Force and acceleration do not determine how the mass is divided "
+        "between the two sides of a cable: half on each side is assumed.",
+        "Dry friction is no part of a linear model: it appears as additional damping, which decreases as the force "
+        f"increases. From the change when the force was lowered to {LOWER_LEVEL:.0%}, "
+        f"{', '.join(f'{each:.3g}' for each in piece.of_friction)} N s/m were attributed to friction and subtracted.",
         fit.reason,
     )

@@ -125,8 +125,8 @@ def _read_wanted(path: Path) -> Trajectory:
         row, axis = np.unravel_index(int(sizes.argmax()), sizes.shape)
         found = trajectory.signal.samples[row, axis]
         raise _not_equalized(
-            f"{path.name} wants {found:g} m/s^2 of {TRAJECTORY.header[1 + axis]} in line {row + 2}; no more than "
-            f"{HIGHEST_MPS2:g} m/s^2 is taken for an acceleration."
+            f"{path.name} wants {found:g} m/s^2 of {TRAJECTORY.header[1 + axis]} in line {row + 2}; the largest "
+            f"acceleration that is accepted is {HIGHEST_MPS2:g} m/s^2."
         )
     return trajectory
 
@@ -148,16 +148,17 @@ def _require_reached(plan: EqualizePlan, solved: Feedforward, in_bands: bool) ->
     if not missed <= LARGEST_ERROR and in_bands:
         raise StudyError(
             "The forces were not computed",
-            f"By the model itself the best forces would miss {100 * missed:.0f} % of what is wanted: three bands have "
-            "to run in and out, and the table begins or ends too close to it.",
-            "Put 3 s of zeros before and after what is wanted, or give one model.",
+            f"According to the model, the error of the best forces would be {100 * missed:.0f} % of the wanted "
+            "acceleration: the three bands need time to rise and decay, and the table begins or ends too close to "
+            "the motion.",
+            "Put 3 s of zeros before and after the motion, or give one model.",
             saved="Nothing was written.",
         )
     if not missed <= LARGEST_ERROR:
         raise StudyError(
             "The forces were not computed",
-            f"By the model itself the best forces would miss {100 * missed:.0f} % of what is wanted: along some "
-            f"direction it hardly moves, for --weight {plan.weight:g}.",
+            f"According to the model, the error of the best forces would be {100 * missed:.0f} % of the wanted "
+            f"acceleration: along some direction the device hardly moves, for --weight {plan.weight:g}.",
             "Check units and axes of the recording that it was made from and identify it again, or lower --weight.",
             saved="Nothing was written.",
         )

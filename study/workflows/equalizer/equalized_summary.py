@@ -80,13 +80,13 @@ def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
     lines += _band_lines(done)
     if solved.left_out > WORTH_SAYING:
         lines.append(
-            f"{100 * solved.left_out:.0f} % of what is wanted (rms) lies outside the "
+            f"{100 * solved.left_out:.0f} % of the wanted acceleration (rms) lies outside the "
             f"{'bands' if done.bands else 'band'} and is not played."
         )
     if solved.loss is not None and done.bands is None and (outside := _force_outside(done)) > WORTH_SAYING:
         lines.append(
             f"Forces that are held at the cap have corners: {100 * outside:.0f} % of them (rms) lies outside the "
-            "band, where the model does not know what the device makes of it."
+            "band, where the model does not describe the device's response."
         )
     lines += _physics_lines(done)
     lines.append(_spring_line(done))
@@ -125,8 +125,8 @@ def _prediction_line(done: EqualizedTrajectory) -> str:
             f"{100 * loss.error_clipped:.2f} %)"
         )
     return (
-        f"As {who}: error {100 * predicted_error(done):.2f} % of what is wanted within {low:g} to {high:g} Hz{cost}; "
-        f"highest force {done.peaks.peak_n:.3g} N of {done.peaks.cap_n:g} N."
+        f"As {who}: error {100 * predicted_error(done):.2f} % of the wanted acceleration within {low:g} to {high:g} "
+        f"Hz{cost}; highest force {done.peaks.peak_n:.3g} N of {done.peaks.cap_n:g} N."
     )
 
 
@@ -144,11 +144,12 @@ def _band_lines(done: EqualizedTrajectory) -> list[str]:
         return []
     low, high = bands.edges_hz
     lines = [
-        f"Bands: a rigid model below {low:g} Hz (the handle travels {1e3 * bands.travel_m:.1f} mm), the narrower model "
-        f"up to {high:g} Hz, from there to {two.wide.band_hz[1]:g} Hz of the loudness alone, all along one direction.",
-        f"The bands begin before the table's first row and end after its last; only its rows are written, and the "
-        f"middle band is solved for them. Its error with all of it played would be {100 * bands.whole_error:.2f} %, "
-        f"were the rest only cut off {100 * bands.cut_error:.2f} %.",
+        f"Bands: a rigid model below {low:g} Hz (the handle travels {1e3 * bands.travel_m:.1f} mm), the narrower "
+        f"model up to {high:g} Hz, from there to {two.wide.band_hz[1]:g} Hz only the loudness is reproduced, all "
+        "along one direction.",
+        "The bands begin before the table's first row and end after its last; only its rows are written, and the "
+        f"middle band is solved for them. Its error would be {100 * bands.whole_error:.2f} % if all rows were "
+        f"played, and {100 * bands.cut_error:.2f} % if the other rows were simply cut off.",
     ]
     if bands.level_error is not None:
         lines.append(

@@ -36,8 +36,10 @@ def summary_lines(device: IdentifiedDevice) -> tuple[str, ...]:
         f"Order {found['order']}, {low:g} to {high:g} Hz, stable (slowest pole {found['spectral_radius']:.5f}), "
         f"from {found['lines']} lines.",
         f"Model against estimate: {100 * found['rms_relative_error']:.2f} % rms, worst line "
-        f"{100 * found['worst_relative_error']:.2f} %; the estimate's own noise is in both.",
+        f"{100 * found['worst_relative_error']:.2f} %; both include the noise of the estimate.",
     ]
     if found["freed_of"]:
-        lines.append(f"The recordings were freed of {', '.join(found['freed_of'])}; play with --physics.")
+        lines.append(
+            f"Subtracted from the recordings: {', '.join(found['freed_of'])}; give --physics when playing, too."
+        )
     return tuple(lines)

@@ -107,7 +107,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
         raise _no_model(str(refusal)) from refusal
     except np.linalg.LinAlgError as problem:
         raise _no_model(
-            f"The fit broke down ({str(problem).rstrip('.')}): an output answers nothing, or order {plan.order} is "
+            f"The fit broke down ({str(problem).rstrip('.')}): an output does not respond, or order {plan.order} is "
             "more than these lines carry."
         ) from problem
     except ValueError as problem:
@@ -179,7 +179,7 @@ def _check_alike(recordings: Sequence[Recording], with_spring: bool) -> None:
         found["the spring"] = {_spring_words(r.meta.get("feedback")) for r in recordings}
     for name, values in found.items():
         if len(values) > 1:
-            raise _no_model(f"The recordings differ in {name} ({'; '.join(sorted(values))}); identify each by itself.")
+            raise _no_model(f"The recordings differ in {name} ({'; '.join(sorted(values))}); identify each separately.")
 
 
 def _spring_words(feedback: object) -> str:
@@ -213,6 +213,6 @@ def _no_model(happened: str) -> StudyError:
     return StudyError(
         "No model can be made from these recordings",
         capitalise(happened),
-        "Record what is missing (hapteq record), or ask for another --band or --order.",
+        "Record what is missing (hapteq record), or choose another --band or --order.",
         saved="Nothing was written.",
     )

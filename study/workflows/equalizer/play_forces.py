@@ -38,7 +38,7 @@ def require_device_alone(models: PlaybackModels) -> None:
     handle."""
     if any("held" in model.provenance.get("hand", ()) for model in models.given):
         raise _refusal(
-            "The model was recorded with a hand on the handle: its forces are right for that hand in that moment.",
+            "The model was recorded with a hand on the handle: its forces are valid only for that hand at that moment.",
             "Take a model of the device alone, and leave the handle alone.",
         )
 

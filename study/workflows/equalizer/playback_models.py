@@ -103,7 +103,7 @@ def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: f
     except WorkspaceError as problem:
         numbered = ", ".join(f"{number}: {path.name}" for number, path in enumerate(paths, start=1))
         raise _unfit_error(
-            f"{as_sentence(str(problem))} Models are {numbered}.", "Give models that go together."
+            f"{as_sentence(str(problem))} Models are {numbered}.", "Give models that belong together."
         ) from problem
 
 
@@ -148,7 +148,7 @@ def _several_places(
             saved="Nothing was written.",
         )
     if len({model.provenance.get("input", "command") for model in workspace.models}) > 1:
-        raise WorkspaceError("some models hold the spring they were recorded under and some do not")
+        raise WorkspaceError("some models include the spring they were recorded under and some do not")
     choice = choose_interpolation(workspace, weight=weight)
     at = choice.at(at_m)
     remarks = [as_sentence(choice.reason)]
@@ -188,8 +188,8 @@ def _readable(path: Path) -> IdentifiedModel:
         )
     if not (gain := peak_gain(model)) <= HIGHEST_GAIN:
         raise _unfit_error(
-            f"By {path.name} 1 N accelerates the handle with up to {gain:.2g} m/s^2; a model is taken up to "
-            f"{HIGHEST_GAIN:g} m/s^2.",
+            f"By {path.name} 1 N accelerates the handle with up to {gain:.2g} m/s^2; models up to {HIGHEST_GAIN:g} "
+            "m/s^2 are accepted.",
             "Check the units of the recording that it was made from, and identify it again.",
         )
     return replace(model, input_channels=FORCES.header[1:], output_channels=TRAJECTORY.header[1:])
@@ -227,8 +227,8 @@ def _far(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, 
     if away_m <= FAR_M:
         return ()
     return (
-        f"{path.name} was identified {1e3 * away_m:.0f} mm from the place: coupling comes back with the distance. "
-        "Models of several places on both sides of it can be interpolated.",
+        f"{path.name} was identified {1e3 * away_m:.0f} mm from the place: coupling between axes increases with the "
+        "distance. Models of several places on both sides of it can be interpolated.",
     )
 
 

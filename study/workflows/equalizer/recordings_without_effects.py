@@ -26,7 +26,7 @@ def remove_effects(recordings: Sequence[Recording], physics: MechanicalModel, pa
     the acceleration of each command."""
     if not removable_effects(physics):
         left = " ".join(reasons_not_removed(physics))
-        raise _not_removable(f"{path.name} names no effect that can be taken off a recording. {left}".rstrip())
+        raise _not_removable(f"{path.name} names no effect that can be subtracted from a recording. {left}".rstrip())
     try:
         return tuple(subtract_effects(recording, physics, excitation_band_hz(recording)) for recording in recordings)
     except ValueError as problem:
@@ -60,7 +60,7 @@ def excitation_band_hz(recording: Recording) -> tuple[float, float]:
     driven = recording.excitation or recording.command
     samples = np.nan_to_num(driven.samples)
     if not np.ptp(samples, axis=0).any():
-        raise ValueError("a recording holds no excitation")
+        raise ValueError("a recording contains no excitation")
     power = (np.abs(np.fft.rfft(samples, axis=0)) ** 2).sum(axis=1)
     power[0] = 0.0  # a constant excites nothing
     lines = np.searchsorted(np.cumsum(power) / power.sum(), (LEFT_OUT, 1 - LEFT_OUT))
@@ -70,7 +70,7 @@ def excitation_band_hz(recording: Recording) -> tuple[float, float]:
 
 def _not_removable(happened: str) -> StudyError:
     return StudyError(
-        "The recordings cannot be freed of known physics",
+        "Known physics cannot be subtracted from the recordings",
         happened,
         "Correct the [[effect]] sections, or leave out --physics.",
         saved="Nothing was written.",

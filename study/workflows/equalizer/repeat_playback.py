@@ -28,7 +28,7 @@ from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, make_
 
 REST_S = 2.0
 """Rest (s) before the first play, to measure the sensor's noise."""
-AGAIN = "Start again; a run for the same trajectory and model can go on from forces that were written."
+AGAIN = "Start again; a run for the same trajectory and model can continue from forces that were written."
 """What to do after an interruption or a fault."""
 
 OnProgress = Callable[[int, float], None]
@@ -73,7 +73,7 @@ def _check(plan: RepeatPlan) -> None:
             "Take the hand off the handle and open the device without one.",
         )
     if plan.repeats < 1:
-        raise not_repeated(f"{plan.repeats} repeats were asked for.", "Ask for one or more with --repeat N.")
+        raise not_repeated(f"{plan.repeats} repeats were requested.", "Give 1 or more to --repeat.")
     for path in () if plan.out is None else (plan.out, repeats_path(plan.out)):
         if path.exists():
             raise not_repeated(f"{path} exists already, and results are never overwritten.", "Choose another --out.")
@@ -131,7 +131,7 @@ def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
         if plan.first is None:
             return begin(repetition)
         if plan.first.shape != signal.samples.shape:
-            raise ValueError(f"forces of shape {plan.first.shape} do not go with {len(signal)} rows")
+            raise ValueError(f"forces of shape {plan.first.shape} do not match {len(signal)} rows")
         # After the last row of the table, the model's own forces are played.
         return begin(repetition, np.vstack([plan.first, invert(inside)[len(signal) :]]))
     except ValueError as error:

@@ -130,7 +130,7 @@ def earlier_forces(forces: Path, wanted: Trajectory, model_sha256: str) -> Float
     }
     if wrong := [what for what, same in found.items() if not same]:
         raise StudyError(
-            "The earlier forces cannot be gone on from",
+            "The repeats cannot continue from the earlier forces",
             f"{repeats_path(forces).name} belongs to {' and '.join(wrong)}.",
             "Leave it out to begin with the model's own forces.",
             saved="Nothing moved.",

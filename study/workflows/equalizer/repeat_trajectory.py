@@ -152,10 +152,11 @@ def _verdict(done: RepeatedTrajectory) -> str:
 def _convergence_line(done: RepeatedTrajectory) -> str:
     """Sentence on the convergence test: worst-case share of the error that remains, and its frequency."""
     if done.tested is None:
-        return "Convergence was not tested before playing: the model does not hold how well it is known."
+        return "Convergence was not tested before playing: the model does not contain its uncertainty."
     return (
-        f"If the device is linear and within the models, at most {100 * done.tested.surviving.max():.1f} % of an error "
-        f"survives a repeat ({done.tested.worst_hz:.1f} Hz); friction lets more survive. Gain {done.gain:.2f}."
+        "If the device is linear and within the models' uncertainty, at most "
+        f"{100 * done.tested.surviving.max():.1f} % of an error remains after a repeat ({done.tested.worst_hz:.1f} "
+        f"Hz); with friction more remains. Gain {done.gain:.2f}."
     )
 
 
@@ -163,7 +164,8 @@ def _require_repeatable(models: PlaybackModels) -> None:
     """Raise StudyError for two models of one place, and for a model that was identified with a hand on the handle."""
     if models.two is not None:
         raise not_repeated(
-            "Two bands of one place were given, and what is felt of the upper one is no waveform to be corrected.",
+            "Two bands of one place were given, and of the upper one only the loudness is felt, so that its "
+            "waveform cannot be corrected.",
             "Give the one model whose band shall be repeated.",
         )
     require_device_alone(models)
@@ -180,7 +182,7 @@ def _test_gain(solved: EqualizedTrajectory, spring: VirtualSpring) -> tuple[floa
     if gain < LOWEST_GAIN:
         raise not_repeated(
             f"Repeats would not converge: at {tested.worst_hz:.1f} Hz {tested.surviving.max():.2f} of an error can "
-            "survive each with gain 1, by what the device may be within the models; a safe gain is below "
+            "remain after each with gain 1, within the models' uncertainty; a safe gain is below "
             f"{LOWEST_GAIN:g}.",
             "Record and identify at the place itself, or with more sweeps.",
         )

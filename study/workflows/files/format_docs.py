@@ -58,13 +58,13 @@ def session_log_markdown() -> Iterable[str]:
         f"A line ends with the field `chain`, {log_chain.DIGITS} hexadecimal digits: the first of the SHA-256 of the "
         "checksum before it, a line feed, and the line's own bytes without this field (nor the comma before it, nor "
         f"the line end). Before the first line stand {log_chain.DIGITS} zeros. Lines that older versions wrote have no "
-        "`chain` and enter the hash all the same: where such a log goes on, its first checksum covers what was before."
+        "`chain` but enter the hash: where such a log is continued, its first checksum covers what was before."
     )
     yield (
         "When a session is closed, `seal.json` is written once: number of lines, bytes, the last checksum, and the "
-        "SHA-256 of these bytes. It tells a log whose end was cut off from one that was interrupted. Notes that are "
+        "SHA-256 of these bytes. It distinguishes a log whose end was cut off from one that was interrupted. Notes "
         "added after the end are covered by `seal-2.json` and so on. Each reader of a session checks all of it, and "
-        "`hapteq validate` names the line. A session that is damaged is left out of an analysis, with the reason."
+        "`hapteq validate` names the line. A damaged session is left out of an analysis, with the reason."
     )
     yield (
         "Checksums and seal have no key: they show damage, and edits by those who do not compute them again. They are "
@@ -83,15 +83,15 @@ LAWS = "\n\n".join(
         "`force` is added to the force at its axis; one of a `command` or `response` takes the place of that "
         "axis' command or response.",
         f"The formula has Python's syntax and SI numbers: `+ - * / **`, parentheses, `pi`, and the functions {_PLAIN}. "
-        "Four more remember what was before: `lag(s, tau_s)` (one pole), `play(s, half_width)` (follows s with play), "
+        "Four more have memory: `lag(s, tau_s)` (one pole), `play(s, half_width)` (follows s with play), "
         f"`delay(s, seconds)` (remembered at up to {CELLS} instants), `integral(s)`; the second argument is constant. "
         "In a force or response they begin as if their signals had always been what they are first, in a command from "
         "zero.",
-        "Signals are `x`, `vx`, `ax`, `fx` (position, velocity, acceleration, command of the x axis; y, z likewise), "
-        "`t` (seconds from the first sample), or the recording's own channels. Where these do not end in x, y, z, the "
-        "axes are called so in their order. A law of the force knows the recording's conditions, too, as `c1`, `c2`, … "
-        "where a condition's channel is no such name, or means something else. A law of a command knows commands and "
-        "`t`, one of a response knows responses and `t`.",
+        "Signals are `x`, `vx`, `ax`, `fx` (position, velocity, acceleration, command of the x axis; y, z "
+        "likewise), `t` (seconds from the first sample), or the recording's own channels. Where these do not end in "
+        "x, y, z, the axes are called so in their order. A law of the force may also use the recording's "
+        "conditions, as `c1`, `c2`, … where a condition's channel is no such name, or means something else. A law "
+        "of a command may use commands and `t`, one of a response responses and `t`.",
         "Numbers with a point or exponent (`4.1`, `1e-3`) are free: a fit may move them. Whole numbers (`2`) belong "
         f"to the form. A formula has up to {LONGEST} characters and {LARGEST} parts, and up to {DEEPEST} numbers at "
         "once. It compares nothing: `maximum(x - 0.01, 0)` is a stop, `(1 + sign(vx))/2` is 1 on the way up.",
@@ -132,7 +132,7 @@ SCHEMAS: tuple[Schema, ...] = (
     Schema("session_event.json", "one line of `events.jsonl`", event_schema),
     Schema(
         "seal.json",
-        "`seal.json`, beside the log of a closed session",
+        "`seal.json`, next to the log of a closed session",
         lambda: document_schema(log_seal.SEAL.json_schema(), log_seal.SEAL_FORMAT, log_seal.SEAL_VERSION),
     ),
     Schema("recording_protocol.json", "recording protocols, read from TOML", lambda: protocol_schema("recording")),
@@ -148,13 +148,13 @@ SCHEMAS: tuple[Schema, ...] = (
     ),
     Schema(
         "repeats.json",
-        f"`*{repeats_file.SUFFIX}`, beside a table of forces that was found by repeating: errors per play, what the "
+        f"`*{repeats_file.SUFFIX}`, next to a table of forces that was found by repeating: errors per play, what the "
         "forces belong to",
         lambda: document_schema(repeats_file.REPEATS.json_schema(), repeats_file.FORMAT, repeats_file.VERSION),
     ),
     Schema(
         "reproduction.json",
-        "`reproduction.json`, what `hapteq reproduce` found beside what the paper reports",
+        "`reproduction.json`, what `hapteq reproduce` found, compared with what the paper reports",
         lambda: document_schema(
             reproduction_document.reproduction_schema(), reproduction_document.FORMAT, reproduction_document.VERSION
         ),
@@ -166,7 +166,7 @@ SCHEMAS: tuple[Schema, ...] = (
     ),
     Schema(
         "request.json",
-        "one file in a session's `requests/`: what is asked of it from beside, removed when it is taken; a name that "
+        "one file in a session's `requests/`: what other programs ask of it, removed when it is read; a name that "
         "begins with `stop` is a stop, with any content",
         request_schema,
     ),
@@ -180,8 +180,8 @@ def formats_markdown() -> str:
         "# File formats",
         "This page is made from the code (`python -m study.workflows.files.format_docs docs`): change the code, not "
         "the page. `hapteq validate FILE` checks any of these files and says in words what is wrong.",
-        "Every HDF5 file and every JSON document says its `format` and `version`; TOML and CSV are known by their keys "
-        f"or header. Units: {ALLOWED}. `g` is standard gravity. Time is the first dimension of every array.",
+        "Every HDF5 file and every JSON document states its `format` and `version`; TOML and CSV are recognised by "
+        f"their keys or header. Units: {ALLOWED}. `g` is standard gravity. Time is the first dimension of each array.",
         *_recordings(),
         "## Identified model (`.h5`)",
         _table(identified_model_file.LAYOUT),

@@ -100,8 +100,8 @@ This page is made from the code (`python -m study.workflows.files.format_docs do
 
 ```
 hapteq import run1.npz run2.npz --map MAP.toml --out rec.h5    # any arrays, by a map
-hapteq import run1.csv --out rec.h5                            # names say it: time [s],fx [N]; t_s, force_N, x_mm
-hapteq import data.mat --out rec.h5 > MAP.toml                 # nothing says it: a map for this file, to be completed
+hapteq import run1.csv --out rec.h5                            # named with units: time [s],fx [N]; t_s, force_N, x_mm
+hapteq import data.mat --out rec.h5 > MAP.toml                 # unclear names: a map for this file, to be completed
 hapteq import FOLDER --out rec.h5                              # its map, ours that fits, or numbered tables by header
 ```
 
@@ -124,7 +124,7 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   Delimiters with which all lines end are no columns. Columns of words, columns that number the rows, and lines of words
   below the last row are left out, and that is said. So is a column with words among its numbers, unless the map takes
   it or its name says a quantity or a role: then it is refused. Signs between thousands are refused, and so are
-  commas and points that may be such (`1,250`; `1.886` beside `946`) until `decimal` under `[csv]` says that they are
+  commas and points that may be such (`1,250`; `1.886` next to `946`) until `decimal` under `[csv]` says that they are
   the decimal sign.
 * **Workbooks**: each sheet with rows of numbers is read as a table. Of several, arrays are named with their sheet
   (`Run 1/force [N]`), and sheets that are alike and numbered are parts, which is said. Hidden sheets are left out.
@@ -132,9 +132,9 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   must have been computed, and up to four million cells are read.
 * **JSON**: records (`[{{"t": 0, "u": 1}}, ...]`), columns (`{{"t": [0, ...], "u": [1, ...]}}`) or a record in each
   line. What is inside an object is named by it (`imu.x` of records, `run1/u` of columns). A unit beside values
-  (`{{"unit": "N", "values": [...]}}`) is theirs; a number beside them, as a scale, is refused, and so is a key that
-  comes twice. Objects that are alike (`run1`, `run2`) are parts if they are numbered.
-* **Rows that were logged twice** (the same time stamp, the same values) are left out and counted. Where a stamp comes
+  (`{{"unit": "N", "values": [...]}}`) is theirs; a number next to them, as a scale, is refused, and so is a key that
+  occurs twice. Objects that are alike (`run1`, `run2`) are parts if they are numbered.
+* **Rows that were logged twice** (the same time stamp, the same values) are left out and counted. Where a stamp occurs
   again with other values, time stands still, and the import is refused with the keys that mend it.
 * **Units** are never guessed: a channel without one keeps its numbers, in the unit `1`, and that is said. So is the
   unit in which each computed channel is taken to be. {ALLOWED[0].upper()}{ALLOWED[1:]}; `lb` and `oz` are masses.
@@ -144,7 +144,8 @@ are missing. What cannot be understood is refused by name, and then nothing is w
 * **Cells** of Matlab hold a run in each of their arrays, where these are alike (-v6, -v7): `y` of a cell of three is
   `1-of-3/y`, `2-of-3/y`, `3-of-3/y`, and `prefix = "2-of-3/"` a part. A part whose arrays have other names says
   them, as in `let = {{ y = "y_test" }}`.
-* **Conditions**: what was known beside (a temperature, a pressure, a setting) is a channel with the role `condition`.
+* **Conditions**: circumstances that were recorded too (a temperature, a pressure, a setting) are a channel with the
+  role `condition`.
 * **Free motion**: a recording without a command gets one of zeros for each axis, as `[[computed]]` with
   `role = "command"`, `name = "none"`, `value = "0 * clock_s"`, `unit = "N"` (`"N m"` for angles).
 * **No time**: where none is known, `unknown = true` of the clock numbers the samples, at 1 Hz; `meta/time` says so
@@ -152,7 +153,7 @@ are missing. What cannot be understood is refused by name, and then nothing is w
 * **Dates and clock times** (`2024-03-01T12:00:00.123+01:00`, with a blank for the T, with or without a zone;
   `12:00:00.123`; a date and a clock time in two columns) are read as seconds since the first, and that is said. Dates
   that do not begin with the year are read where all are the same. Clock times without a date may pass midnight. A clock
-  that was set back or ahead by an hour, or a counter that begins anew, is refused with the expression that mends it:
+  that was set back or ahead by an hour, or a counter that restarts, is refused with the expression that mends it:
   `time = "t + 3600 * cumsum(diff(t) < 0)"` under `[[clock]]`. Stamps with and without a zone are not mixed.
 * **Left out** of what is proposed, and said: columns without any number, and further columns of the same time.
 * **Resampling** is never done unasked. `held`: a command that stays until the next one. `band-limited`: a signal that
@@ -165,9 +166,9 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   2 % of a step) off the usual one, as 9.9 and 10.1 among 10.0 ms, are even too, as long as no stamp lies half a step
   from an even grid; a change of rate is not. Where all steps are multiples of the shortest, and no more than about 2 %
   are longer (in a short table, a few), rows were left out. How far stamps lie from the even grid is said.
-* **Missing** samples are NaN. Rows that a uniform logger has left out, and gaps in uneven stamps, become NaN; what lies
-  beside them stays. Where nothing is missing between them, as in a log of changes, `gap_s` of the clock says from which
-  step on there is a gap; the channels then need `resample`.
+* **Missing** samples are NaN. Rows that a uniform logger has left out, and gaps in uneven stamps, become NaN; samples
+  next to them are unchanged. Where nothing is missing between them, as in a log of changes, `gap_s` of the clock says
+  from which step on there is a gap; the channels then need `resample`.
 * **Clocks** of several loggers are brought to the first by `offset_s`, by a trigger that both saw, or by correlating
   one motion that both saw. The offset is said. Where nothing agrees, or two offsets agree equally well, it is refused.
 * **Parts**: several files, or several groups of arrays in one file (`prefix`), go one after another; the state of the
@@ -184,8 +185,8 @@ are missing. What cannot be understood is refused by name, and then nothing is w
   motion is a condition.
   Of a force and a displacement alone, neither called a command, the displacement is the command where it follows ramps
   or sines and the force does not, as on a testing machine; else the force. Either is said, with the way to turn it.
-  The map that is proposed also takes `cmd`, `input`, `output`, `u` beside `y`, and `ref` or `target` (a helper) for
-  what they say. `hapteq diagnose` takes a response in no unit for what its name says.
+  The map that is proposed also takes `cmd`, `input`, `output`, `u` together with `y`, and `ref` or `target` (a helper)
+  for what they say. `hapteq diagnose` takes a response in no unit for what its name says.
 * **Rate**: where no column is the time, a single number in hertz that is called so (`fs_Hz`, `rate [Hz]`, `sampling
   frequency [Hz]`, not `excitation rate [Hz]`) is the sample rate, or one in seconds (`Ts_s`, `dt [s]`) the step, and
   that is said. In a table it stands in the first row, with nothing below. The map that is proposed takes `fs` and

@@ -60,7 +60,7 @@ def _describe_withdrawn(folder: SessionFolder, path: Path) -> str:
     """Kind of a withdrawn session. Raises UnusableFileError where erasing is not finished."""
     if finish := how_to_finish(folder):
         raise UnusableFileError(path, "withdrawn session", ("the erasing is not finished", finish))
-    return "withdrawn session; nothing is left of it but its tombstone"
+    return "withdrawn session; only its tombstone remains"
 
 
 def recognise_document(content: FileContent) -> str | None:
@@ -70,7 +70,7 @@ def recognise_document(content: FileContent) -> str | None:
         return None
     kind, needed = DOCUMENTS[content.json_format]
     if content.json_format == WITHDRAWAL_FORMAT:
-        finish = "the erasing is not finished; `hapteq withdraw` goes on with it"
+        finish = "the erasing is not finished; `hapteq withdraw` continues it"
         raise UnusableFileError(content.path, kind, (finish,))
     if content.json_format == SEAL_FORMAT:
         read_seal(content.path)

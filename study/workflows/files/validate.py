@@ -144,7 +144,7 @@ def _json_problem(content: FileContent) -> str:
     except ValueError as error:
         return f"this is not JSON: {error}"
     if content.json_format is None:
-        return "it says no format; every hapteq document says its format and version"
+        return "it states no format; every hapteq document states its format and version"
     return f"its format, '{content.json_format}', is not known here"
 
 

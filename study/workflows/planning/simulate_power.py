@@ -148,7 +148,7 @@ def _read_finished(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict
         raise StudyError(
             "This folder holds another power simulation",
             f"{path} was begun with other people, another rule, contrast, seed or number of studies.",
-            "Choose another folder with --out, or the same options to go on.",
+            "Choose another folder with --out, or the same options to continue.",
             saved="Nothing was changed.",
         )
     return {(row["piece"][0], row["piece"][1]): [StudyVerdict(**v) for v in row["verdicts"]] for row in rows[1:]}

@@ -105,7 +105,7 @@ def sentence(drift: Drift) -> str:
     """A drift in words with its unit and time, such as "friction along x 0.12 -> 0.20 N at minute 14"."""
     minute = f"at minute {drift.at_s / 60:.0f}"
     along = f" along {drift.axis}" if drift.axis else ""
-    other = f" (or {' or '.join(drift.rivals)}: the probes cannot tell)" if drift.rivals else ""
+    other = f" (or {' or '.join(drift.rivals)}: the probes cannot distinguish them)" if drift.rivals else ""
     if drift.before is not None:
         return f"friction{along} {drift.before:.2f} -> {max(0.0, drift.before + drift.change):.2f} N {minute}{other}"
     if drift.number == "gain":

@@ -61,7 +61,9 @@ def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalys
 def _not_finished(end: ConductedSitting) -> StudyError:
     """Error for an unfinished session: UserInterruptError without a fault of the device, else DeviceError."""
     kind = UserInterruptError if end.fault is Fault.NONE else DeviceError
-    device_advice = f"Run hapteq doctor --device {end.device_name}, which says what is wrong with it, and mend that. "
+    device_advice = (
+        f"Run hapteq doctor --device {end.device_name}, which says what is wrong with it, and correct that. "
+    )
     advice = device_advice if end.fault in DEVICE_FAULTS else ""
     if end.left.startswith(TOO_BUSY):
         advice = BUSY_ADVICE
@@ -69,7 +71,7 @@ def _not_finished(end: ConductedSitting) -> StudyError:
     return kind(
         "The session is not finished",
         f"The sitting ended: {end.left}.{f' {end.why[0].upper()}{end.why[1:]}.' if end.why else ''}",
-        f"{advice}Go on with: hapteq resume {end.folder.path}{option}",
+        f"{advice}Continue with: hapteq resume {end.folder.path}{option}",
         saved=f"{answers_are(end.state.answers)} on disk.",
     )
 

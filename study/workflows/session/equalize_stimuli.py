@@ -221,7 +221,7 @@ def _check_reach(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
     beyond = [f"{f:g}" for f, share in zip(frequency_hz, left_out, strict=True) if not share <= LARGEST_ERROR]
     if beyond:
         raise _refusal(
-            f"By {path} itself, no reasonable force gives the wanted acceleration at {', '.join(beyond)} Hz.",
+            f"According to {path}, no reasonable force gives the wanted acceleration at {', '.join(beyond)} Hz.",
             "Check units and axes of the recording it was made from, and identify it again.",
         )
 

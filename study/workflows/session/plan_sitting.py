@@ -83,7 +83,7 @@ def plan_sitting(
     check_playable(plan.protocol, model)
     check_code(data, plan.subject, simulated=observer is not None)
     unfinished_before = (
-        f"{unfinished.name} is not finished; hapteq resume {unfinished.path} goes on with it."
+        f"{unfinished.name} is not finished; hapteq resume {unfinished.path} continues it."
         for unfinished in find_unfinished_sessions(data, plan.subject, source.protocol.name)
     )
     return SittingPlan(plan, (*unfinished_before, *filter(None, [data_folder_warning(data)])))

@@ -187,7 +187,7 @@ def _check_same(rehearsal: Rehearsal) -> None:
     if more:
         raise StudyError(
             "This folder holds other sessions",
-            f"Beside this rehearsal's participants there is {', '.join(more[:5])} in {rehearsal.data}.",
+            f"In addition to this rehearsal's participants there is {', '.join(more[:5])} in {rehearsal.data}.",
             "Choose another folder with --out, or at least as many --subjects as were begun.",
             saved="Nothing was changed.",
         )
@@ -201,20 +201,20 @@ def _check_same(rehearsal: Rehearsal) -> None:
             raise StudyError(
                 "This folder holds another rehearsal",
                 f"{folder.name} in {rehearsal.data} was begun with another --model.",
-                "Choose another folder with --out, or the same --model to go on.",
+                "Choose another folder with --out, or the same --model to continue.",
                 saved="Nothing was changed.",
             )
         if opened.observer != make_rehearsed_observer(rehearsal, number).name:
             raise StudyError(
                 "This folder holds another rehearsal",
                 f"{folder.name} in {rehearsal.data} was begun with the observer {opened.observer}.",
-                "Choose another folder with --out, or the same --observer and --seed to go on.",
+                "Choose another folder with --out, or the same --observer and --seed to continue.",
                 saved="Nothing was changed.",
             )
         if opened.seed != subject_seed(rehearsal.seed, number) or opened.protocol_text != rehearsal.protocol_text:
             raise StudyError(
                 "This folder holds another rehearsal",
                 f"{folder.name} in {rehearsal.data} was begun with another seed or protocol.",
-                "Choose another folder with --out, or the same --seed and --protocol to go on.",
+                "Choose another folder with --out, or the same --seed and --protocol to continue.",
                 saved="Nothing was changed.",
             )

@@ -101,8 +101,8 @@ def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFol
     if device.simulated != state.opened.device.simulated:
         raise StudyError(
             "This session was begun on another kind of device",
-            f"{folder.name} was begun on '{state.opened.device.name}', now there is '{device.name}'. Felt and unfelt "
-            "answers never mix.",
+            f"{folder.name} was begun on '{state.opened.device.name}', now there is '{device.name}'. A session must "
+            "not mix answers on a real device with answers on a simulated one.",
             "Resume it with the device it was begun on.",
             saved="Nothing was changed.",
         )

@@ -107,7 +107,7 @@ def _end_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Sessi
                 monotonic_s=sitting.clock.now_s(),
             )
         )
-    way_back = f"Go on with: hapteq resume {sitting.folder.path}"
+    way_back = f"Continue with: hapteq resume {sitting.folder.path}"
     saved = f"{answers_are(state.answers)} on disk."
     if still_on:
         raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, way_back, saved) from interruption
@@ -120,7 +120,7 @@ def _say_how_to_resume(error: StudyError, sitting: Sitting) -> StudyError:
         state = fold_session(sitting.folder).state
         if not state.turned_away_for_good:
             error.saved = f"{answers_are(state.answers)} on disk."
-            error.do_now = f"{error.do_now} Then go on with: hapteq resume {sitting.folder.path}"
+            error.do_now = f"{error.do_now} Then continue with: hapteq resume {sitting.folder.path}"
     return error
 
 

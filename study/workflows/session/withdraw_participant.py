@@ -162,6 +162,6 @@ def _not_everything(data: Path, withdrawal: Withdrawal, problem: OSError) -> Stu
     return StudyError(
         "Not everything could be erased",
         f"Of {withdrawal.subject}: {problem.strerror or problem}{where}.",
-        f"Mend the permissions and go on with: hapteq withdraw {first} --data {data}",
-        saved="What is left is no longer used as data once erasing has begun.",
+        f"Correct the permissions and continue with: hapteq withdraw {first} --data {data}",
+        saved="What remains is no longer used as data once erasing has begun.",
     )

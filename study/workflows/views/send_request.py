@@ -44,18 +44,23 @@ def _unheard(folder: SessionFolder, request: Request, inbox: RequestInbox, name:
     """Handle a request that was not received in time; returns and raises as `send_request`."""
     if isinstance(request, NoteAsked):
         return False
-    waits = f"{folder.name} took nothing within {HEARD_WITHIN_S:g} s: a form or a notice is being read, or it hangs."
+    waits = (
+        f"{folder.name} accepted no request within {HEARD_WITHIN_S:g} s: a form or a notice is being read, or it hangs."
+    )
     if isinstance(request, StopAsked):
         raise StudyError(
-            "The stop was not heard",
+            "The session did not respond to the stop",
             waits,
             "If the handle moves: hand off, and switch the device off.",
-            saved="The stop waits for the session and is the first thing that it will hear.",
+            saved="The stop is kept, and is the first request that the session will receive.",
         )
     # A pause that begins minutes later would surprise participant and experimenter. If it cannot be taken back, the
     # session has taken it meanwhile.
     if not inbox.take_back(name):
         return True
     raise StudyError(
-        "The pause was not heard", waits, "Ask again when trials are running.", saved="Nothing is pending."
+        "The session did not respond to the pause",
+        waits,
+        "Ask again when trials are running.",
+        saved="Nothing is pending.",
     )

@@ -61,7 +61,7 @@ def _device(path: Path) -> Device | None:
 def _effect(effect: NamedEffect) -> tuple[str, ...]:
     """Sentences on a named effect, and on effects that the recording cannot distinguish from it."""
     text = (
-        f"{effect_sentence(effect)} It explains {_percent(effect.share)} of the mismatch left after re-tuning "
+        f"{effect_sentence(effect)} It explains {_percent(effect.share)} of the mismatch that remains after re-tuning "
         f"(probability {_probability(effect.probability)})."
     )
     return tuple(filter(None, (text, inseparable_sentence(effect))))
@@ -97,7 +97,7 @@ def _next_experiment_text(diagnosis: Diagnosis) -> str:
     if following is None:
         return ""
     named, *rivals = (noun_of(name) for name in following.splits) if following.splits else ("",)
-    splits = f" This tells {named} from {conjoin(rivals)}." if rivals else ""
+    splits = f" This distinguishes {named} from {conjoin(rivals)}." if rivals else ""
     return f"{following.command}\n{following.why}{splits}"
 
 

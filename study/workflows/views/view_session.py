@@ -66,10 +66,10 @@ def _log_remarks(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...
     remarks = (
         (
             folded.contents.torn_bytes,
-            "A crash tore the last line of the log; it is taken off when the session is resumed.",
+            "A crash left the last line of the log incomplete; it is removed when the session is resumed.",
         ),
         (due, f"Missing or not as the log gives it: {due}. hapteq resume writes it."),
-        (not folded.contents.chain.since, "The log carries no checksums: it was written before there were any."),
+        (not folded.contents.chain.since, "The log contains no checksums: an older version wrote it."),
     )
     return tuple(text for holds, text in remarks if holds)
 

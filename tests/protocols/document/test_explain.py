@@ -34,7 +34,7 @@ def test_a_field_shows_value_default_and_what_is_allowed(threshold):
     field = {field.key: field for field in explain(faster)}["stimulus.fade_in_s"]
     assert (field.value, field.default) == (0.3, 0.5)
     assert field.allowed == "a number above 0 up to 5, in seconds"
-    assert "no onset tells the direction" in field.description
+    assert "no onset reveals the direction" in field.description
 
 
 def test_entries_of_lists_count_from_one():

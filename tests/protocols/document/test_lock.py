@@ -49,8 +49,11 @@ def test_a_lock_survives_its_file_and_says_what_it_is(lock):
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        ({"format": "hapteq-recording"}, 'a lock says "format": "hapteq-protocol-lock", and this document does not'),
-        ({"version": 2}, "the lock is of version 2, and this hapteq knows version 1"),
+        (
+            {"format": "hapteq-recording"},
+            'a lock contains "format": "hapteq-protocol-lock", and this document does not',
+        ),
+        ({"version": 2}, "the lock is of version 2, and this hapteq reads version 1"),
         ({"hash": None}, "the lock lacks the text hash"),
         ({"name": 3, "locked_utc": None}, "the lock lacks the text name, locked_utc"),
     ],

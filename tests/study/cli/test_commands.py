@@ -42,7 +42,7 @@ def test_a_command_that_was_left_says_that_nothing_is_half_written(run, monkeypa
     monkeypatch.setattr("study.workflows.equalizer.identify_model.identify_model", interrupted)
     code, out, err = run("identify", tmp_path / "rec.h5", "--out", tmp_path / "model.h5")
     assert (code, out) == (130, "")
-    assert "Interrupted" in err and "none is half written" in err
+    assert "Interrupted" in err and "Files that it had written are complete" in err
 
 
 def test_validate_says_what_is_wrong_and_fails(run, data, tmp_path):

@@ -65,7 +65,7 @@ def test_models_come_first_and_a_table_behind_them(run, files, missing):
 def test_repeat_and_device_go_together(run, files, part):
     code, _, err = run(*files, *part)
     assert code == 2
-    assert "--repeat and --device go together, and --from only with them." in err
+    assert "--repeat and --device must be given together, and --from only with them." in err
 
 
 def test_repeating_needs_a_model_that_says_its_spring(run, files):

@@ -43,7 +43,7 @@ def test_an_interruption_is_exit_code_130(run, small_file, tmp_path, monkeypatch
     code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", tmp_path / "d")
     assert code == 130
     assert "0 answers are on disk." in err
-    assert "Go on with: hapteq resume" in err
+    assert "Continue with: hapteq resume" in err
     monkeypatch.undo()
     assert run("resume", "ideal1_001", "--data", tmp_path / "d")[0] == 0
 

@@ -85,7 +85,7 @@ def test_plain_lines_end_with_the_sitting(capsys, data):
 @pytest.mark.parametrize(
     ("option", "asked", "said"),
     [
-        ("--stop", StopAsked("experimenter"), "The force is off and the sitting ends. Go on with: hapteq resume"),
+        ("--stop", StopAsked("experimenter"), "The force is off and the sitting ends. Continue with: hapteq resume"),
         ("--pause", PauseAsked("experimenter"), "Paused."),
     ],
 )

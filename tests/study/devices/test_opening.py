@@ -76,7 +76,7 @@ def unchecked_bounds(name: str, value: float) -> SimpleNamespace:
 def test_a_device_with_impossible_properties_is_refused(rigs, name, value):
     """The spring's stiffness is made from its mass, every duration from its rate."""
     rig = replace(rigs.compiled_rig(), info=replace(rigs.INFO, **{name: value}))
-    with pytest.raises(DeviceError, match=f"what it says of itself cannot be.*{name} is"):
+    with pytest.raises(DeviceError, match=f"it reports implausible properties.*{name} is"):
         SafeDevice(rig, rigs.SETTINGS, VirtualClock())
 
 

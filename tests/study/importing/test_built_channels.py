@@ -66,7 +66,7 @@ def test_parts_of_one_file_by_their_prefix_with_numbers_of_their_own(files):
 
 
 def test_a_part_that_is_empty_is_refused(files):
-    assert "nothing is left between 5 and 0.399 s" in refusal(map_text(end="[[part]]\nstart_s = 5.0\n"), files())
+    assert "no sample remains between 5 and 0.399 s" in refusal(map_text(end="[[part]]\nstart_s = 5.0\n"), files())
 
 
 def test_parts_of_different_rates_are_refused(files):

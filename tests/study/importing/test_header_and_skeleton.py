@@ -257,7 +257,7 @@ def test_a_number_in_hertz_is_the_rate_of_an_archive_and_its_runs_are_parts(tmp_
         ({"gain": 250.0}, "no number is the sample rate (as in 'rate_Hz')"),
         ({"fs": 250.0}, "'fs' does not say in which unit it is (as in 'fs_Hz')"),
         ({"Ts": 0.004}, "'Ts' does not say in which unit it is (as in 'Ts_s')"),
-        ({"fs_Hz": 250.0, "rate_Hz": 500.0}, "which of 'fs_Hz' and 'rate_Hz' is the sample rate is open"),
+        ({"fs_Hz": 250.0, "rate_Hz": 500.0}, "which of 'fs_Hz' and 'rate_Hz' is the sample rate is ambiguous"),
     ],
     ids=["none", "without a unit", "a step without a unit", "two"],
 )

@@ -88,7 +88,7 @@ def test_a_cell_of_anything_else_is_named_with_what_to_do(tmp_path, held):
 def test_a_cell_that_says_more_than_it_holds_is_refused(tmp_path):
     path = written(tmp_path, u=cell(RUNS[:2]))
     path.write_bytes(path.read_bytes().replace(struct.pack("<ii", 2, 1), struct.pack("<ii", 2**20, 1), 1))
-    assert "a cell of 1048576 arrays is longer than what is left of the file" in refusal(map_text(), path).lower()
+    assert "a cell of 1048576 arrays is longer than the rest of the file" in refusal(map_text(), path).lower()
 
 
 def element(kind, content):

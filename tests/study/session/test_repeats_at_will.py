@@ -145,7 +145,7 @@ def test_the_number_of_repeats_in_a_run_is_limited_by_the_protocol(facts, protoc
     assert repeats_left(state) == 0
     action = next_action(state)
     state = apply(state, facts.presented(action))
-    with pytest.raises(LogContradiction, match="no repeat of this run was left"):
+    with pytest.raises(LogContradiction, match="no repeat of this run remained"):
         apply(state, spoiled(action, VoidCause.ASKED))
     assert repeats_left(apply(state, spoiled(action, VoidCause.FAULT))) == 0
 

@@ -166,7 +166,7 @@ def test_of_many_faults_the_first_are_named_and_the_rest_counted():
     with pytest.raises(CsvError) as refused:
         rows_from_csv(",".join(TRIALS_HEADER) + "\n" + "x\n" * 20, Trial)
     assert len(refused.value.problems) == 9
-    assert refused.value.problems[-1] == "and 12 problems more like these"
+    assert refused.value.problems[-1] == "and 12 more problems of this kind"
 
 
 def test_columns_are_described_for_people():

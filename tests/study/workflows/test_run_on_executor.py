@@ -69,7 +69,7 @@ def killed(number):
 @pytest.mark.timeout(120)
 def test_a_killed_worker_is_an_error_that_says_what_is_kept_and_what_to_do():
     came = []
-    told = pytest.raises(StudyError, match=r"worker process was killed.*finished is kept.*goes on where it stopped")
+    told = pytest.raises(StudyError, match=r"worker process was killed.*finished is kept.*continues where it stopped")
     with told, worker_processes(1) as pool:
         for key, _ in run_pieces(pool, killed, ((number, (number,)) for number in range(6))):
             came.append(key)

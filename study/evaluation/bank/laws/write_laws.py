@@ -103,7 +103,10 @@ def law_lines(done: LawBlindTest) -> Iterator[str]:
     for figure in done.score.figures:
         yield f"{figure.name:52s} {figure_text(figure)}"
     if len(done.engines) > 1:
-        yield f"The answers come from {len(done.engines)} versions of the diagnosis: run the bank anew for a figure."
+        yield (
+            f"The answers come from {len(done.engines)} versions of the diagnosis: run the bank again, so that all "
+            "figures are of one version."
+        )
     yield f"Seal of the labels (SHA-256 of labels.sha256): {done.seal}"
     yield f"Everything is in {done.folder.path}"
 

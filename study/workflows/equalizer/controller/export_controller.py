@@ -86,7 +86,7 @@ def controller_settings(weight: float, preview_s: float, cap_n: float) -> Realti
     """Settings of the real-time controller. weight: of the forces in the cost; preview_s: time (s) for which the stream
     is known in advance; cap_n: largest force (N). Raises StudyError for values outside their limits."""
     if not preview_s <= LONGEST_PREVIEW_S:
-        raise _refusal(f"A preview of {preview_s:g} s was asked for; {LONGEST_PREVIEW_S:g} s is the longest.", TRY)
+        raise _refusal(f"A preview of {preview_s:g} s was requested; {LONGEST_PREVIEW_S:g} s is the longest.", TRY)
     try:
         return RealtimeSettings(weight, preview_s, cap_n)
     except TrackingError as problem:
@@ -119,7 +119,7 @@ def warn_of_export(exported: ExportedController) -> tuple[str, ...]:
         return ()
     return (
         f"Its cap of {cap_n:g} N is above the {HAND_STIMULUS_CAP_N:g} N that hapteq plays with a hand on the handle, "
-        "and no safety layer comes along: docs/controller.md.",
+        "and the exported code contains no safety layer: docs/controller.md.",
     )
 
 

@@ -60,7 +60,7 @@ def test_positions_in_the_wrong_order_are_refused(swapped):
 
 def test_a_dead_channel_is_refused():
     positions = tuple(samples * [1, 1, 0] for samples in readings(3))
-    with pytest.raises(ValueError, match="hardly answers to gravity"):
+    with pytest.raises(ValueError, match="hardly responds to gravity"):
         calibrate(positions)
 
 

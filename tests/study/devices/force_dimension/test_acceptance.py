@@ -69,7 +69,7 @@ def test_a_firmware_that_is_no_version_opens_for_no_hand_and_is_not_accepted(stu
         lambda: open_device("omega3", without_spring(rigs), RealClock(), 1, own_process=False).close(),
         lambda: accept_device("omega3", without_spring(rigs), RealClock(), "Ada"),
     ):
-        with pytest.raises(DeviceError, match=r"omega\.3 does not say its firmware.*Switch the device off and on"):
+        with pytest.raises(DeviceError, match=r"omega\.3 does not report its firmware.*Switch the device off and on"):
             opens()
         assert stub.safe and (stub.get("opened"), stub.get("writes")) == (0, stub.get("closes"))
     found = next(each for each in examine_device("omega3") if each.name == "Driver")
@@ -80,9 +80,9 @@ def test_a_serial_number_that_is_not_told_opens_for_no_hand_and_is_not_accepted(
     stub.set("serial_told", 0)
     for details in ("serial 0, firmware 2.41, SDK 3.17.5.0", "serial 65535, firmware 2.41, SDK 3.17.5.0"):
         vendor.accept("omega.3", details=details)
-        with pytest.raises(DeviceError, match="does not say its serial number"):
+        with pytest.raises(DeviceError, match="does not report its serial number"):
             open_for_a_hand(rigs)
-    with pytest.raises(DeviceError, match="does not say its serial number"):
+    with pytest.raises(DeviceError, match="does not report its serial number"):
         accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
     assert stub.safe
 
@@ -136,8 +136,8 @@ def cap_opened_at_each_tick(device, rig, stub) -> None:
 
 
 CAPS = {
-    "The cap at each tick does not hold: 1 N were asked for, and the device gave": cap_opened_at_each_tick,
-    "The cap of the library does not hold: 1 N were asked for, and the device gave 1.00 N":
+    "The cap at each tick does not hold: 1 N were commanded, and the device gave": cap_opened_at_each_tick,
+    "The cap of the library does not hold: 1 N were commanded, and the device gave 1.00 N":
         lambda device, rig, stub: stub.set("cap_works", 0),
     "The cap at each tick could not be tried": lambda device, rig, stub: stub.set("gain_told", 0.1),
     "A stimulus above its cap was not refused":

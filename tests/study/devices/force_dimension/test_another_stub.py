@@ -53,7 +53,7 @@ def test_a_force_that_is_changed_without_a_word_ends_the_trial(stepped_stub, rig
     stepped_stub.set("stiffness", stiffness)
     fault, said = lost_words(stepped_stub, rigs, lambda stub: [stub.set(*each) for each in switches.items()])
     assert fault is Fault.LOST
-    assert "It says that it gives another force than it was sent" in said
+    assert "It repeatedly reports another force than the one that it was sent" in said
 
 
 @pytest.mark.parametrize("frequency_hz", [5, 25, 40, 45])
@@ -74,7 +74,7 @@ def test_a_force_that_is_scaled_without_a_word_ends_the_trial_although_it_is_wea
             device.keep_alive()
             clock.sleep(0.05)
         assert device.fault() is Fault.LOST
-        assert "another force than it was sent" in device.health().why
+        assert "another force than the one that it was sent" in device.health().why
         assert not stepped_stub.applied_n.any()
 
 
@@ -157,7 +157,7 @@ def test_a_position_that_is_reported_as_read_and_never_written_is_no_position(st
 
 
 @pytest.mark.parametrize(
-    ("untold", "why"), [(1, "its power supply is off"), (2, "it gives another force than it was sent")]
+    ("untold", "why"), [(1, "its power supply is off"), (2, "reports another force than the one that it was sent")]
 )
 def test_a_status_or_force_that_is_reported_as_read_and_never_written_ends_the_trial(stepped_stub, rigs, untold, why):
     """What an earlier call wrote there must not stand for it."""
@@ -278,7 +278,7 @@ def test_a_device_that_keeps_its_force_at_zero_is_braked_while_nothing_is_played
             time.sleep(0.005)
         assert stub.safe
         assert 0.0 < stub.get("braked_s") - stub.get("zeroed_s") < 0.5
-        with pytest.raises(DeviceError, match="another force than it was sent"):
+        with pytest.raises(DeviceError, match="another force than the one that it was sent"):
             rig.sense()
         with pytest.raises(DeviceError):
             device.hold(rigs.push(1.0))

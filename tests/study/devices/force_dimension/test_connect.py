@@ -107,11 +107,11 @@ def test_a_library_without_a_function_is_too_old(another, vendor, opened, tmp_pa
         ({"open_fails": 2}, "cannot be opened: dhdOpenID: communication error (error 2)"),
         ({"powered": 0}, "has no power"),
         ({"calibrated": 0}, "not calibrated. It does not know where its handle is. Push the handle gently"),
-        ({"force_enables": 0}, "takes no forces"),
+        ({"force_enables": 0}, "accepts no forces"),
         ({"write_fails": 2}, "dhdSetForce: communication error"),
         ({"watchdog_works": 0}, "watchdog failed its test"),
         ({"off_by": 6}, "dead-man"),
-        ({"watchdog_settable": 0}, "no watchdog of its own"),
+        ({"watchdog_settable": 0}, "it has no watchdog"),
     ],
 )
 def test_a_failed_opening_names_the_cause_and_leaves_the_brakes_on(stub, opened, switches, said):

@@ -76,7 +76,7 @@ def test_a_repeated_reading_is_accepted_and_many_in_a_row_end_the_force(stepped_
     stepped_stub.set("stale_every", 1)
     for _ in range(STALE_FOR - 2):
         rig.sense()
-    with pytest.raises(DeviceError, match="repeats its last position"):
+    with pytest.raises(DeviceError, match="repeatedly reports the same position"):
         for _ in range(3):
             rig.sense()
 
@@ -89,7 +89,7 @@ def test_a_briefly_scaled_force_is_accepted_and_a_long_one_ends_the_force(steppe
     stepped_stub.set("scaled_every", 1)
     for _ in range(SCALED_FOR - 1):
         rig.write(force(1.0, 0.0, 0.0))
-    with pytest.raises(DeviceError, match="cannot give the force"):
+    with pytest.raises(DeviceError, match="cannot give the commanded force"):
         rig.write(force(1.0, 0.0, 0.0))
     rig.write(np.zeros(3))
     assert not stepped_stub.applied_n.any()

@@ -57,7 +57,7 @@ def test_a_reported_force_that_is_no_number_hides_no_wrong_gain(stepped_stub, ri
             device.keep_alive()
             clock.sleep(0.05)
         assert device.fault() is Fault.LOST
-        assert "another force than it was sent" in device.health().why
+        assert "another force than the one that it was sent" in device.health().why
         assert stepped_stub.get("told_nan") == 0
 
 
@@ -72,7 +72,7 @@ def test_a_force_that_is_added_without_a_word_ends_the_trial(stepped_stub, rigs,
         stepped_stub.set("silent_bias", bias_n)
         clock.sleep(0.25)
         assert device.fault() is Fault.LOST
-        assert "another force than it was sent" in device.health().why
+        assert "another force than the one that it was sent" in device.health().why
         stepped_stub.advance(0.05)
         assert stepped_stub.safe
 

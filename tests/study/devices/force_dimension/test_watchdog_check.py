@@ -49,11 +49,11 @@ def test_a_device_that_lets_go_in_time_is_proved_and_then_takes_forces_again(ste
 @pytest.mark.parametrize(
     ("switches", "said"),
     [
-        ({"watchdog_works": 0}, "it still takes forces"),
-        ({"watchdog_stretch": 5}, "it still takes forces"),
+        ({"watchdog_works": 0}, "it still accepts forces"),
+        ({"watchdog_stretch": 5}, "it still accepts forces"),
         ({"watchdog_settable": 0}, "no watchdog"),
-        ({"force_enables": 0}, "does not keep taking forces"),
-        ({"off_by": 1}, "does not keep taking forces: a button"),
+        ({"force_enables": 0}, "does not continue to accept forces"),
+        ({"off_by": 1}, "does not continue to accept forces: a button"),
     ],
 )
 def test_a_device_that_does_not_let_go_in_time_is_not_proved(stepped_stub, handle, switches, said):

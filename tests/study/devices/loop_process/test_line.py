@@ -60,7 +60,7 @@ def test_a_process_that_cannot_be_killed_is_not_said_to_be_gone(monkeypatch):
     monkeypatch.setattr(start, "DEAD_S", 0.1)
     monkeypatch.setattr(process._process, "kill", lambda: None)
     try:
-        assert process.end(0.0) == "was killed, and has not ended even so"
+        assert process.end(0.0) == "was killed, but has not ended"
     finally:
         monkeypatch.undo()
         process.hang_up()

@@ -153,7 +153,7 @@ def test_interrupted_the_same_command_continues(folder: Path, tmp_path: Path) ->
 
     with pytest.raises(UserInterruptError) as left:
         diagnose_folder(RealPlan(folder, tmp_path / "out", seconds=1.0), leave)
-    assert "goes on where it stopped" in left.value.do_now
+    assert "continues where it stopped" in left.value.do_now
     assert (tmp_path / "out" / "axis" / "run" / "answer.json").is_file()
     assert not (tmp_path / "out" / "torn" / "run").exists()
 

@@ -165,7 +165,7 @@ def test_a_folder_without_a_recording_is_an_error_and_nothing_is_written(tmp_pat
 
 @pytest.mark.parametrize("seconds", [float("nan"), float("inf")])
 def test_seconds_that_are_no_number_are_wrong_use(folder: Path, tmp_path: Path, seconds: float) -> None:
-    with pytest.raises(StudyError, match="That is no number of seconds") as refused:
+    with pytest.raises(StudyError, match="This is not a valid number of seconds") as refused:
         diagnose_folder(RealPlan(folder, tmp_path / "out", seconds), silent)
     assert refused.value.exit_code == 2
     assert not (tmp_path / "out").exists()

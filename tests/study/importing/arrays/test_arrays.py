@@ -66,7 +66,7 @@ _COMMA = (
         (
             "# c\nt,u\n0,1\n1,2,3\n",
             {},
-            "Line 4 has 3 fields, but there are 2 columns; take that line out, or fill it up.",
+            "Line 4 has 3 fields, but there are 2 columns; remove that line, or complete it.",
         ),
         ("t,t\n0,1\n", {}, "Its header names 't' twice; give the columns names of their own in [csv] names."),
         ("t [s],u [V]\ns,N\n0,1\n", {}, "Its header says V in 'u [V]', and its row of units says N."),

@@ -64,7 +64,11 @@ def test_a_map_is_known_by_its_channels():
         ('device = "rig"', "device = ", "it is not TOML"),
         ('name = "ax"', 'name = "ax"\nclock = "daq"', "channel 'ax' is on the clock 'daq', but there are clock"),
         ("rate_hz = 1000", "", "clock 'clock' has no rate: give its rate_hz, its rate as an expression, or its time"),
-        ("rate_hz = 1000", 'rate_hz = 1000\nrate = "fs"', "says its time more than once; one of time, rate_hz, rate"),
+        (
+            "rate_hz = 1000",
+            'rate_hz = 1000\nrate = "fs"',
+            "states its time more than once; state one of time, rate_hz, rate",
+        ),
         ("rate_hz = 1000", 'time = "t"', "clock 'clock' has no time_unit; stamps need their unit"),
         ("rate_hz = 1000", "rate_hz = 1000\noffset_s = 1.0", "is the first, to which the others are aligned"),
         ('role = "command"', 'role = "response"', "there is no channel with the role 'command'"),
@@ -89,7 +93,7 @@ def test_what_is_wrong_with_a_map_is_reported_by_key(old, new, problem):
         ('[[clock]]\nname = "b"\nrate_hz = 3\ntrigger = "y"', "clock 'b' needs both trigger and reference_trigger"),
         (
             '[[clock]]\nname = "b"\nrate_hz = 3\nalign = "y"\nalign_to = "u"\ntrigger = "y"\nreference_trigger = "u"',
-            "clock 'b' is aligned twice, by a trigger and by correlation; one of them",
+            "clock 'b' is aligned twice, by a trigger and by correlation; choose one of them",
         ),
         (
             '[[clock]]\nname = "b"\nrate_hz = 3\nfile = "b.csv"\n[[part]]\nfile = "a.csv"',
@@ -97,7 +101,7 @@ def test_what_is_wrong_with_a_map_is_reported_by_key(old, new, problem):
         ),
         ('[[segment]]\nkind = "noise"\nsplit = { fitt = 1.0 }', "segment[1].split names fitt; roles are fit, test"),
         ('[[segment]]\nkind = "noise"\nsplit = { fit = 0.5 }', "segment[1].split must have shares that make 1"),
-        ('[[segment]]\nkind = "noise"\nstart = 1\nstart_s = 1.0', "segment[1] says the same in samples and in seconds"),
+        ('[[segment]]\nkind = "noise"\nstart = 1\nstart_s = 1.0', "segment[1] is stated in samples and in seconds"),
         ('[[segment]]\nkind = "loud"', 'segment[1].kind is "loud"; it must be "multisine", "sweep"'),
     ],
 )

@@ -52,7 +52,7 @@ SENTENCES = [
     ),
     (
         TrialSpoiled(UTC, 1, 4, 0, "the handle was let go"),
-        "Run 2, trial 5 is void and comes again: the handle was let go.",
+        "Run 2, trial 5 is void and is presented again: the handle was let go.",
     ),
     (RestTaken(UTC, 2, 0, 60.0), "Rested 60 s before trial 1 of run 3."),
     (
@@ -61,7 +61,7 @@ SENTENCES = [
     ),
     (
         SessionResumed(UTC, DEVICE, {}, mended='{"utc'),
-        "The session went on, on omega.3. A last line that a crash had torn was taken off.",
+        "The session was continued, on omega.3. An incomplete last line, left by a crash, was removed.",
     ),
     (SessionClosed(UTC, "completed"), "The session is finished."),
     (

@@ -108,7 +108,9 @@ def test_a_folder_that_is_not_closed_is_reported(opened, why, monkeypatch, tmp_p
         opened.chmod(0o2775)
     else:
         monkeypatch.chdir(opened)
-    assert data_folder_warning(opened).endswith(f"A session leaves them: {why}. Take them away: chmod 700 {opened}")
+    assert data_folder_warning(opened).endswith(
+        f"A session leaves them: {why}. Remove these rights: chmod 700 {opened}"
+    )
     assert plan_sitting(str(CORPUS / "corpus_study.toml"), "P09", None, 3, opened).notes == (
         data_folder_warning(opened),
     )

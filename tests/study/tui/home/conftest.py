@@ -186,7 +186,7 @@ def diagnosis() -> DiagnosisView:
         path="/data/out/diagnosis.json",
         verdict="The mismatch is explained in part: physics that the model lacks is named, and more remains.",
         sentences=("Coulomb friction in the mechanism, axis x: level 0.21 N (95 %: 0.2 to 0.22). It explains 90 % of "
-                   "the mismatch left after re-tuning (probability 0.97).",),
+                   "the mismatch that remains after re-tuning (probability 0.97).",),
         rivals=("stribeck friction (probability 0.03): its static level is no different from its coulomb level",),
         mismatch=(("output", "input", "band", "amplitude", "where", "share", "p"),
                   ("ax", "fx", "5 to 15 Hz", "1.5", "near v = 0", "80 %", "1.0e-09"),

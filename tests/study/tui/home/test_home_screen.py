@@ -100,7 +100,7 @@ def test_a_protocol_of_accelerations_asks_for_a_model_and_no_other_does(on_scree
 def test_without_a_model_it_says_where_one_comes_from_and_begins_nothing(on_screen, home):
     async def story(sight):
         await sight.press("P", "0", "6", "f5")
-        assert "needs a model beside the data: hapteq record, hapteq identify" in sight.words
+        assert "needs a model, next to the data: hapteq record, hapteq identify" in sight.words
 
     assert on_screen(HomeScreen(with_equalized_first(home)), story).asked == []
 

@@ -49,7 +49,7 @@ def test_agreement_is_reported_where_there_is_nothing_else(on_screen, diagnosis)
         for sentence in (
             "No effect is named.",
             "None beyond what repeats allow.",
-            "No further recording is asked for.",
+            "No further recording is suggested.",
         ):
             assert sentence in sight.words
 

@@ -43,7 +43,7 @@ def test_a_view_that_stands_still_is_an_alarm(seated):
         await seat.pass_time(NO_NEWS_AFTER_S - 0.1)
         assert seat.bells == []
         await seat.pass_time(0.2)
-        assert "This view has stood still for seconds" in seat.text
+        assert "This view has not been updated for seconds" in seat.text
 
     assert seated(story).bells
 
@@ -51,7 +51,9 @@ def test_a_view_that_stands_still_is_an_alarm(seated):
 def test_a_reader_that_ended_is_an_alarm(seated):
     async def story(seat):
         seat.source.problem = "the program that reads the log has ended."
-        await seat.wait(lambda: "This view is not fed any more: the program that reads the log has ended." in seat.text)
+        await seat.wait(
+            lambda: "This view receives no more data: the program that reads the log has ended." in seat.text
+        )
 
     assert seated(story).bells
 

@@ -73,7 +73,7 @@ def test_a_stop_that_cannot_be_sent_says_what_to_do(seated):
 def test_pause_is_sent_and_says_who_continues(seated):
     async def story(seat):
         await seat.press("p")
-        assert "Pause sent. The participant goes on" in seat.lines[1]
+        assert "Pause sent. The participant continues" in seat.lines[1]
         await seat.show(view(standing="paused", activity="pausing", open_trial=None))
         await seat.press("p")
         assert "It is paused already" in seat.lines[1]

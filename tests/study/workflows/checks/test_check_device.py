@@ -70,7 +70,7 @@ def test_the_simulated_device_is_fine_and_is_said_to_be_simulated(rigs, clock):
     assert values["Device"] == "simulated omega.3 (simulated: no handle moves)"
     assert values["Handle"] == "0.0 mm from its place"
     assert values["Accelerometer"] == "0.10 m/s² rms at rest"
-    assert values["Largest force"] == "12 N; at most 4.5 N will be asked for"
+    assert values["Largest force"] == "12 N; at most 4.5 N will be commanded"
     assert all(finding.advice == "" for finding in report.findings)
 
 
@@ -154,7 +154,7 @@ def test_where_no_accelerometer_is_configured_that_is_said(rigs, clock):
     rig.instead_of_sensing = changed(noisy(0.05), 4, math.nan)
     sensor = findings(rig, rigs, clock)["Accelerometer"]
     assert (sensor.value, sensor.fine, sensor.warning) == ("none is configured", False, True)
-    assert sensor.advice.startswith("Trials run all the same; what the device delivered stays unknown.")
+    assert sensor.advice.startswith("Trials run all the same; what the device delivers remains unknown.")
 
 
 def test_a_rate_other_than_a_kilohertz_is_found(rigs, clock):
@@ -170,7 +170,7 @@ def test_a_rate_other_than_a_kilohertz_is_found(rigs, clock):
 
 def test_a_device_that_is_too_weak_is_found(rig, rigs, clock):
     force = findings(rig, rigs, clock, total_cap_n=12.5)["Largest force"]
-    assert (force.value, force.fine) == ("12 N; at most 12.5 N will be asked for", False)
+    assert (force.value, force.fine) == ("12 N; at most 12.5 N will be commanded", False)
     assert force.advice == "Lower total_cap_n in the protocol's [safety] section, or take a stronger device."
     assert findings(rig, rigs, clock)["Largest force"].value == "12 N"
 

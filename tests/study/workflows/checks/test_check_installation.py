@@ -118,7 +118,7 @@ def test_a_terminal_in_which_the_screens_would_not_work_is_found(monkeypatch, te
     [
         ({"COLORTERM": "truecolor"}, "16 million"),
         ({}, "256"),
-        ({"NO_COLOR": "1"}, "switched off by NO_COLOR; nothing is told by colour alone"),
+        ({"NO_COLOR": "1"}, "switched off by NO_COLOR; no information is given by colour alone"),
     ],
 )
 def test_colours_are_reported_and_can_be_done_without(monkeypatch, variables, value):

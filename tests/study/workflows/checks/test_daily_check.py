@@ -98,7 +98,7 @@ def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, s
         if found.fine:
             assert last_check(INFO, needed=True) == found
         else:
-            with pytest.raises(DeviceError, match="asks for a daily check.*noise changed.*--daily"):
+            with pytest.raises(DeviceError, match="requires a passed daily check.*noise changed.*--daily"):
                 last_check(INFO, needed=True)
     other = replace(INFO, details="serial 7, firmware 2.41, SDK 3.17.5.0")
     assert last_check(other).value == "none yet"

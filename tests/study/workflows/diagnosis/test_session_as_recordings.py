@@ -94,7 +94,7 @@ def test_another_seed_keeps_other_trials_for_the_test(session):
 def test_only_what_is_there_is_claimed(session):
     said = session_recordings(session, seed=1).remarks
     assert "a hand on the handle" in said[0]
-    assert "What shows only there cannot be found here." in said[0]
+    assert "Effects that show only there cannot be found here." in said[0]
     assert len(said) == 2
 
 

@@ -25,8 +25,8 @@ def test_the_reference_is_read_in_the_place_of_the_trials(folder):
     assert [segment.role for segment in recording.segments] == ["fit", "test", "fit", "test"]
     assert recording.position is not None
     assert folder.log in found.parents
-    assert any("the reference without a hand went into the diagnosis" in remark for remark in found.remarks)
-    assert any("nothing is seen to change" in remark for remark in found.remarks)
+    assert any("the reference without a hand was diagnosed" in remark for remark in found.remarks)
+    assert any("no change was detected" in remark for remark in found.remarks)
 
 
 def test_a_reference_that_was_changed_since_is_left_out_and_the_trials_are_read(folder):

@@ -78,7 +78,7 @@ def test_what_friction_put_into_the_damping_is_taken_off_and_said(twin):
     np.testing.assert_allclose(left, written.piece.of_friction)
     assert (written.piece.of_friction > 4.0).all()
     np.testing.assert_allclose(written.piece.damping - written.piece.of_friction, 10.2, rtol=0.4)
-    assert any("were friction's, and were taken off" in note for note in written.notes)
+    assert any("were attributed to friction and subtracted" in note for note in written.notes)
 
 
 def test_the_model_is_a_few_bodies_with_tolerances_as_a_laboratory_states_them(twin):

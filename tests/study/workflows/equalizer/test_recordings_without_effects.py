@@ -101,9 +101,10 @@ def refused(folder, tmp_path, model, recording="0.h5") -> StudyError:
 
 def test_physics_that_name_nothing_to_take_off_are_refused_with_the_reason(folder, tmp_path):
     said = refused(folder, tmp_path, mechanical(ModelEffect("viscous_damping", None, {"damping": 3.0})))
-    assert "cannot be freed" in said.title
+    assert "cannot be subtracted" in said.title
     assert (
-        "known.toml names no effect that can be taken off a recording. viscous_damping: it is linear" in said.happened
+        "known.toml names no effect that can be subtracted from a recording. viscous_damping: it is linear"
+        in said.happened
     )
 
 
@@ -127,5 +128,5 @@ def test_what_was_excited_is_read_off_the_excitation(folder):
     recording = read_recording(folder / "0.h5")
     assert excitation_band_hz(recording) == pytest.approx((4.6, 36.8), abs=0.4)
     silent = Signal(np.full((100, 3), 0.2), RATE_HZ, "force", "N", ("fx", "fy", "fz"))
-    with pytest.raises(ValueError, match="holds no excitation"):
+    with pytest.raises(ValueError, match="contains no excitation"):
         excitation_band_hz(replace(recording, command=silent, excitation=None))

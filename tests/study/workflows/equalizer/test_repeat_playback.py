@@ -126,7 +126,7 @@ def test_forces_of_something_else_are_not_gone_on_from(plan, tmp_path, other):
         out.write_text("\n".join([header, first, "0.001,0.5,0.0,0.0", *rest]))
     wanted = trajectory(1.7) if other == "another trajectory" else plan.wanted
     model = "1" * 64 if other == "another model" else plan.model_sha256
-    with pytest.raises(StudyError, match="cannot be gone on from") as refused:
+    with pytest.raises(StudyError, match="cannot continue from the earlier forces") as refused:
         earlier_forces(out, wanted, model)
     assert refused.value.happened == f"forces.repeats.json belongs to {other}."
 
@@ -199,7 +199,7 @@ def test_what_does_not_fit_is_refused_before_anything_moves(plan, tmp_path):
         (replace(plan, out=tmp_path / "taken.csv"), "exists already"),
         (replace(plan, out=tmp_path / "no" / "f.csv"), "There is no folder"),
         (replace(plan, wanted=slow), "The trajectory is at 500 Hz, the device runs at 1000 Hz"),
-        (replace(plan, first=np.zeros((5, 3))), r"Forces of shape \(5, 3\) do not go with 2000 rows"),
+        (replace(plan, first=np.zeros((5, 3))), r"Forces of shape \(5, 3\) do not match 2000 rows"),
     ):
         with pytest.raises(StudyError, match=why):
             repeat_playback(wrong, unheard)

@@ -143,7 +143,7 @@ def test_a_diagnosis_is_described(tmp_path):
         ),
         ("th.csv", "subject,frequency_hz\n", "table of thresholds", "Column 3 of the header is missing; it must be"),
         ("d.json", "{", "JSON document", "This is not JSON: "),
-        ("d.json", "[]", "JSON document", "It says no format; every hapteq document says its format and version."),
+        ("d.json", "[]", "JSON document", "It states no format; every hapteq document states its format and version."),
         ("d.json", '{"format": "x"}', "JSON document", "Its format, 'x', is not known here."),
         ("d.json", '{"format": "hapteq-diagnosis"}', "hapteq-diagnosis", "Its version is missing; this program reads"),
         ("d.json", '{"format": "hapteq-diagnosis", "version": 1}', "diagnosis", "verdict: this is missing."),

@@ -74,7 +74,7 @@ def test_three_in_a_row_end_the_sitting_in_words_that_fit(late_at):
     with pytest.raises(UserInterruptError) as left:
         end_sitting(end, UTC)
     assert left.value.do_now.startswith("Close other programs, and measure with hapteq doctor whether that helps.")
-    assert left.value.do_now.endswith(f"Go on with: hapteq resume {end.folder.path}")
+    assert left.value.do_now.endswith(f"Continue with: hapteq resume {end.folder.path}")
     assert len(screen.told) == 1
 
 

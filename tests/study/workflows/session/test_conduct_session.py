@@ -226,7 +226,7 @@ def test_ctrl_c_leaves_a_log_that_can_be_resumed(sitter):
     with pytest.raises(UserInterruptError) as left:
         sitter.interrupted(after=4, instead=press)
     assert left.value.saved == "4 answers are on disk."
-    assert left.value.do_now.startswith("Go on with: hapteq resume ")
+    assert left.value.do_now.startswith("Continue with: hapteq resume ")
     (folder,) = [f for f in sitter.data.iterdir() if f.is_dir()]
     from study.store.sessions.archive import SessionFolder
 
@@ -266,7 +266,7 @@ def test_nothing_is_presented_when_the_log_cannot_be_written(sitter, monkeypatch
     assert "No space left on device" in error.value.happened
     assert error.value.saved == "2 answers are on disk."
     assert error.value.do_now.endswith("P01_001")
-    assert "Then go on with: hapteq resume " in error.value.do_now
+    assert "Then continue with: hapteq resume " in error.value.do_now
     monkeypatch.undo()
     (folder,) = [f for f in sitter.data.iterdir() if f.is_dir()]
     presented = [e for e in read_log(folder / "events.jsonl").events if isinstance(e, TrialPresented)]

@@ -105,15 +105,15 @@ def test_a_stop_that_is_not_heard_stays_and_says_what_to_do(sitter, soon):
     with Session(sitter.interrupted(after=2).folder, hears=False) as session:
         with pytest.raises(StudyError) as told:
             send_request(session.folder, STOP, RealClock())
-        assert told.value.title == "The stop was not heard"
-        assert "took nothing within 0.1 s" in told.value.happened
+        assert told.value.title == "The session did not respond to the stop"
+        assert "accepted no request within 0.1 s" in told.value.happened
         assert "switch the device off" in told.value.do_now
         assert RequestInbox(session.folder.path).take() == (STOP,)
 
 
 def test_a_pause_that_is_not_heard_is_taken_back(sitter, soon):
     with Session(sitter.interrupted(after=2).folder, hears=False) as session:
-        with pytest.raises(StudyError, match="The pause was not heard"):
+        with pytest.raises(StudyError, match="The session did not respond to the pause"):
             send_request(session.folder, PAUSE, RealClock())
         assert RequestInbox(session.folder.path).take() == ()
 

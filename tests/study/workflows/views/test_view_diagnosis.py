@@ -44,7 +44,9 @@ def view(tmp_path):
 def test_each_effect_is_a_sentence_with_its_interval(view):
     assert view.verdict.startswith("Missing in the model: dry friction on the x drive, but that is not all.")
     assert view.sentences[0].startswith("Dry friction on the x drive, 0.21")
-    assert view.sentences[0].endswith("It explains 90 % of the mismatch left after re-tuning (probability 0.97).")
+    assert view.sentences[0].endswith(
+        "It explains 90 % of the mismatch that remains after re-tuning (probability 0.97)."
+    )
 
 
 def test_a_rival_says_why_not_and_what_cannot_be_told_apart_stands_beside_the_name(view):
@@ -68,7 +70,9 @@ def test_a_p_value_of_zero_is_shown_as_an_upper_bound(tmp_path):
 
 def test_the_next_experiment_begins_with_its_command(view):
     assert view.next_experiment.splitlines()[0] == "hapteq record slow --out N.h5"
-    assert view.next_experiment.endswith("This tells dry friction from friction that is larger at rest (Stribeck).")
+    assert view.next_experiment.endswith(
+        "This distinguishes dry friction from friction that is larger at rest (Stribeck)."
+    )
     assert "free simulation" in view.notes[0]
     assert view.notes[-1].startswith("Still unexplained: ax at 5 to 15 Hz")
 

@@ -94,7 +94,7 @@ def test_the_open_trial_of_a_running_session_keeps_its_direction(session, sessio
 def test_a_torn_last_line_is_reported(session):
     with (session / "events.jsonl").open("ab") as log:
         log.write(b'{"utc":"2026')
-    assert "A crash tore the last line" in session_view(session).warnings[0]
+    assert "A crash left the last line" in session_view(session).warnings[0]
 
 
 def test_of_a_damaged_log_the_whole_lines_are_shown_and_the_damage_is_named(session):
@@ -122,7 +122,7 @@ def test_a_log_of_an_older_version_says_that_it_has_no_checksums(session, sessio
     session_logs.as_older(session)
     view = session_view(session)
     assert view.line.standing == "finished"
-    assert "carries no checksums" in view.warnings[0]
+    assert "contains no checksums" in view.warnings[0]
     assert "without checksums" in dict(view.facts)["log"]
 
 

@@ -60,4 +60,4 @@ def test_a_position_that_the_clean_ones_lack_is_left_out_of_all(files, findings,
 
 def test_a_folder_beside_recordings_is_refused(files, findings, tmp_path):
     error = refused_with(files, findings, tmp_path, sources=(files / "rec.h5", tmp_path))
-    assert "is a folder: a session is diagnosed by itself" in error.happened
+    assert "is a folder: a session is diagnosed alone" in error.happened

@@ -96,6 +96,6 @@ def test_a_folder_that_is_taken_is_refused_before_any_work(files, findings, tmp_
 def test_an_unknown_effect_is_wrong_use_with_a_suggestion(files, findings, tmp_path):
     with pytest.raises(WrongUseError) as refused:
         diagnose_recordings(plan(files, tmp_path / "out", without=("backlsh",)), quiet, Scripted(findings))
-    assert refused.value.title == "There is no effect 'backlsh' to do without"
+    assert refused.value.title == "There is no effect 'backlsh' to exclude"
     assert "did you mean 'backlash'?" in refused.value.happened
     assert "coulomb_friction" in refused.value.do_now

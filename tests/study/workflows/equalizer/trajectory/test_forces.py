@@ -52,7 +52,7 @@ def test_what_the_cap_costs_is_reported_in_one_figure(plan):
     assert summary(done)["predicted_error"] == capped["error_capped"]
     assert sum(" error " in line for line in lines) == 1
     figures = [100 * capped[f"error_{kind}"] for kind in ("capped", "free", "clipped")]
-    assert "error {:.2f} % of what is wanted".format(*figures) in lines[1]
+    assert "error {:.2f} % of the wanted acceleration".format(*figures) in lines[1]
     assert "under the cap, {1:.2f} % without it (clipping would have given {2:.2f} %)".format(*figures) in lines[1]
 
 
@@ -62,7 +62,7 @@ def test_a_model_that_does_not_answer_is_refused(plants, plan, tmp_path, rows, c
     good = model_of(plants.omega_like(0.1))
     write_identified_model(tmp_path / "deaf.h5", replace(good, C=np.array(rows)[:, None] * good.C))
     refused = refusal(replace(plan, models=(tmp_path / "deaf.h5",), constrain=constrain))
-    assert "By the model itself the best forces would miss" in refused.happened
+    assert "According to the model, the error of the best forces would be" in refused.happened
     assert "identify it again" in refused.do_now
 
 

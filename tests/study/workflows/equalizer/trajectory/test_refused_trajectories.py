@@ -72,7 +72,7 @@ def test_models_that_do_not_go_together_are_refused(plants, plan, tmp_path):
     wrong = {
         "rate.h5": (replace(good, sample_rate_hz=500.0), "sample rate"),
         "nowhere.h5": (replace(good, place_m=None), "does not say where it was identified"),
-        "spring.h5": (replace(good, provenance={"input": "excitation"}), "ome models hold the spring"),
+        "spring.h5": (replace(good, provenance={"input": "excitation"}), "ome models include the spring"),
     }
     for name, (model, said) in wrong.items():
         write_identified_model(tmp_path / name, model)

@@ -35,7 +35,7 @@ def test_a_device_that_was_not_checked_today_is_warned_of_and_that_is_logged(pla
 
 def test_a_protocol_may_refuse_a_device_that_was_not_checked_today(plan, small_protocol, seat, person, real_device):
     strict = replace(small_protocol, setup=SetupSettings(daily_check_needed=True))
-    with pytest.raises(DeviceError, match="asks for a daily check that was passed.*none yet.*hapteq resume"):
+    with pytest.raises(DeviceError, match="requires a passed daily check.*none yet.*hapteq resume"):
         conduct_new(plan(strict), "simulated", seat)
     assert not person.questions and "welcome" not in person.calls
 

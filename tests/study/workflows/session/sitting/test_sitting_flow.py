@@ -108,7 +108,7 @@ def test_the_same_seed_and_answers_give_the_same_trials_for_any_participant(plan
 def test_before_the_first_trial_the_computer_is_checked_with_the_device_and_both_are_logged(plan, full, seat):
     end = conduct_new(plan(full), "simulated", seat)
     (checked,) = of(end, DeviceChecked)
-    assert "Load: this system does not tell it, so it was not checked" in checked.findings  # in virtual time
+    assert "Load: this system does not report it, so it was not checked" in checked.findings  # in virtual time
     (lateness,) = [finding for finding in checked.findings if finding.startswith("Lateness: ")]
     assert "99 % within 0.00 ms" in lateness
 
