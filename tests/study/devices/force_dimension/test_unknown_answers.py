@@ -22,7 +22,7 @@ def test_brakes_that_are_on_while_it_says_force_on_end_the_trial(stepped_stub, r
 @pytest.mark.real_time
 def test_brakes_that_are_on_while_it_says_force_on_keep_it_from_being_opened(stub, rigs):
     stub.set("brakes_told", 1)
-    with pytest.raises(DeviceError, match="stays off: its brakes are on"):
+    with pytest.raises(DeviceError, match="stay off: its brakes are on"):
         open_device("omega3", rigs.SETTINGS, RealClock(), 1, own_process=False)
 
 

@@ -150,7 +150,7 @@ def chained(count, text):
         ("(" * 900 + "u" + ")" * 900, {}, "is not an expression"),
         ("u" + "[0:9]" * 300, {}, "nested too deeply"),
         ("u" + "+u" * 300, {}, "nested too deeply"),
-        ("a1", {"a1": "a2", "a2": "a1 + u"}, "the definition of 'a1' needs itself"),
+        ("a1", {"a1": "a2", "a2": "a1 + u"}, "the definition of 'a1' refers to itself"),
     ],
 )
 def test_what_costs_too_much_ends_with_a_named_error(text, definitions, sentence):

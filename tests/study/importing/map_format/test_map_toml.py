@@ -87,8 +87,8 @@ def test_what_is_wrong_with_a_map_is_reported_by_key(old, new, problem):
 @pytest.mark.parametrize(
     ("more", "problem"),
     [
-        ('[[channel]]\nrole = "command"\nname = "fx"\nvalue = "u"\nunit = "N"', "command 'fx' is there twice"),
-        ("[[clock]]\nrate_hz = 3", "clock 'clock' is there twice"),
+        ('[[channel]]\nrole = "command"\nname = "fx"\nvalue = "u"\nunit = "N"', "command 'fx' is defined twice"),
+        ("[[clock]]\nrate_hz = 3", "clock 'clock' is defined twice"),
         ('[[clock]]\nname = "b"\nrate_hz = 3\nalign = "y"', "clock 'b' needs both align and align_to, or neither"),
         ('[[clock]]\nname = "b"\nrate_hz = 3\ntrigger = "y"', "clock 'b' needs both trigger and reference_trigger"),
         (
@@ -100,7 +100,7 @@ def test_what_is_wrong_with_a_map_is_reported_by_key(old, new, problem):
             "clocks with `file` put files side by side, [[part]] one after another; a map does one or the other",
         ),
         ('[[segment]]\nkind = "noise"\nsplit = { fitt = 1.0 }', "segment[1].split names fitt; roles are fit, test"),
-        ('[[segment]]\nkind = "noise"\nsplit = { fit = 0.5 }', "segment[1].split must have shares that make 1"),
+        ('[[segment]]\nkind = "noise"\nsplit = { fit = 0.5 }', "segment[1].split must have shares that sum to 1"),
         ('[[segment]]\nkind = "noise"\nstart = 1\nstart_s = 1.0', "segment[1] is stated in samples and in seconds"),
         ('[[segment]]\nkind = "loud"', 'segment[1].kind is "loud"; it must be "multisine", "sweep"'),
     ],

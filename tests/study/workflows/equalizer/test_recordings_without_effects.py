@@ -82,7 +82,7 @@ def test_a_model_of_freed_recordings_plays_with_the_friction_compensated_wholly(
     assert plain > 0.07
     assert freed < 0.03
     said = capsys.readouterr().out
-    assert "freed of coulomb_friction (level 0.1); play with --physics" in said
+    assert "Subtracted from the recordings: coulomb_friction (level 0.1); give --physics when" in said
     provenance = read_identified_model(folder / "freed.h5").provenance
     assert provenance["amplitude_n"] is None
     assert provenance["freed_of"] == ["coulomb_friction (level 0.1)"]

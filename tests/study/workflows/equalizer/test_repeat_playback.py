@@ -195,7 +195,7 @@ def test_what_does_not_fit_is_refused_before_anything_moves(plan, tmp_path):
     (tmp_path / "taken.csv").write_text("")
     slow = Trajectory(Signal(plan.wanted.signal.samples, 500.0, "acceleration", "m/s^2", ("ax", "ay", "az")))
     for wrong, why in (
-        (replace(plan, repeats=0), "0 repeats were asked for"),
+        (replace(plan, repeats=0), "0 repeats were requested"),
         (replace(plan, out=tmp_path / "taken.csv"), "exists already"),
         (replace(plan, out=tmp_path / "no" / "f.csv"), "There is no folder"),
         (replace(plan, wanted=slow), "The trajectory is at 500 Hz, the device runs at 1000 Hz"),
