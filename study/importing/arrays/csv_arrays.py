@@ -81,7 +81,6 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
     first = next((fields for _, line in body if all(fields := split_row(line, layout.delimiter))), [])
     dated = {name for name, field in zip(layout.names, first, strict=False) if is_stamp(field)}
     kinds = {name: str if name in dated | words else np.float64 for name in layout.names}
-    wanted = [name for name in layout.names if name not in words]
     try:
         found = _read(text, layout, {"dtype": kinds, "na_values": _MISSING})
     except ValueError:
@@ -89,7 +88,7 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
     if len(found) != len(body):
         number = next((number for number, line in body if line.count('"') % 2), body[0][0])
         raise ValueError(f"line {number}: a quote is opened and not closed in its line; remove it, or close it")
-    made = _table({name: found[name] for name in wanted}, body, layout)
+    made = _table({name: found[name] for name in layout.names if name not in words}, body, layout)
     faulty = {name: problem for name in words if (problem := _number_in_words(found[name], name, body, layout))}
     faulty |= {name: array.item() for name, array in made.by_name.items() if array.dtype.kind == "O"}
     left_out = [f"Left out: '{name}' holds words, not numbers." for name in layout.names if name in words - {*faulty}]
@@ -171,8 +170,7 @@ def _seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], str] | N
         return None
     if array.dtype.kind in "Mm":
         first = line[int(np.argmin(np.isnat(line)))]
-        since = line - first
-        return np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s")), str(first)
+        return np.where(np.isnat(line), np.nan, (line - first) / np.timedelta64(1, "s")), str(first)
     if not is_stamp(str(line[0].decode("utf-8", "replace") if isinstance(line[0], bytes) else line[0]).strip()):
         return None
     import pandas as pd

@@ -82,7 +82,7 @@ class IdentifiedDevice:
     def remarks(self) -> tuple[str, ...]:
         """Sentences for the user on the quality of the model, on the estimate and on effects that were not removed."""
         known = self.model.quality.remarks if self.model.quality else ()
-        left = (f"Not taken off the recordings: {sentence}" for sentence in self.not_removed)
+        left = (f"Not subtracted from the recordings: {sentence}" for sentence in self.not_removed)
         return (*known, *(as_sentence(remark) for remark in self.estimate.remarks), *left)
 
 

@@ -115,7 +115,7 @@ def test_what_stays_in_the_recordings_is_told(folder, tmp_path):
     recordings = tuple(folder / f"{number}.h5" for number in range(3))
     plan = IdentifyPlan(recordings, tmp_path / "m.h5", order=6, smooth=False, physics=tmp_path / "known.toml")
     told = identify_model(plan, lambda share: None).remarks
-    (said,) = [sentence for sentence in told if sentence.startswith("Not taken off the recordings: ")]
+    (said,) = [sentence for sentence in told if sentence.startswith("Not subtracted from the recordings: ")]
     assert "cogging: amplitude and pitch do not say where" in said
 
 
