@@ -74,7 +74,7 @@ def test_a_write_that_fails_half_way_leaves_the_old_state(tmp_path, overwrite):
         write_atomically(path, bytes(100_000), overwrite=overwrite)
     assert [kept.read_bytes() for kept in tmp_path.iterdir()] == ([b"old"] if overwrite else [])
     assert "It would be larger than the system allows for one file" in str(refused.value)
-    assert "Nothing was changed: no half-written file is left" in refused.value.saved
+    assert "Nothing was changed: no half-written file remains" in refused.value.saved
     assert refused.value.exit_code is ExitCode.ERROR
 
 

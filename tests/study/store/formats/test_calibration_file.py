@@ -99,7 +99,7 @@ def test_other_readers_of_hdf5_read_past_the_seal(path):
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("inertia_kg", np.full((185, 3, 3), np.nan), "no number"),
+        ("inertia_kg", np.full((185, 3, 3), np.nan), "not a number"),
         ("inertia_kg", np.zeros((3, 3)), "must be"),
         ("jacobian", np.zeros((184, 3, 3)), "one entry for each"),
         ("gravity_n", np.zeros((185, 3), int), "float32 or float64"),
