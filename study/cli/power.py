@@ -69,9 +69,7 @@ def power(
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
     scheduler: SchedulerOption = None,
     protocol: Annotated[str, typer.Option(help="Protocol with staircase and frequencies.")] = "direction_threshold",
-    out: Annotated[Path, typer.Option(help="Folder of the results; an interrupted run is continued there.")] = Path(
-        "power"
-    ),
+    out: Annotated[Path, typer.Option(help="Folder of results; an interrupted run continues there.")] = Path("power"),
     curve: CurveOption = "weibull",
     lapse: LapseOption = 0.02,
     people: PeopleOption = "attentive",
@@ -80,8 +78,7 @@ def power(
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of all draws.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate whole studies and count how often each analysis finds the difference. Interrupted, the same
-    command continues."""
+    """Simulate whole studies and count how often each analysis finds the difference. Run again, it continues."""
     from study.cli.progress import bar
     from study.store.formats.protocol_files import read_study_protocol
     from study.workflows.cluster import cluster_workers
