@@ -227,8 +227,8 @@ def _far(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, 
     if away_m <= FAR_M:
         return ()
     return (
-        f"{path.name} was identified {1e3 * away_m:.0f} mm from the place: coupling between axes increases with the "
-        "distance. Models of several places on both sides of it can be interpolated.",
+        f"{path.name} was identified {1e3 * away_m:.0f} mm from the place: the coupling between axes that remains "
+        "after equalization increases with the distance. Models of several places on both sides of it can be interpolated.",
     )
 
 
