@@ -228,7 +228,8 @@ def _far(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, 
         return ()
     return (
         f"{path.name} was identified {1e3 * away_m:.0f} mm from the place: the coupling between axes that remains "
-        "after equalization increases with the distance. Models of several places on both sides of it can be interpolated.",
+        "after equalization increases with the distance. Models of several places on both sides of it can be "
+        "interpolated.",
     )
 
 
