@@ -71,7 +71,8 @@ def _fill_missing(signal: Signal, name: str) -> Signal:
     missing = 1 - float(np.isfinite(signal.samples).all(axis=1).mean())
     if missing > MISSED_LIMIT:
         raise NotMeasurableError(
-            f"{100 * missing:.1f} % of the samples of the {name} are missing; at most {100 * MISSED_LIMIT:g} % are allowed"
+            f"{100 * missing:.1f} % of the samples of the {name} are missing; at most {100 * MISSED_LIMIT:g} % are "
+            "allowed"
         )
     return replace(signal, samples=fill_gaps(signal.samples))
 
