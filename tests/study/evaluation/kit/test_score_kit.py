@@ -142,7 +142,7 @@ def test_without_the_hash_it_is_said_that_only_the_file_beside_was_compared(tmp_
     digest = seal_labels(table)
     folder = answered(tmp_path / "d", {"rec_01": diagnosis("added_mass")})
     last = score_lines(score_kit(table, folder, tmp_path / "score.csv"))[-1]
-    assert last.startswith(f"Labels: SHA-256 {digest}, compared only with labels.csv.sha256 beside them")
+    assert last.startswith(f"Labels: SHA-256 {digest}, compared only with labels.csv.sha256 in the same folder")
     assert "give --seal the hash" in last
 
 
