@@ -97,7 +97,7 @@ def test_a_hand_adds_to_the_mass_that_the_handle_seems_to_have(drifting_device):
 
 def test_a_recording_without_a_whole_period_is_refused(drifting_device):
     (played,) = drifting_device.play(WAVE, [drifting_device.Truth()], (0.8,), seed=1)
-    with pytest.raises(ValueError, match="less than one period"):
+    with pytest.raises(ValueError, match="less than one whole period"):
         probe_lines(played, 2.0)
     torn = np.where(np.arange(len(played))[:, None] == 5, np.nan, played.response.samples)
     with pytest.raises(ValueError, match="missing"):

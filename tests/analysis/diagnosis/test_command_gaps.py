@@ -41,7 +41,7 @@ def test_short_gaps_of_a_slow_command_are_bridged_within_the_share_that_is_asked
     (found,), (said,) = bridge_gaps([recording(lost(slow(), (1000, 1003), (3000, 3001)))], ["a"])
     assert np.abs(found.command.samples[:, 0] - slow()).max() < 0.02
     assert parts_of(found) == ((0, SAMPLES),)
-    assert "2 gaps (4 samples) bridged" in said
+    assert "2 gaps (4 samples) interpolated" in said
 
 
 def test_gaps_of_a_fast_command_are_cut_out_and_what_is_known_stays():

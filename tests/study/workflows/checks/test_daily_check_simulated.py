@@ -92,7 +92,7 @@ def test_a_few_missed_ticks_change_nothing_and_many_are_refused(recorded, seed):
     with pytest.raises(DeviceError, match="% of the samples of the command are missing"):
         compare_recordings(baseline, missed(today, 0.05, seed))
     no_sensor = replace(today.response, samples=np.full_like(today.response.samples, np.nan))
-    with pytest.raises(DeviceError, match="100.0 % of its response is missing"):
+    with pytest.raises(DeviceError, match="100.0 % of the samples of the response are missing"):
         compare_recordings(baseline, replace(today, response=no_sensor))
 
 
