@@ -51,7 +51,7 @@ def measure_device(recording: Recording) -> DeviceMeasures:
     friction = np.array([_friction_n(recording, axis) for axis in range(len(recording.command.channels))])
     rests = _second_halves_of_rests(recording)
     if not rests:
-        raise NotMeasurableError("the recording contains no rest of the handle, from which the noise is measured")
+        raise NotMeasurableError("the handle is never at rest, so the noise cannot be measured")
     noise, samples = _noise(recording, rests)
     return DeviceMeasures(friction[:, 0], friction[:, 1], response, noise, samples)
 

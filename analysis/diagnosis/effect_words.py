@@ -65,7 +65,8 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     "hand_impedance": EffectWords("the impedance of a hand", {"mass": _BARE, "damping": _BARE, "stiffness": _BARE}),
     "time_varying_grip": EffectWords("a grip that varies in time", {"rate_hz": "at {}", "depth": "by {}"}, ("depth",)),
     "body_on_actuator": EffectWords(
-        "a body attached by a spring and a damper", {"mass": _BARE, "damping": _BARE, "stiffness": _BARE}
+        "a body attached to the actuator by a spring and a damper",
+        {"mass": _BARE, "damping": _BARE, "stiffness": _BARE},
     ),
     "force_saturation": EffectWords("force saturation", {"limit": "at {}"}),
     "force_deadband": EffectWords("a dead band of the force", {"width": "± {}"}),

@@ -103,7 +103,10 @@ def _noise_checks(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[C
     shares = np.array([each.share for each in noise])
     sentence = conjoin([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
     noisy = [name for k, name in enumerate(channels) if shares[:, k].min() > LOUD]
-    text = f"The rms difference between repeats (up to {max(each.periods for each in noise)}) is at least {sentence}."
+    text = (
+        f"The rms deviation of single periods from their mean (up to {max(each.periods for each in noise)} periods) is "
+        f"at least {sentence}."
+    )
     do = f"{conjoin(noisy)} hardly repeat: average more periods, or drive the device more strongly." if noisy else ""
     return (Check(REPEATS, "notice" if noisy else "fine", text, do),)
 

@@ -24,7 +24,7 @@ SIMULATED_RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0
 """The published staircase and cap, with which `measured_coverage` was simulated: its counts hold for no other rule."""
 NOTHING_DECLARED = (
     "The protocol declares no primary analysis, contrast, sample size or exclusions; the hierarchical model is given "
-    "first because it needs the fewest assumptions near the cap; a choice made after the data were seen is not a "
+    "first because the cap distorts it least; a choice made after the data were seen is not a "
     "declaration."
 )
 NEAR_CAP = (
@@ -48,8 +48,8 @@ def declaration_text(declared: AnalysisSettings) -> str:
         return NOTHING_DECLARED
     if declared.primary == "undeclared":
         primary = (
-            "The protocol declares no primary analysis. The hierarchical model is given first because it needs the "
-            "fewest assumptions near the cap; a choice made after the data were seen is not a declaration."
+            "The protocol declares no primary analysis. The hierarchical model is given first because the "
+            "cap distorts it least; a choice made after the data were seen is not a declaration."
         )
     else:
         named = "Its interval" if declared.interval == "undeclared" else f"Declared interval ({declared.interval})"

@@ -48,7 +48,7 @@ class CatchSettings:
         Field(
             ge=0,
             le=100,
-            description="One trial in this number is a catch trial, at a random position. Default 0: none, as "
+            description="One in this many trials is a catch trial, at a random position. Default 0: none, as "
             "published. 20 costs 5 % more trials.",
         ),
     ] = 0

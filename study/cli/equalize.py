@@ -32,7 +32,7 @@ def equalize(
     weight: Annotated[float, typer.Option(min=0.0, help="Weight of |force|² against |error|², (m/s² per N)².")] = 1e-3,
     cap: Annotated[float, typer.Option(min=0.001, help="Highest force, in newtons.")] = 3.0,
     constrain: Annotated[
-        bool, typer.Option("--constrain", help="Above the cap: compute the best forces under it, and report the loss.")
+        bool, typer.Option("--constrain", help="Above the cap, compute the best forces under it instead of refusing.")
     ] = False,
     physics: Annotated[
         Path | None, typer.Option(help="Mechanical model whose named effects are compensated, such as friction.")

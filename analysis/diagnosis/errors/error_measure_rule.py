@@ -49,9 +49,9 @@ IMPOSED = (
     "with the measured one."
 )
 CLOSED_LOOP = (
-    "The command depends on the response and the model has no stable position of rest, so a simulation by the "
-    "command alone would drift; the force that the model needs along the measured motion is compared with the force "
-    "that was applied."
+    "The command depends on the response and the model's free motion does not decay within the recording, so a "
+    "simulation by the command alone would drift; the force that the model needs along the measured motion is "
+    "compared with the force that was applied."
 )
 UNSTABLE = (
     "The model alone is unstable, so a controller must have held the device, and a simulation without the controller "
@@ -59,8 +59,8 @@ UNSTABLE = (
     "applied."
 )
 CLOSED_LOOP_WINDOWS = (
-    "The command depends on the response and the model has no stable position of rest; it is simulated in short "
-    "windows, each from a state estimated from the measured motion."
+    "The command depends on the response and the model's free motion does not decay within the recording; it is "
+    "simulated in short windows, each from a state estimated from the measured motion."
 )
 DRIFTS = (
     "The model integrates freely, so that small errors would grow without bound; it is simulated in short windows, "

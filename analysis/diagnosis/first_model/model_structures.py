@@ -295,5 +295,5 @@ def _remarks(given: BalancedRecordings, kind: Kind) -> tuple[str, ...]:
         )
     if kind == "massless":
         timed = "" if not given.untimed else " No time is known: samples are numbered, and damping is not fitted."
-        return (f"The mass in the file is a lower bound that the forces do not determine.{timed}",)
+        return (f"The mass in the file is a lower bound for simulations; the forces do not determine it.{timed}",)
     return ()

@@ -60,7 +60,7 @@ def _describe_ceiling_of_axis(reached: BalanceErrors, single: bool) -> str:
     if reached.any_named and reached.named <= reached.ceiling * (1 + SAME):
         return f"{alone}, {named}, and all laws together reach no smaller error."
     share = (
-        f", which is {share_text(reached.share)} of that reduction of the error power"
+        f", and that is {share_text(reached.share)} of the reduction of the error power that all laws together reach"
         if reached.named < reached.linear
         else ""
     )

@@ -36,7 +36,7 @@ def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
     states = Picture(
         name="state-map",
         title=f"Missing force{along} over the states of motion",
-        caption=f"Force on the device that {first.model} {'lack' if ' and ' in first.model else 'lacks'} ; grey: "
+        caption=f"Force on the device that {first.model} {'lack' if ' and ' in first.model else 'lacks'}; grey: "
         f"single samples; black: mean per bin, with two standard errors.{left} A flat line at zero means that the "
         f"missing force does not depend on that state. Rms: {share_text(first.share)} of the force.{beside}",
         figure=_draw_states(first),

@@ -74,7 +74,7 @@ def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSett
     remarks = list(found.remarks)
     if found.experiments and all(experiment.periods == 1 for experiment in found.experiments) and found.periodic:
         remarks.append(
-            "No experiment has two counted periods: errors were estimated from the scatter from line to line, and by "
+            "No experiment has two counted periods: errors were estimated from the scatter from line to line, and from "
             "the noise at rest where that is larger."
         )
     if any(recording.excitation is None and spring_frequency_hz([recording.meta]) for recording in recordings):

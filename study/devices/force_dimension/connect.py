@@ -84,7 +84,7 @@ def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_k
         if not status.gives_forces:
             raise DeviceError(
                 f"The {model.name} accepts no forces",
-                f"Its motors were switched on, but stay off: {status.why_off}.",
+                f"It was told to switch its motors on, but they stay off: {status.why_off}.",
                 "Check that its power supply is on, and press its force button if it has one.",
             )
     except LibraryError as error:

@@ -152,7 +152,7 @@ def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[Dev
 def _masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
     """The masses in use (kg): for the gravity compensation, and for the stiffness of the centring spring."""
     carried_kg = lab.effector_mass_kg or model.effector_mass_kg
-    carried = f"{carried_kg:g} kg" if carried_kg else "what the library accepts"
+    carried = f"{carried_kg:g} kg" if carried_kg else "with the library's own mass"
     moved = f"{lab.effective_mass_kg:g} kg" if lab.effective_mass_kg else f"{model.effective_mass_kg:g} kg, assumed"
     return DeviceFinding("Masses", f"gravity compensation {carried}, spring {moved} ({lab_file()})", fine=True)
 

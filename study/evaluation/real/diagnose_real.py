@@ -111,8 +111,8 @@ def _downgrade_if_remainder(answer: RealAnswer, pair: PairOutcome) -> RealAnswer
     if answer.verdict != "explained" or left is None or missed is None or left <= EXPLAINED_ERROR * missed:
         return answer
     text = (
-        f"Still unexplained: {100 * left:.3g} % of the signal is the error on held-out data; before the change, the "
-        f"model's error was {100 * missed:.3g} %."
+        f"Still unexplained: the error on held-out data is {100 * left:.3g} % of the signal; before the change it was "
+        f"{100 * missed:.3g} %."
     )
     return replace(answer, verdict="partly_explained", left=text, pair=replace(pair, verdict="partly_explained"))
 

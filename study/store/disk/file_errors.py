@@ -94,7 +94,7 @@ def _shorten_problems(problems: tuple[str, ...]) -> tuple[str, ...]:
     """The problems, limited in number and length: a damaged file may have a million problems or a name of a million
     letters."""
     rest = len(problems) - _MOST_PROBLEMS
-    more = (f"and {rest} problems more",) if rest > 0 else ()
+    more = (f"and {rest} more problems",) if rest > 0 else ()
     cut = (text if len(text) <= _LONGEST_PROBLEM else f"{text[:_LONGEST_PROBLEM]}…" for text in problems)
     return (*islice(cut, _MOST_PROBLEMS), *more)
 

@@ -59,7 +59,9 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
         )  # fmt: skip
     found = read_input(plan.recordings, 1, True, plan.force_constants)
     if has_carried_weight(found.recordings):
-        raise _refusal("A recording was made with a weight on, and the model would hold the weight.")
+        raise _refusal(
+            "A recording was made with a weight on the handle, and a model fitted to it would include the weight."
+        )
     try:
         choice = choose_structure(found.recordings, wanted, on_progress)
     except StructureRefused as refusal:

@@ -42,10 +42,10 @@ def find_references(session: Path) -> SessionReferences | None:
     )
     if not paths:
         return None
-    what = "the reference" if len(paths) == 1 else f"the {len(paths)} references"
+    what, were = ("the reference", "was") if len(paths) == 1 else (f"the {len(paths)} references", "were")
     text = (
-        f"Of {folder.name} {what} without a hand was diagnosed, and not its trials, which contain single frequencies "
-        "with a hand."
+        f"Of {folder.name} {what} without a hand {were} diagnosed, and not its trials, which contain single "
+        "frequencies with a hand."
     )
     return SessionReferences(folder.log, paths, (text, *_drifts(folder, folded)))
 

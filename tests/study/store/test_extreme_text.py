@@ -82,5 +82,5 @@ def test_a_header_of_two_hundred_thousand_letters_costs_no_square_of_them(letter
 def test_a_problem_of_a_million_letters_is_cut():
     error = UnusableFileError(Path("a"), "file", ("x" * 10**6, *["y"] * 1000))
     assert len(error.happened) < 1000
-    assert error.problems[-1] == "and 961 problems more"
+    assert error.problems[-1] == "and 961 more problems"
     assert io.StringIO(str(error))
