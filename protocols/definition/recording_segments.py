@@ -67,8 +67,12 @@ class SweepSegment:
     role: Role = ""
 
     @model_validator(mode="after")
-    def _require_rising(self) -> Self:
+    def _require_rising_cycle(self) -> Self:
         _refuse_downwards(self.from_hz, self.to_hz)
+        least_s = math.log(self.to_hz / self.from_hz) / (self.to_hz - self.from_hz)
+        said = f"is {self.duration_s} s, less than a cycle of the sweep"
+        allowed = f"{math.ceil(1e6 * least_s) / 1e6:g} s or more"
+        refuse([] if self.duration_s >= least_s else [Problem("duration_s", said, allowed)])
         return self
 
 

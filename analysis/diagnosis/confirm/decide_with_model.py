@@ -81,7 +81,7 @@ def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
         return "its gain on held-out data is not larger than its variation between stretches of the recording"
     if min(whole.gain, last.gain) < FURTHER_LAW_OF_ALL:
         return (
-            f"on held-out data it explains {100 * min(whole.gain, last.gain):.0f} % of the error's power, "
+            f"on held-out data it explains {100 * min(whole.gain, last.gain):.1f} % of the error's power, "
             f"and {100 * FURTHER_LAW_OF_ALL:.0f} % are required"
         )
     if context.tuning.is_at_bound(found.after.fitted.deviations):

@@ -31,7 +31,7 @@ down to 1/16. A map that needs more is near saturation, where commands would use
 compensation of all other effects."""
 _FLAT = 1e-9
 """Force, relative to the largest force of the table, below which a command counts as within a dead band."""
-_SPANS = tuple(10.0**decade for decade in range(5))
+_SPANS = tuple(10.0**decade for decade in range(-6, 5))
 """Ranges of commands, in the command's unit, within which a map is tested for rising."""
 PLAYED = 1000.0
 """Sample rate (Hz) at which a law without memory is evaluated; the result does not depend on it."""

@@ -97,14 +97,15 @@ def _decode_other_encoding(data: bytes) -> TableText:
 
 
 def _find_lines_beyond_ascii(data: bytes) -> list[bytes]:
-    """The first non-ASCII lines that are not comments, up to `_READ_FOR_WORDS` bytes; a longer line is cut there."""
+    """The first non-ASCII lines that are not comments, up to about `_READ_FOR_WORDS` bytes. Lines are
+    kept whole: a cut within a character would make the right encoding invalid."""
     lines, size, read = list[bytes](), 0, 0
     while size < _READ_FOR_WORDS and (found := _BYTE_BEYOND_ASCII.search(data, read)):
         at = found.start()
         begin = max(data.rfind(b"\n", read, at), data.rfind(b"\r", read, at), read - 1) + 1
         end = _LINE_END.search(data, at)
         read = end.start() if end else len(data)
-        line = data[begin : min(read, begin + _READ_FOR_WORDS - size)]
+        line = data[begin:read]
         if not line.lstrip().startswith((b"#", b"%")):
             lines.append(line)
             size += len(line)

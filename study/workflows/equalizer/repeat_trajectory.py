@@ -186,7 +186,7 @@ def _test_gain(solved: EqualizedTrajectory, spring: VirtualSpring) -> tuple[floa
             f"{LOWEST_GAIN:g}.",
             "Record and identify at the place itself, or with more sweeps.",
         )
-    return gain, convergence_at(at, weight, spring, gain)
+    return gain, tested if gain == 1.0 else convergence_at(at, weight, spring, gain)
 
 
 def _initial_forces(solved: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSpring) -> FloatArray | None:

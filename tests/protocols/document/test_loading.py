@@ -226,6 +226,12 @@ def test_what_a_recording_allows_is_reported():
     assert refused(changed(RECORDING, "to_hz = 100.0", "to_hz = 1")).allowed == "above 1.0 Hz, the from_hz"
 
 
+def test_a_sweep_of_less_than_a_cycle_is_refused_with_the_least_period():
+    short = 'kind = "sweep"\nalong = "x"\nfrom_hz = 1.0\nto_hz = 2.0\nduration_s = 0.5\namplitude_n = 1.0\n'
+    error = refused(f"{RECORDING}\n\n[[segments]]\n{short}")
+    assert (error.problem, error.allowed) == ("is 0.5 s, less than a cycle of the sweep", "0.693148 s or more")
+
+
 def test_an_entry_that_is_no_table_is_refused():
     text = RECORDING[: RECORDING.index("[[segments]]")].replace("[safety]", "segments = [3]\n[safety]")
     error = refused(text)

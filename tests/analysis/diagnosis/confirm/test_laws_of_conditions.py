@@ -85,7 +85,6 @@ def test_friction_that_a_setting_changes_is_named_where_the_motion_is_imposed():
     assert found.fit.test.after < 0.15 * found.fit.test.before
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_condition_that_does_nothing_is_not_named(seed):
     found = diagnose_values(rubbing_mass(np.full(SAMPLES, 2.0), warming(seed), seed)).diagnosis

@@ -10,7 +10,6 @@ from analysis.diagnosis.contrast.decide import decide
 from equalizer.signals.recording import Recording
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_another_recording_of_the_same_device_names_nothing(rig, seed):
     found = rig.contrast(seed=seed).decision

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import law_of
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
@@ -122,6 +123,16 @@ def test_a_map_near_saturation_does_not_use_up_the_cap_of_other_effects():
 def test_a_force_beyond_saturation_gets_the_smallest_range_of_commands():
     done = compensate(PUSHED, WANTED, MODEL, physics(found("0.1*tanh(fy/0.1)", "command")), None)
     assert np.abs(done.forces[:, 1]).max() <= 2 * np.abs(PUSHED[:, 1]).max() * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("text", ["1.0*fy - 0.5*fy**3", "0.2*sin(5*fy)"])
+def test_a_map_that_falls_only_beyond_the_commands_needed_is_inverted(text):
+    weak = PUSHED * (0.05 / np.abs(PUSHED[:, 1]).max())
+    law = found(text, "command")
+    done = compensate(weak, WANTED, MODEL, physics(law), None)
+    assert not done.not_used
+    played = evaluate(law.law, {"fy": done.forces[:, 1]}, RATE_HZ)
+    assert np.abs(played - weak[:, 1]).max() < 1e-3 * np.abs(weak[:, 1]).max()
 
 
 def test_a_map_that_falls_among_the_commands_needed_is_refused():

@@ -59,6 +59,14 @@ def test_the_first_foreign_words_may_come_after_many_plain_lines(tmp_path):
     assert list(read_arrays(path, CsvMap()).by_name) == ["时间(s)", "载荷(N)", "位移(mm)"]
 
 
+@pytest.mark.parametrize("ahead", ["", "t"])
+def test_a_long_table_with_foreign_words_in_each_row_is_read(tmp_path, ahead):
+    path = tmp_path / "a.csv"
+    rows = "\n".join(f"{k / 10},{k % 7},{k % 5},正常运行" for k in range(6000))
+    path.write_bytes(f"{ahead}时间(s),载荷(N),位移(mm),状态\n{rows}\n".encode("gbk"))
+    assert "载荷(N)" in read_arrays(path, CsvMap()).by_name
+
+
 @pytest.mark.parametrize(
     ("stated", "said"), [("klingon", "There is no encoding 'klingon'"), ("ascii", "no whole ascii")]
 )

@@ -51,7 +51,6 @@ def changed(baseline: Recording, today: Recording) -> set[str]:
     return {change.kind for change in compare_recordings(baseline, today) if change.changed}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seeds", [range(2, 4), pytest.param(range(2, 32), marks=pytest.mark.slow)])
 def test_another_day_of_the_same_device_passes(recorded, seeds):
     baseline = recorded(1)

@@ -71,7 +71,6 @@ def answer_or_refusal(seed, folder):
         return None
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_any_recording_has_an_answer_or_a_refusal(seed, tmp_path):
     found = answer_or_refusal(seed, tmp_path)
