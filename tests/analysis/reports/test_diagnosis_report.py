@@ -117,7 +117,7 @@ def test_candidates_and_classes_are_on_the_page_and_only_where_there_are_some(fr
     text, headings = rendered(replace(told(friction_found, effects=(alike,), candidates=(other,)), reached=reached))
     assert "What else may be missing" in headings.found
     for piece in ("The weight of a body off its axis (a pendulum)", "500 mN m, hanging", "34 %", "Too little.",
-                  "Friction whose law these data do not determine", "which is 67 % of that reduction of the error "
+                  "Friction whose law these data do not determine", "and that is 67 % of the reduction of the error "
                   "power"):  # fmt: skip
         assert piece in text
         assert piece not in page[0]
