@@ -133,6 +133,8 @@ CRITICAL = 2 * np.sqrt(0.3 * 120.0)
 STIFF = ("coulomb_friction", (0,), {"level": 0.4})
 SMOOTH = ("quadratic_damping", (1,), {"coefficient": 5.0})
 LOOSE = ("loose_joint", (0,), {"gap": 1e-4, "stiffness": 2e3, "slip": 0.05})
+SEVERAL = [STIFF, SMOOTH, LOOSE]
+ALIKE = [("coulomb_friction", (0, 1, 2), {"level": 0.2}), ("hardening_stiffness", (2,), {"k3": 1e7})]
 
 
 @pytest.mark.parametrize(
@@ -140,14 +142,20 @@ LOOSE = ("loose_joint", (0,), {"gap": 1e-4, "stiffness": 2e3, "slip": 0.05})
     [
         ([], 1, 1), ([], 4, 1), ([], 4, 4),
         ([STIFF], 4, 1), ([STIFF], 4, 4), ([SMOOTH], 4, 4), ([LOOSE], 8, 1),
-        ([STIFF, SMOOTH, LOOSE], 8, 1),
-        ([("coulomb_friction", (0, 1, 2), {"level": 0.2}), ("hardening_stiffness", (2,), {"k3": 1e7})], 4, 1),
+        (SEVERAL, 8, 1), (ALIKE, 4, 1),
     ],
 )  # fmt: skip
 def test_three_axes_move_as_the_plain_recipe_says(bench, named, steps, fine):
     samples = SAMPLES if len(named) < 2 else SAMPLES // 8  # the recipe solves several forces by iteration, in Python
     commands = 2 * bench.commands(3)[300 : 300 + samples] + 0.2
     assert_same(bench.three_axes(), placed(*named), commands, steps, fine)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("named", "steps"), [(SEVERAL, 8), (ALIKE, 4)])
+def test_several_forces_move_them_so_for_longer(bench, named, steps):
+    commands = 2 * bench.commands(3)[300 : 300 + SAMPLES] + 0.2
+    assert_same(bench.three_axes(), placed(*named), commands, steps, 1)
 
 
 @pytest.mark.parametrize(
@@ -198,7 +206,7 @@ def _heavier(of: np.ndarray, memory: np.ndarray, at: np.ndarray) -> float:
 def test_a_law_knows_the_acceleration_if_its_effect_asks_for_it(bench, asked):
     acts = AxisForce(_heavier, lambda model, axis, values: np.array([0.05]), acceleration=asked)
     effects = [PlacedEffect(replace(EFFECTS["coulomb_friction"], acts=acts), (axis,), {}) for axis in (0, 1)]
-    commands = bench.commands(3)[: SAMPLES // 3] + 0.1
+    commands = bench.commands(3)[:SAMPLES] + 0.1
     if asked:
         assert_same(bench.three_axes(), effects, commands, 4)
     else:
