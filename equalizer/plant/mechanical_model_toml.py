@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, fields
+from datetime import date, time
 from typing import Any, TypeVar
 
 import numpy as np
@@ -57,7 +58,7 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
     rotational = model.get("rotational", document.get("rotational", False))
     if not isinstance(rotational, bool):
         problems.append(f"rotational is {_quote_value(rotational)}; it must be true or false")
-    origin = _read_table(document, "provenance", problems)
+    origin = _dates_as_text(_read_table(document, "provenance", problems))
     if problems:
         raise MechanicalModelError(tuple(problems))
     return MechanicalModel(
@@ -98,6 +99,15 @@ def mechanical_model_toml(model: MechanicalModel) -> str:
     if origin:
         lines += _format_section("[provenance]", origin)
     return "\n".join(lines) + "\n"
+
+
+def _dates_as_text(value: Any) -> Any:
+    """The value with dates and times as ISO 8601 text: TOML has them, but results quote the provenance in JSON."""
+    if isinstance(value, dict):
+        return {key: _dates_as_text(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_dates_as_text(entry) for entry in value]
+    return value.isoformat() if isinstance(value, date | time) else value
 
 
 def _read_units(origin: Mapping[str, Any]) -> UnitSystem | None:

@@ -1,7 +1,6 @@
 """Consistency checks of a recording: lengths, rates, channels, segments and time stamps."""
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -54,9 +53,16 @@ def segment_problems(segments: Sequence[Segment], samples: int) -> Iterator[str]
         for problem in _problems_of_segment(segment, samples):
             yield f"segment {number} {problem}"
     ordered = sorted(enumerate(segments, start=1), key=lambda numbered: numbered[1].start)
-    for (first, each), (second, other) in pairwise(ordered):
-        if other.start < each.stop:
-            yield f"segments {first} and {second} overlap (one stops at {each.stop}, the other starts at {other.start})"
+    last = ordered[:1]  # of the earlier segments, the one that stops last, with its number
+    for number, segment in ordered[1:]:
+        first, earlier = last[0]
+        if segment.start < earlier.stop:
+            yield (
+                f"segments {first} and {number} overlap (one stops at {earlier.stop}, the other starts at "
+                f"{segment.start})"
+            )
+        if segment.stop > earlier.stop:
+            last = [(number, segment)]
 
 
 def _problems_of_segment(segment: Segment, samples: int) -> Iterator[str]:

@@ -46,6 +46,8 @@ def prove(
     from study.evaluation.bank.sealed_bank import BankOptions
     from study.evaluation.bank.write_proof import write_proof, write_table
 
+    if laws and controls:
+        raise typer.BadParameter("The bank of laws has no controls: leave --controls or --laws out.")
     plan = BankPlan(seed, cases, brief)
     with cluster_if(scheduler) as cluster:
         options = BankOptions(workers, keep, controls, cluster)

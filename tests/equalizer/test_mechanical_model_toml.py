@@ -136,6 +136,14 @@ def test_every_fault_of_the_text_is_named(old, new, problem):
     assert any(found.startswith(problem) for found in refused.value.problems), refused.value.problems
 
 
+def test_dates_of_the_provenance_become_text():
+    made = "[provenance]\nday = 2026-11-01\nat = [2026-11-01T12:00:00Z]\n[provenance.bench]\nclock = 12:30:00\n"
+    origin = parse_mechanical_model(f"{ONE_AXIS}\n{made}").provenance
+    assert origin == {
+        "day": "2026-11-01", "at": ["2026-11-01T12:00:00+00:00"], "bench": {"clock": "12:30:00"}
+    }  # fmt: skip
+
+
 def test_an_empty_text_lacks_its_model():
     with pytest.raises(MechanicalModelError) as refused:
         parse_mechanical_model("")

@@ -87,6 +87,14 @@ def test_overlapping_segments_are_named_in_any_order(recording):
     assert check_recording(replace(recording, segments=(segments[0], Segment(10, 50, "sweep")))) == ()
 
 
+def test_each_segment_within_a_longer_earlier_one_overlaps_it(recording):
+    segments = (Segment(0, 80, "sine"), Segment(10, 20, "sine"), Segment(30, 40, "sine"), Segment(90, 95, "sine"))
+    assert check_recording(replace(recording, segments=segments)) == (
+        "segments 1 and 2 overlap (one stops at 80, the other starts at 10)",
+        "segments 1 and 3 overlap (one stops at 80, the other starts at 30)",
+    )
+
+
 @pytest.mark.parametrize(
     ("time_s", "problem"),
     [

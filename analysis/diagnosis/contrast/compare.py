@@ -190,19 +190,22 @@ def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
 def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, plain: Fit, samples: int) -> JudgedFault:
     """The fault with its values and their standard errors, its gain, and the gains of the negative control. plain: the
     fit with no fault undone. samples: number in both sets, over all bases."""
-    fit, fault, variant, pairs = found
-    values = variant.parameters_of(fit.sizes)
+    accepted, fault, variant, pairs = found
+    values = variant.parameters_of(accepted.sizes)
     folds = _leave_out_sixths(pairs)
     fits = [fit_sizes(kept, variant) for kept in folds]
-    held_out = sum(held_out_error(kept, each.sizes, out) for out, kept, each in zip(SIXTHS, folds, fits, strict=True))
+    # Errors count at the size that was accepted; only the standard errors need the free size of a timing fault.
+    allowed = restrict_sizes(variant)
+    fixed = [fit_sizes(kept, allowed) for kept in folds] if variant.exact else fits
+    held_out = sum(held_out_error(kept, fit.sizes, out) for out, kept, fit in zip(SIXTHS, folds, fixed, strict=True))
     # The negative control takes long, and a fault with hardly any gain needs none.
     gains = (
-        list(_gains_within_a_set(compared_bases, fault, restrict_sizes(variant), fit.sizes))
-        if plain.error > (1 + LEAST_FAULT_GAIN) * fit.error
+        list(_gains_within_a_set(compared_bases, fault, allowed, accepted.sizes))
+        if plain.error > (1 + LEAST_FAULT_GAIN) * accepted.error
         else [0.0]
     )
     typical = max(float(np.median(gains)), 0.0)
-    errors = fit.errors * (1 + typical)
+    errors = accepted.errors * (1 + typical)
     drawn = bootstrap_draws(len(errors))
     drawn_gains = plain.errors[drawn].sum(axis=1) / np.maximum(errors[drawn].sum(axis=1), 1e-300) - 1
     # With a separate base for each set, errors are white with rms 1: their sum of squares is the number of samples.
@@ -218,7 +221,7 @@ def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, pl
         share=(plain.error - error) / excess if excess > 0 else 0.0,
         held_out=held_out,
         gain_low=float(np.quantile(drawn_gains, BOOTSTRAP_LEVEL)),
-        apart=max(_excesses_within_a_set([pair.with_it.undo_sizes(fit.sizes) for pair in pairs])),
+        apart=max(_excesses_within_a_set([pair.with_it.undo_sizes(accepted.sizes) for pair in pairs])),
     )
 
 

@@ -137,4 +137,9 @@ def _line_power_ratio(samples: FloatArray, rate_hz: float, mains: float) -> tupl
         return 0.0, 0.0, mains
     top = int(np.flatnonzero(near)[np.argmax(power[near])])
     floor = max(float(np.median(power[around])), 1e-300)
-    return float(power[top]) / floor, 2 * float(np.sqrt(power[top])) / float(window.sum()), float(frequency[top])
+    # Parseval over the main lobe of the Hann window, less the noise in it (its mean power is its median over log 2): so
+    # the amplitude depends neither on where the tone lies between two lines, nor on the noise.
+    lobe = power[max(top - 2, 1) : top + 3]
+    tone = max(float(lobe.sum()) - len(lobe) * floor / np.log(2), 0.0)
+    amplitude = 2 * float(np.sqrt(tone / (len(samples) * float(np.sum(window**2)))))
+    return float(power[top]) / floor, amplitude, float(frequency[top])

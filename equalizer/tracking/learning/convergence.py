@@ -69,7 +69,10 @@ def convergence(
 
 def _safe_beta(played: ComplexArray) -> float:
     """Upper bound, 0 to 2, of the gains with |I - beta T| < 1 for all T of `played`, (..., lines, p, p). As matrix
-    inequalities the condition is T + T* > beta T* T, hence T⁻¹ + T⁻* > beta I: the smallest eigenvalue is the bound."""
+    inequalities the condition is T + T* > beta T* T, hence T⁻¹ + T⁻* > beta I: the smallest eigenvalue is the bound.
+    0 where a T is singular to rounding: in one direction the device then never moves, and no gain lessens an error."""
+    if np.any(np.linalg.cond(played) > 1 / np.finfo(float).eps):
+        return 0.0
     inverse = np.linalg.inv(played)
     lowest = np.linalg.eigvalsh(inverse + inverse.conj().swapaxes(-1, -2))[..., 0].min()
     return float(np.clip(lowest, 0.0, 2.0))

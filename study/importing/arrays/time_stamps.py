@@ -83,7 +83,9 @@ def _clock_seconds(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
     half = parts["half"].fillna("").str.lower().str[:1]
     # Alone, a clock time may be the time since a start, which has more hours.
     highest = np.select([half == "a", half == "p", parts["date"].notna()], [12.0, 23.0, 24.0], math.inf)
-    for place in np.flatnonzero(hour > highest):
+    # 24:00:00 is the end of a day (ISO 8601); no time comes after it.
+    after_midnight = parts["date"].notna() & (hour == 24) & ((parts["minute"].astype(int) > 0) | (second > 0))
+    for place in np.flatnonzero((hour > highest) | after_midnight):
         raise ValueError(f"'{text.iloc[place]}' is no clock time: it has hour {hour.iloc[place]:g}; correct it")
     hour = hour.where(half == "", hour % 12) + 12.0 * (half == "p")
     ahead = parts["zone"].fillna("").map({zone: _zone_s(zone) for zone in parts["zone"].fillna("").unique()})

@@ -112,11 +112,16 @@ def how_to_finish(folder: SessionFolder) -> str:
 
 
 def _parse_begun(left: Any) -> SessionParticipant | None:
-    """Facts on a session from JSON; None if they are missing or have other fields."""
+    """Facts on a session from JSON; None if they are missing, or have other fields or types."""
     try:
-        return SessionParticipant(**left) if left else None
+        begun = SessionParticipant(**left) if left else None
     except TypeError:
         return None
+    if begun is None or not isinstance(begun.protocol, str) or not isinstance(begun.simulated, bool):
+        return None
+    # A bool is an int for Python, but no participant number.
+    is_number = isinstance(begun.number, int) and not isinstance(begun.number, bool) and begun.number >= 0
+    return begun if begun.number is None or is_number else None
 
 
 def _is_of_subject(name: Any, subject: str) -> bool:

@@ -107,6 +107,8 @@ def _parse_answer(field: FormField, line: Line, numbered: bool) -> str | None:
     if numbered and text.isdecimal() and 1 <= int(text) <= len(field.choices):
         return field.choices[int(text) - 1]
     meant = [choice for choice in field.choices if choice.casefold() == text.casefold()]
+    if not meant and line.word in (BACK, "q"):
+        return None  # a command, also where a choice begins with this letter
     # As on the screen, the first letters of a choice suffice if no other choice has them: y for yes.
     meant = meant or [choice for choice in field.choices if choice.casefold().startswith(text.casefold())]
     return meant[0] if len(meant) == 1 else None

@@ -57,11 +57,13 @@ def write_entry(found: Path, out: Path, number: int = 1) -> LawEntry:
         )
     law = laws[number - 1]
     signature = f"it varies with {', '.join(law.variables) or 'nothing'} as the formula states"
+    about = f"Discovered law without a name: {law.text} (acts on the {law.acts_on} at {law.axis})."
     entry = LawEntry(out.stem, law, f"found by hapteq: {found.name}", signature)
     write_text(
         out,
         TEXT.format(
-            about=f"A law that was found, not named: {law.text} (acts on the {law.acts_on} at {law.axis}).",
+            # Escaped: the texts come from a file, and an unescaped quote would end the docstring and run as code.
+            about=about.replace("\\", r"\\").replace('"', r"\""),
             name=entry.name, expression=law.expression, numbers=law.numbers, units=law.units, acts_on=law.acts_on,
             axis=law.axis, source=entry.source, signature=entry.signature,
         ),

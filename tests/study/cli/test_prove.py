@@ -98,3 +98,9 @@ def test_a_folder_with_other_files_and_another_seed_are_refused(bank, run, tmp_p
     assert code == 1 and "A bank needs a folder of its own" in err
     code, _, err = run("--out", bank, "--cases", CASES, "--seed", SEED + 1, "--brief")
     assert code == 1 and "This folder holds another bank" in err
+
+
+def test_controls_of_a_bank_of_laws_are_refused(run, tmp_path):
+    code, _, err = run("--out", tmp_path / "new", "--laws", "--controls")
+    assert code == 2 and "The bank of laws has no controls" in err
+    assert not (tmp_path / "new").exists()

@@ -7,6 +7,8 @@ import pytest
 
 from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.signal_faults import find_hum, find_quantization, find_sensor_noise
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
 
 
 def test_a_line_of_the_mains_is_seen_where_the_clean_recording_has_none(rig):
@@ -15,6 +17,26 @@ def test_a_line_of_the_mains_is_seen_where_the_clean_recording_has_none(rig):
     assert found is not None
     assert found.values == {"frequency": pytest.approx(50.0, abs=0.1), "amplitude": pytest.approx(2e-5, rel=0.2)}
     assert find_hum(split_into_parts([rig.recording(2)]), clean) is None
+
+
+@pytest.mark.parametrize("off_lines", [0.0, 0.25, 0.5])
+def test_the_amplitude_of_hum_depends_neither_on_the_noise_nor_on_the_lines(off_lines):
+    # A tone between two lines of the spectrum loses up to 1.4 dB at the larger of them.
+    count, rate_hz = 20_000, 1000.0
+    random = np.random.default_rng(5)
+    time_s, hum_hz = np.arange(count) / rate_hz, 50.0 + off_lines * rate_hz / count
+
+    def part_of(amplitude: float, rms: float):
+        samples = amplitude * np.sin(2 * np.pi * hum_hz * time_s) + rms * random.standard_normal(count)
+        driven = Signal(random.standard_normal((count, 1)), rate_hz, "force", "N", ("fx",))
+        return split_into_parts(
+            [Recording("d", driven, Signal(samples[:, None], rate_hz, "acceleration", "m/s^2", ("ax",)))]
+        )
+
+    for rms in (0.01, 1.0):
+        found = find_hum(part_of(0.3, rms), part_of(0.0, rms))
+        assert found is not None
+        assert found.values["amplitude"] == pytest.approx(0.3, rel=0.01 if rms < 0.1 else 0.08)
 
 
 def test_white_noise_is_seen_where_the_clean_recording_has_less(rig):

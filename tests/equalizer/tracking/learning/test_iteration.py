@@ -140,6 +140,14 @@ def test_the_safe_gain_is_where_errors_begin_to_grow(plants, model):
     assert not convergence(answers, device, LINES_HZ, BAND_HZ, 1.001 * safe).converges
 
 
+def test_no_gain_is_safe_for_a_device_that_does_not_move_in_one_direction(plants, model):
+    answers, device = model_response(model, LINES_HZ), plants.omega_like().response(LINES_HZ)
+    device[:, 1] = device[:, 0]
+    found = convergence(answers, device, LINES_HZ, BAND_HZ)
+    assert found.safe_beta == 0
+    assert not found.converges
+
+
 def test_of_several_possible_devices_the_worst_counts(plants, model):
     answers = model_response(model, LINES_HZ)
     one, other = (plants.omega_like(shift).response(LINES_HZ) for shift in (0.0, 0.1))

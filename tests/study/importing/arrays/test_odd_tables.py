@@ -193,6 +193,7 @@ def test_a_quote_that_is_not_closed_swallows_no_rows(tmp_path):
         (("12:75:00", "12:76:00"), "'12:75:00' is no clock time"),
         (("12:00:59.5", "12:00:60.5"), "'12:00:60.5' is no clock time"),
         (("2024-03-01 24:00:00", "2024-03-01 25:00:00"), "'2024-03-01 25:00:00' is no clock time: it has hour 25"),
+        (("2024-03-01 23:59:00", "2024-03-01 24:00:01"), "'2024-03-01 24:00:01' is no clock time: it has hour 24"),
         (("11:00:00 PM", "25:00:00 PM"), "'25:00:00 PM' is no clock time: it has hour 25"),
         (("11:00:00 AM", "13:00:00 AM"), "'13:00:00 AM' is no clock time: it has hour 13"),
     ],

@@ -55,6 +55,18 @@ def test_choices_that_are_numbers_are_not_numbered_again(typed):
     assert "'3' is none of the answers. Type 0 or 1 or 2." in typed.said
 
 
+def test_b_goes_back_also_where_a_choice_begins_with_it(typed):
+    blind = FormField("sight", "What did you see?", ("both", "none"))
+    typed.type("1", "b", "no", "both")
+    assert filled(typed, CONSENT, blind) == {"hands": "no", "sight": "both"}
+
+
+def test_q_leaves_also_where_a_choice_begins_with_it(typed):
+    typed.type("q")
+    with pytest.raises(KeyboardInterrupt):
+        typed.display.fill_in(form(FormField("noise", "How loud was it?", ("quiet", "loud"))))
+
+
 @pytest.mark.parametrize("line", ["3", "0", "maybe", "", "-1", "\x1b[A"])
 def test_an_answer_that_is_no_choice_is_named_and_asked_again(typed, line):
     typed.type(line, "2")

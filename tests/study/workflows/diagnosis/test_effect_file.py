@@ -1,5 +1,6 @@
 """A discovered law becomes a file of a user's own, and a later diagnosis looks for it beside the catalogue."""
 
+import ast
 from dataclasses import replace
 
 import numpy as np
@@ -41,6 +42,15 @@ def test_a_law_is_written_as_an_effect_and_read_back(model_file, tmp_path):
     read = read_entry(tmp_path / "drag_of_oil.py")
     assert read == written
     assert (read.name, read.law.expression, read.law.numbers) == ("drag_of_oil", LAW.expression, LAW.numbers)
+
+
+@pytest.mark.parametrize("axis", ['x"""\nraise SystemExit\n"""', 'x"', "x\\"])
+def test_a_text_of_a_diagnosis_never_runs_as_code(tmp_path, monkeypatch, axis):
+    law = replace(LAW, axis=axis)
+    monkeypatch.setattr("study.workflows.diagnosis.effect_file._laws", lambda found: [law])
+    write_entry(tmp_path / "diagnosis.json", tmp_path / "drag.py")
+    assert read_entry(tmp_path / "drag.py").law.axis == axis
+    assert axis in ast.get_docstring(ast.parse((tmp_path / "drag.py").read_text()), clean=False)
 
 
 @pytest.mark.parametrize("name", ["Drag.py", "drag.txt", "cogging.py", "discovered_law.py"])
