@@ -1,8 +1,8 @@
 # %% [markdown]
-# # Add an effect of one's own
+# # Add an effect of your own
 #
-# A law that the catalogue does not hold is a formula of the motion. Here a force that grows with the 1.5th power of the
-# speed; diagnoses look for it beside the catalogue, at every axis.
+# A law outside the catalogue is a formula of the motion. Here it is a force that grows with the 1.5th power of the
+# speed. A diagnosis tests it together with the catalogue, at every axis.
 
 # %%
 import numpy as np

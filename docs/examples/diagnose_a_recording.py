@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Which physics does a model lack?
 #
-# A cart on a spring whose bearing rubs: 20 s of a force and of the position that it caused. No model is given, so a
-# first one is fitted; what it cannot follow is searched for in the catalogue of effects.
+# A cart on a spring with friction in its bearing: 20 s of a force and of the resulting position. No model is given, so
+# a first one is fitted. The catalogue of effects is then searched for the remaining error.
 
 # %%
 import numpy as np
@@ -20,7 +20,8 @@ time_s = np.arange(int(SECONDS * RATE_HZ)) / RATE_HZ
 force_n = 1.2 * np.sum(np.sin(2 * np.pi * lines_hz * time_s[:, None] + phases), axis=1)
 
 # %% [markdown]
-# Semi-implicit Euler steps of a tenth of a sample; the friction turns within 1 mm/s, so that the steps stay stable.
+# Semi-implicit Euler steps of a tenth of a sample. The friction changes sign within 1 mm/s, so that the steps are
+# stable.
 
 # %%
 position_m = np.zeros(len(time_s))

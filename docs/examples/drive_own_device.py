@@ -1,9 +1,10 @@
 # %% [markdown]
-# # Drive a device of one's own
+# # Drive a device of your own
 #
-# A driver turns a vendor's calls into five methods: say what it is, sense, buttons, write, close. Everything that
-# protects a person stands above it (`SafeDevice`). The vendor's library is invented here: it speaks millimetres and
-# millinewtons, measures its acceleration in thousandths of g, and lets its force go 50 ms after the last call.
+# A driver maps a vendor's calls to the methods of `Rig`: info, sense, buttons, write, close, and the time of the
+# device's own watchdog. The layer above it protects the person (`SafeDevice`). The vendor's library is invented here:
+# it uses millimetres and millinewtons, measures acceleration in thousandths of g, and drops its force 50 ms after the
+# last call.
 
 # %%
 import numpy as np
@@ -18,7 +19,7 @@ from study.session.stimulus.limits import Limits
 
 
 class InventedLibrary:
-    """A handle of 0.3 kg on an oil damper. Each read is a millisecond later."""
+    """A handle of 0.3 kg on an oil damper. Each read advances time by a millisecond."""
 
     def __init__(self) -> None:
         self.opened = True
@@ -44,8 +45,8 @@ class InventedLibrary:
 # %% [markdown]
 # ## The driver
 #
-# SI units, the handle's place in the axes of the protocol (x to the right, y away from the person, z up). What is not
-# known is NaN, never zero: a zero would be believed.
+# SI units, the handle's place in the axes of the protocol (x toward the operator, y to the right, z up). Unknown values
+# are NaN, never zero: a zero would be taken for a measurement.
 
 
 # %%
@@ -68,7 +69,7 @@ class InventedRig:
 
     @property
     def drops_force_after_s(self) -> float:
-        """As the device has it: the only thing that ends a force when the computer hangs."""
+        """As set in the device. Nothing else ends a force when the computer hangs."""
         return 0.05
 
     def sense(self) -> np.ndarray:
@@ -99,8 +100,8 @@ class InventedRig:
 # %% [markdown]
 # ## Behind the safety layer
 #
-# In the program `open_device` does this. A stimulus above its cap is refused before anything moves; what the driver
-# is given never exceeds the caps, whatever is asked for.
+# In the program `open_device` does this. A stimulus above its cap is refused before anything moves. No request gives
+# the driver a force above the caps.
 
 # %%
 LIMITS = Limits(

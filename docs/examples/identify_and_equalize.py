@@ -1,7 +1,7 @@
 # %% [markdown]
-# # Identify a device, and compute the forces that make it accelerate as wanted
+# # Identify a device, and compute the forces for a wanted acceleration
 #
-# A short recording of the simulated device, a state-space model of it, and the forces for a wanted acceleration.
+# The steps: a short recording of the simulated device, a state-space model of it, and the forces.
 
 # %%
 import tempfile
@@ -29,8 +29,8 @@ device = identify(recording, IdentificationSettings(order=12, draws=0))
 device.identified
 
 # %% [markdown]
-# A second of 20 Hz along x that fades in and out. `equalize` is the finite-horizon tracker: it refuses what lies above
-# the cap, and says what it predicts.
+# A second of 20 Hz along x that fades in and out. `equalize` is the finite-horizon tracker. It refuses forces above the
+# cap, and reports the predicted error.
 
 # %%
 time_s = np.arange(1000) / 1000.0

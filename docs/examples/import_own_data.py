@@ -1,7 +1,7 @@
 # %% [markdown]
-# # Import a table of one's own
+# # Import a table of your own
 #
-# A table whose header says what each column is needs no map: name and unit are read from it. Units are turned into SI.
+# A table with names and units in its header needs no map: both are read from it. Units are converted to SI.
 
 # %%
 import tempfile
@@ -28,7 +28,7 @@ for note in imported.notes:
     print(note)
 
 # %% [markdown]
-# Before any model: what is in it, and what should be noticed.
+# The contents and the checks of the recording, before any model.
 
 # %%
 overview("motor", imported.recording)

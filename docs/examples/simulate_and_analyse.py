@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Run a simulated study and analyse it
 #
-# Two simulated participants take the shipped protocol on the simulated device, in virtual time. What comes out are the
-# files that a study with people leaves: one folder per session, whose `trials.csv` holds a row per trial.
+# Two simulated participants run the shipped protocol on the simulated device, in virtual time. The results are the
+# files of a study with people: one folder per session, whose `trials.csv` has a row per trial.
 
 # %%
 import tempfile
@@ -19,8 +19,8 @@ sessions = [
 [session.name for session in sessions]
 
 # %% [markdown]
-# The analysis takes trials and the protocol that they followed, and returns values: thresholds per run, the analysis of
-# variance as published and the one within participants, warnings.
+# The analysis takes trials and their protocol, and returns values: thresholds per run, the analysis of variance as
+# published and the analysis of variance within participants, warnings.
 
 # %%
 trials = [trial for session in sessions for trial in read_trials(session.path / "trials.csv")]

@@ -1,8 +1,8 @@
 # %% [markdown]
-# # Write a protocol of one's own
+# # Write a protocol of your own
 #
-# A protocol is a TOML file: a shipped one is copied, given a name of its own, and changed. What is wrong in it is
-# refused with every problem named.
+# A protocol is a TOML file: copy a shipped one, give it a name of its own, and change it. An invalid protocol is
+# refused with a list of all its errors.
 
 # %%
 from protocols import begin_staircase, dump_protocol, load_protocol, planned_runs, staircase_level_n, step_staircase
