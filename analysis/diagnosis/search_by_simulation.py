@@ -17,6 +17,7 @@ from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search import HUM, Beyond, move_model_further, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import SearchResult, judge
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.effects.catalogue import CATALOGUE
@@ -137,7 +138,8 @@ class _ImpactSearch:
             found = explain_impacts(seen.context, seen.found, floors, self._catalogue, time_left)
             self._found, self._steps = None, len(seen.found.steps)
             if found is not None:
-                self._found = SearchResult(seen.context, found, judge(found), (IMPACTS_COMPARED,))
+                remarks = (IMPACTS_COMPARED, *((OUT_OF_TIME,) if found.ended_early else ()))
+                self._found = SearchResult(seen.context, found, judge(found), remarks)
         return self._found
 
 

@@ -4,8 +4,7 @@ Two simulations of a drive with play diverge within a few impacts, however small
 Dynamical Systems, chapter 4). The difference between two simulations of one hypothesis, its chance variation, is
 therefore used in place of the noise.
 
-Where play alone leaves clearly more than chance, a second effect is looked for: sensor faults, whose starting values
-come from the readings themselves, and the candidates of the first round of the search by waveforms.
+Where play alone leaves clearly more than chance, a second effect is searched for (`second_effect_with_play`).
 """
 
 from collections.abc import Sequence
@@ -14,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.errors.band_power import BandPower
-from analysis.diagnosis.errors.band_power_fit import BandPowerFit, View, evaluate_hypothesis, fit_band_power, perturb
+from analysis.diagnosis.errors.band_power_fit import BandPowerFit, View, evaluate_hypothesis, fit_band_power
 from analysis.diagnosis.errors.excited_segments import select_excited_segments
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import (
@@ -25,7 +24,8 @@ from analysis.diagnosis.errors.hypothesis import (
     hypothesis_of_claim,
     without_claim,
 )
-from analysis.diagnosis.errors.output_error import evaluate_fit, expect_gain, gather_evidence
+from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
+from analysis.diagnosis.errors.refine_band_power import refine_band_power
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.search.band_power_comparison import (
@@ -37,36 +37,28 @@ from analysis.diagnosis.search.band_power_comparison import (
 )
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.identifiability import open_effects
-from analysis.diagnosis.search.search_context import STARTING, SearchContext
-from analysis.diagnosis.search.starting_hypotheses import candidates
+from analysis.diagnosis.search.search_context import SearchContext
+from analysis.diagnosis.search.second_effect_with_play import (
+    RIVAL,
+    SecondEffects,
+    fit_second_effects,
+    suggest_second_effects,
+)
 from analysis.diagnosis.search.time_budget import always
 from analysis.diagnosis.settings import (
     EXPLAINED_BY_CHANCE,
-    IMPACTS_SHARE,
     PEAKED_KURTOSIS,
     VARIES_ERROR,
 )
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import Effect, Values
-from equalizer.effects.placing import place_of_effect
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.signals.signal import FloatArray
 
 WORDS = "band power of the response"
-SIMULATIONS = 4
-"""Simulations of one hypothesis: their standard deviation is the chance variation, and their mean is what the last fit
-compares."""
 WIDTHS = np.geomspace(0.02, 5.0, 13)
 """Starting values of the gap that are tried, relative to the estimated gap."""
-FIRST_ROUNDS, ROUNDS, STEPS = 5, 4, 2
-"""Steps of the first fit, in which the model's parameters are fixed; linearisations of the last fit, and steps with
-each of them."""
-GAINED = 0.02
-"""Expected relative reduction of the cost above which a further linearisation follows."""
-RIVAL = "loose_joint"
-"""Effect that is fitted at the same place as play, for comparison."""
-MOST_BESIDE = 3
-"""Most effects, of different names, that are fitted as a second effect with play; each takes some 7 s. By hand."""
+FIRST_ROUNDS = 5
+"""Steps of the first fit, in which the model's parameters are fixed."""
 
 
 def explain_impacts(
@@ -91,61 +83,29 @@ def explain_impacts(
     places = sorted((_fit_claim(view, evidence, claim) for claim in claims), key=lambda claim: claim.cost)
     if places[0].cost >= evaluate_hypothesis(view, given.deviations, NOTHING).cost:
         return None
-    best = _refine(view, places[0])
-    others = list(places[1:])
+    play = refine_band_power(view, places[0])
+    rivals = list(places[1:])
     if RIVAL in effects:
-        others.append(_fit_claim(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
-    beside: tuple[BandPowerFit, ...] = ()
-    comparison = comparison_of(context, best)
-    left = comparison.score_candidate(best.deviations, best.hypothesis)
-    if worst_part(left) > EXPLAINED_BY_CHANCE and time_left():
-        suggested = _suggest_second_effects(context, found, best, catalogue)
-        beside = _with_second_effect(view, best, suggested, time_left)
-        comparison = comparison_of(context, beside[0]) if beside else comparison
-    rivals = [rival.hypothesis for rival in others if rival.hypothesis.claims and np.isfinite(rival.cost)]
-    named = _judge(comparison, found, view, (best, beside), rivals)
-    # If the gap may be zero, play is not the cause of the irregular response.
-    if named is None or any(open_effects(context, named)) or not _needs_gap(comparison, view, (*beside, best)[0]):
-        return None
-    return named
+        rivals.append(_fit_claim(view, evidence, Claim(effects[RIVAL], "one", play.hypothesis.claims[0].sites)))
+    hypotheses = [rival.hypothesis for rival in rivals if rival.hypothesis.claims and np.isfinite(rival.cost)]
+    second = SecondEffects((), True)
+    comparison = comparison_of(context, play)
+    if worst_part(comparison.score_candidate(play.deviations, play.hypothesis)) > EXPLAINED_BY_CHANCE and time_left():
+        suggested = suggest_second_effects(context, found, play, catalogue)
+        second = fit_second_effects(view, play, suggested, time_left)
+    # Where the best pair is not confirmed, the next one is judged, and at last play alone.
+    for number in range(len(second.fits) + 1):
+        pairs = second.fits[number:]
+        named = _judge(comparison_of(context, (*pairs, play)[0]), found, view, (play, pairs), hypotheses)
+        if named is not None and _is_determined(context, view, named, (*pairs, play)[0]):
+            return replace(named, ended_early=named.ended_early or not second.complete)
+    return None
 
 
-def _suggest_second_effects(
-    context: SearchContext, found: Explanation, alone: BandPowerFit, catalogue: Sequence[Effect]
-) -> list[Hypothesis]:
-    """Hypotheses of a second effect in addition to play: sensor faults with starting values from the readings, and the
-    candidates of the first round of the search by waveforms, as fitted there."""
-    played = evaluate_fit(context.measure, context.tuning, alone.deviations, alone.hypothesis)
-    evidence = gather_evidence(context.measure, context.tuning, played)[0]
-    sensed = [effect for effect in catalogue if place_of_effect(effect) == "sensor"]
-    tried = found.rounds[0] if found.rounds else ()
-    fitted = [each.fitted.hypothesis for each in tried if each.newest not in ("backlash", RIVAL)]
-    return [*candidates(sensed, evidence, context.guard.over(context.map_, STARTING)), *fitted]
-
-
-def _with_second_effect(
-    view: View, alone: BandPowerFit, suggested: Sequence[Hypothesis], time_left: TimeBudget
-) -> tuple[BandPowerFit, ...]:
-    """Fits of play with a second effect, the best first: those that remove at least `IMPACTS_SHARE` of the cost of play
-    alone, on the samples to fit and to choose by. Empty where none does."""
-    chanced = _with_chance(view, alone)
-    before = evaluate_hypothesis(chanced, alone.deviations, alone.hypothesis).cost
-
-    def tried(hypothesis: Hypothesis, deviations: FloatArray) -> BandPowerFit:
-        return evaluate_hypothesis(chanced, deviations, hypothesis)
-
-    starts = [tried(combine(alone.hypothesis, each), alone.deviations) for each in suggested]
-    likeliest: dict[str, BandPowerFit] = {}
-    for start in sorted(starts, key=lambda trial: trial.cost):
-        likeliest.setdefault(start.hypothesis.claims[-1].effect.name, start)
-    refined: list[tuple[float, BandPowerFit]] = []
-    for start in list(likeliest.values())[:MOST_BESIDE]:
-        if start.cost >= before or (refined and not time_left()):
-            break
-        fitted = _refine(view, start)
-        refined.append((tried(fitted.hypothesis, fitted.deviations).cost, fitted))
-    refined.sort(key=lambda each: each[0])
-    return tuple(fitted for cost, fitted in refined if cost <= (1 - IMPACTS_SHARE) * before)
+def _is_determined(context: SearchContext, view: View, named: Explanation, fit: BandPowerFit) -> bool:
+    """Whether the recordings determine the effects: none has an open parameter, and the gap is needed, because play of
+    no gap is not the cause of the irregular response."""
+    return not any(open_effects(context, named)) and _needs_gap(comparison_of(context, fit), view, fit)
 
 
 def _needs_gap(comparison: BandPowerComparison, view: View, best: BandPowerFit) -> bool:
@@ -159,7 +119,7 @@ def _needs_gap(comparison: BandPowerComparison, view: View, best: BandPowerFit) 
         hypothesis_of_claim(replace(claim, effect=closed), [{**placed.values, "gap": gap}]),
         without_claim(best.hypothesis, 0),
     )
-    without = _refine(view, evaluate_hypothesis(view, best.deviations, hypothesis))
+    without = refine_band_power(view, evaluate_hypothesis(view, best.deviations, hypothesis))
     if not np.isfinite(without.cost):
         return False
     each = [comparison.score_candidate(fitted.deviations, fitted.hypothesis) for fitted in (best, without)]
@@ -184,45 +144,6 @@ def _fit_claim(view: View, evidence: Evidence, claim: Claim) -> BandPowerFit:
     return evaluate_hypothesis(view, given, NOTHING if best is None else best.hypothesis)
 
 
-def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
-    """The joint fit of the hypothesis's and the model's parameters. The sensitivity to the model's parameters is
-    renewed up to `ROUNDS` times, because play changes it."""
-    view = _with_chance(view, start)
-    best = evaluate_hypothesis(view, start.deviations, start.hypothesis)
-    before = 0.0
-    for _ in range(ROUNDS):
-        view = replace(view, by_deviations=_by_deviations(view, best))
-        better = fit_band_power(view, best, STEPS)
-        gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
-        best, expected, before = better, expect_gain(gained, before), gained
-        if expected <= GAINED:
-            break
-    return best
-
-
-def _with_chance(view: View, at: BandPowerFit) -> View:
-    """The view with each band's standard deviation over `SIMULATIONS` simulations, and predictions averaged over as
-    many."""
-
-    def predict(number: int) -> FloatArray:
-        return view.predict(at.deviations, perturb(at.hypothesis, number))
-
-    spread = np.std(np.array(list(view.map_(predict, range(SIMULATIONS)))), axis=0, ddof=1)
-    return replace(view, spread=spread, ensemble=SIMULATIONS)
-
-
-def _by_deviations(view: View, at: BandPowerFit) -> FloatArray:
-    """(t, stretches, bands, c): sensitivity to the model's t parameters, by forward differences with steps of one
-    standard deviation, which are large compared with the chance variation; 0 where a step gives no finite value."""
-    ways = np.eye(len(at.deviations))
-
-    def moved(number: int) -> FloatArray:
-        change = view.predict(at.deviations + ways[number], at.hypothesis) - at.predicted
-        return np.where(np.isfinite(change), change, 0.0)
-
-    return np.array(list(view.map_(moved, range(len(ways)))))
-
-
 def _judge(
     comparison: BandPowerComparison,
     found: Explanation,
@@ -232,7 +153,7 @@ def _judge(
 ) -> Explanation | None:
     """The explanation by play, and by a second effect if there is one; None where the re-tuned model, another effect or
     a rival of play is about as good. comparison: with the chance variation of the best fit. fits: of play alone, and
-    with a second effect, the best first. others: the rivals."""
+    with a second effect, the best first. others: the rivals. A second effect must also be better than play alone."""
     alone, beside = fits
     best = (*beside, alone)[0]
     played = comparison.score_candidate(alone.deviations, alone.hypothesis)
@@ -251,7 +172,8 @@ def _judge(
         for candidate in (*(found.rounds[0] if found.rounds else ()), *found.steps[1:])
         if candidate.fitted.hypothesis.key[-1] != alone.hypothesis.key[-1]
     ]
-    if not is_convincing(named, retuned) or any(is_as_good(each, named) for each in earlier):
+    simpler = (*earlier, played) if both else earlier
+    if not is_convincing(named, retuned) or any(is_as_good(each, named) for each in simpler):
         return None
     for rival in (each for each in rivals if is_as_good(each, played)):
         if not beside:

@@ -143,6 +143,16 @@ def test_a_friction_that_the_search_tried_is_named_beside_play(diagnosed):
 
 
 @pytest.mark.slow
+def test_a_dead_band_that_no_waveform_shows_is_named_beside_play(diagnosed):
+    dead = PlacedEffect(EFFECTS["force_deadband"], (AXIS,), {"width": 0.3, "jump": 0.0})
+    found = explain_impacts(*searched(diagnosed, (*LOOSE, dead)), CATALOGUE)
+    assert [each.effect.name for each in found.after.fitted.hypothesis.claims] == ["backlash", "force_deadband"]
+    width = found.after.fitted.hypothesis.list_placed_effects()[-1].values["width"]
+    assert width == pytest.approx(0.3, rel=0.15)
+    assert judge(found).verdict == "explained"
+
+
+@pytest.mark.slow
 def test_without_time_no_second_effect_is_looked_for(diagnosed):
     hum = PlacedEffect(EFFECTS["mains_hum"], (0, 1), {"amplitude": 2.0, "frequency": 60.0, "phase": 1.0})
     late = explain_impacts(*searched(diagnosed, (*LOOSE, hum)), CATALOGUE, lambda: False)

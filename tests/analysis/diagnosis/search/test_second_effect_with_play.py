@@ -1,0 +1,68 @@
+"""The strength of a second effect is searched over a decade and a half, and fits end in order and in time."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import analysis.diagnosis.search.second_effect_with_play as second_effect
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
+from analysis.diagnosis.search.time_budget import CountedBudget
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.coulomb_friction import EFFECT as DRY
+
+PLAY = SimpleNamespace(hypothesis=NOTHING, deviations=np.zeros(0), cost=9.0)
+VIEW = SimpleNamespace(map_=map)
+
+
+def friction(level_n: float):
+    return hypothesis_of_claim(Claim(DRY, "one", (0,)), [{"level": level_n}])
+
+
+def level_of(fit) -> float:
+    return float(fit.hypothesis.list_placed_effects()[-1].values["level"])
+
+
+@pytest.fixture
+def true_level(monkeypatch):
+    """The cost grows with the squared logarithm of the level over the true one."""
+    level_n = [1.0]
+
+    def evaluate(view, deviations, hypothesis):
+        (placed,) = hypothesis.list_placed_effects()
+        cost = 1.0 + np.log(placed.values.get("level", 1.0) / level_n[0]) ** 2
+        return SimpleNamespace(hypothesis=hypothesis, deviations=deviations, cost=float(cost))
+
+    monkeypatch.setattr(second_effect, "evaluate_hypothesis", evaluate)
+    return level_n
+
+
+@pytest.mark.parametrize("true_n", [0.03, 0.1, 0.3, 0.55, 1.0, 1.8, 3.2])
+def test_a_strength_is_found_from_a_wrong_start(true_level, true_n):
+    true_level[0] = true_n
+    fit = second_effect._search_strength(VIEW, PLAY, friction(1.0))
+    assert level_of(fit) == pytest.approx(true_n)
+    assert fit.cost == pytest.approx(1.0)
+
+
+def test_an_effect_that_does_not_vanish_at_zero_keeps_its_start(true_level):
+    gain = EFFECTS["sensor_gain"]
+    assert gain.parameters[0].none != 0
+    hypothesis = hypothesis_of_claim(Claim(gain, "one", (0,)), [{"gain": 1.1}])
+    fit = second_effect._search_strength(VIEW, PLAY, hypothesis)
+    assert fit.hypothesis.list_placed_effects()[0].values["gain"] == pytest.approx(1.1)
+
+
+def test_starts_end_in_time_and_what_was_evaluated_is_kept(true_level, monkeypatch):
+    monkeypatch.setattr(second_effect, "replace", lambda view, **changes: view)
+    suggested = [friction(1.0)] * (3 * second_effect.BATCH)
+    starts, complete = second_effect._evaluate_starts(VIEW, PLAY, suggested, CountedBudget(1))
+    assert (len(starts), complete) == (2 * second_effect.BATCH, False)
+    starts, complete = second_effect._evaluate_starts(VIEW, PLAY, suggested, CountedBudget(9))
+    assert (len(starts), complete) == (len(suggested), True)
+
+
+def test_of_each_effect_only_its_best_start_is_kept(true_level):
+    starts = [second_effect.evaluate_hypothesis(VIEW, PLAY.deviations, friction(level)) for level in (3.0, 1.1, 2.0)]
+    (best,) = second_effect._best_per_effect(starts)
+    assert level_of(best) == pytest.approx(1.1)
