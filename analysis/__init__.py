@@ -59,8 +59,8 @@ def __getattr__(name: str) -> Any:
     """The exported object of this name, imported at first access (PEP 562). Raises AttributeError for other names."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, _, own = _HOME[name].partition(":")
-    return getattr(import_module(module), own)
+    module, _, attribute = _HOME[name].partition(":")
+    return getattr(import_module(module), attribute)
 
 
 def __dir__() -> list[str]:

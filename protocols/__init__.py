@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from protocols.definition.study_protocol import StudyProtocol as StudyProtocol
     from protocols.document.dumping import dump_protocol as dump_protocol
     from protocols.document.loading import load_protocol as load_protocol
-    from protocols.procedure.schedule import runs as planned_runs
-    from protocols.procedure.staircase import begin as begin_staircase
+    from protocols.procedure.schedule import schedule_runs as planned_runs
+    from protocols.procedure.staircase import begin_staircase as begin_staircase
     from protocols.procedure.staircase import level_n as staircase_level_n
     from protocols.procedure.staircase import step as step_staircase
     from protocols.trial import Trial as Trial
@@ -33,10 +33,10 @@ _HOME = {
     "StaircaseRule": "protocols.definition.staircase_rule:StaircaseRule",
     "StudyProtocol": "protocols.definition.study_protocol:StudyProtocol",
     "Trial": "protocols.trial:Trial",
-    "begin_staircase": "protocols.procedure.staircase:begin",
+    "begin_staircase": "protocols.procedure.staircase:begin_staircase",
     "dump_protocol": "protocols.document.dumping:dump_protocol",
     "load_protocol": "protocols.document.loading:load_protocol",
-    "planned_runs": "protocols.procedure.schedule:runs",
+    "planned_runs": "protocols.procedure.schedule:schedule_runs",
     "staircase_level_n": "protocols.procedure.staircase:level_n",
     "step_staircase": "protocols.procedure.staircase:step",
 }
@@ -60,8 +60,8 @@ def __getattr__(name: str) -> Any:
     """Import an exported object at first use (PEP 562). Raises AttributeError for another name."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, _, own = _HOME[name].partition(":")
-    return getattr(import_module(module), own)
+    module, _, attribute = _HOME[name].partition(":")
+    return getattr(import_module(module), attribute)
 
 
 def __dir__() -> list[str]:

@@ -58,8 +58,8 @@ class VoidCause(Enum):
     """The program ended before the answer."""
 
 
-AT_WILL = frozenset({VoidCause.ASKED, VoidCause.PAUSED, VoidCause.LEFT, VoidCause.LATE, VoidCause.EARLY})
-"""Causes that a participant can produce while feeling the stimulus."""
+PARTICIPANT_CAUSES = frozenset({VoidCause.ASKED, VoidCause.PAUSED, VoidCause.LEFT, VoidCause.LATE, VoidCause.EARLY})
+"""Causes that a participant can bring about at will while feeling the stimulus."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -62,10 +62,11 @@ class UserInterruptError(StudyError):
 
 
 @contextmanager
-def resumable(happened: str, saved: str, also: tuple[type[UserInterruptError], ...] = ()) -> Iterator[None]:
-    """Context that turns Ctrl-C into a UserInterruptError which says that the same command continues the work. also:
-    (UserInterruptError,) where a part of the work raises its own error, which this error then replaces."""
-    caught: tuple[type[BaseException], ...] = (KeyboardInterrupt, *also)
+def resumable(happened: str, saved: str, further_types: tuple[type[UserInterruptError], ...] = ()) -> Iterator[None]:
+    """Context that turns Ctrl-C into a UserInterruptError which says that the same command continues the work.
+    further_types: (UserInterruptError,) where a part of the work raises its own error, which this error then
+    replaces."""
+    caught: tuple[type[BaseException], ...] = (KeyboardInterrupt, *further_types)
     try:
         yield
     except caught as interruption:

@@ -1,4 +1,5 @@
-"""Open regular files only, without blocking: for a pipe, a device or a folder, an error is raised at once."""
+"""Open and read regular files only, without blocking; all readers of files use it. For a pipe, a device or a folder,
+an error is raised at once."""
 
 import errno
 import io
@@ -50,20 +51,20 @@ def read_regular(path: Path, most_bytes: int = TABLE_BYTES) -> bytes:
     with open_regular(path) as file:
         size = os.fstat(file.fileno()).st_size
         blocks: list[bytes] = []
-        found = 0
+        byte_count = 0
         # The stated size is not trusted alone: a system file may state 0 bytes and be endless.
-        while size <= most_bytes and found <= most_bytes and (block := file.read(_BLOCK_BYTES)):
+        while size <= most_bytes and byte_count <= most_bytes and (block := file.read(_BLOCK_BYTES)):
             blocks.append(block)
-            found += len(block)
-    if max(size, found) > most_bytes:
-        raise RefusedFileError(errno.EFBIG, f"it has {max(size, found)} bytes, and up to {most_bytes} are read")
+            byte_count += len(block)
+    if max(size, byte_count) > most_bytes:
+        raise RefusedFileError(errno.EFBIG, f"it has {max(size, byte_count)} bytes, and up to {most_bytes} are read")
     return b"".join(blocks)
 
 
-def _require_regular(found: os.stat_result) -> None:
+def _require_regular(status: os.stat_result) -> None:
     """Raises IsADirectoryError for a folder, RefusedFileError for anything else that is not a regular file."""
-    if stat.S_ISDIR(found.st_mode):
+    if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-    if not stat.S_ISREG(found.st_mode):
-        what = next((words for is_kind, words in _KINDS if is_kind(found.st_mode)), "it is no regular file")
-        raise RefusedFileError(errno.EINVAL, what)
+    if not stat.S_ISREG(status.st_mode):
+        reason = next((words for is_kind, words in _KINDS if is_kind(status.st_mode)), "it is no regular file")
+        raise RefusedFileError(errno.EINVAL, reason)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from analysis.diagnosis.errors.choose_measure import measure_of
-from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.search.explain import Explanation, retune_alone
@@ -70,6 +70,6 @@ def arena_of(recording: Recording, model: MechanicalModel | None = None) -> tupl
     measure = measure_of([recording], given).measure
     tuning = tuning_of(given, recording.command.channels)
     context = SearchContext(measure.shorten(), measure, tuning, map)
-    before = evaluate_fit(context.measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+    before = evaluate_fit(context.measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
     given_, retuned = (context.with_test_score(context.candidate(fitted)) for fitted in (before, retune_alone(context)))
     return context, Explanation(given_, retuned, retuned, (), ())

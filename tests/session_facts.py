@@ -9,8 +9,8 @@ from study.session.facts.events import (
     TrialMeasured,
     TrialPresented,
 )
-from study.session.state.fold import apply
-from study.session.state.machine import Present, Rest, next_action
+from study.session.state.fold import apply_event
+from study.session.state.machine import PresentTrial, TakeRest, next_action
 
 UTC = "2026-01-01T00:00:00.000+00:00"
 
@@ -35,7 +35,7 @@ def opened(protocol, text, **changes):
     return SessionOpened(**(facts | changes))
 
 
-def presented(action: Present, utc: str = UTC) -> TrialPresented:
+def presented(action: PresentTrial, utc: str = UTC) -> TrialPresented:
     return TrialPresented(
         utc=utc,
         run=action.run,
@@ -51,21 +51,21 @@ def presented(action: Present, utc: str = UTC) -> TrialPresented:
     )
 
 
-def answered(action: Present, correct: bool) -> AnswerGiven:
+def answered(action: PresentTrial, correct: bool) -> AnswerGiven:
     answer = action.label if correct else 3 - action.label
     return AnswerGiven(UTC, action.run, action.trial, action.attempt, answer, response_time_s=1.0)
 
 
-def measured(action: Present) -> TrialMeasured:
+def measured(action: PresentTrial) -> TrialMeasured:
     return TrialMeasured(UTC, action.run, action.trial, action.attempt, "ok", missed_ticks=0)
 
 
 def one_trial(state, correct: bool):
     """Present, answer, measure; rests on the way."""
     action = next_action(state)
-    if isinstance(action, Rest):
-        state = apply(state, RestTaken(UTC, state.run, state.trial, rested_s=action.seconds))
+    if isinstance(action, TakeRest):
+        state = apply_event(state, RestTaken(UTC, state.run, state.trial, rested_s=action.seconds))
         action = next_action(state)
     for event in (presented(action), answered(action, correct), measured(action)):
-        state = apply(state, event)
+        state = apply_event(state, event)
     return state

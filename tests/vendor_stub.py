@@ -23,7 +23,7 @@ from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.library import Library
 from study.devices.force_dimension.models import MODELS
 from study.devices.force_dimension.rig import ForceDimensionRig
-from study.devices.force_dimension.rigs import info_of
+from study.devices.force_dimension.rigs import read_info
 
 SOURCE = Path(__file__).parent / "study" / "devices" / "force_dimension" / "dhd_stub.c"
 FILE = "libdrd.so.3.17.5"
@@ -115,7 +115,7 @@ class Stub:
         """Ready for forces. sensed: with an accelerometer that tells the truth."""
         model, handle = MODELS["omega3"], self.opened()
         drops_after_s = make_ready(handle, model, cap_n, None)
-        info: DeviceInfo = info_of(handle, handle.library, model, None)
+        info: DeviceInfo = read_info(handle, handle.library, model, None)
         return ForceDimensionRig(handle, info, drops_after_s, cap_n, TrueSensor(self) if sensed else None, rests)
 
 
@@ -140,7 +140,7 @@ class TrueSensor:
         stub.sense_into(self.samples)
 
     def latest(self) -> tuple[FloatArray, bool]:
-        return self._newest.fresh(time.monotonic())
+        return self._newest.read_zeroed(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> None:
         """It is read at each tick."""

@@ -12,11 +12,11 @@ from study.session.facts.events import (
     TrialMeasured,
     TrialSpoiled,
 )
-from study.session.state.due_trial import Present
-from study.session.state.machine import Finish, Rest, next_action
-from study.session.watching.followed_session import FollowedSession, begin_watching, follow
+from study.session.state.due_trial import PresentTrial
+from study.session.state.machine import Finish, TakeRest, next_action
+from study.session.watching.followed_session import FollowedSession, apply_followed_event, begin_watching
 from study.session.watching.live import Live
-from study.session.watching.make_watch_view import LiveInfo, watch_view
+from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from tests.session_facts import opened, presented
 
 BEGAN = datetime(2026, 11, 22, 10, 0, tzinfo=UTC)
@@ -29,7 +29,7 @@ def at(seconds: float) -> str:
     return (BEGAN + timedelta(seconds=seconds)).isoformat(timespec="milliseconds")
 
 
-def place(action: Present) -> dict[str, int]:
+def place(action: PresentTrial) -> dict[str, int]:
     return {"run": action.run, "trial": action.trial, "attempt": action.attempt}
 
 
@@ -43,12 +43,12 @@ class Story:
         self.seconds = 0.0
 
     def tell(self, event) -> "Story":
-        self.watched = follow(self.watched, event)
+        self.watched = apply_followed_event(self.watched, event)
         return self
 
-    def open_trial(self) -> Present:
+    def open_trial(self) -> PresentTrial:
         action = next_action(self.watched.state)
-        if isinstance(action, Rest):
+        if isinstance(action, TakeRest):
             state = self.watched.state
             self.tell(RestTaken(at(self.seconds), state.run, state.trial, rested_s=action.seconds))
             action = next_action(self.watched.state)
@@ -79,7 +79,7 @@ class Story:
         return self.tell(SessionClosed(at(self.seconds + 4), "completed"))
 
     def view(self, live: Live | None = None, later: float = 4.0, before=None, writer: bool | None = None):
-        return watch_view(self.watched, LiveInfo(live, writer), at(self.seconds + later), before)
+        return make_watch_view(self.watched, LiveInfo(live, writer), at(self.seconds + later), before)
 
     def live(self, activity="trial", age_s: float = 0.1, since_s: float = 1.0, later: float = 4.0, **changes) -> Live:
         now = self.seconds + later

@@ -1,8 +1,9 @@
 """Changes between two measurements of a device: each number with its accepted value, standard error and limit.
 
 Compared are dry friction, gain, frequency response by third octaves and noise, of a recording at the acceptance of the
-device and of one of today (`measure_device`). A number counts as changed if the difference exceeds both its limit,
-derived from the smallest step of the published staircases, and three standard errors (`ChangeLimits`).
+device and of one of today (`measure_device`). Friction and gain count as changed if the difference exceeds both a limit
+derived from the smallest step of the published staircases, and three standard errors; a response, if its difference
+beyond the noise does; noise, if its ratio exceeds a factor (`ChangeLimits`). Called by `hapteq`'s daily check.
 """
 
 import math
@@ -62,14 +63,14 @@ class Change:
     """Limit of the difference; for noise, of the ratio."""
     unit: str
     changed: bool
-    """Whether the change exceeds both its limit and the scatter of the measurements."""
+    """Whether the change exceeds its limit and, but for noise, the scatter of the measurements."""
     band_hz: tuple[float, float] | None = None
     """Band in which a response changed most."""
     peaks_hz: tuple[float, float] | None = None
     """Frequencies of the peak of a changed response, then and now."""
     unclear: bool = False
-    """Nothing was seen to change, and it was measured too inaccurately to see a change of the limit's size, or (today
-    is NaN) not at all."""
+    """No change was detected, but the error is too large to detect a change of the size of the limit, or (`today` is
+    NaN) nothing was measured."""
 
 
 def compare_devices(
@@ -81,131 +82,155 @@ def compare_devices(
     reliable frequencies of the two do not agree.
     """
     limits = limits or ChangeLimits()
-    _check_played_alike(baseline, recording)
+    _require_same_excitation(baseline, recording)
     accepted, today = measure_device(baseline), measure_device(recording)
     return (
-        *_friction_changes(accepted, today, limits),
-        *_response_changes(accepted.response, today.response, limits),
-        *_lost_bands(accepted.response, today.response, limits),
-        *_noise_changes(accepted, today, limits),
+        *_compare_friction(accepted, today, limits),
+        *_compare_responses(accepted.response, today.response, limits),
+        *_find_lost_bands(accepted.response, today.response, limits),
+        *_compare_noise(accepted, today, limits),
     )
 
 
-def _check_played_alike(baseline: Recording, recording: Recording) -> None:
+def _require_same_excitation(baseline: Recording, recording: Recording) -> None:
     """Raise NotMeasurableError unless both have segments of the same kinds, amplitudes and periods, in one order."""
-    then, now = ([(s.kind, s.amplitude, s.period) for s in each.segments] for each in (baseline, recording))
-    if len(then) != len(now):
-        raise NotMeasurableError(f"{len(now)} segments were played now, but {len(then)} at the acceptance")
-    for before, after in zip(then, now, strict=True):
-        if before != after:
-            words = (
-                f"a {kind} of {amplitude:.3g} N, {period} samples long" for kind, amplitude, period in (after, before)
+    accepted_segments, segments = (
+        [(s.kind, s.amplitude, s.period) for s in measured.segments] for measured in (baseline, recording)
+    )
+    if len(accepted_segments) != len(segments):
+        raise NotMeasurableError(
+            f"{len(segments)} segments were played now, but {len(accepted_segments)} at the acceptance"
+        )
+    for accepted_segment, segment in zip(accepted_segments, segments, strict=True):
+        if accepted_segment != segment:
+            descriptions = (
+                f"a {kind} of {amplitude:.3g} N, {period} samples long"
+                for kind, amplitude, period in (segment, accepted_segment)
             )
-            raise NotMeasurableError(" was played instead of ".join(words))
+            raise NotMeasurableError(" was played instead of ".join(descriptions))
 
 
-def _friction_changes(accepted: DeviceMeasures, today: DeviceMeasures, limits: ChangeLimits) -> Iterator[Change]:
+def _compare_friction(accepted: DeviceMeasures, today: DeviceMeasures, limits: ChangeLimits) -> Iterator[Change]:
     for axis, channel in enumerate(accepted.response.input_channels):
-        then, now = float(accepted.friction_n[axis]), float(today.friction_n[axis])
+        accepted_n, today_n = float(accepted.friction_n[axis]), float(today.friction_n[axis])
         error = float(np.hypot(accepted.friction_error_n[axis], today.friction_error_n[axis]))
         # A handle that no longer moves has changed: its friction is unknown, and large.
-        stuck = math.isnan(now) or math.isnan(then)
-        changed = stuck or _is_beyond(now - then, error, limits.friction_n, limits)
+        stuck = math.isnan(today_n) or math.isnan(accepted_n)
+        changed = stuck or _is_significant(today_n - accepted_n, error, limits.friction_n, limits)
         unclear = not changed and limits.deviations * error > limits.friction_n
-        yield Change("friction", channel, then, now, error, limits.friction_n, "N", changed, unclear=unclear)
+        yield Change("friction", channel, accepted_n, today_n, error, limits.friction_n, "N", changed, unclear=unclear)
 
 
-def _response_changes(then: FrequencyResponse, now: FrequencyResponse, limits: ChangeLimits) -> Iterator[Change]:
-    if then.input_channels != now.input_channels or then.output_channels != now.output_channels:
+def _compare_responses(accepted: FrequencyResponse, today: FrequencyResponse, limits: ChangeLimits) -> Iterator[Change]:
+    if accepted.input_channels != today.input_channels or accepted.output_channels != today.output_channels:
         raise NotMeasurableError("the channels of the two recordings differ")
-    shared = np.intersect1d(then.frequency_hz[then.reliable], now.frequency_hz[now.reliable])
+    shared = np.intersect1d(accepted.frequency_hz[accepted.reliable], today.frequency_hz[today.reliable])
     if not len(shared):
         raise NotMeasurableError("no frequency is reliable in both recordings")
-    then, now = (each.of_lines(np.isin(each.frequency_hz, shared)) for each in (then, now))
-    for axis, channel in enumerate(then.input_channels):
+    accepted, today = (measured.of_lines(np.isin(measured.frequency_hz, shared)) for measured in (accepted, today))
+    for axis, channel in enumerate(accepted.input_channels):
         # Norm over all outputs of the response to this force. Its median ratio over frequency is the change of gain;
         # differences from that common factor are changes of the response.
-        ratio = np.linalg.norm(now.response[:, :, axis], axis=1) / np.linalg.norm(then.response[:, :, axis], axis=1)
+        ratio = np.linalg.norm(today.response[:, :, axis], axis=1) / np.linalg.norm(
+            accepted.response[:, :, axis], axis=1
+        )
         gain = float(np.median(ratio))
         # Standard error of a median: sqrt(pi / 2) = 1.2533 times that of a mean; 1.4826 MAD estimates the deviation.
         error = float(1.2533 * 1.4826 * np.median(np.abs(ratio - gain)) / np.sqrt(len(ratio)))
-        changed = _is_beyond(np.log(gain), error / gain, np.log1p(limits.share), limits)
+        changed = _is_significant(np.log(gain), error / gain, np.log1p(limits.share), limits)
         unclear = not changed and limits.deviations * error > limits.share
         yield Change("gain", channel, 1.0, gain, error, limits.share, "", changed, unclear=unclear)
-        yield _worst_band(then, now, axis, gain, limits)
+        yield _find_worst_band(accepted, today, axis, gain, limits)
 
 
-def _lost_bands(then: FrequencyResponse, now: FrequencyResponse, limits: ChangeLimits) -> Iterator[Change]:
+def _find_lost_bands(accepted: FrequencyResponse, today: FrequencyResponse, limits: ChangeLimits) -> Iterator[Change]:
     """Bands in which most lines that were reliable at the acceptance are not reliable today: reported as unclear."""
-    before_hz = then.frequency_hz[then.reliable]
-    lost = ~np.isin(before_hz, now.frequency_hz[now.reliable])
-    band = _bands(before_hz, limits)
+    accepted_hz = accepted.frequency_hz[accepted.reliable]
+    lost = ~np.isin(accepted_hz, today.frequency_hz[today.reliable])
+    band = _number_bands(accepted_hz, limits)
     for number in np.unique(band):
-        here = band == number
-        if 2 * lost[here].sum() > here.sum():
-            band_hz = (float(before_hz[here][0]), float(before_hz[here][-1]))
-            axes = ", ".join(then.input_channels)
+        in_band = band == number
+        if 2 * lost[in_band].sum() > in_band.sum():
+            band_hz = (float(accepted_hz[in_band][0]), float(accepted_hz[in_band][-1]))
+            axes = ", ".join(accepted.input_channels)
             yield Change(
                 "response", axes, 0.0, math.nan, math.nan, limits.share, "", False, band_hz=band_hz, unclear=True
             )
 
 
-def _bands(frequency_hz: FloatArray, limits: ChangeLimits) -> FloatArray:
+def _number_bands(frequency_hz: FloatArray, limits: ChangeLimits) -> FloatArray:
     """(lines,): number of the third-octave band of each line, counted from the lowest line."""
     number: FloatArray = np.floor(np.log2(frequency_hz / frequency_hz[0]) / limits.band_octaves)
     return number
 
 
-def _worst_band(
-    then: FrequencyResponse, now: FrequencyResponse, axis: int, gain: float, limits: ChangeLimits
+def _find_worst_band(
+    accepted: FrequencyResponse, today: FrequencyResponse, axis: int, gain: float, limits: ChangeLimits
 ) -> Change:
     """The third octave in which the response, divided by the common gain, differs most beyond the noise.
 
     Late and missed ticks make noise in bursts, which affect neighbouring lines alike. Therefore `deviations` times the
     power that is expected from the scatter between periods is subtracted from the power of the difference.
     """
-    band = _bands(then.frequency_hz, limits)
-    found = []
+    band = _number_bands(accepted.frequency_hz, limits)
+    bands = []
     for number in np.unique(band):
         lines = band == number
-        before, after = then.response[lines][:, :, axis], now.response[lines][:, :, axis] / gain
-        noise = then.noise_variance[lines][:, :, axis] + now.noise_variance[lines][:, :, axis] / gain**2
-        size = float(np.sum(np.abs(before) ** 2))
-        power, expected = float(np.sum(np.abs(after - before) ** 2)) / size, float(np.sum(noise)) / size
-        at_hz = then.frequency_hz[lines]
-        surely = float(np.sqrt(max(power - limits.deviations * expected, 0.0)))
+        accepted_response, today_response = (
+            accepted.response[lines][:, :, axis],
+            today.response[lines][:, :, axis] / gain,
+        )
+        noise = accepted.noise_variance[lines][:, :, axis] + today.noise_variance[lines][:, :, axis] / gain**2
+        accepted_power = float(np.sum(np.abs(accepted_response) ** 2))
+        power, expected = (
+            float(np.sum(np.abs(today_response - accepted_response) ** 2)) / accepted_power,
+            float(np.sum(noise)) / accepted_power,
+        )
+        band_lines_hz = accepted.frequency_hz[lines]
+        certain_share = float(np.sqrt(max(power - limits.deviations * expected, 0.0)))
         share = float(np.sqrt(max(power - expected, 0.0)))
-        found.append((surely, share, float(np.sqrt(expected)), (float(at_hz[0]), float(at_hz[-1]))))
-    surely, share, _, band_hz = max(found)
-    error = max(each[2] for each in found)
-    changed = surely > limits.share
+        bands.append(
+            (certain_share, share, float(np.sqrt(expected)), (float(band_lines_hz[0]), float(band_lines_hz[-1])))
+        )
+    certain_share, share, _, band_hz = max(bands)
+    error = max(entry[2] for entry in bands)
+    changed = certain_share > limits.share
     unclear = not changed and error > limits.share
-    peaks_hz = (_peak_hz(then, band_hz, axis), _peak_hz(now, band_hz, axis)) if changed else None
-    channel = then.input_channels[axis]
+    peaks_hz = (_find_peak_hz(accepted, band_hz, axis), _find_peak_hz(today, band_hz, axis)) if changed else None
+    channel = accepted.input_channels[axis]
     return Change("response", channel, 0.0, share, error, limits.share, "", changed, band_hz, peaks_hz, unclear)
 
 
-def _peak_hz(response: FrequencyResponse, band_hz: tuple[float, float], axis: int) -> float:
+def _find_peak_hz(response: FrequencyResponse, band_hz: tuple[float, float], axis: int) -> float:
     """Frequency of the strongest response to the force along `axis`, within the band extended by half on either
     side."""
-    wider = (band_hz[1] / band_hz[0]) ** 0.5
-    lines = response.within(band_hz[0] / wider, band_hz[1] * wider)
+    widening = (band_hz[1] / band_hz[0]) ** 0.5
+    lines = response.within(band_hz[0] / widening, band_hz[1] * widening)
     strength = np.linalg.norm(lines.response[:, :, axis], axis=1)
     return float(lines.frequency_hz[int(np.argmax(strength))])
 
 
-def _noise_changes(accepted: DeviceMeasures, today: DeviceMeasures, limits: ChangeLimits) -> Iterator[Change]:
+def _compare_noise(accepted: DeviceMeasures, today: DeviceMeasures, limits: ChangeLimits) -> Iterator[Change]:
     # Relative standard error of an rms of independent samples.
-    relative = np.sqrt(0.5 / accepted.noise_samples + 0.5 / today.noise_samples)
-    for channel, then, now in zip(accepted.response.output_channels, accepted.noise, today.noise, strict=True):
-        high, low = max(float(then), float(now)), min(float(then), float(now))
+    relative_error = np.sqrt(0.5 / accepted.noise_samples + 0.5 / today.noise_samples)
+    for channel, accepted_rms, today_rms in zip(
+        accepted.response.output_channels, accepted.noise, today.noise, strict=True
+    ):
+        high, low = max(float(accepted_rms), float(today_rms)), min(float(accepted_rms), float(today_rms))
         changed = high > limits.noise_factor * low
         unit = accepted.response.output_unit
         yield Change(
-            "noise", channel, float(then), float(now), float(relative * now), limits.noise_factor, unit, changed
+            "noise",
+            channel,
+            float(accepted_rms),
+            float(today_rms),
+            float(relative_error * today_rms),
+            limits.noise_factor,
+            unit,
+            changed,
         )
 
 
-def _is_beyond(difference: float, error: float, limit: float, limits: ChangeLimits) -> bool:
+def _is_significant(difference: float, error: float, limit: float, limits: ChangeLimits) -> bool:
     """Whether a difference exceeds both its limit and `deviations` standard errors."""
     return bool(abs(difference) > limit and abs(difference) > limits.deviations * error)

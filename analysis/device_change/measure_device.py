@@ -46,18 +46,18 @@ class DeviceMeasures:
 def measure_device(recording: Recording) -> DeviceMeasures:
     """Friction, frequency response and noise of a free device. recording: strokes and a broadband excitation along
     every axis, with rests. Raises NotMeasurableError where any of the three cannot be computed."""
-    recording = _without_gaps(recording)
-    response = _response(recording)
-    friction = np.array([_friction_n(recording, axis) for axis in range(len(recording.command.channels))])
-    rests = _second_halves_of_rests(recording)
+    recording = _interpolate_gaps(recording)
+    response = _estimate_response(recording)
+    friction = np.array([_measure_friction(recording, axis) for axis in range(len(recording.command.channels))])
+    rests = _select_settled_rests(recording)
     if not rests:
         raise NotMeasurableError("the handle is never at rest, so the noise cannot be measured")
-    noise, samples = _noise(recording, rests)
+    noise, samples = _measure_noise(recording, rests)
     return DeviceMeasures(friction[:, 0], friction[:, 1], response, noise, samples)
 
 
-def _without_gaps(recording: Recording) -> Recording:
-    """The recording with missed ticks interpolated: a single one would otherwise cost a whole period."""
+def _interpolate_gaps(recording: Recording) -> Recording:
+    """The recording with missed ticks interpolated: a period with a missing sample would otherwise be left out."""
     if recording.position is None:
         raise NotMeasurableError("the recording contains no position signal")
     command, response = _fill_missing(recording.command, "command"), _fill_missing(recording.response, "response")
@@ -77,7 +77,7 @@ def _fill_missing(signal: Signal, name: str) -> Signal:
     return replace(signal, samples=fill_gaps(signal.samples))
 
 
-def _response(recording: Recording) -> FrequencyResponse:
+def _estimate_response(recording: Recording) -> FrequencyResponse:
     try:
         response = estimate_transfer([recording])
     except TransferEstimateError as refusal:
@@ -87,48 +87,48 @@ def _response(recording: Recording) -> FrequencyResponse:
     return response
 
 
-def _friction_n(recording: Recording, axis: int) -> tuple[float, float]:
+def _measure_friction(recording: Recording, axis: int) -> tuple[float, float]:
     """Mean friction along an axis and its standard error, both in N: the work that a stroke loses, over its path.
 
     Energy that springs, weights and inertia store is returned within a stroke, so that no model is needed. Raises
     NotMeasurableError with fewer than two strokes along the axis.
     """
-    found = [
-        _lost_per_path_n(recording, start, start + segment.period, axis)
+    stroke_n = [
+        _measure_loss_per_path(recording, start, start + segment.period, axis)
         for segment in recording.segments
-        if _is_stroke(recording, segment) and _driven_axis(recording, segment) == axis
+        if _is_stroke(recording, segment) and _find_driven_axis(recording, segment) == axis
         for start in range(segment.start, segment.stop - segment.period + 1, segment.period)
     ]
-    if len(found) < 2:
+    if len(stroke_n) < 2:
         raise NotMeasurableError(
-            f"the recording contains {len(found)} slow strokes along {recording.command.channels[axis]}; at least 2 "
+            f"the recording contains {len(stroke_n)} slow strokes along {recording.command.channels[axis]}; at least 2 "
             "are needed"
         )
-    return float(np.mean(found)), float(np.std(found, ddof=1) / np.sqrt(len(found)))
+    return float(np.mean(stroke_n)), float(np.std(stroke_n, ddof=1) / np.sqrt(len(stroke_n)))
 
 
 def _is_stroke(recording: Recording, segment: Segment) -> bool:
     return segment.kind == "sine" and segment.period * STROKES_BELOW_HZ > recording.sample_rate_hz
 
 
-def _driven_axis(recording: Recording, segment: Segment) -> int:
+def _find_driven_axis(recording: Recording, segment: Segment) -> int:
     """Index of the command with the largest peak-to-peak excitation in a segment."""
     return int(np.argmax(np.ptp(instrument_signal(recording)[segment.start : segment.stop], axis=0)))
 
 
-def _lost_per_path_n(recording: Recording, start: int, stop: int, axis: int) -> float:
+def _measure_loss_per_path(recording: Recording, start: int, stop: int, axis: int) -> float:
     """Work per path (N) of one stroke along an axis; NaN where the handle moved no further along it than across it."""
     assert recording.position is not None
     position_m = recording.position.samples[start : stop + 1]
     force_n = recording.command.samples[start : start + len(position_m) - 1]
     path_m = 2 * float(np.ptp(position_m[:, axis]))
-    across_m = 2 * float(np.delete(np.ptp(position_m, axis=0), axis).max(initial=0.0))
-    if not path_m > across_m:
+    cross_path_m = 2 * float(np.delete(np.ptp(position_m, axis=0), axis).max(initial=0.0))
+    if not path_m > cross_path_m:
         return np.nan
     return float(np.sum(force_n * np.diff(position_m, axis=0)) / path_m)
 
 
-def _second_halves_of_rests(recording: Recording) -> list[FloatArray]:
+def _select_settled_rests(recording: Recording) -> list[FloatArray]:
     """Responses (k, outputs) in the second half of each long rest; transients decay in the first half."""
     rests = runs_of(np.asarray(~instrument_signal(recording).any(axis=1)))
     longest = max((stop - start for start, stop in rests), default=0)
@@ -137,13 +137,13 @@ def _second_halves_of_rests(recording: Recording) -> list[FloatArray]:
     ]
 
 
-def _noise(recording: Recording, rests: list[FloatArray]) -> tuple[FloatArray, int]:
+def _measure_noise(recording: Recording, rests: list[FloatArray]) -> tuple[FloatArray, int]:
     """(outputs,): rms of the response about the least-squares line of each rest, and the number of samples."""
     squares, samples = np.zeros(len(recording.response.channels)), 0
-    for rest in rests:
-        at = np.arange(len(rest)) - (len(rest) - 1) / 2
-        detrended = rest - rest.mean(axis=0)
-        detrended = detrended - np.outer(at, at @ detrended / max(float(at @ at), 1.0))
+    for rest_response in rests:
+        index = np.arange(len(rest_response)) - (len(rest_response) - 1) / 2
+        detrended = rest_response - rest_response.mean(axis=0)
+        detrended = detrended - np.outer(index, index @ detrended / max(float(index @ index), 1.0))
         squares += np.sum(detrended**2, axis=0)
-        samples += len(rest)
+        samples += len(rest_response)
     return np.sqrt(squares / max(samples, 1)), samples

@@ -59,24 +59,25 @@ def probe_lines(recording: Recording, period_s: float) -> ProbeLines:
     the multisine. Raises ValueError where less than a period was recorded, or samples are missing."""
     period = round(period_s * recording.sample_rate_hz)
     # With a virtual spring, the command also holds the spring's force, which would count as driven.
-    designed = recording.command if recording.excitation is None else recording.excitation
+    excitation_signal = recording.command if recording.excitation is None else recording.excitation
     start, stop = 0, len(recording)
     if recording.segments:
         start, stop = recording.segments[0].start, recording.segments[0].stop
     if stop - start > 2 * period:  # the first of many periods holds the transient
         start += period
     excitation, force, acceleration = (
-        _mean_spectrum(each.samples[start:stop], period) for each in (designed, recording.command, recording.response)
+        _mean_spectrum(signal.samples[start:stop], period)
+        for signal in (excitation_signal, recording.command, recording.response)
     )
     if not np.isfinite(force).all() or not np.isfinite(acceleration).all():
         raise ValueError("the recording has missing samples")
     position = np.full(force.shape, np.nan, dtype=complex)
     if recording.position is not None and recording.position.samples.shape[1] == force.shape[1]:
         position = _mean_spectrum(recording.position.samples[start:stop], period)
-    size = np.abs(excitation)
+    amplitude = np.abs(excitation)
     return ProbeLines(
         frequency_hz=np.arange(1, len(force) + 1) / period_s,
-        driven=size > DRIVEN_SHARE * size.max(axis=0),
+        driven=amplitude > DRIVEN_SHARE * amplitude.max(axis=0),
         force_n=force,
         acceleration_mps2=acceleration,
         position_m=position,
@@ -132,8 +133,8 @@ def friction_shapes(probes: tuple[ProbeLines, ...], period: int) -> ComplexArray
         step = step_m[tick % period][None]
         direction = np.sign(step)
         # Exact over a step of constant direction, so that the force never leaves -1 to 1, however long the step.
-        slid = direction - (direction - force) * np.exp(-np.abs(step) / lengths_m)
-        force = np.where(step == 0, force, slid)
+        sliding_force = direction - (direction - force) * np.exp(-np.abs(step) / lengths_m)
+        force = np.where(step == 0, force, sliding_force)
         one_period[tick % period] = force
     spectrum: ComplexArray = 2 / period * np.fft.rfft(one_period, axis=0)[1 : period // 2]
     shapes: ComplexArray = np.moveaxis(spectrum, 0, 2)
@@ -147,9 +148,9 @@ def _position_m(probe: ProbeLines, period: int) -> FloatArray:
     if np.isfinite(probe.position_m).all():
         lines = np.where(frequency_hz <= TO_HZ, probe.position_m, 0)
     else:
-        inside = (frequency_hz >= FROM_HZ) & (frequency_hz <= TO_HZ)
-        lines = np.where(inside, probe.acceleration_mps2 / -((2 * np.pi * frequency_hz) ** 2), 0)
-    whole = np.zeros((period // 2 + 1, lines.shape[1]), dtype=complex)
-    whole[1 : period // 2] = lines * period / 2
-    position_m: FloatArray = np.fft.irfft(whole, period, axis=0)
+        in_band = (frequency_hz >= FROM_HZ) & (frequency_hz <= TO_HZ)
+        lines = np.where(in_band, probe.acceleration_mps2 / -((2 * np.pi * frequency_hz) ** 2), 0)
+    spectrum = np.zeros((period // 2 + 1, lines.shape[1]), dtype=complex)
+    spectrum[1 : period // 2] = lines * period / 2
+    position_m: FloatArray = np.fft.irfft(spectrum, period, axis=0)
     return position_m

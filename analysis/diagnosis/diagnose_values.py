@@ -7,19 +7,19 @@ Checks and prepares the recordings, fits a linear first model where none is give
 from collections.abc import Sequence
 from dataclasses import replace
 
-from analysis.diagnosis.data.input_checks import require_alike, require_model_of
+from analysis.diagnosis.data.input_checks import require_comparable, require_model_of
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.fit_without_model import first_model_of, fit_first_linear_model
-from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare
+from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare_recordings
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 
-def _ignore_progress(what: str, share: float) -> None:
+def _ignore_progress(step: str, share: float) -> None:
     """No progress is shown."""
 
 
@@ -38,23 +38,23 @@ def diagnose_values(
     share that is done. Raises NothingToDiagnose with the error in the recordings, NothingLearned where clean recordings
     cannot be compared with them.
     """
-    given = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    recording_list = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or DiagnosisSettings()
-    names = settings.names or tuple(f"recording {number}" for number in range(1, len(given) + 1))
+    names = settings.names or tuple(f"recording {number}" for number in range(1, len(recording_list) + 1))
     clean_names = tuple(f"clean recording {number}" for number in range(1, len(settings.clean) + 1))
-    require_alike((*given, *settings.clean), (*names, *clean_names))
-    ready = prepare(given, names, model is None and not settings.clean)
-    clean = prepare(settings.clean, clean_names, False).recordings if settings.clean else ()
-    every = keep_common_signals((*ready.recordings, *clean))
-    found, remarks = every.recordings[: len(given)], (*ready.remarks, *every.remarks)
-    settings = replace(settings, names=names, clean=every.recordings[len(given) :])
+    require_comparable((*recording_list, *settings.clean), (*names, *clean_names))
+    prepared = prepare_recordings(recording_list, names, model is None and not settings.clean)
+    clean = prepare_recordings(settings.clean, clean_names, False).recordings if settings.clean else ()
+    common = keep_common_signals((*prepared.recordings, *clean))
+    compared, remarks = common.recordings[: len(recording_list)], (*prepared.remarks, *common.remarks)
+    settings = replace(settings, names=names, clean=common.recordings[len(recording_list) :])
     if model is None:
-        first = _first_model(found, settings, map_, progress)
+        first = _first_model(compared, settings, map_, progress)
         model, remarks = first.model, (*remarks, *first.remarks)
         settings = replace(settings, fitted=True, balances=first.balances)
     else:
-        require_model_of(model, found)
-    findings = diagnose(found, model, settings, map_, progress)
+        require_model_of(model, compared)
+    findings = diagnose(compared, model, settings, map_, progress)
     return replace(findings, remarks=(*remarks, *findings.remarks))
 
 
@@ -64,7 +64,7 @@ def _first_model(
     """A linear model with remarks: of these recordings with their force balances, or of the clean ones alone."""
     if not settings.clean:
         return first_model_of(recordings, settings.without, settings.time_left, progress, map_)
-    what = "fitting a linear model, as none was given"
+    step = "fitting a linear model, as none was given"
     return FirstModel(
-        *fit_first_linear_model(settings.clean, lambda share: progress(what, share), "the clean recordings")
+        *fit_first_linear_model(settings.clean, lambda share: progress(step, share), "the clean recordings")
     )

@@ -20,10 +20,10 @@ STRICT = ConfigDict(extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
 Verdict = Literal["no_mismatch", "parameters", "explained", "partly_explained", "unexplained"]
 Share = Annotated[float, Field(ge=0, le=1)]
-Rms = Annotated[float | None, Field(ge=0, description="Normalised rms; null where it is not known.")]
+Rms = Annotated[float | None, Field(ge=0, description="Normalised root mean square; null where it is not known.")]
 EffectWord = Annotated[
     str,
-    Field(pattern=r"^[a-z][a-z0-9_]{0,63}$", description="A name of the vocabulary, or a new name in the same form."),
+    Field(pattern=r"^[a-z][a-z0-9_]{0,63}$", description="Name in the vocabulary, or a new name of the same form."),
 ]
 
 
@@ -33,26 +33,26 @@ class DiagnosisError(ListedProblemsError):
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class FoundLaw:
-    """A law that has no name, as a formula."""
+    """A law without a name in the vocabulary, as a formula."""
 
-    expression: Annotated[str, Field(description="In the language of laws, docs/formats.md; numbers in SI.")]
-    variables: Annotated[tuple[str, ...], Field(description="Signals that it needs.")]
-    acts_on: Annotated[ActsOn, Field(description="force: added to it; command, response: in place of it.")]
+    expression: Annotated[str, Field(description="Formula in the language of laws (docs/formats.md), in SI.")]
+    variables: Annotated[tuple[str, ...], Field(description="Signals that the formula uses.")]
+    acts_on: Annotated[ActsOn, Field(description="force: the law is added to it; command, response: replaced by it.")]
     axis: str
 
     @model_validator(mode="after")
-    def _in_the_language(self) -> Self:
+    def _require_valid_expression(self) -> Self:
         """Parse the expression in the language of laws; ValueError where it needs other signals than it lists."""
-        found = law_of(self.expression, self.acts_on, self.axis)
-        if set(found.variables) != set(self.variables):
-            needed = ", ".join(found.variables) or "no signals"
-            raise ValueError(f"the law {self.expression} needs {needed}, but its variables list others")
+        law = law_of(self.expression, self.acts_on, self.axis)
+        if set(law.variables) != set(self.variables):
+            signals = ", ".join(law.variables) or "no signals"
+            raise ValueError(f"the law {self.expression} needs {signals}, but its variables list others")
         return self
 
 
 @dataclass(frozen=True, config=STRICT)
 class Mismatch:
-    """A place where model and device disagree more than repeats do."""
+    """Part of the recording where model and device differ by more than repeats differ."""
 
     output: str
     input: str
@@ -76,7 +76,7 @@ class Estimate:
     """A parameter with its 95 % interval; null where no interval can be given."""
 
     value: float
-    unit: Annotated[str, Field(min_length=1, description="SI in ASCII; 1 for a plain number.")]
+    unit: Annotated[str, Field(min_length=1, description="SI unit in ASCII; 1 for a plain number.")]
     ci95: tuple[float, float] | None = None
 
     @model_validator(mode="after")
@@ -88,22 +88,22 @@ class Estimate:
 
 @dataclass(frozen=True, config=STRICT)
 class Rival:
-    """An effect that was passed over."""
+    """An effect that was considered and not named."""
 
     effect: EffectWord
     probability: Share
-    inseparable: Annotated[bool, Field(description="True: these data cannot distinguish it from the named effect.")]
+    inseparable: Annotated[bool, Field(description="Whether these data cannot distinguish it from the named effect.")]
     why_not: str
 
 
 @dataclass(frozen=True, config=STRICT)
 class NamedEffect:
-    """Physics that the model lacks. With its inseparable rivals it is the returned set."""
+    """A physical effect that the model lacks. The effect and its inseparable rivals form the returned set."""
 
     effect: EffectWord
     place: Place
-    axis: Annotated[str | None, Field(description="Axis or channel; null where all share it.")]
-    share: Annotated[Share, Field(description="Of the mismatch after re-tuning.")]
+    axis: Annotated[str | None, Field(description="Axis or channel; null where the effect is common to all.")]
+    share: Annotated[Share, Field(description="Share of the mismatch after re-tuning.")]
     probability: Share
     parameters: dict[str, Estimate]
     rivals: tuple[Rival, ...] = ()
@@ -111,35 +111,35 @@ class NamedEffect:
         tuple[EffectWord, ...],
         Field(
             alias="class",
-            description="Laws that these data cannot distinguish, this one first; empty where there are no others.",
+            description="Laws that these data cannot distinguish, the named one first; empty without such laws.",
         ),
     ] = ()
-    law: Annotated[FoundLaw | None, Field(description=f"Of a {DISCOVERED_LAW}, or of one that was kept.")] = None
+    law: Annotated[FoundLaw | None, Field(description=f"Formula of a {DISCOVERED_LAW}, or of a kept law.")] = None
     held_out_gain: Annotated[
         Estimate | None,
         Field(description="Share of the error power on held-out data that the effect explains, with a 95 % interval."),
     ] = None
 
     @model_validator(mode="after")
-    def _as_in_the_vocabulary(self) -> Self:
+    def _require_vocabulary_entry(self) -> Self:
         """ValueError where the effect lacks its law or main parameter, or contradicts its entry in the vocabulary."""
         if self.law is None and self.effect == DISCOVERED_LAW:
             raise ValueError(f"{DISCOVERED_LAW} lacks its law")
         if self.law is not None and self.effect in EFFECTS_BY_NAME:
             raise ValueError(f"{self.effect} is an effect of the catalogue, so it must not have a law")
-        known = EFFECTS_BY_NAME.get(self.effect)
-        if known is None:
+        entry = EFFECTS_BY_NAME.get(self.effect)
+        if entry is None:
             return self
-        if self.place != known.place:
-            raise ValueError(f"{self.effect} belongs to the {known.place}, not to the {self.place}")
-        if known.main.name not in self.parameters:
-            raise ValueError(f"{self.effect} lacks its main parameter, {known.main.name} ({known.main.unit})")
+        if self.place != entry.place:
+            raise ValueError(f"{self.effect} belongs to the {entry.place}, not to the {self.place}")
+        if entry.main.name not in self.parameters:
+            raise ValueError(f"{self.effect} lacks its main parameter, {entry.main.name} ({entry.main.unit})")
         return self
 
 
 @dataclass(frozen=True, config=STRICT)
 class Candidate:
-    """Physics that would explain some of the mismatch, and is not confirmed."""
+    """A physical effect that would explain a part of the mismatch and is not confirmed."""
 
     effect: EffectWord
     place: Place
@@ -152,16 +152,16 @@ class Candidate:
     share_of_black_box: Annotated[
         Share,
         Field(
-            description="The same as a share of the power that all laws together explain of the linear model's error."
+            description="The same, as a share of the power of the linear model's error that all laws together explain."
         ),
     ]
     why_not: str
-    law: Annotated[FoundLaw | None, Field(description=f"Of a {DISCOVERED_LAW}.")] = None
+    law: Annotated[FoundLaw | None, Field(description=f"Formula of a {DISCOVERED_LAW}.")] = None
 
 
 @dataclass(frozen=True, config=STRICT)
 class Errors:
-    """One record's errors: the given model, re-tuned, with the named effects, and what repeats allow."""
+    """Errors of one record: given model, re-tuned, with the named effects, and noise known from repeats."""
 
     before: Rms
     retuned: Rms
@@ -179,7 +179,7 @@ class Fit:
 
 @dataclass(frozen=True, config=STRICT)
 class NextExperiment:
-    """The recording that would tell rivals apart."""
+    """Recording that would distinguish the rivals."""
 
     command: str
     splits: tuple[str, ...]
@@ -200,16 +200,16 @@ class Diagnosis:
         str,
         Field(
             pattern=r"^(free simulation|predicted force|windows of [0-9.]+ s)$",
-            description="How errors were measured: free simulation, windows of 1 s, or predicted force.",
+            description="Measure of the errors: free simulation, windows of a length in s, or predicted force.",
         ),
     ]
     next_experiment: NextExperiment | None
     candidates: Annotated[
-        tuple[Candidate, ...], Field(description="The best candidates that were not confirmed, the best first.")
+        tuple[Candidate, ...], Field(description="Best candidates that were not confirmed, in descending order.")
     ] = ()
 
     @model_validator(mode="after")
-    def _verdict_fits(self) -> Self:
+    def _require_consistent_verdict(self) -> Self:
         """ValueError where the verdict contradicts the effects, the remainder or the mismatch."""
         named = self.verdict in ("explained", "partly_explained")
         if named != bool(self.effects):
@@ -225,20 +225,20 @@ class Diagnosis:
     @property
     def returned_set(self) -> tuple[str, ...]:
         """Names of the named effects and of every rival that these data cannot distinguish from them."""
-        names = [name for effect in self.effects for name in (effect.effect, *_inseparable(effect))]
+        names = [name for effect in self.effects for name in (effect.effect, *_list_inseparable(effect))]
         return tuple(dict.fromkeys(names))
 
 
 def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """The diagnosis as JSON values, without format and version. Empty optional entries are left out."""
-    plain: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json", by_alias=True)
-    effects, candidates = plain["effects"], plain["candidates"]
-    left_out = [(effect, optional) for effect in effects for optional in ("class", "held_out_gain")]
-    left_out += [(entry, "law") for entry in (*effects, *candidates)]
-    for entry, optional in ((plain, "candidates"), *left_out):
+    document: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json", by_alias=True)
+    effects, candidates = document["effects"], document["candidates"]
+    optional_entries = [(effect, optional) for effect in effects for optional in ("class", "held_out_gain")]
+    optional_entries += [(entry, "law") for entry in (*effects, *candidates)]
+    for entry, optional in ((document, "candidates"), *optional_entries):
         if not entry[optional]:
             del entry[optional]
-    return plain
+    return document
 
 
 def diagnosis_from_json(document: dict[str, Any]) -> Diagnosis:
@@ -249,7 +249,10 @@ def diagnosis_from_json(document: dict[str, Any]) -> Diagnosis:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
         raise DiagnosisError(
-            tuple(_sentence(wrong["loc"], _PLAIN.get(wrong["type"], wrong["msg"])) for wrong in error.errors())
+            tuple(
+                _format_problem(problem["loc"], _PYDANTIC_MESSAGES.get(problem["type"], problem["msg"]))
+                for problem in error.errors()
+            )
         ) from error
 
 
@@ -258,33 +261,33 @@ def diagnosis_schema() -> dict[str, Any]:
     return _ADAPTER.json_schema(mode="serialization")
 
 
-def _inseparable(effect: NamedEffect) -> tuple[str, ...]:
+def _list_inseparable(effect: NamedEffect) -> tuple[str, ...]:
     """Names of the rivals that the data cannot distinguish from the effect."""
     return tuple(rival.effect for rival in effect.rivals if rival.inseparable)
 
 
-_PLAIN = {"unexpected_keyword_argument": "this key is unknown", "missing": "this is missing"}
+_PYDANTIC_MESSAGES = {"unexpected_keyword_argument": "this key is unknown", "missing": "this is missing"}
 """Messages that replace those of pydantic, by pydantic's type of error."""
 
 
-def _sentence(place: tuple[str | int, ...], message: str) -> str:
+def _format_problem(place: tuple[str | int, ...], message: str) -> str:
     """The message after the path of the entry; without a path for the whole document."""
-    where = ".".join(str(part) for part in place)
-    plain = message.removeprefix("Value error, ")
-    return f"{where}: {plain}" if where else plain
+    path = ".".join(str(part) for part in place)
+    text = message.removeprefix("Value error, ")
+    return f"{path}: {text}" if path else text
 
 
 _ADAPTER: TypeAdapter[Diagnosis] = TypeAdapter(Diagnosis)
 
 
-def found_law(law: Law) -> FoundLaw:
-    """The law's text, variables, place and axis as an entry of the document."""
+def make_found_law(law: Law) -> FoundLaw:
+    """A law as an entry of the document: formula with values, variables, what it acts on, and axis."""
     return FoundLaw(law.text, law.variables, law.acts_on, law.axis)
 
 
-def law_text(law: FoundLaw) -> str:
+def format_law(law: FoundLaw) -> str:
     """ "F = -4.1*abs(vy)**1.5*sign(vy) N": the force that a law adds, or the command or reading that it replaces."""
     if law.acts_on == "force":
         return f"F = {law.expression} N"
-    replaced = "command" if law.acts_on == "command" else "reading"
-    return f"in place of the {replaced} of {law.axis}: {law.expression}"
+    replaced_signal = "command" if law.acts_on == "command" else "reading"
+    return f"in place of the {replaced_signal} of {law.axis}: {law.expression}"

@@ -8,7 +8,7 @@ from analysis.diagnosis.unit_wording import percent_text, value_text
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
 from equalizer.signals.unit_system import UnitSystem
 
-_BARE = "{}"
+_VALUE_ALONE = "{}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,8 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
         {"level": "{} at the centre", "slope_per_m": "growing by {}", "bend_per_m2": "bent by {}"},
     ),
     "presliding_hysteresis": EffectWords(
-        "dry friction with elastic presliding", {"level": _BARE, "stiffness": "a stiffness of {} before it slides"}
+        "dry friction with elastic presliding",
+        {"level": _VALUE_ALONE, "stiffness": "a stiffness of {} before it slides"},
     ),
     "viscous_damping": EffectWords("viscous damping"),
     "quadratic_damping": EffectWords("damping that grows with the square of the speed"),
@@ -46,27 +47,29 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     "asymmetric_stiffness": EffectWords("a spring that is stiffer to one side"),
     "constant_force": EffectWords("a constant force"),
     "gravity_torque": EffectWords(
-        "the weight of a body off its axis (a pendulum)", {"torque": _BARE, "angle": "hanging {} from zero"}
+        "the weight of a body off its axis (a pendulum)", {"torque": _VALUE_ALONE, "angle": "hanging {} from zero"}
     ),
     "cogging": EffectWords(
-        "a force ripple along the travel (cogging)", {"amplitude": _BARE, "pitch": "repeating every {}"}
+        "a force ripple along the travel (cogging)", {"amplitude": _VALUE_ALONE, "pitch": "repeating every {}"}
     ),
     "backlash": EffectWords("play (backlash)", {"gap": "a gap of {}"}),
     "loose_joint": EffectWords(
         "a loose joint", {"gap": "a gap of {}", "stiffness": "a stiffness of {}", "slip": "slipping at {}"}
     ),
     "end_stop": EffectWords("an end stop", {"position": "met at {}", "stiffness": "a stiffness of {}"}),
-    "pose_dependent_inertia": EffectWords("inertia that changes with the position", {"per_m": _BARE}),
+    "pose_dependent_inertia": EffectWords("inertia that changes with the position", {"per_m": _VALUE_ALONE}),
     "extra_mode": EffectWords(
         "a resonance that the model lacks",
         {"frequency": "at {}", "mass": "carrying {}", "damping_ratio": "damping ratio {}"},
     ),
     "added_mass": EffectWords("an added mass"),
-    "hand_impedance": EffectWords("the impedance of a hand", {"mass": _BARE, "damping": _BARE, "stiffness": _BARE}),
+    "hand_impedance": EffectWords(
+        "the impedance of a hand", {"mass": _VALUE_ALONE, "damping": _VALUE_ALONE, "stiffness": _VALUE_ALONE}
+    ),
     "time_varying_grip": EffectWords("a grip that varies in time", {"rate_hz": "at {}", "depth": "by {}"}, ("depth",)),
     "body_on_actuator": EffectWords(
         "a body attached to the actuator by a spring and a damper",
-        {"mass": _BARE, "damping": _BARE, "stiffness": _BARE},
+        {"mass": _VALUE_ALONE, "damping": _VALUE_ALONE, "stiffness": _VALUE_ALONE},
     ),
     "force_saturation": EffectWords("force saturation", {"limit": "at {}"}),
     "force_deadband": EffectWords("a dead band of the force", {"width": "± {}"}),
@@ -93,9 +96,9 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     "sensor_offset": EffectWords("a sensor offset"),
     "sensor_drift": EffectWords("a drift of the sensor", {"total": "{} in all"}),
     "quantization": EffectWords("rounding to steps (quantisation)", {"step": "steps of {}"}),
-    "mains_hum": EffectWords("mains hum", {"amplitude": _BARE, "frequency": "at {}"}),
-    "clock_drift": EffectWords("drift between the clocks", {"ppm": _BARE}),
-    "logger_offset": EffectWords("a delay of the logger", {"offset": _BARE}),
+    "mains_hum": EffectWords("mains hum", {"amplitude": _VALUE_ALONE, "frequency": "at {}"}),
+    "clock_drift": EffectWords("drift between the clocks", {"ppm": _VALUE_ALONE}),
+    "logger_offset": EffectWords("a delay of the logger", {"offset": _VALUE_ALONE}),
     "lost_samples": EffectWords("lost samples", {"fraction": "{} of all"}, ("fraction",)),
 }
 
@@ -117,12 +120,12 @@ LAW_WORDS: Mapping[str, LawWords] = {
     "viscoelastic_relaxation": LawWords(
         EffectWords(
             "viscoelastic relaxation of a spring",
-            {"stiffness": _BARE, "time_constant": "time constant {}"},
+            {"stiffness": _VALUE_ALONE, "time_constant": "time constant {}"},
         ),
         {"stiffness": _STIFFNESS, "time_constant": ("s", "s")},
     ),
     "drifting_friction": LawWords(
-        EffectWords("dry friction that changes during the recording", {"level": _BARE, "change": _CHANGE}),
+        EffectWords("dry friction that changes during the recording", {"level": _VALUE_ALONE, "change": _CHANGE}),
         {"level": _FORCE, "change": _FORCE},
     ),
     "drifting_damping": LawWords(
@@ -132,7 +135,9 @@ LAW_WORDS: Mapping[str, LawWords] = {
         EffectWords("a force that drifts during the recording", {"change": _CHANGE}), {"change": _FORCE}
     ),
     "condition_dependent_friction": LawWords(
-        EffectWords("dry friction that depends on the recorded condition", {"level": _BARE, "change": _PER_CONDITION}),
+        EffectWords(
+            "dry friction that depends on the recorded condition", {"level": _VALUE_ALONE, "change": _PER_CONDITION}
+        ),
         {"level": _FORCE, "change": _FORCE},
     ),
     "condition_dependent_force": LawWords(
@@ -190,15 +195,15 @@ OF_THE_WHOLE = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", 
 
 def noun_of(effect: str) -> str:
     """The plain noun of an effect; its name with spaces where it has none."""
-    known = _find_words(effect)
-    return known.noun if known else effect.replace("_", " ")
+    words = _find_words(effect)
+    return words.noun if words else effect.replace("_", " ")
 
 
 def place_of(effect: str) -> Place:
     """Place (mechanism, actuator, sensor or hand) at which an effect of the vocabulary, or a law outside it, acts."""
-    known = EFFECTS_BY_NAME.get(effect)
+    entry = EFFECTS_BY_NAME.get(effect)
     law = LAW_WORDS.get(effect)
-    return known.place if known is not None else "mechanism" if law is None else law.place
+    return entry.place if entry is not None else "mechanism" if law is None else law.place
 
 
 def _find_words(effect: str) -> EffectWords | None:
@@ -209,10 +214,10 @@ def _find_words(effect: str) -> EffectWords | None:
 def unit_of(effect: str, parameter: str, system: UnitSystem) -> str:
     """The unit of an effect's parameter; "1" where it is not known."""
     if effect in LAW_WORDS:
-        linear, turning = LAW_WORDS[effect].units.get(parameter, ("1", "1"))
-        return turning if system.rotational else system.express(linear)
-    known = EFFECTS_BY_NAME.get(effect)
-    units = {} if known is None else {each.name: each.unit_in(system, "1") for each in known.parameters}
+        linear, rotational = LAW_WORDS[effect].units.get(parameter, ("1", "1"))
+        return rotational if system.rotational else system.express(linear)
+    entry = EFFECTS_BY_NAME.get(effect)
+    units = {} if entry is None else {p.name: p.unit_in(system, "1") for p in entry.parameters}
     return units.get(parameter, "1")
 
 
@@ -220,10 +225,10 @@ def place_words(place: Place, axis: str | None, single: bool = False) -> str:
     """Where an effect acts, in words. single: the device has one axis, which then needs no name."""
     if place == "hand":
         return "at the handle" if axis is None or single else f"at the handle, along {axis}"
-    seat, all_ = _SEATS[place]
+    one_place, all_places = _SEATS[place]
     if axis is None:
-        return seat.format("").replace("  ", " ") if single else all_
-    return seat.format(axis)
+        return one_place.format("").replace("  ", " ") if single else all_places
+    return one_place.format(axis)
 
 
 _SEATS: Mapping[str, tuple[str, str]] = {
@@ -235,15 +240,15 @@ _SEATS: Mapping[str, tuple[str, str]] = {
 
 def parameters_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
     """ "0.15 N [0.14, 0.16] in motion, 0.21 N [0.19, 0.23] at rest"."""
-    known = _find_words(effect)
-    named = dict(known.parameters) if known else {}
-    if not named:
+    effect_words = _find_words(effect)
+    wording = dict(effect_words.parameters) if effect_words else {}
+    if not wording:
         main = (EFFECTS_BY_NAME[effect].main.name,) if effect in EFFECTS_BY_NAME else tuple(parameters)[:1]
-        named = dict.fromkeys(main, _BARE)
-    shares = known.shares if known else ()
+        wording = dict.fromkeys(main, _VALUE_ALONE)
+    shares = effect_words.shares if effect_words else ()
     texts = [
         words.format(estimate_text(parameters[name], name in shares))
-        for name, words in named.items()
+        for name, words in wording.items()
         if name in parameters
     ]
     if "side" in parameters:

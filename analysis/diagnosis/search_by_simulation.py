@@ -15,14 +15,14 @@ from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.search import HUM, Beyond, move_model_further, search_effects
+from analysis.diagnosis.search.search import HUM, FurtherSearches, move_model_further, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import SearchResult, judge
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import Effect
-from equalizer.effects.law_entry import kept_effects
+from equalizer.effects.law_entry import library_effects
 from equalizer.effects.placing import place_of_effect
 from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
 from equalizer.signals.recording import Recording
@@ -48,7 +48,7 @@ class SearchOutcome:
     """Model error of the clean recordings; empty without any."""
 
 
-def search_context_of(
+def make_search_context(
     recording: Recording, fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchContext:
     """The shared state of the search. recording: as given by the user, for names and units; the records of a measure
@@ -70,31 +70,35 @@ def search_by_simulation(
     """The result of the search by simulation. balances: force balances of the same recordings, if any; where they name
     a law, no effect is tried, else only effects of the actuator and the sensor that a balance cannot observe. Raises
     NothingLearned with clean recordings from which no model error can be learned."""
-    chosen, context = fitting.chosen, search_context_of(recordings[0], fitting, settings, map_)
-    catalogue = _catalogue(settings, recordings[0], context.barred)
-    may_be_named = [effect for effect in catalogue if effect.name not in context.barred]
+    chosen, context = fitting.chosen, make_search_context(recordings[0], fitting, settings, map_)
+    catalogue = _select_catalogue(settings, recordings[0], context.excluded)
+    may_be_named = [effect for effect in catalogue if effect.name not in context.excluded]
     if balances:
-        named = any(balance.named for balance in balances)
+        has_named_law = any(balance.named for balance in balances)
         # Effects of the actuator show only in complete commands: not in those reduced by the force of other motions.
-        driven = not fitting.is_reduced and not recordings[0].meta.get("imposed")
-        catalogue = [] if named else [e for e in catalogue if _unseen_by_balance(e.name, place_of_effect(e), driven)]
+        is_complete_command = not fitting.is_reduced and not recordings[0].meta.get("imposed")
+        catalogue = (
+            []
+            if has_named_law
+            else [e for e in catalogue if _is_unobservable(e.name, place_of_effect(e), is_complete_command)]
+        )
         may_be_named = []
     impacts = _ImpactSearch(fitting, may_be_named, settings, progress)
     if settings.clean:
         observable = [effect for effect in may_be_named if chosen.measure.can_observe(effect)]
-        found = _search_with_learned_error(
+        outcome = _search_with_learned_error(
             recordings, fitting.model, (context, catalogue, observable), settings, progress
         )
     else:
-        found = _search(context, catalogue, settings, progress, impacts)
-        if hums_low(found.result.found):
+        outcome = _search(context, catalogue, settings, progress, impacts)
+        if has_low_hum(outcome.result.found):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
             impacts = _ImpactSearch(fitting, may_be_named, settings, progress)
-            found = _search(context, catalogue, settings, progress, impacts)
-    if balances and found.result.judgement.named:
-        repeats = all(floor.how == "repeats" for floor in chosen.floors)
-        found = replace(found, result=unname_doubtful_effects(require_enough_gain(found.result, repeats)))
-    return replace(found, result=impacts.at_end(found.result))
+            outcome = _search(context, catalogue, settings, progress, impacts)
+    if balances and outcome.result.judgement.named:
+        repeats = all(floor.method == "repeats" for floor in chosen.floors)
+        outcome = replace(outcome, result=unname_doubtful_effects(require_enough_gain(outcome.result, repeats)))
+    return replace(outcome, result=impacts.at_end(outcome.result))
 
 
 class _ImpactSearch:
@@ -109,58 +113,60 @@ class _ImpactSearch:
         self._found: SearchResult | None = None
         self._steps = -1
 
-    def before_thirds(self, seen: SearchResult) -> SearchResult:
+    def before_thirds(self, result: SearchResult) -> SearchResult:
         """The result with play, where the drive repeats, two effects leave the mismatch unexplained, and play explains
         all of it: a third effect would take much time and could not predict a chaotic waveform."""
-        repeats = any(floor.how == "repeats" for floor in self._fitting.chosen.floors)
-        left = not seen.judgement.named and judge(seen.found).verdict == "unexplained"
-        if not repeats or not left or hums_low(seen.found) or not self._settings.time_left():
-            return seen
-        rattled = self._look(seen)
-        return rattled if rattled is not None and rattled.judgement.verdict == "explained" else seen
+        repeats = any(floor.method == "repeats" for floor in self._fitting.chosen.floors)
+        unexplained = not result.judgement.named and judge(result.found).verdict == "unexplained"
+        if not repeats or not unexplained or has_low_hum(result.found) or not self._settings.time_left():
+            return result
+        with_play = self._look(result)
+        return with_play if with_play is not None and with_play.judgement.verdict == "explained" else result
 
-    def at_end(self, seen: SearchResult) -> SearchResult:
+    def at_end(self, result: SearchResult) -> SearchResult:
         """The result with play, where the search leaves a mismatch that play explains at least partly."""
-        left = seen.judgement.verdict in ("unexplained", "partly_explained") and not has_law(seen)
-        if not left or seen.context.certain or not self._settings.time_left():
-            return seen
-        return self._look(seen) or seen
+        has_mismatch = result.judgement.verdict in ("unexplained", "partly_explained") and not names_discovered_law(
+            result
+        )
+        if not has_mismatch or result.context.certain or not self._settings.time_left():
+            return result
+        return self._look(result) or result
 
-    def _look(self, seen: SearchResult) -> SearchResult | None:
-        """The result with play, or None where play does not explain the recordings; computed as the class describes."""
-        if self._steps < 0 or (self._found is not None and len(seen.found.steps) > self._steps):
+    def _look(self, result: SearchResult) -> SearchResult | None:
+        """The result with play, or None where play does not explain the recordings; cached (see the class)."""
+        if self._steps < 0 or (self._found is not None and len(result.found.steps) > self._steps):
             # Imported here, because only a diagnosis that leaves a mismatch looks for impacts.
             from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
             from analysis.diagnosis.search.impacts import explain_impacts
 
             self._progress("looking for rattling play", 0.9)
             floors, time_left = self._fitting.chosen.floors, self._settings.time_left
-            found = explain_impacts(seen.context, seen.found, floors, self._catalogue, time_left)
-            self._found, self._steps = None, len(seen.found.steps)
-            if found is not None:
-                remarks = (IMPACTS_COMPARED, *((OUT_OF_TIME,) if found.ended_early else ()))
-                self._found = SearchResult(seen.context, found, judge(found), remarks)
+            explanation = explain_impacts(result.context, result.found, floors, self._catalogue, time_left)
+            self._found, self._steps = None, len(result.found.steps)
+            if explanation is not None:
+                remarks = (IMPACTS_COMPARED, *((OUT_OF_TIME,) if explanation.ended_early else ()))
+                self._found = SearchResult(result.context, explanation, judge(explanation), remarks)
         return self._found
 
 
 def _search_with_learned_error(
     recordings: Sequence[Recording],
     model: MechanicalModel,
-    given: tuple[SearchContext, Sequence[Effect], Sequence[Effect]],
+    search_inputs: tuple[SearchContext, Sequence[Effect], Sequence[Effect]],
     settings: DiagnosisSettings,
     progress: Progress,
 ) -> SearchOutcome:
-    """The search in which the model error on the clean recordings counts as noise. given: the shared state, the effects
-    to try, and the effects that may be named as sensor faults without a search. Raises NothingLearned."""
+    """The search in which the model error on the clean recordings counts as noise. search_inputs: the shared state, the
+    effects to try, and the effects that may be named as sensor faults without a search. Raises NothingLearned."""
     from analysis.diagnosis.reference.learn_model_error import learn_model_error
     from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
     from analysis.diagnosis.reference.search_with_reference import search_with_reference
 
-    context, catalogue, observable = given
+    context, catalogue, observable = search_inputs
     learned = learn_model_error(settings.clean, model, recordings, context.map_, progress)
     context = replace(context, certain=find_sensor_faults(recordings, settings.clean, observable))
-    found = search_with_reference(context, learned, catalogue, progress, settings.time_left)
-    return SearchOutcome(found, learned.floor)
+    result = search_with_reference(context, learned, catalogue, progress, settings.time_left)
+    return SearchOutcome(result, learned.floor)
 
 
 def _search(
@@ -172,50 +178,52 @@ def _search(
 ) -> SearchOutcome:
     """The search without clean recordings: with laws outside the catalogue where `settings` asks for them, and, unless
     the model was fitted to the recordings, repeated with a wider bound where needed."""
-    beyond = Beyond(before_thirds=impacts.before_thirds)
+    law_searches = FurtherSearches(before_thirds=impacts.before_thirds)
     if settings.discovery and not settings.fitted:
         # Imported here, because only a diagnosis that searches for laws needs their grammar.
         from analysis.diagnosis.discovery.add_laws import LawSearch
 
         laws = LawSearch(progress, settings.time_left)
-        beyond = Beyond(_unless_hum(laws.add_short), impacts.before_thirds, _unless_hum(laws.add_any))
-    found = search_effects(context, catalogue, progress, settings.time_left, beyond)
+        law_searches = FurtherSearches(
+            _skip_with_hum(laws.add_short), impacts.before_thirds, _skip_with_hum(laws.add_any)
+        )
+    result = search_effects(context, catalogue, progress, settings.time_left, law_searches)
     # A model that was fitted to the recordings has no calibration, hence no bound to widen.
     if not settings.fitted:
-        found = move_model_further(context, found, catalogue, progress, settings.time_left)
-    return SearchOutcome(found, CleanFloor())
+        result = move_model_further(context, result, catalogue, progress, settings.time_left)
+    return SearchOutcome(result, CleanFloor())
 
 
-def _unless_hum(add_laws: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:
+def _skip_with_hum(add_laws: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:
     """The law search, skipped where hum below the mains was found: that is no answer, and the search is repeated
     without hum before any law is added."""
-    return lambda seen: seen if hums_low(seen.found) else add_laws(seen)
+    return lambda result: result if has_low_hum(result.found) else add_laws(result)
 
 
-def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozenset[str]) -> list[Effect]:
+def _select_catalogue(settings: DiagnosisSettings, recording: Recording, excluded: frozenset[str]) -> list[Effect]:
     """The effects to try: the catalogue and the kept laws without the excluded effects; excluded effects that others
     refine are included as rivals that cannot be named."""
-    left_out = {*settings.without, *(GAINS if settings.fitted and not settings.clean else ())}
-    known = (*CATALOGUE, *kept_effects(settings.kept, recording))
-    catalogue = [effect for effect in known if effect.name not in left_out]
+    omitted = {*settings.without, *(GAINS if settings.fitted and not settings.clean else ())}
+    all_effects = (*CATALOGUE, *library_effects(settings.kept, recording))
+    catalogue = [effect for effect in all_effects if effect.name not in omitted]
     refined = {name for effect in catalogue for name in effect.simpler}
-    return catalogue + [effect for effect in CATALOGUE if effect.name in refined & barred]
+    return catalogue + [effect for effect in CATALOGUE if effect.name in refined & excluded]
 
 
-def _unseen_by_balance(name: str, place: str, driven: bool) -> bool:
-    """Whether a force balance cannot observe an effect of the actuator or the sensor. driven: an actuator drives the
+def _is_unobservable(name: str, place: str, complete: bool) -> bool:
+    """Whether a force balance cannot observe an effect of the actuator or the sensor. complete: an actuator drives the
     device with the commands as recorded, neither reduced by other forces nor with an imposed motion."""
     untested = name != "body_on_actuator" and name not in TESTED_BY_BALANCE
-    return place == "sensor" or (place == "actuator" and driven and untested)
+    return place == "sensor" or (place == "actuator" and complete and untested)
 
 
-def hums_low(found: Explanation) -> bool:
+def has_low_hum(explanation: Explanation) -> bool:
     """Whether mains hum was named at a frequency below `LOWEST_MAINS_HZ`: such a line comes from the drive itself."""
-    placed = found.after.fitted.hypothesis.list_placed_effects()
-    return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)
+    placed_effects = explanation.after.fitted.hypothesis.list_placed_effects()
+    return any(effect.effect.name == HUM and effect.values["frequency"] < LOWEST_MAINS_HZ for effect in placed_effects)
 
 
-def has_law(result: SearchResult) -> bool:
+def names_discovered_law(result: SearchResult) -> bool:
     """Whether a discovered law is among the named effects."""
     claims = result.found.after.fitted.hypothesis.claims
     return result.judgement.named and any(claim.effect.law is not None for claim in claims)

@@ -27,9 +27,9 @@ LEAST_SAMPLES_TO_FIT = 64  # samples with a response that are available for fitt
 LEAST_CYCLES = 3.0
 # by hand: 0.81 of the power of a step, which is no cycle, lies in one line; drifting random levels have many
 CYCLES_SHARE = 0.75
-BRIDGED = 0.02  # share of the command's spread: largest error of linear interpolation over gaps of that length; by hand
+BRIDGED_GAP_ERROR = 0.02  # share of the command's spread: largest error of linear interpolation over a gap; by hand
 # least share of the samples without gaps that lies in stretches that can be compared; principle: the main part
-LEAST_KEPT = 0.5
+LEAST_GAPLESS_SHARE = 0.5
 LARGEST_VALUE = 1e12  # SI; principle: far beyond any device, and its powers are still finite numbers
 # e-foldings of the free motion over the longest recording; principle: rounding errors stay far below it
 MOST_GROWTH = 1.0
@@ -162,7 +162,7 @@ HELD_OUT_TOO_SMALL = 0.05  # unless the mismatch there is smaller than this
 # held-out samples to be used for fitting (`open_milder`). Pairs of seeds 101000 and 101200
 HELD_OUT_ALONE_ERROR = 1.25
 LEAST_PART = 16  # samples: shortest part into which held-out stretches are cut
-LOUDER = 1.05  # ratio to the largest command elsewhere, from which a stretch counts as louder
+LOUDER_RATIO = 1.05  # ratio to the largest command elsewhere, from which a stretch counts as louder
 
 # Faults that a recording shows without a model (`model_free_faults`). By hand.
 STEP_FACTOR = 1.5  # ratio to a reference device's steps, from which steps are different
@@ -188,9 +188,9 @@ MOST_BETWEEN_SEGMENTS = 5.0
 # gain that makes a candidate e times less likely. Bank (docs/proof.md), also the next two lines
 PROBABILITY_SCALE = 0.002
 # probability that no candidate is right: with noise alone left, and with much more left
-ELSEWHERE_LEAST, ELSEWHERE_MOST = 0.01, 0.8
+NO_CANDIDATE_LEAST, NO_CANDIDATE_MOST = 0.01, 0.8
 # error above the noise halfway between these, and steepness of the transition
-ELSEWHERE_HALFWAY, ELSEWHERE_STEEPNESS = 0.35, 1.5
+NO_CANDIDATE_HALFWAY, NO_CANDIDATE_STEEPNESS = 0.35, 1.5
 
 # Limits of statements and proposals (`wording`, `unit_doubt`, `next_experiment`). By hand.
 SAME_TO_READERS = 1.05  # ratio of errors up to which they count as the same
@@ -252,7 +252,7 @@ BALANCE_FOLDS = 8  # least number of blocks to fit, and of blocks to test by
 # largest number of samples to fit to, and of samples to test by: the first ones of each block
 BALANCE_MOST_SAMPLES = 20000
 
-# Which sums of laws are tried, and which is the plainest (`structures`, `simplest_structure`, `linear_part`). By hand.
+# Which sums of laws are tried and preferred (`structures`, `choose_simplest_structure`, `linear_part`). By hand.
 MOST_SUMMED_LAWS = 3  # laws in one sum
 STRUCTURES_BEAM = 5  # structures of each size that are extended further
 FURTHER_LAW_GAIN = 0.02  # share of the cross-validated error power that a further law must remove
@@ -341,7 +341,7 @@ PART_MOST_SAMPLES = 40000
 CONTRAST_BLOCKS = 24
 CONTRAST_WHITENING_ORDER = 8  # order of the autoregressive model that whitens the errors
 
-# When two sets of recordings differ (`compare`). By hand.
+# When two sets of recordings differ (`rank_faults`). By hand.
 # factor by which the excess error of both sets together must exceed the largest excess between stretches of one set.
 # By hand: of seven public devices without a fault, halves in which a fault was named reached a factor of 1.53; for
 # correctly named faults it was 1.75 or more
@@ -355,7 +355,7 @@ SIZE_IS_NEAR = 0.02  # relative change of a fault's size, below which its invers
 # largest number of rounds in which a fault with a nonlinear inverse is inverted again at the size found before
 UNDOING_ROUNDS = 4
 
-# Which faults are named (`decide`). By hand.
+# Which faults are named (`contrast.decide`). By hand.
 # factor by which the gain of a fault must exceed the largest gain between stretches of one set. By hand: for six public
 # devices without a fault, the factor between two halves was up to 3.7
 FAULT_BEYOND = 5.0

@@ -55,21 +55,21 @@ def scale_of(unit: str, magnitude: float) -> Scale:
 
 def typeset_unit(unit: str) -> str:
     """The unit with raised exponents: "m/s^2" gives "m/s²", "1/m" gives "per m", and "1" gives an empty string."""
-    shown = "" if unit == "1" else f"per {unit[2:]}" if unit.startswith("1/") else unit
-    for ascii_, raised in _RAISED.items():
-        shown = shown.replace(ascii_, raised)
-    return _SYMBOLS.get(shown, shown)
+    text = "" if unit == "1" else f"per {unit[2:]}" if unit.startswith("1/") else unit
+    for power, raised in _RAISED.items():
+        text = text.replace(power, raised)
+    return _SYMBOLS.get(text, text)
 
 
 def value_text(value: float, unit: str, ci95: tuple[float, float] | None = None) -> str:
     """A value with its 95 % interval, such as "54 µm [49, 60]"; three significant digits without an interval. value,
     ci95: in `unit`, SI."""
     scale = scale_of(unit, value)
-    shown = value * scale.factor
+    scaled = value * scale.factor
     interval = None if ci95 is None else (ci95[0] * scale.factor, ci95[1] * scale.factor)
-    decimals = _decimals(shown, interval)
+    decimals = _decimals(scaled, interval)
     space = "" if scale.unit in ("", "°") else " "
-    text = f"{_number(shown, decimals)}{space}{scale.unit}"
+    text = f"{_number(scaled, decimals)}{space}{scale.unit}"
     if interval is None:
         return text
     return f"{text} [{_number(interval[0], decimals)}, {_number(interval[1], decimals)}]"
@@ -77,8 +77,8 @@ def value_text(value: float, unit: str, ci95: tuple[float, float] | None = None)
 
 def percent_text(share: float, ci95: tuple[float, float] | None = None) -> str:
     """A share (0 to 1) as per cent, with its 95 % interval."""
-    shown = value_text(100 * share, "1", None if ci95 is None else (100 * ci95[0], 100 * ci95[1]))
-    value, bracket, interval = shown.partition(" [")
+    text = value_text(100 * share, "1", None if ci95 is None else (100 * ci95[0], 100 * ci95[1]))
+    value, bracket, interval = text.partition(" [")
     return f"{value} %{bracket}{interval}"
 
 
@@ -110,9 +110,9 @@ def _decimals(value: float, interval: tuple[float, float] | None) -> int:
     size = np.floor(np.log10(abs(value))) if value else 0.0
     if interval is None or not interval[1] > interval[0]:
         return int(max(0, _DIGITS - 1 - size))
-    half = (interval[1] - interval[0]) / 2
-    wanted = -int(np.floor(np.log10(half * 1.0001)))
-    return int(np.clip(wanted, 0, max(0, _MOST_DIGITS - 1 - size)))
+    half_width = (interval[1] - interval[0]) / 2
+    decimals = -int(np.floor(np.log10(half_width * 1.0001)))
+    return int(np.clip(decimals, 0, max(0, _MOST_DIGITS - 1 - size)))
 
 
 def _number(value: float, decimals: int) -> str:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from analysis.evaluation.blind_test.calibration import Calibration
-from analysis.evaluation.blind_test.detection import EffectDraws, detection_strips, shares_by_size
+from analysis.evaluation.blind_test.detection import EffectDraws, compute_rates_by_size, make_detection_strips
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes, ratio_ticks
@@ -28,7 +28,11 @@ def blind_test_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -
     singles = [outcome for outcome in outcomes if outcome.kind == "single"]
     pictures = []
     if singles:
-        pictures += [_strips_picture(detection_strips(singles)), _size_picture(singles), _confusion_picture(singles)]
+        pictures += [
+            _strips_picture(make_detection_strips(singles)),
+            _size_picture(singles),
+            _confusion_picture(singles),
+        ]
     if calibration.bins:
         pictures.append(_reliability_picture(calibration))
     return tuple(pictures)
@@ -40,8 +44,8 @@ def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
     axes = figure.add_subplot()
     plain_axes(axes)
     for row, strip in enumerate(strips):
-        for strength, how in strip.draws:
-            marker, colour = MARKS[how]
+        for strength, outcome in strip.draws:
+            marker, colour = MARKS[outcome]
             axes.plot(strength, row, marker, color=colour, markersize=6.5 if marker != "." else 5)
         if strip.ideal_threshold is not None:
             axes.vlines(strip.ideal_threshold, row - 0.38, row + 0.38, color=BLACK, linewidth=1.4)
@@ -49,7 +53,10 @@ def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
     axes.set_ylim(len(strips) - 0.4, -0.6)
     axes.set_xlim(-0.03, 1.03)
     axes.set_xlabel("strength, from the weakest that is drawn to the strongest (logarithmic)")
-    handles = [Line2D([], [], marker=m, color=c, linestyle="", label=how) for how, (m, c) in MARKS.items()]
+    handles = [
+        Line2D([], [], marker=marker_style, color=marker_colour, linestyle="", label=outcome)
+        for outcome, (marker_style, marker_colour) in MARKS.items()
+    ]
     handles.append(
         Line2D([], [], marker="|", color=BLACK, linestyle="", markersize=9, label="ideal observer detects it")
     )
@@ -62,7 +69,7 @@ def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
         "effect, detects it: no re-tuning can hide the effect from it (line fit to the logarithms of the changes "
         "that the effects cause).",
         figure,
-        alternative=" ".join(f"{s.effect}: {', '.join(f'{x:.2f} {how}' for x, how in s.draws)}." for s in strips),
+        alternative=" ".join(f"{s.effect}: {', '.join(f'{x:.2f} {word}' for x, word in s.draws)}." for s in strips),
     )  # fmt: skip
 
 
@@ -72,14 +79,20 @@ def _size_picture(singles: Sequence[Outcome]) -> Picture:
     figure = new_figure(7.4, 3.6)
     axes = figure.add_subplot()
     plain_axes(axes)
-    parts = shares_by_size(singles)
+    size_bins = compute_rates_by_size(singles)
     axes.set_xscale("log")
-    at = [part.adds for part in parts]
-    axes.vlines(at, [part.low for part in parts], [part.high for part in parts], color=BLUE, linewidth=1.4)
-    axes.plot(at, [part.right for part in parts], "o-", color=BLUE, linewidth=1.2)
+    changes = [size_bin.median_change for size_bin in size_bins]
+    axes.vlines(
+        changes,
+        [size_bin.low for size_bin in size_bins],
+        [size_bin.high for size_bin in size_bins],
+        color=BLUE,
+        linewidth=1.4,
+    )
+    axes.plot(changes, [size_bin.rate for size_bin in size_bins], "o-", color=BLUE, linewidth=1.2)
     axes.set_ylim(-0.02, 1.02)
-    if max(at) > min(at):
-        ratio_ticks(axes.xaxis, min(at), max(at))
+    if max(changes) > min(changes):
+        ratio_ticks(axes.xaxis, min(changes), max(changes))
     axes.set_xlabel("change of the readings by the effect: rms over the noise's, worst channel")
     axes.set_ylabel("share named right")
     return Picture(
@@ -87,7 +100,7 @@ def _size_picture(singles: Sequence[Outcome]) -> Picture:
         "All effects together, in bins of equal count; bars are Wilson's 95 % intervals. The abscissa compares the "
         "same device with and without the effect, before a re-tuned model hides part of it.",
         figure,
-        alternative=" ".join(f"{part.adds:.3g}: {100 * part.right:.0f} % of {part.of}." for part in parts),
+        alternative=" ".join(f"{b.median_change:.3g}: {100 * b.rate:.0f} % of {b.count}." for b in size_bins),
     )  # fmt: skip
 
 
@@ -118,12 +131,12 @@ def _confusion_picture(singles: Sequence[Outcome]) -> Picture:
 def _draw_counts(axes: Axes, counts: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> None:
     """Cells of the confusion matrix, shaded by their count; the diagonal in another colour. counts: (rows, columns)."""
     rows, columns = counts.shape
-    most = max(counts.max(initial=1.0), 1.0)
+    largest_count = max(counts.max(initial=1.0), 1.0)
     for i in range(rows):
         for j in range(columns):
             if counts[i, j]:
                 colour = BLUE if i == j else VERMILLION
-                shade = 0.25 + 0.65 * counts[i, j] / most
+                shade = 0.25 + 0.65 * counts[i, j] / largest_count
                 axes.fill_between([j - 0.5, j + 0.5], i - 0.5, i + 0.5, color=colour, alpha=shade, linewidth=0)
                 axes.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=7.5, color=BLACK)
     axes.set_xlim(-0.5, columns - 0.5)
@@ -140,9 +153,9 @@ def _reliability_picture(calibration: Calibration) -> Picture:
     axes = figure.add_subplot()
     plain_axes(axes)
     axes.plot([0, 1], [0, 1], color=GREY, linewidth=1.0, linestyle="--")
-    for part in calibration.bins:
-        axes.vlines(part.stated, part.low, part.high, color=BLUE, linewidth=1.4)
-        axes.plot(part.stated, part.right, "o", color=BLUE)
+    for probability_bin in calibration.bins:
+        axes.vlines(probability_bin.stated, probability_bin.low, probability_bin.high, color=BLUE, linewidth=1.4)
+        axes.plot(probability_bin.stated, probability_bin.right, "o", color=BLUE)
     axes.set_xlim(-0.02, 1.02)
     axes.set_ylim(-0.02, 1.02)
     axes.set_xlabel("stated probability")

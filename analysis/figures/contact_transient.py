@@ -15,32 +15,32 @@ Play = tuple[str, FloatArray, FloatArray]
 """One way of playing the transient: its name, forces (n, 3) in N, and measured acceleration (n, 3) in m/s^2."""
 
 
-def contact_picture(normal: FloatArray, sample_rate_hz: float, wanted: FloatArray, *plays: Play) -> Picture:
-    """Figure of a transient played at a contact. normal: (3,), unit vector. wanted: (n, 3), acceleration in m/s^2."""
-    words = ", ".join(f"{part:.2g}" for part in normal)
+def contact_picture(normal: FloatArray, sample_rate_hz: float, target: FloatArray, *plays: Play) -> Picture:
+    """Figure of a transient played at a contact. normal: (3,), unit vector. target: (n, 3), acceleration in m/s^2."""
+    normal_text = ", ".join(f"{component:.2g}" for component in normal)
     return Picture(
         name="contact",
-        title=f"A transient along the normal ({words})",
+        title=f"A transient along the normal ({normal_text})",
         caption="Columns: ways to play it. Above: acceleration along the normal, wanted (grey) and measured. Middle: "
         "length of what was measured across the normal, which nothing wants. Below: the forces.",
-        figure=_draw(normal, sample_rate_hz, wanted, plays),
+        figure=_draw_transient(normal, sample_rate_hz, target, plays),
         alternative="Acceleration along and across the normal, and forces, over time, for "
         + " and ".join(name for name, _, _ in plays),
     )
 
 
-def _draw(normal: FloatArray, rate_hz: float, wanted: FloatArray, plays: tuple[Play, ...]) -> Figure:
+def _draw_transient(normal: FloatArray, rate_hz: float, target: FloatArray, plays: tuple[Play, ...]) -> Figure:
     figure = new_figure(4.3 * len(plays), 5.6)
     grid = figure.subplots(3, len(plays), sharex=True, sharey="row", squeeze=False)
-    time_ms = 1000 * np.arange(len(wanted)) / rate_hz
+    time_ms = 1000 * np.arange(len(target)) / rate_hz
     for column, (name, forces, measured) in zip(grid.T, plays, strict=True):
-        along = measured @ normal
-        across = np.linalg.norm(measured - np.outer(along, normal), axis=1)
-        column[0].plot(time_ms, wanted @ normal, color=GREY, linewidth=2.2, label="wanted")
-        column[0].plot(time_ms, along, color=BLUE, linewidth=1.0, label="measured")
-        column[1].plot(time_ms, across, color=VERMILLION, linewidth=1.0)
-        for each, axis, colour in zip(forces.T, "xyz", (BLUE, VERMILLION, GREEN), strict=True):
-            column[2].plot(time_ms, each, color=colour, linewidth=1.0, label=f"f{axis}")
+        along_normal = measured @ normal
+        across_normal = np.linalg.norm(measured - np.outer(along_normal, normal), axis=1)
+        column[0].plot(time_ms, target @ normal, color=GREY, linewidth=2.2, label="wanted")
+        column[0].plot(time_ms, along_normal, color=BLUE, linewidth=1.0, label="measured")
+        column[1].plot(time_ms, across_normal, color=VERMILLION, linewidth=1.0)
+        for component, axis, colour in zip(forces.T, "xyz", (BLUE, VERMILLION, GREEN), strict=True):
+            column[2].plot(time_ms, component, color=colour, linewidth=1.0, label=f"f{axis}")
         column[0].set_title(name, fontsize=10)
         column[2].set_xlabel("Time after the contact (ms)")
         for axes in column:

@@ -44,7 +44,7 @@ def draw_delivered(trials: Sequence[Trial]) -> Figure:
         _draw_frequency(panel, [trial for trial in measured if trial.frequency_hz == frequency])
         newton_ticks(panel.xaxis, min(levels), max(levels))
         panel.set_title(f"{frequency:g} Hz", fontsize=10, loc="left")
-    panels[-1].legend(handles=_legend(), loc="center", fontsize=9, frameon=False)
+    panels[-1].legend(handles=_legend_handles(), loc="center", fontsize=9, frameon=False)
     name_panel_axes(panels, len(frequencies), "Level (N)", "Measured (m/s²)")
     return figure
 
@@ -54,17 +54,17 @@ def _draw_frequency(axes: Axes, trials: list[Trial]) -> None:
     plain_axes(axes)
     rasterized = len(trials) > _RASTER_FROM
     levels = np.array([trial.level_n for trial in trials])
-    along = np.array([trial.delivered_mps2 for trial in trials], dtype=np.float64)
+    on_axis = np.array([trial.delivered_mps2 for trial in trials], dtype=np.float64)
     # A zero has no place on a logarithmic axis and is left out, like a missing value.
-    across = np.array([trial.off_axis_mps2 or np.nan for trial in trials], dtype=np.float64)
-    axes.loglog(levels, along, "o", color=BLUE, markersize=3, alpha=0.5, rasterized=rasterized)
-    axes.loglog(levels, across, "s", color=VERMILLION, markersize=3, alpha=0.5, rasterized=rasterized,
+    off_axis = np.array([trial.off_axis_mps2 or np.nan for trial in trials], dtype=np.float64)
+    axes.loglog(levels, on_axis, "o", color=BLUE, markersize=3, alpha=0.5, rasterized=rasterized)
+    axes.loglog(levels, off_axis, "s", color=VERMILLION, markersize=3, alpha=0.5, rasterized=rasterized,
                 markerfacecolor="none")  # fmt: skip
     span = np.array([levels.min(), levels.max()])
-    axes.loglog(span, span * np.median(along / levels), color=GREY, linewidth=1)
+    axes.loglog(span, span * np.median(on_axis / levels), color=GREY, linewidth=1)
 
 
-def _legend() -> list[Line2D]:
+def _legend_handles() -> list[Line2D]:
     return [
         Line2D([], [], marker="o", color=BLUE, linewidth=0, label="along the direction"),
         Line2D([], [], marker="s", color=VERMILLION, markerfacecolor="none", linewidth=0, label="off the direction"),

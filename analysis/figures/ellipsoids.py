@@ -13,7 +13,7 @@ from matplotlib.typing import LineStyleType
 
 from analysis.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, draw_no_data_note, new_figure
 from analysis.psychophysics.ellipsoid import EllipsoidResult
-from analysis.wording import number
+from analysis.wording import format_number
 
 _COLUMNS = 6
 """Largest number of frequencies in a row of panels."""
@@ -34,16 +34,16 @@ def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:
     directions = list(dict.fromkeys(result.along for result in results))
     height = 1.1 * max(0.4, *(_half_height(result) for result in results))
     columns = min(_COLUMNS, len(frequencies))
-    blocks = -(-len(frequencies) // columns)
-    figure = new_figure(8.6, (1.6 + 2 * min(2.0, 8.0 / columns) * height / 1.15) * blocks + 0.4)
-    grid = figure.subplots(2 * blocks, columns, squeeze=False, sharex=True, sharey=True)
-    for line in grid:
-        for axes in line:
+    block_count = -(-len(frequencies) // columns)
+    figure = new_figure(8.6, (1.6 + 2 * min(2.0, 8.0 / columns) * height / 1.15) * block_count + 0.4)
+    grid = figure.subplots(2 * block_count, columns, squeeze=False, sharex=True, sharey=True)
+    for grid_row in grid:
+        for axes in grid_row:
             axes.axis("off")
     for index, frequency in enumerate(frequencies):
         block, column = divmod(index, columns)
-        here = [result for result in results if result.frequency_hz == frequency]
-        _draw_panels(grid[2 * block][column], grid[2 * block + 1][column], here, directions, height)
+        frequency_results = [result for result in results if result.frequency_hz == frequency]
+        _draw_panels(grid[2 * block][column], grid[2 * block + 1][column], frequency_results, directions, height)
     handles = [
         Line2D([], [], color=_COLOURS[i % 5], linestyle=_STYLES[i % 5], label=direction.replace("_", " "))
         for i, direction in enumerate(directions)
@@ -53,31 +53,36 @@ def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:
     return figure
 
 
-def _draw_panels(above: Axes, below: Axes, here: list[EllipsoidResult], directions: list[str], height: float) -> None:
-    """Both panels of one frequency. here: results at this frequency. height: half height of a panel, semi-axis = 1."""
+def _draw_panels(
+    above: Axes, below: Axes, frequency_results: list[EllipsoidResult], directions: list[str], height: float
+) -> None:
+    """Both panels of one frequency. frequency_results: results at this frequency. height: half height of a panel,
+    semi-axis = 1."""
     for axes in (above, below):
         axes.set_aspect("equal")
         axes.set_xlim(-1.15, 1.15)
         axes.set_ylim(-height, height)
         axes.plot([-1.12, 1.12], [0, 0], color=GREY, linewidth=0.9)
         axes.plot([0, 0], [-0.06, 0.06], color=GREY, linewidth=0.9)
-    first, alone = here[0], len(here) == 1
+    first, is_single = frequency_results[0], len(frequency_results) == 1
     above.set_title(
         f"{first.frequency_hz:g} Hz\nmean squares"
-        + (_label(first.moments.normalised_axes[1], first.moments.tilt_deg) if alone else ""),
+        + (_ellipse_label(first.moments.normalised_axes[1], first.moments.tilt_deg) if is_single else ""),
         fontsize=9,
     )
-    below.set_title("phasors" + (_label(first.phasor.ellipticity, first.phasor.tilt_deg) if alone else ""), fontsize=9)
-    for result in here:
-        i = directions.index(result.along)
-        colour, style = _COLOURS[i % 5], _STYLES[i % 5]
+    below.set_title(
+        "phasors" + (_ellipse_label(first.phasor.ellipticity, first.phasor.tilt_deg) if is_single else ""), fontsize=9
+    )
+    for result in frequency_results:
+        index = directions.index(result.along)
+        colour, style = _COLOURS[index % 5], _STYLES[index % 5]
         _draw_ellipse(above, result.moments.normalised_axes[1], result.moments.turn_deg, colour, style)
         _draw_ellipse(below, result.phasor.ellipticity, result.phasor.turn_deg, colour, style)
 
 
-def _label(ratio: float, tilt_deg: float) -> str:
+def _ellipse_label(ratio: float, tilt_deg: float) -> str:
     """Ratio of the semi-axes and tilt (degrees) of an ellipse, as a line of a title."""
-    return f"\n1 : {ratio:.2f}, tilt {number(tilt_deg, 0)}°"
+    return f"\n1 : {ratio:.2f}, tilt {format_number(tilt_deg, 0)}°"
 
 
 def _half_height(result: EllipsoidResult) -> float:

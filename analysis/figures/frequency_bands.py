@@ -21,9 +21,9 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.frequency_response.octave_bins import octave_bins
 
 _COLOURS = {"low": GREEN, "middle": BLUE, "high": PURPLE}
-_HALF, _TALLER = 0.4, 0.35
+_HALF_HEIGHT, _EXTRA_HALF_HEIGHT = 0.4, 0.35
 """Half the height of a row, and additional half height of the row of control methods, in units of the ordinate."""
-_LETTERS = 110
+_LETTERS_PER_AXES = 110
 """Approximate number of letters that fit into the width of the axes, for line breaks."""
 _Shade = tuple[str, float]
 """Colour and opacity (0 to 1) of a bar."""
@@ -92,9 +92,9 @@ def _mark_onset(axes: Axes, frequency_hz: float, onset: CouplingOnset) -> None:
     if onset.interval_hz is not None:
         axes.axvspan(*onset.interval_hz, color=VERMILLION, alpha=0.3, linewidth=0)
     axes.plot(frequency_hz, level, "o", color=VERMILLION, markersize=6, zorder=4)
-    begins = "coupled from the start" if onset.from_the_start else f"coupling begins: {frequency_hz:.1f} Hz"
+    label = "coupled from the start" if onset.from_the_start else f"coupling begins: {frequency_hz:.1f} Hz"
     axes.annotate(
-        begins, (frequency_hz, level), xytext=(-8, 14), textcoords="offset points", ha="right", fontsize=9,
+        label, (frequency_hz, level), xytext=(-8, 14), textcoords="offset points", ha="right", fontsize=9,
         color=VERMILLION,
     )  # fmt: skip
 
@@ -103,27 +103,27 @@ def _draw_rows(axes: Axes, onset: CouplingOnset, bands: Sequence[FrequencyBand],
     """Three rows of bars: coupling of the device, direction perception, control method by band."""
     lowest, highest = bands[0].low_hz, bands[-1].high_hz
     coupled_hz = highest if onset.frequency_hz is None else min(max(onset.frequency_hz, lowest), highest)
-    _bar(axes, 2, (lowest, coupled_hz), "axes hardly couple", (GREY, 0.18))
-    _bar(axes, 2, (coupled_hz, highest), "axes couple", (GREY, 0.45))
-    _bar(axes, 1, (lowest, direction_limit_hz), "directions are felt", (ORANGE, 0.45))
-    _bar(axes, 1, (direction_limit_hz, highest), "hardly felt", (ORANGE, 0.18))
+    _draw_bar(axes, 2, (lowest, coupled_hz), "axes hardly couple", (GREY, 0.18))
+    _draw_bar(axes, 2, (coupled_hz, highest), "axes couple", (GREY, 0.45))
+    _draw_bar(axes, 1, (lowest, direction_limit_hz), "directions are felt", (ORANGE, 0.45))
+    _draw_bar(axes, 1, (direction_limit_hz, highest), "hardly felt", (ORANGE, 0.18))
     for band in bands:
-        room = int(_LETTERS * np.log(band.high_hz / band.low_hz) / np.log(highest / lowest))
-        words = f"{band.name}\n{fill(band.method, max(room, 10))}"
-        _bar(axes, 0, (band.low_hz, band.high_hz), words, (_COLOURS[band.name], 0.35))
-    axes.set_yticks([2, 1, -_TALLER], ["Device", "Person", "Driven by"])
+        letters_per_line = int(_LETTERS_PER_AXES * np.log(band.high_hz / band.low_hz) / np.log(highest / lowest))
+        label = f"{band.name}\n{fill(band.method, max(letters_per_line, 10))}"
+        _draw_bar(axes, 0, (band.low_hz, band.high_hz), label, (_COLOURS[band.name], 0.35))
+    axes.set_yticks([2, 1, -_EXTRA_HALF_HEIGHT], ["Device", "Person", "Driven by"])
     axes.set_ylim(-1.2, 2.5)
     axes.tick_params(axis="y", length=0)
     for side in ("top", "right", "left"):
         axes.spines[side].set_visible(False)
 
 
-def _bar(axes: Axes, row: int, band_hz: tuple[float, float], words: str, colour: _Shade) -> None:
+def _draw_bar(axes: Axes, row: int, band_hz: tuple[float, float], label: str, colour: _Shade) -> None:
     """A labelled bar over a frequency band; none for an empty band. row: ordinate; 0 is the taller row of methods."""
     low_hz, high_hz = band_hz
     if high_hz <= low_hz:
         return
-    half = _HALF + (_TALLER if row == 0 else 0.0)
-    middle = row - (_TALLER if row == 0 else 0.0)
-    axes.fill_between([low_hz, high_hz], middle - half, middle + half, color=colour, linewidth=0)
-    axes.text(float(np.sqrt(low_hz * high_hz)), middle, words, ha="center", va="center", fontsize=8.5, linespacing=1.1)
+    half_height = _HALF_HEIGHT + (_EXTRA_HALF_HEIGHT if row == 0 else 0.0)
+    middle = row - (_EXTRA_HALF_HEIGHT if row == 0 else 0.0)
+    axes.fill_between([low_hz, high_hz], middle - half_height, middle + half_height, color=colour, linewidth=0)
+    axes.text(float(np.sqrt(low_hz * high_hz)), middle, label, ha="center", va="center", fontsize=8.5, linespacing=1.1)

@@ -24,54 +24,54 @@ COLUMNS = 1200
 """Columns of a drawn time series, each from its lowest to its highest sample."""
 SHOWN_SAMPLES = 600
 """Samples that are shown where two time series are compared."""
-_FIT, _TEST, _BAND = "#EEF3E6", "#FBEFD9", "#EEF3E6"
+_FIT_COLOUR, _TEST_COLOUR, _BAND_COLOUR = "#EEF3E6", "#FBEFD9", "#EEF3E6"
 """Background colours of samples to fit, of samples to test, and of the driven band."""
 _DECADES = 8
 """Decades of amplitude that a spectrum shows, from its largest value down."""
-_COLOUR_OF = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "position": SKY, "condition": GREY}
+_ROLE_COLOURS = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "position": SKY, "condition": GREY}
 
 
-def look_pictures(found: Overview, place: int) -> tuple[Picture, ...]:
-    """All figures of one recording; in samples instead of seconds where its time axis is unknown. place: number of the
+def look_pictures(overview: Overview, number: int) -> tuple[Picture, ...]:
+    """All figures of one recording; in samples instead of seconds where its time axis is unknown. number: number of the
     recording on the page, from 1, for the names of the pictures."""
-    pictures = [_signals_picture(found, f"signals-{place}")]
-    if found.spectra is not None:
-        pictures.append(_spectra_picture(found, f"spectra-{place}"))
-    if found.coherences:
-        pictures.append(_coherence_picture(found, f"coherence-{place}"))
-    if len(found.levels) > 2:
-        pictures.append(_levels_picture(found, f"levels-{place}"))
-    if found.pairs:
-        pictures.append(_derivatives_picture(found, f"derivatives-{place}"))
-    return tuple(pictures if found.recording.is_timed else map(count_in_samples, pictures))
+    pictures = [_signals_picture(overview, f"signals-{number}")]
+    if overview.spectra is not None:
+        pictures.append(_spectra_picture(overview, f"spectra-{number}"))
+    if overview.coherences:
+        pictures.append(_coherence_picture(overview, f"coherence-{number}"))
+    if len(overview.levels) > 2:
+        pictures.append(_levels_picture(overview, f"levels-{number}"))
+    if overview.pairs:
+        pictures.append(_derivatives_picture(overview, f"derivatives-{number}"))
+    return tuple(pictures if overview.recording.is_timed else map(count_in_samples, pictures))
 
 
-def _channel_panels(found: Overview, height_in: float) -> tuple[Figure, list[Axes]]:
+def _channel_panels(overview: Overview, height_in: float) -> tuple[Figure, list[Axes]]:
     """A figure with a titled panel per channel. height_in: height of a panel in inches."""
-    figure = new_figure(8.6, 0.8 + height_in * len(found.channels))
-    axes = figure.subplots(len(found.channels), 1, sharex=True, squeeze=False)[:, 0]
-    for channel, panel in zip(found.channels, axes, strict=True):
+    figure = new_figure(8.6, 0.8 + height_in * len(overview.channels))
+    axes = figure.subplots(len(overview.channels), 1, sharex=True, squeeze=False)[:, 0]
+    for channel, panel in zip(overview.channels, axes, strict=True):
         plain_axes(panel)
         panel.set_title(f"{channel.role} {channel.name} ({_unit_text(channel.unit)})", fontsize=9, loc="left", pad=3)
     return figure, list(axes)
 
 
-def _signals_picture(found: Overview, name: str) -> Picture:
+def _signals_picture(overview: Overview, name: str) -> Picture:
     """Time series of all channels, with the samples to fit and to test, and the boundaries of parts."""
-    figure, axes = _channel_panels(found, 1.15)
-    rate_hz = found.recording.sample_rate_hz
-    for channel, panel in zip(found.channels, axes, strict=True):
+    figure, axes = _channel_panels(overview, 1.15)
+    rate_hz = overview.recording.sample_rate_hz
+    for channel, panel in zip(overview.channels, axes, strict=True):
         times_s, low, high = envelope(channel.samples, rate_hz)
-        panel.fill_between(times_s, low, high, color=_COLOUR_OF[channel.role], linewidth=0.6)
-        for segment in found.recording.segments:
+        panel.fill_between(times_s, low, high, color=_ROLE_COLOURS[channel.role], linewidth=0.6)
+        for segment in overview.recording.segments:
             if segment.role:
-                shade = _FIT if segment.role == "fit" else _TEST
+                shade = _FIT_COLOUR if segment.role == "fit" else _TEST_COLOUR
                 panel.axvspan(segment.start / rate_hz, segment.stop / rate_hz, color=shade, zorder=0, linewidth=0)
-        for start, _ in found.stretches[1:]:
+        for start, _ in overview.stretches[1:]:
             panel.axvline(start / rate_hz, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)))
     figure.supxlabel("Time (s)", fontsize=10)
-    handles = [Patch(color=_FIT, label="to fit"), Patch(color=_TEST, label="to test")]
-    if any(segment.role for segment in found.recording.segments):
+    handles = [Patch(color=_FIT_COLOUR, label="to fit"), Patch(color=_TEST_COLOUR, label="to test")]
+    if any(segment.role for segment in overview.recording.segments):
         figure.legend(handles=handles, loc="outside upper center", ncols=2, fontsize=8.5, frameon=False)
     return Picture(
         name=name,
@@ -93,22 +93,22 @@ def envelope(samples: FloatArray, rate_hz: float, columns: int = COLUMNS) -> tup
     return starts / rate_hz, low, high
 
 
-def _spectra_picture(found: Overview, name: str) -> Picture:
+def _spectra_picture(overview: Overview, name: str) -> Picture:
     """Amplitude densities of all channels, in their units per root hertz."""
-    assert found.spectra is not None
-    figure, axes = _channel_panels(found, 1.25)
-    frequency_hz = found.spectra.frequency_hz
-    for k, (channel, panel) in enumerate(zip(found.channels, axes, strict=True)):
-        amplitude = np.sqrt(found.spectra.power(k))
+    assert overview.spectra is not None
+    figure, axes = _channel_panels(overview, 1.25)
+    frequency_hz = overview.spectra.frequency_hz
+    for k, (channel, panel) in enumerate(zip(overview.channels, axes, strict=True)):
+        amplitude = np.sqrt(overview.spectra.power(k))
         if np.nanmin(channel.samples) == np.nanmax(channel.samples):
             panel.text(0.5, 0.5, "constant", transform=panel.transAxes, ha="center", fontsize=9, color=GREY)
             continue
-        panel.plot(frequency_hz, np.where(amplitude > 0, amplitude, np.nan), color=_COLOUR_OF[channel.role], lw=1.0)
+        panel.plot(frequency_hz, np.where(amplitude > 0, amplitude, np.nan), color=_ROLE_COLOURS[channel.role], lw=1.0)
         panel.set_yscale("log")
         if amplitude.max() > 0:
             top = float(amplitude.max())
             panel.set_ylim(max(0.5 * float(amplitude[amplitude > 0].min()), top * 10.0**-_DECADES), 2 * top)
-        _shade_bands(panel, found)
+        _shade_bands(panel, overview)
     axes[0].set_xscale("log")
     axes[0].set_xlim(float(frequency_hz[0]), float(frequency_hz[-1]))
     figure.supxlabel("Frequency (Hz)", fontsize=10)
@@ -117,50 +117,50 @@ def _spectra_picture(found: Overview, name: str) -> Picture:
     return Picture(
         name=name,
         title="Spectra",
-        caption=f"Mean of {found.spectra.windows} windows of {1 / step_hz:.3g} s (Hann window, half overlap, linear "
+        caption=f"Mean of {overview.spectra.windows} windows of {1 / step_hz:.3g} s (Hann window, half overlap, linear "
         "trend removed). Shade: from the lowest to the highest frequency that a command was driven at.",
         figure=figure,
     )
 
 
-def _shade_bands(panel: Axes, found: Overview) -> None:
+def _shade_bands(panel: Axes, overview: Overview) -> None:
     """Shade from the lowest to the highest driven frequency."""
-    if found.bands:
-        low, high = min(band.low_hz for band in found.bands), max(band.high_hz for band in found.bands)
-        panel.axvspan(low, high, color=_BAND, zorder=0)
+    if overview.bands:
+        low, high = min(band.low_hz for band in overview.bands), max(band.high_hz for band in overview.bands)
+        panel.axvspan(low, high, color=_BAND_COLOUR, zorder=0)
 
 
-def _band_lines(found: Overview) -> Mask:
+def _band_lines(overview: Overview) -> Mask:
     """(lines,): the spectral lines from the lowest to the highest driven frequency."""
-    assert found.spectra is not None
-    low, high = min(band.low_hz for band in found.bands), max(band.high_hz for band in found.bands)
-    return np.asarray((found.spectra.frequency_hz >= low) & (found.spectra.frequency_hz <= high))
+    assert overview.spectra is not None
+    low, high = min(band.low_hz for band in overview.bands), max(band.high_hz for band in overview.bands)
+    return np.asarray((overview.spectra.frequency_hz >= low) & (overview.spectra.frequency_hz <= high))
 
 
-def _coherence_picture(found: Overview, name: str) -> Picture:
+def _coherence_picture(overview: Overview, name: str) -> Picture:
     """Multiple coherence of each response with all commands; faint outside the driven band."""
-    assert found.spectra is not None
+    assert overview.spectra is not None
     figure = new_figure(8.6, 3.0)
     panel = figure.subplots()
     plain_axes(panel)
-    _shade_bands(panel, found)
-    for k, coherence in enumerate(found.coherences):
+    _shade_bands(panel, overview)
+    for k, coherence in enumerate(overview.coherences):
         colour = COLOURS[k % len(COLOURS)]
-        panel.plot(found.spectra.frequency_hz, coherence.multiple, color=colour, lw=0.7, alpha=0.3)
-        inside = _band_lines(found)
+        panel.plot(overview.spectra.frequency_hz, coherence.multiple, color=colour, lw=0.7, alpha=0.3)
+        in_band = _band_lines(overview)
         panel.plot(
-            found.spectra.frequency_hz[inside],
-            coherence.multiple[inside],
+            overview.spectra.frequency_hz[in_band],
+            coherence.multiple[in_band],
             color=colour,
             lw=1.3,
             label=coherence.response,
         )
     panel.set_xscale("log")
-    panel.set_xlim(float(found.spectra.frequency_hz[0]), float(found.spectra.frequency_hz[-1]))
+    panel.set_xlim(float(overview.spectra.frequency_hz[0]), float(overview.spectra.frequency_hz[-1]))
     panel.set_ylim(0, 1.02)
     panel.set_xlabel("Frequency (Hz)", fontsize=10)
     panel.set_ylabel("Multiple coherence", fontsize=10)
-    figure.legend(loc="outside upper center", ncols=min(4, len(found.coherences)), fontsize=8.5, frameon=False)
+    figure.legend(loc="outside upper center", ncols=min(4, len(overview.coherences)), fontsize=8.5, frameon=False)
     return Picture(
         name=name,
         title="Coherence",
@@ -171,31 +171,33 @@ def _coherence_picture(found: Overview, name: str) -> Picture:
     )
 
 
-def _levels_picture(found: Overview, name: str) -> Picture:
+def _levels_picture(overview: Overview, name: str) -> Picture:
     """Rms of each command and response by segment, relative to its largest: curves of a linear device coincide."""
     figure = new_figure(8.6, 3.2)
     panel = figure.subplots()
     plain_axes(panel)
-    numbers = [level.number for level in found.levels]
-    strongest = [max(level.rms[k] for level in found.levels) for k in range(len(found.channels))]
-    shown = [k for k, c in enumerate(found.channels) if c.role in ("command", "response") and strongest[k] > 0]
-    for count, k in enumerate(shown):
-        sizes = np.array([level.rms[k] for level in found.levels]) / strongest[k]
+    numbers = [level.number for level in overview.levels]
+    strongest = [max(level.rms[k] for level in overview.levels) for k in range(len(overview.channels))]
+    drawn_channels = [
+        k for k, c in enumerate(overview.channels) if c.role in ("command", "response") and strongest[k] > 0
+    ]
+    for position, k in enumerate(drawn_channels):
+        sizes = np.array([level.rms[k] for level in overview.levels]) / strongest[k]
         panel.plot(
             numbers,
             np.where(sizes > 0, sizes, np.nan),
-            color=COLOURS[count % len(COLOURS)],
-            marker=MARKERS[count % len(MARKERS)],
+            color=COLOURS[position % len(COLOURS)],
+            marker=MARKERS[position % len(MARKERS)],
             markersize=5,
             linewidth=0.8,
-            linestyle=":" if found.channels[k].role == "command" else "-",
-            label=f"{found.channels[k].label} ({_unit_text(found.channels[k].format(strongest[k]))})",
+            linestyle=":" if overview.channels[k].role == "command" else "-",
+            label=f"{overview.channels[k].label} ({_unit_text(overview.channels[k].format(strongest[k]))})",
         )
     panel.set_ylim(0, 1.05)
     panel.set_xlabel("Segment", fontsize=10)
     panel.set_ylabel("Rms over that of the strongest", fontsize=10)
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-    if shown:
+    if drawn_channels:
         figure.legend(loc="outside upper center", ncols=2, fontsize=8.5, frameon=False)
     return Picture(
         name=name,
@@ -206,13 +208,13 @@ def _levels_picture(found: Overview, name: str) -> Picture:
     )
 
 
-def _derivatives_picture(found: Overview, name: str) -> Picture:
+def _derivatives_picture(overview: Overview, name: str) -> Picture:
     """Recorded velocities or accelerations compared with the differentiated signals of the same motion."""
-    pairs = found.pairs
+    pairs = overview.pairs
     figure = new_figure(8.6, 0.8 + 1.9 * len(pairs))
     axes = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
     for pair, panel in zip(pairs, axes, strict=True):
-        _draw_pair(panel, pair, found)
+        _draw_pair(panel, pair, overview)
     handles = [
         Line2D([], [], color=BLACK, linewidth=2.2, alpha=0.35, label="recorded"),
         Line2D([], [], color=BLUE, linewidth=1.0, label="differentiated position or speed"),
@@ -228,36 +230,36 @@ def _derivatives_picture(found: Overview, name: str) -> Picture:
     )
 
 
-def _draw_pair(panel: Axes, pair: KinematicPair, found: Overview) -> None:
+def _draw_pair(panel: Axes, pair: KinematicPair, overview: Overview) -> None:
     """A recorded channel, and central differences of the channel whose derivative it should be."""
-    rate_hz = found.recording.sample_rate_hz
-    by_label = {channel.label: channel for channel in found.channels}
-    later = by_label[pair.derivative]
-    start, stop = _most_varying_part(later, found.stretches)
+    rate_hz = overview.recording.sample_rate_hz
+    by_label = {channel.label: channel for channel in overview.channels}
+    recorded = by_label[pair.derivative]
+    start, stop = _most_varying_part(recorded, overview.stretches)
     times_s = np.arange(start, stop) / rate_hz
     # Differences within this stretch only: positions jump where two parts of a recording meet.
     differences = derivative(by_label[pair.place].samples[start:stop], pair.order, rate_hz)
     plain_axes(panel)
-    panel.plot(times_s, later.samples[start:stop], color=BLACK, linewidth=2.2, alpha=0.35)
+    panel.plot(times_s, recorded.samples[start:stop], color=BLACK, linewidth=2.2, alpha=0.35)
     panel.plot(times_s, differences, color=BLUE, linewidth=1.0)
-    panel.set_title(f"{pair.derivative} ({_unit_text(later.unit)}) and {pair.place}", fontsize=9, loc="left", pad=3)
+    panel.set_title(f"{pair.derivative} ({_unit_text(recorded.unit)}) and {pair.place}", fontsize=9, loc="left", pad=3)
     panel.set_xlim(float(times_s[0]), float(times_s[-1]))
 
 
 def _most_varying_part(channel: Channel, stretches: Sequence[tuple[int, int]]) -> tuple[int, int]:
     """First and end sample of the `SHOWN_SAMPLES` samples (or fewer, in a shorter stretch) in which the channel's
     variance is largest; missing samples count as the mean."""
-    best, place = -1.0, stretches[0]
+    largest, best_part = -1.0, stretches[0]
     for start, stop in stretches:
-        piece = np.nan_to_num(channel.samples[start:stop] - np.nanmean(channel.samples))
-        length = min(SHOWN_SAMPLES, len(piece))
-        sums, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (piece, piece**2))
+        centred = np.nan_to_num(channel.samples[start:stop] - np.nanmean(channel.samples))
+        length = min(SHOWN_SAMPLES, len(centred))
+        sums, squares = (np.concatenate([[0.0], np.cumsum(values)]) for values in (centred, centred**2))
         mean = (sums[length:] - sums[:-length]) / length
-        varied = (squares[length:] - squares[:-length]) / length - mean**2
-        if varied.max() > best:
-            at = start + int(np.argmax(varied))
-            best, place = float(varied.max()), (at, at + length)
-    return place
+        variance = (squares[length:] - squares[:-length]) / length - mean**2
+        if variance.max() > largest:
+            first = start + int(np.argmax(variance))
+            largest, best_part = float(variance.max()), (first, first + length)
+    return best_part
 
 
 def _unit_text(unit: str) -> str:

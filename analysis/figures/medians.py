@@ -28,9 +28,9 @@ from analysis.psychophysics.hierarchy.primary import PersonEstimate, PrimaryAnal
 
 _SPREAD = 0.5
 """Width over which the participants are spread at one frequency, as a share of the step between frequencies."""
-_ABOVE, _TOP = 1.12, 1.45
+_ABOVE_CAP_AT, _LEAST_TOP = 1.12, 1.45
 """Ordinate of participants above the cap, and least upper end of the axis, relative to the cap."""
-_HIGHEST, _ARROW = 8.0, 1.25
+_LARGEST_TOP, _LEAST_ARROW_RATIO = 8.0, 1.25
 """Largest upper end of the axis, relative to the cap; and least ratio of an arrow's upper to its lower end."""
 _LEGEND_LIMIT = 24
 """Largest number of participants that the legend lists."""
@@ -44,68 +44,73 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     axes = figure.add_subplot()
     plain_axes(axes)
     axes.set_yscale("log")
-    top, lowest = _top(primary, cap_n), _lowest(primary)
+    top, lowest = _upper_limit_n(primary, cap_n), _lower_limit_n(primary)
     axes.set_ylim(lowest, top)
     ratio_ticks(axes.yaxis, lowest, cap_n)
     axes.axhline(cap_n, color=GREY, linestyle="--", linewidth=1.2)
-    places = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(primary.persons))
-    played = {(run.subject, run.frequency_hz) for run in primary.runs}
+    shifts = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(primary.persons))
+    answered = {(run.subject, run.frequency_hz) for run in primary.runs}
     for number, person in enumerate(primary.persons):
-        known = np.array([(person.subject, frequency_hz) in played for frequency_hz in primary.frequencies_hz])
-        _draw_person(axes, person, (number, places[number]), known, cap_n)
-    for place, median in enumerate(primary.medians):
-        _draw_median(axes, place, median, (lowest, top))
+        has_answers = np.array([(person.subject, frequency_hz) in answered for frequency_hz in primary.frequencies_hz])
+        _draw_person(axes, person, (number, shifts[number]), has_answers, cap_n)
+    for index, median in enumerate(primary.medians):
+        _draw_median(axes, index, median, (lowest, top))
     _draw_limit(axes, primary.limit, primary.frequencies_hz, cap_n)
     axes.set_xticks(range(len(primary.frequencies_hz)), [f"{f:g}" for f in primary.frequencies_hz])
     axes.set_xlim(-0.6, len(primary.frequencies_hz) - 0.4)
     axes.set_xlabel("Frequency (Hz)")
     axes.set_ylabel("Threshold (N)")
-    figure.legend(handles=_legend(primary, cap_n), loc="outside right upper", fontsize=8.5, frameon=False)
+    figure.legend(handles=_legend_handles(primary, cap_n), loc="outside right upper", fontsize=8.5, frameon=False)
     return figure
 
 
-def _top(primary: PrimaryAnalysis, cap_n: float) -> float:
-    """Upper end of the axis in N: above all intervals and arrows, but at most `_HIGHEST` times the cap, so that the
+def _upper_limit_n(primary: PrimaryAnalysis, cap_n: float) -> float:
+    """Upper end of the axis in N: above all intervals and arrows, but at most `_LARGEST_TOP` times the cap, so that the
     rest stays readable."""
-    ends = [median.upper_n or _ARROW * (median.lower_n or 0.0) for median in primary.medians]
-    return min(max(_TOP * cap_n, *(1.1 * end for end in ends)), _HIGHEST * cap_n)
+    ends = [median.upper_n or _LEAST_ARROW_RATIO * (median.lower_n or 0.0) for median in primary.medians]
+    return min(max(_LEAST_TOP * cap_n, *(1.1 * end for end in ends)), _LARGEST_TOP * cap_n)
 
 
-def _lowest(primary: PrimaryAnalysis) -> float:
+def _lower_limit_n(primary: PrimaryAnalysis) -> float:
     """Lower end of the axis in N, below all thresholds and bounds."""
     people = [value for person in primary.persons for value in person.thresholds_n]
     return 0.85 * min(*people, *(median.lower_n or median.newton for median in primary.medians))
 
 
 def _draw_person(
-    axes: Axes, person: PersonEstimate, place: tuple[int, float], known: NDArray[np.bool_], cap_n: float
+    axes: Axes,
+    person: PersonEstimate,
+    number_and_shift: tuple[int, float],
+    has_answers: NDArray[np.bool_],
+    cap_n: float,
 ) -> None:
-    """A participant's thresholds, joined by a line. place: number of the participant, and shift along the abscissa.
-    known: (k,), frequencies at which the participant has answers; the model's estimates elsewhere are not drawn."""
-    number, shift = place
+    """A participant's thresholds, joined by a line. number_and_shift: number of the participant, and shift along the
+    abscissa. has_answers: (k,), frequencies at which the participant has answers; the model's estimates elsewhere are
+    not drawn."""
+    number, shift = number_and_shift
     above_cap = np.array(person.above_cap)
-    shown = np.where(above_cap, _ABOVE * cap_n, person.thresholds_n)[known]
-    at = (np.arange(len(known)) + shift)[known]
-    axes.plot(at, shown, "-", color=participant_colour(number), linewidth=0.7, alpha=0.45, zorder=1)
-    for x, value, above in zip(at, shown, above_cap[known], strict=True):
-        draw_threshold(axes, float(x), float(value), number, bool(above))
+    drawn_n = np.where(above_cap, _ABOVE_CAP_AT * cap_n, person.thresholds_n)[has_answers]
+    positions = (np.arange(len(has_answers)) + shift)[has_answers]
+    axes.plot(positions, drawn_n, "-", color=participant_colour(number), linewidth=0.7, alpha=0.45, zorder=1)
+    for x, value, is_above in zip(positions, drawn_n, above_cap[has_answers], strict=True):
+        draw_threshold(axes, float(x), float(value), number, bool(is_above))
 
 
-def _draw_median(axes: Axes, place: int, median: MedianThreshold, ends: tuple[float, float]) -> None:
+def _draw_median(axes: Axes, index: int, median: MedianThreshold, ends: tuple[float, float]) -> None:
     """The median at one frequency with its interval; an arrow where it is above the cap. ends: lower and upper end of
     the ordinate, N."""
     if median.above_cap:
-        begin = ends[0] if median.lower_n is None else min(median.lower_n, ends[1] / _ARROW)
-        axes.annotate("", (place, ends[1]), xytext=(place, begin), zorder=4,
+        arrow_start_n = ends[0] if median.lower_n is None else min(median.lower_n, ends[1] / _LEAST_ARROW_RATIO)
+        axes.annotate("", (index, ends[1]), xytext=(index, arrow_start_n), zorder=4,
                       arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.6, "shrinkA": 0,
                                   "shrinkB": 0})  # fmt: skip
         if median.lower_n is not None:
-            axes.plot(place, begin, "_", color=BLACK, markersize=9, markeredgewidth=1.6, zorder=4)
+            axes.plot(index, arrow_start_n, "_", color=BLACK, markersize=9, markeredgewidth=1.6, zorder=4)
         return
-    axes.plot(place, median.newton, "_", color=BLACK, markersize=22, markeredgewidth=2.4, zorder=4)
+    axes.plot(index, median.newton, "_", color=BLACK, markersize=22, markeredgewidth=2.4, zorder=4)
     if median.lower_n is not None and median.upper_n is not None:
         bars = [[median.newton - median.lower_n], [median.upper_n - median.newton]]
-        axes.errorbar(place, median.newton, yerr=bars, fmt="none", color=BLACK, elinewidth=1.6, capsize=4, zorder=4)
+        axes.errorbar(index, median.newton, yerr=bars, fmt="none", color=BLACK, elinewidth=1.6, capsize=4, zorder=4)
 
 
 def _draw_limit(axes: Axes, limit: DirectionLimit, frequencies_hz: tuple[float, ...], cap_n: float) -> None:
@@ -113,12 +118,14 @@ def _draw_limit(axes: Axes, limit: DirectionLimit, frequencies_hz: tuple[float, 
     if limit.frequency_hz is None:
         return
     ends = (limit.lower_hz or frequencies_hz[0], limit.frequency_hz, limit.upper_hz or frequencies_hz[-1])
-    low, at, high = np.interp(np.log(ends), np.log(frequencies_hz), np.arange(len(frequencies_hz)))
-    axes.plot([low, high], [cap_n, cap_n], "-", color=BLACK, linewidth=3.2, alpha=0.75, solid_capstyle="butt", zorder=3)
-    axes.plot(at, cap_n, "D", color="white", markeredgecolor=BLACK, markeredgewidth=1.6, markersize=8, zorder=6)
+    low_x, limit_x, high_x = np.interp(np.log(ends), np.log(frequencies_hz), np.arange(len(frequencies_hz)))
+    axes.plot(
+        [low_x, high_x], [cap_n, cap_n], "-", color=BLACK, linewidth=3.2, alpha=0.75, solid_capstyle="butt", zorder=3
+    )
+    axes.plot(limit_x, cap_n, "D", color="white", markeredgecolor=BLACK, markeredgewidth=1.6, markersize=8, zorder=6)
 
 
-def _legend(primary: PrimaryAnalysis, cap_n: float) -> list[Line2D]:
+def _legend_handles(primary: PrimaryAnalysis, cap_n: float) -> list[Line2D]:
     """Legend entries of what the figure contains."""
     percent = f"{100 * primary.confidence:g} %"
     handles = [

@@ -31,9 +31,9 @@ def draw_model_order(report: OrderReport, chosen: int) -> Figure:
     """Figure of the singular values (left), and of errors and multiplications by order (right). chosen: order of the
     identified model."""
     figure = new_figure(8.6, 3.2)
-    left, right = figure.subplots(1, 2)
-    _draw_singular_values(left, report)
-    _draw_errors(right, report, chosen)
+    left_axes, right_axes = figure.subplots(1, 2)
+    _draw_singular_values(left_axes, report)
+    _draw_errors(right_axes, report, chosen)
     return figure
 
 
@@ -42,9 +42,11 @@ def _draw_singular_values(axes: Axes, report: OrderReport) -> None:
     plain_axes(axes)
     values = report.singular_values
     number = np.arange(1, len(values) + 1)
-    seen = number <= report.visible_order
-    axes.semilogy(number[seen], values[seen], "o", color=BLUE, markersize=4, label="seen")
-    axes.semilogy(number[~seen], values[~seen], "o", color=GREY, markersize=4, markerfacecolor="none", label="noise")
+    is_visible = number <= report.visible_order
+    axes.semilogy(number[is_visible], values[is_visible], "o", color=BLUE, markersize=4, label="seen")
+    axes.semilogy(
+        number[~is_visible], values[~is_visible], "o", color=GREY, markersize=4, markerfacecolor="none", label="noise"
+    )
     axes.axhline(VISIBLE, color=GREY, linestyle="--", linewidth=1)
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("State")

@@ -13,10 +13,10 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from analysis.wording import write_without_time
+from analysis.wording import replace_time_units
 
 
-def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> str:
+def render_inline_svg(figure: Figure, name: str, title: str, description: str = "") -> str:
     """The figure as an <svg> element, with a title and a description for screen readers. The same figure gives the same
     text.
 
@@ -31,12 +31,13 @@ def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> 
     svg = text[text.index("<svg") :]
     svg = re.sub(r'\bid="', f'id="{name}-', svg)
     svg = svg.replace("url(#", f"url(#{name}-").replace('href="#', f'href="#{name}-')
-    opening, rest = svg.split(">", 1)
-    named = f"{name}-title {name}-description" if description else f"{name}-title"
-    described = f'<desc id="{name}-description">{_escape_markup(description)}</desc>' if description else ""
+    opening_tag, svg_body = svg.split(">", 1)
+    label_ids = f"{name}-title {name}-description" if description else f"{name}-title"
+    desc_element = f'<desc id="{name}-description">{_escape_markup(description)}</desc>' if description else ""
     return (
-        f'{opening} role="img" aria-labelledby="{named}"><title id="{name}-title">{_escape_markup(title)}</title>'
-        f"{described}{rest}"
+        f'{opening_tag} role="img" aria-labelledby="{label_ids}">'
+        f'<title id="{name}-title">{_escape_markup(title)}</title>'
+        f"{desc_element}{svg_body}"
     )
 
 
@@ -72,18 +73,19 @@ class Picture:
     """Whether the picture is also written as PNG. Diagnoses omit the PNG of their many folded pictures."""
     alternative: str = ""
     """Description for screen readers; empty: they read the title alone."""
-    drawn: list[str] = field(default_factory=list)
-    """Cached result of `inline_svg`, empty before the first call of `picture_svg`: page and file use the same SVG."""
+    rendered_svg: list[str] = field(default_factory=list)
+    """Cached result of `render_inline_svg`, empty before the first call of `render_picture_svg`: page and file use the
+    same SVG."""
 
 
-def picture_svg(picture: Picture) -> str:
-    """Draw a picture once and return it as inline SVG (see `inline_svg`)."""
-    if not picture.drawn:
-        picture.drawn.append(inline_svg(picture.figure, picture.name, picture.title, picture.alternative))
-    return picture.drawn[0]
+def render_picture_svg(picture: Picture) -> str:
+    """Draw a picture once and return it as inline SVG (see `render_inline_svg`)."""
+    if not picture.rendered_svg:
+        picture.rendered_svg.append(render_inline_svg(picture.figure, picture.name, picture.title, picture.alternative))
+    return picture.rendered_svg[0]
 
 
-def without_figure(picture: Picture) -> Picture:
+def remove_figure(picture: Picture) -> Picture:
     """A copy of the picture with an empty figure and the SVG already drawn, which can be sent to another process."""
     return replace(picture, figure=Figure())
 
@@ -93,6 +95,6 @@ def count_in_samples(picture: Picture) -> Picture:
     figure are changed in place. Call this function before the picture is drawn."""
     for text in picture.figure.findobj(Text):
         if isinstance(text, Text):
-            text.set_text(write_without_time(text.get_text()))
-    caption, alternative = write_without_time(picture.caption), write_without_time(picture.alternative)
+            text.set_text(replace_time_units(text.get_text()))
+    caption, alternative = replace_time_units(picture.caption), replace_time_units(picture.alternative)
     return replace(picture, caption=caption, alternative=alternative)

@@ -59,12 +59,12 @@ def draw_played_responses(rows: Sequence[PlayedResponse]) -> Figure:
     figure = new_figure(8.6, 0.8 + 1.75 * len(rows))
     grid = figure.subplots(len(rows), 3, sharex=True, sharey=True, squeeze=False)
     for panels, row in zip(grid, rows, strict=True):
-        for wanted, axes in enumerate(panels):
-            _draw_panel(axes, row, wanted)
+        for target_axis, axes in enumerate(panels):
+            _draw_panel(axes, row, target_axis)
         panels[0].set_ylabel(f"{fill(row.name, 18)}\n(dB)", fontsize=9)
-    for wanted, name in enumerate(_AXES):
-        grid[0][wanted].set_title(f"wanted along {name}", fontsize=10)
-        grid[-1][wanted].set_xlabel("Frequency (Hz)")
+    for target_axis, name in enumerate(_AXES):
+        grid[0][target_axis].set_title(f"wanted along {name}", fontsize=10)
+        grid[-1][target_axis].set_xlabel("Frequency (Hz)")
     handles = [
         Line2D([], [], color=colour, label=f"came along {name}") for colour, name in zip(_COLOURS, _AXES, strict=True)
     ]
@@ -72,15 +72,18 @@ def draw_played_responses(rows: Sequence[PlayedResponse]) -> Figure:
     return figure
 
 
-def _draw_panel(axes: Axes, row: PlayedResponse, wanted: int) -> None:
-    """Draw |T| in dB over frequency for the three delivered axes. wanted: index of the wanted axis, drawn thicker."""
+def _draw_panel(axes: Axes, row: PlayedResponse, target_axis: int) -> None:
+    """Draw |T| in dB over frequency for the three delivered axes. target_axis: index of the wanted axis, drawn
+    thicker."""
     plain_axes(axes)
     axes.axhline(0, color=GREY, linewidth=0.8)
-    for came, colour in enumerate(_COLOURS):
+    for delivered_axis, colour in enumerate(_COLOURS):
         # -180 dB at the least, far below the axis: the logarithm of 0 is never taken.
-        level_db = 20 * np.log10(np.maximum(np.abs(row.response[:, came, wanted]), 1e-9))
-        along = came == wanted
-        axes.plot(row.frequency_hz, level_db, color=colour, linewidth=1.8 if along else 0.8, zorder=3 if along else 2)
+        level_db = 20 * np.log10(np.maximum(np.abs(row.response[:, delivered_axis, target_axis]), 1e-9))
+        is_target = delivered_axis == target_axis
+        axes.plot(
+            row.frequency_hz, level_db, color=colour, linewidth=1.8 if is_target else 0.8, zorder=3 if is_target else 2
+        )
     axes.set_xscale("log")
     axes.set_xlim(float(row.frequency_hz[0]), float(row.frequency_hz[-1]))
     axes.set_ylim(_LOWEST_DB, _HIGHEST_DB)

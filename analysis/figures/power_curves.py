@@ -22,7 +22,7 @@ _DESIRED_POWER = 80.0
 """Conventional power, percent (J. Cohen, Statistical Power Analysis for the Behavioral Sciences, 1988)."""
 _MARKER_STEP = 0.12
 """Horizontal offset between the curves, in participants, so that their error bars do not hide each other."""
-_ROOM = 1.5
+_MARGIN_PEOPLE = 1.5
 """Margin at either end of the horizontal axis, in participants."""
 
 
@@ -32,16 +32,16 @@ def power_picture(
     """Picture of power and coverage with its caption. points: at least one, each of one sample size. effect_db: true
     threshold at the first frequency of pair_hz minus that at the second; 0: the power is the type-1 error. means: noun
     for the thresholds of runs, in the plural."""
-    found = "finds the difference" if effect_db else "finds a difference that does not exist (type-1 error)"
-    aim = "the usual target of the power" if effect_db else "the level of the test"
+    outcome_text = "finds the difference" if effect_db else "finds a difference that does not exist (type-1 error)"
+    reference_text = "the usual target of the power" if effect_db else "the level of the test"
     return Picture(
         name="power",
         title=f"Of {points[0].studies} simulated studies of each size, with a difference of {effect_db:g} dB "
         f"between {pair_hz[0]:g} and {pair_hz[1]:g} Hz",
-        caption=f"Above: share of the studies in which each analysis {found}. Below: share in which the primary "
+        caption=f"Above: share of the studies in which each analysis {outcome_text}. Below: share in which the primary "
         f"analysis's {100 * CONFIDENCE:g} % interval holds the true difference. Bars: 95 % intervals of the shares. "
-        f"Grey lines: {_line_percent(effect_db):g} %, {aim}, and {100 * CONFIDENCE:g} %.",
-        figure=_draw(points, effect_db, means),
+        f"Grey lines: {_reference_percent(effect_db):g} %, {reference_text}, and {100 * CONFIDENCE:g} %.",
+        figure=_draw_power(points, effect_db, means),
         alternative="; ".join(
             f"{point.people} participants: found in {100 * point.primary.value:.0f} % by all answers in one model, in "
             f"{100 * point.means.value:.0f} % by {means}"
@@ -50,12 +50,12 @@ def power_picture(
     )
 
 
-def _line_percent(effect_db: float) -> float:
+def _reference_percent(effect_db: float) -> float:
     """Reference line, percent: the conventional power, or without an effect the level of the test."""
     return _DESIRED_POWER if effect_db else 100 * (1 - CONFIDENCE)
 
 
-def _draw(points: Sequence[PowerPoint], effect_db: float, means: str) -> Figure:
+def _draw_power(points: Sequence[PowerPoint], effect_db: float, means: str) -> Figure:
     """Two panels: power (above) and coverage (below) over the number of participants."""
     figure = new_figure(PAGE_IN, 5.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
@@ -65,11 +65,11 @@ def _draw(points: Sequence[PowerPoint], effect_db: float, means: str) -> Figure:
         ("as published (Tukey)", VERMILLION, "D:", [point.published for point in points]),
     )
     people = np.array([point.people for point in points], dtype=float)
-    for place, (label, colour, style, shares) in enumerate(curves):
-        drawn = _draw_shares(above, people + _MARKER_STEP * (place - 1), shares, colour, style)
-        drawn.set_label(label)
+    for index, (label, colour, style, shares) in enumerate(curves):
+        error_bars = _draw_shares(above, people + _MARKER_STEP * (index - 1), shares, colour, style)
+        error_bars.set_label(label)
     _draw_shares(below, people, [point.coverage for point in points], BLUE, "o-")
-    above.axhline(_line_percent(effect_db), color=GREY, linewidth=0.9)
+    above.axhline(_reference_percent(effect_db), color=GREY, linewidth=0.9)
     below.axhline(100 * CONFIDENCE, color=GREY, linewidth=0.9)
     above.set_ylim(0, 103 if effect_db else None)
     above.set_ylabel("Found (% of studies)", fontsize=9)
@@ -77,7 +77,7 @@ def _draw(points: Sequence[PowerPoint], effect_db: float, means: str) -> Figure:
     below.set_xlabel("Participants", fontsize=9)
     below.set_xticks(people)
     # A fixed margin, so that the markers of one sample size stay close together where there are few sizes.
-    below.set_xlim(people.min() - _ROOM, people.max() + _ROOM)
+    below.set_xlim(people.min() - _MARGIN_PEOPLE, people.max() + _MARGIN_PEOPLE)
     for axes in (above, below):
         plain_axes(axes)
     figure.legend(*above.get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8, frameon=False)

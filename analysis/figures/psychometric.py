@@ -28,36 +28,38 @@ from analysis.psychophysics.hierarchy.curve import TARGET
 from analysis.psychophysics.hierarchy.observed_shares import (
     FittedCurves,
     ObservedShare,
-    people_curve,
-    person_curve,
-    shares_of_people,
-    shares_of_person,
+    average_person_curves,
+    compute_group_shares,
+    compute_person_shares,
+    evaluate_person_curve,
 )
 from protocols.procedure.staircase import to_db
 
-_LINE_IN = 2.2
+_ROW_IN = 2.2
 """Height of a row of panels, inches."""
-_SMALLEST, _LARGEST = 2.5, 7.5
-"""Marker sizes in points: the lower limit, for very few trials, and that of `_MANY` trials or more."""
-_MANY = 100
+_SMALLEST_MARKER, _LARGEST_MARKER = 2.5, 7.5
+"""Marker sizes in points: the lower limit, for very few trials, and that of `_LARGEST_MARKER_TRIALS` trials or more."""
+_LARGEST_MARKER_TRIALS = 100
 """Number of trials from which a marker has its largest size."""
 
 
 def draw_people_curves(answers: Answers, fit: FittedCurves) -> Figure:
     """Figure of all people together, one panel per frequency, over the level in dB re each person's threshold."""
     k = len(fit.frequencies_hz)
-    figure, places = panel_grid(k, _LINE_IN, sharex=True)
-    shown = [shares_of_people(answers, fit, place) for place in range(k)]
-    levels = [share.level_db for shares in shown for share in shares]
+    figure, panels = panel_grid(k, _ROW_IN, sharex=True)
+    shares_by_frequency = [compute_group_shares(answers, fit, index) for index in range(k)]
+    levels = [share.level_db for shares in shares_by_frequency for share in shares]
     above_db = np.linspace(min(levels) - 1.0, max(levels) + 1.0, 200)
-    for place, (axes, shares) in enumerate(zip(places, shown, strict=False)):
+    for index, (axes, shares) in enumerate(zip(panels, shares_by_frequency, strict=False)):
         _draw_shares(axes, [share.level_db for share in shares], shares)
-        axes.plot(above_db, 100 * people_curve(above_db, answers, fit, place), color=BLACK, linewidth=1.4, zorder=2)
+        axes.plot(
+            above_db, 100 * average_person_curves(above_db, answers, fit, index), color=BLACK, linewidth=1.4, zorder=2
+        )
         axes.axvline(0.0, color=GREY, linestyle=":", linewidth=1.0)
-        axes.set_title(f"{fit.frequencies_hz[place]:g} Hz", fontsize=10, loc="left")
-    name_panel_axes(places, k, "Level re threshold (dB)", "Right (%)")
-    places[-1].legend(
-        handles=_legend("curve of the model,\nmean of the people"), loc="center", fontsize=8.5, frameon=False
+        axes.set_title(f"{fit.frequencies_hz[index]:g} Hz", fontsize=10, loc="left")
+    name_panel_axes(panels, k, "Level re threshold (dB)", "Right (%)")
+    panels[-1].legend(
+        handles=_legend_handles("curve of the model,\nmean of the people"), loc="center", fontsize=8.5, frameon=False
     )
     return figure
 
@@ -66,28 +68,28 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
     """Figure of one person, one panel per frequency with answers, over the level in newtons. person: index of the
     person; cap_n: cap of the level, drawn as a dashed line."""
     estimate, k = fit.persons[person], len(fit.frequencies_hz)
-    played = [(place, shares) for place in range(k) if (shares := shares_of_person(answers, person, place))]
-    if not played:
+    answered = [(index, shares) for index in range(k) if (shares := compute_person_shares(answers, person, index))]
+    if not answered:
         return draw_no_data_note(new_figure(4.0, 2.0), "There is no answer to draw.")
-    figure, places = panel_grid(len(played), _LINE_IN)
-    for axes, (place, shares) in zip(places, played, strict=False):
+    figure, panels = panel_grid(len(answered), _ROW_IN)
+    for axes, (index, shares) in zip(panels, answered, strict=False):
         levels = [10.0 ** (share.level_db / 20.0) for share in shares]
         low_n, high_n = 0.8 * min(levels), 1.15 * max(*levels, cap_n)
         level_n = np.geomspace(low_n, high_n, 200)
-        above_db = 20.0 * np.log10(level_n) - to_db(estimate.thresholds_n[place])
+        above_db = 20.0 * np.log10(level_n) - to_db(estimate.thresholds_n[index])
         _draw_shares(axes, levels, shares)
-        axes.plot(level_n, 100 * person_curve(above_db, estimate, fit), color=BLACK, linewidth=1.4, zorder=2)
+        axes.plot(level_n, 100 * evaluate_person_curve(above_db, estimate, fit), color=BLACK, linewidth=1.4, zorder=2)
         axes.axvline(cap_n, color=GREY, linestyle="--", linewidth=1.0)
-        if not estimate.above_cap[place]:
-            axes.axvline(estimate.thresholds_n[place], color=GREY, linestyle=":", linewidth=1.0)
+        if not estimate.above_cap[index]:
+            axes.axvline(estimate.thresholds_n[index], color=GREY, linestyle=":", linewidth=1.0)
         axes.set_xscale("log")
         newton_ticks(axes.xaxis, low_n, high_n)
         axes.set_xlim(low_n, high_n)
-        size = "above the cap" if estimate.above_cap[place] else f"{estimate.thresholds_n[place]:.2f} N"
-        axes.set_title(f"{fit.frequencies_hz[place]:g} Hz: {size}", fontsize=10, loc="left")
-    name_panel_axes(places, len(played), "Level (N)", "Right (%)")
+        size = "above the cap" if estimate.above_cap[index] else f"{estimate.thresholds_n[index]:.2f} N"
+        axes.set_title(f"{fit.frequencies_hz[index]:g} Hz: {size}", fontsize=10, loc="left")
+    name_panel_axes(panels, len(answered), "Level (N)", "Right (%)")
     cap = Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {cap_n:g} N")
-    places[-1].legend(handles=[*_legend("curve of the model"), cap], loc="center", fontsize=8.5, frameon=False)
+    panels[-1].legend(handles=[*_legend_handles("curve of the model"), cap], loc="center", fontsize=8.5, frameon=False)
     return figure
 
 
@@ -95,25 +97,30 @@ def _draw_shares(axes: Axes, x: Sequence[float], shares: Sequence[ObservedShare]
     """Draw shares in percent at the places `x`, with their intervals and a dotted line at the threshold's share."""
     plain_axes(axes)
     axes.axhline(100 * TARGET, color=GREY, linestyle=":", linewidth=1.0)
-    for at, share in zip(x, shares, strict=True):
-        axes.plot([at, at], [100 * share.lower, 100 * share.upper], color=BLUE, linewidth=0.8, zorder=1)
-        axes.plot(at, 100 * share.share, "o", color=BLUE, markersize=_marker_size(share.trials), zorder=3,
+    for level, share in zip(x, shares, strict=True):
+        axes.plot([level, level], [100 * share.lower, 100 * share.upper], color=BLUE, linewidth=0.8, zorder=1)
+        axes.plot(level, 100 * share.share, "o", color=BLUE, markersize=_marker_size(share.trials), zorder=3,
                   markeredgecolor="white", markeredgewidth=0.4)  # fmt: skip
     axes.set_ylim(0, 104)
     axes.set_yticks([0, 25, 50, 75, 100])
 
 
 def _marker_size(trials: int) -> float:
-    """Marker size in points: it rises with the square root of the trials up to `_MANY`."""
-    return _SMALLEST + (_LARGEST - _SMALLEST) * math.sqrt(min(1.0, trials / _MANY))
+    """Marker size in points: it rises with the square root of the trials up to `_LARGEST_MARKER_TRIALS`."""
+    return _SMALLEST_MARKER + (_LARGEST_MARKER - _SMALLEST_MARKER) * math.sqrt(
+        min(1.0, trials / _LARGEST_MARKER_TRIALS)
+    )
 
 
-def _legend(curve: str) -> list[Line2D]:
+def _legend_handles(curve: str) -> list[Line2D]:
     """Handles of the legend. curve: label of the fitted curve."""
     return [
         *(
             Line2D([], [], marker="o", color=BLUE, linewidth=0.8, markersize=_marker_size(trials), label=label)
-            for trials, label in ((5, "5 trials, 95 % interval"), (_MANY, f"{_MANY} trials or more"))
+            for trials, label in (
+                (5, "5 trials, 95 % interval"),
+                (_LARGEST_MARKER_TRIALS, f"{_LARGEST_MARKER_TRIALS} trials or more"),
+            )
         ),
         Line2D([], [], color=BLACK, linewidth=1.4, label=curve),
         Line2D([], [], color=GREY, linestyle=":", linewidth=1.0, label=f"threshold, {100 * TARGET:.1f} % right"),

@@ -33,5 +33,5 @@ def reproduction_pictures(
         2: tuple(picture for picture in study_pictures(study) if picture.name == "thresholds"),
         3: (ellipsoid_picture(shapes),),
         4: (transfer_functions_picture(device.response),),
-        5: (played_responses_picture(rows.drawn), friction_picture(rows.of_friction)),
+        5: (played_responses_picture(rows.figure_rows), friction_picture(rows.friction_rows)),
     }

@@ -28,7 +28,7 @@ from analysis.psychophysics.runs import Run
 from analysis.psychophysics.thresholds import RunEnd, Threshold, threshold_of
 from protocols.definition.staircase_rule import StaircaseRule
 
-_LINE_IN = 2.2
+_ROW_IN = 2.2
 """Height of a row of panels, in inches."""
 
 
@@ -38,13 +38,13 @@ def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
         return draw_no_data_note(new_figure(PAGE_IN, 2.0), "There is no run to draw.")
     lowest_n = 0.75 * min([trial.staircase_n for run in runs for trial in run.answered], default=rule.start_n)
     ordered = sorted(runs, key=lambda run: (run.frequency_hz, run.session, run.run))
-    figure, panels = panel_grid(len(ordered), _LINE_IN)
+    figure, panels = panel_grid(len(ordered), _ROW_IN)
     for panel, run in zip(panels, ordered, strict=False):
         _draw_run(panel, run, rule)
         panel.set_ylim(lowest_n, 1.25 * rule.cap_n)
         newton_ticks(panel.yaxis, lowest_n, rule.cap_n)
     name_panel_axes(panels, len(ordered), "Trial", "Level (N)")
-    panels[-1].legend(handles=_legend(rule), loc="center", fontsize=8.5, frameon=False)
+    panels[-1].legend(handles=_legend_handles(rule), loc="center", fontsize=8.5, frameon=False)
     return figure
 
 
@@ -53,55 +53,55 @@ def _draw_run(axes: Axes, run: Run, rule: StaircaseRule) -> None:
     plain_axes(axes)
     levels = np.array([trial.staircase_n for trial in run.answered])
     numbers = np.arange(1, len(levels) + 1)
-    right = np.array([bool(trial.correct) for trial in run.answered], dtype=bool)
+    is_correct = np.array([bool(trial.correct) for trial in run.answered], dtype=bool)
     reversals = np.array(run.state.reversal_trials, dtype=int)
-    used = reversals[-rule.averaged_reversals :] if run.complete else reversals[:0]
+    averaged = reversals[-rule.averaged_reversals :] if run.complete else reversals[:0]
     axes.axhline(rule.cap_n, color=GREY, linestyle="--", linewidth=1)
     axes.plot(numbers, levels, color=GREY, linewidth=0.9, drawstyle="steps-post", zorder=1)
-    axes.plot(numbers[right], levels[right], "o", color=BLUE, markersize=2.8)
-    axes.plot(numbers[~right], levels[~right], "x", color=VERMILLION, markersize=4.5, markeredgewidth=1.3)
+    axes.plot(numbers[is_correct], levels[is_correct], "o", color=BLUE, markersize=2.8)
+    axes.plot(numbers[~is_correct], levels[~is_correct], "x", color=VERMILLION, markersize=4.5, markeredgewidth=1.3)
     axes.plot(numbers[reversals], levels[reversals], "o", markersize=8, markerfacecolor="none", markeredgecolor=GREY)
-    axes.plot(numbers[used], levels[used], "o", markersize=8, markerfacecolor="none", markeredgecolor=BLACK)
+    axes.plot(numbers[averaged], levels[averaged], "o", markersize=8, markerfacecolor="none", markeredgecolor=BLACK)
     row = threshold_of(run, rule)
     if row.threshold_n is not None:
         axes.plot(
-            [numbers[used[0]] if len(used) else 1, numbers[-1]],
+            [numbers[averaged[0]] if len(averaged) else 1, numbers[-1]],
             [row.threshold_n] * 2,
             color=BLACK,
             linewidth=1.1,
             zorder=3,
         )
     axes.set_yscale("log")
-    axes.set_title(f"{run.frequency_hz:g} Hz{_outcome(row)}", fontsize=10, loc="left")
+    axes.set_title(f"{run.frequency_hz:g} Hz{_outcome_text(row)}", fontsize=10, loc="left")
 
 
-def _outcome(row: Threshold) -> str:
+def _outcome_text(row: Threshold) -> str:
     """End of a panel's title: the threshold in N, or why there is none."""
     if row.threshold_n is not None:
         return f": {row.threshold_n:.2f} N{', cut by the cap' if row.censored else ''}"
     return " (stopped by the trial limit)" if row.ended is RunEnd.TRIAL_LIMIT else " (not complete)"
 
 
-def _legend(rule: StaircaseRule) -> list[Line2D]:
+def _legend_handles(rule: StaircaseRule) -> list[Line2D]:
     """Entries of the legend; no reversals where the Psi method chose the levels."""
     return [
         Line2D([], [], marker="o", color=BLUE, markersize=4, linewidth=0, label="right"),
         Line2D([], [], marker="x", color=VERMILLION, linewidth=0, label="wrong"),
-        *([] if rule.is_bayesian else _rings(rule)),
+        *([] if rule.is_bayesian else _reversal_handles(rule)),
         Line2D([], [], color=BLACK, linewidth=1.1, label="threshold"),
         Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {rule.cap_n:g} N"),
     ]
 
 
-def _rings(rule: StaircaseRule) -> list[Line2D]:
+def _reversal_handles(rule: StaircaseRule) -> list[Line2D]:
     """Legend entries of averaged and other reversals."""
     return [
-        _ring(BLACK, f"reversal, one of the last {rule.averaged_reversals}"),
-        _ring(GREY, "reversal, not averaged"),
+        _circle_handle(BLACK, f"reversal, one of the last {rule.averaged_reversals}"),
+        _circle_handle(GREY, "reversal, not averaged"),
     ]
 
 
-def _ring(colour: str, label: str) -> Line2D:
+def _circle_handle(colour: str, label: str) -> Line2D:
     """Legend entry: an open circle of this colour."""
     return Line2D(
         [], [], marker="o", markersize=8, markerfacecolor="none", markeredgecolor=colour, linewidth=0, label=label

@@ -14,7 +14,7 @@ from analysis.figures.picture import Picture
 from analysis.figures.psychometric import draw_people_curves, draw_person_curves
 from analysis.figures.staircases import draw_staircases
 from analysis.figures.thresholds import draw_thresholds
-from analysis.figures.thresholds_by_unit import draw_thresholds_by_unit, is_drawn
+from analysis.figures.thresholds_by_unit import can_be_drawn, draw_thresholds_by_unit
 from analysis.psychophysics.detection import above_detection
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.hierarchy.answers import count_answers
@@ -33,7 +33,7 @@ def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult
         pictures += _units_pictures(analysis)
     pictures += _curve_pictures(analysis)
     if any(trial.counts and trial.delivered_mps2 for trial in analysis.trials):
-        pictures.append(_draw_delivered(analysis))
+        pictures.append(_delivered_picture(analysis))
     pictures += _staircase_pictures(analysis)
     if ellipsoids:
         pictures.append(ellipsoid_picture(ellipsoids))
@@ -72,7 +72,7 @@ def _units_pictures(analysis: StudyAnalysis) -> list[Picture]:
     tables = [
         table
         for table in _unit_tables(analysis)
-        if any(is_drawn(v, table.quantity) for row in table.values for v in row)
+        if any(can_be_drawn(v, table.quantity) for row in table.values for v in row)
     ]
     if len(tables) < 2:
         return []
@@ -110,26 +110,26 @@ def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
     answers = count_answers(analysis.trials, fit.frequencies_hz) if fit is not None else None
     if fit is None or answers is None:
         return []
-    points = (
+    points_text = (
         f"Points: shares of right answers in bins of {BIN_DB:g} dB, with Wilson's 95 % intervals; the larger, the more "
         "trials. "
     )
     primary = analysis.primary
-    together = primary and Picture(
+    people_picture = primary and Picture(
         name="psychometric",
         title="Psychometric functions, all people together",
-        caption=f"{points}Levels are relative to each person's threshold by the model of all answers, whose curve is "
-        f"drawn. {threshold_words(analysis.protocol.staircase).levels}",
+        caption=f"{points_text}Levels are relative to each person's threshold by the model of all answers, whose curve "
+        f"is drawn. {threshold_words(analysis.protocol.staircase).levels}",
         figure=draw_people_curves(answers, primary),
     )
     return [
         *([_medians_picture(primary, analysis.protocol.staircase.cap_n)] if primary else []),
-        *([together] if together else []),
+        *([people_picture] if people_picture else []),
         *(
             Picture(
                 name=f"psychometric-{number}-{_file_name(subject)}",
                 title=f"Psychometric functions of {subject}",
-                caption=points
+                caption=points_text
                 + (
                     "Curves: the model of all answers; it shrinks a person's threshold towards those of the others "
                     "where the person's own answers carry little information."
@@ -163,7 +163,7 @@ def _file_name(subject: str) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "-", subject).strip("-")
 
 
-def _draw_delivered(analysis: StudyAnalysis) -> Picture:
+def _delivered_picture(analysis: StudyAnalysis) -> Picture:
     """Picture of the delivered acceleration over the commanded level, along and off the direction."""
     return Picture(
         name="delivered",

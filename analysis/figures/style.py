@@ -53,23 +53,23 @@ def panel_grid(panels: int, height_in: float, sharex: bool = False) -> tuple[Fig
     """A page-wide figure of up to three columns, and its axes row by row: at least one more than there are panels, for
     the legend; axes without a panel are switched off. height_in: height of a row of panels (inches)."""
     columns = min(3, panels + 1)
-    lines = -(-(panels + 1) // columns)
-    figure = new_figure(PAGE_IN, height_in * lines)
-    grid = figure.subplots(lines, columns, sharex=sharex, sharey=True, squeeze=False)
-    places = [axes for line in grid for axes in line]
-    for axes in places[panels:]:
+    rows = -(-(panels + 1) // columns)
+    figure = new_figure(PAGE_IN, height_in * rows)
+    grid = figure.subplots(rows, columns, sharex=sharex, sharey=True, squeeze=False)
+    panel_axes = [axes for grid_row in grid for axes in grid_row]
+    for axes in panel_axes[panels:]:
         axes.axis("off")
-    return figure, places
+    return figure, panel_axes
 
 
-def name_panel_axes(places: list[Axes], panels: int, below: str, left: str) -> None:
+def name_panel_axes(panel_axes: list[Axes], panels: int, x_label: str, y_label: str) -> None:
     """Labels below the lowest panel of each column and left of each line of `panel_grid`."""
     columns = min(3, panels + 1)
     for number in range(0, panels, columns):
-        places[number].set_ylabel(left)
+        panel_axes[number].set_ylabel(y_label)
     for number in range(max(0, panels - columns), panels):
-        places[number].set_xlabel(below)
-        places[number].tick_params(labelbottom=True)
+        panel_axes[number].set_xlabel(x_label)
+        panel_axes[number].tick_params(labelbottom=True)
 
 
 def newton_ticks(axis: Axis, lowest_n: float, highest_n: float) -> None:
@@ -83,11 +83,11 @@ def ratio_ticks(axis: Axis, low: float, high: float) -> None:
     """Ticks from low to high on a logarithmic axis, at the multiples of powers of ten of `_STEPS`: fewer of them the
     more decades there are. Call after the scale is set."""
     decades = np.log10(high / low)
-    steps = next(each for most, each in _STEPS if decades <= most)
+    steps = next(multiples for most_decades, multiples in _STEPS if decades <= most_decades)
     powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
     values = [step * 10.0**power for power in powers for step in steps]
-    shown = [value for value in values if low <= value <= high]
-    axis.set_ticks(shown, labels=[f"{value:.10g}" for value in shown])
+    tick_values = [value for value in values if low <= value <= high]
+    axis.set_ticks(tick_values, labels=[f"{value:.10g}" for value in tick_values])
     axis.set_ticks([], minor=True)
 
 

@@ -55,19 +55,19 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
     axes.set_ylim(0, 1.15 * cap_n)
     axes.set_xlabel("Frequency (Hz)")
     axes.set_ylabel("Threshold (N)")
-    figure.legend(handles=_legend(table, comparisons), loc="outside right upper", fontsize=8.5, frameon=False)
+    figure.legend(handles=_legend_handles(table, comparisons), loc="outside right upper", fontsize=8.5, frameon=False)
     return figure
 
 
 def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
     count = len(table.subjects)
     # A fixed offset from the tick instead of random jitter: a participant has the same offset at every frequency.
-    places = np.linspace(-_SPREAD / 2, _SPREAD / 2, count) if count > 1 else np.zeros(1)
+    offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, count) if count > 1 else np.zeros(1)
     for index, row in enumerate(table.values):
-        at = np.arange(len(row)) + places[index]
+        positions = np.arange(len(row)) + offsets[index]
         values = np.array([np.nan if value is None else value for value in row], dtype=float)
-        axes.plot(at, values, "-", color=participant_colour(index), linewidth=0.7, alpha=0.45, zorder=1)
-        for x, value, cut in zip(at, row, table.censored[index], strict=True):
+        axes.plot(positions, values, "-", color=participant_colour(index), linewidth=0.7, alpha=0.45, zorder=1)
+        for x, value, cut in zip(positions, row, table.censored[index], strict=True):
             if value is not None:
                 draw_threshold(axes, x, value, index, cut)
 
@@ -87,31 +87,31 @@ def draw_threshold(axes: Axes, x: float, value: float, participant: int, cut: bo
 
 def _draw_stopped(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
     """Draw a hollow marker above the cap for each stopped run, which has no threshold."""
-    places = np.linspace(-_SPREAD / 2, _SPREAD / 2, max(2, len(table.subjects)))
+    offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, max(2, len(table.subjects)))
     for index, row in enumerate(table.stopped):
-        for at, stopped in enumerate(row):
-            if stopped:
-                axes.plot(at + places[index], _STOPPED_AT * cap_n, participant_marker(index), markersize=6,
+        for position, is_stopped in enumerate(row):
+            if is_stopped:
+                axes.plot(position + offsets[index], _STOPPED_AT * cap_n, participant_marker(index), markersize=6,
                           color=participant_colour(index), markerfacecolor="none")  # fmt: skip
 
 
 def _draw_means(axes: Axes, table: ThresholdTable, comparisons: Comparisons) -> None:
     """Draw the mean of each frequency, with its comparison interval where there is one."""
     intervals = {interval.name: interval for interval in comparisons.intervals}
-    for at, (name, values) in enumerate(table.groups().items()):
-        present = [value for value in values if value is not None]
-        if not present:
+    for position, (name, values) in enumerate(table.groups().items()):
+        measured = [value for value in values if value is not None]
+        if not measured:
             continue
-        mean = float(np.mean(present))
-        half = intervals[name].upper - mean if name in intervals else None
-        axes.errorbar(at, mean, yerr=half, fmt="_", color=BLACK, markersize=22, markeredgewidth=2.4,
+        mean = float(np.mean(measured))
+        half_width = intervals[name].upper - mean if name in intervals else None
+        axes.errorbar(position, mean, yerr=half_width, fmt="_", color=BLACK, markersize=22, markeredgewidth=2.4,
                       elinewidth=1.6, capsize=4, zorder=4)  # fmt: skip
 
 
-def _legend(table: ThresholdTable, comparisons: Comparisons) -> list[Line2D]:
+def _legend_handles(table: ThresholdTable, comparisons: Comparisons) -> list[Line2D]:
     percent = f"{100 * comparisons.confidence:g} %"
-    without = ",\nwithout coverage" if table.coverage else ""
-    mean = f"mean, {percent}\ncomparison interval{without}" if comparisons.intervals else "mean"
+    coverage_note = ",\nwithout coverage" if table.coverage else ""
+    mean = f"mean, {percent}\ncomparison interval{coverage_note}" if comparisons.intervals else "mean"
     handles = [Line2D([], [], color=BLACK, marker="_", markersize=12, markeredgewidth=2.4, linewidth=0, label=mean)]
     if table.cut:
         handles.append(

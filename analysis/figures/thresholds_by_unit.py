@@ -45,20 +45,20 @@ _ROOM_BELOW, _ROOM_ABOVE = 0.8, 1.35
 def draw_thresholds_by_unit(tables: Sequence[ThresholdTable]) -> Figure:
     """Figure with one panel per table: each participant's thresholds in a colour and marker, and the median per
     frequency. tables: at least one, one per unit, with the same participants and frequencies, and each with at least
-    one value for which `is_drawn` is true."""
+    one value for which `can_be_drawn` is true."""
     columns = 2 if len(tables) > 1 else 1
-    lines = -(-len(tables) // columns)
-    figure = new_figure(PAGE_IN, _PANEL_IN * lines + _LEGEND_IN)
-    places = [axes for line in figure.subplots(lines, columns, squeeze=False) for axes in line]
-    for axes, table in zip(places, tables, strict=False):
+    rows = -(-len(tables) // columns)
+    figure = new_figure(PAGE_IN, _PANEL_IN * rows + _LEGEND_IN)
+    panel_axes = [axes for grid_row in figure.subplots(rows, columns, squeeze=False) for axes in grid_row]
+    for axes, table in zip(panel_axes, tables, strict=False):
         _draw_table(axes, table)
-    for axes in places[len(tables) :]:
+    for axes in panel_axes[len(tables) :]:
         axes.axis("off")
-    figure.legend(handles=_legend(tables), loc="outside upper center", ncols=3, fontsize=8.5, frameon=False)
+    figure.legend(handles=_legend_handles(tables), loc="outside upper center", ncols=3, fontsize=8.5, frameon=False)
     return figure
 
 
-def is_drawn(value: float | None, quantity: Quantity) -> bool:
+def can_be_drawn(value: float | None, quantity: Quantity) -> bool:
     """Whether a threshold can be drawn in its panel. The axes are logarithmic and have no zero, which
     a threshold in m/s² is where the accelerometer reads nothing; dB above detection are drawn on a linear axis and may
     be negative."""
@@ -68,20 +68,20 @@ def is_drawn(value: float | None, quantity: Quantity) -> bool:
 def _draw_table(axes: Axes, table: ThresholdTable) -> None:
     """Draw one panel; values that are missing or cannot be drawn are gaps. Medians are those of the drawn values."""
     plain_axes(axes)
-    shown = [[value if is_drawn(value, table.quantity) else np.nan for value in row] for row in table.values]
-    values = np.array(shown, dtype=float)
+    drawable = [[value if can_be_drawn(value, table.quantity) else np.nan for value in row] for row in table.values]
+    values = np.array(drawable, dtype=float)
     offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(values)) if len(values) > 1 else np.zeros(1)
     for person, row in enumerate(values):
-        at = np.arange(len(row)) + offsets[person]
-        axes.plot(at, row, "-", color=participant_colour(person), linewidth=0.7, alpha=0.5, zorder=1)
-        for x, value, cut in zip(at, row, table.censored[person], strict=True):
+        positions = np.arange(len(row)) + offsets[person]
+        axes.plot(positions, row, "-", color=participant_colour(person), linewidth=0.7, alpha=0.5, zorder=1)
+        for x, value, cut in zip(positions, row, table.censored[person], strict=True):
             if np.isfinite(value):
                 draw_threshold(axes, float(x), float(value), person, cut)
-    for place, column in enumerate(values.T):
+    for position, column in enumerate(values.T):
         if np.isfinite(column).any():
             median = float(np.nanmedian(column))
             axes.plot(
-                [place - _MEDIAN_HALF_WIDTH, place + _MEDIAN_HALF_WIDTH],
+                [position - _MEDIAN_HALF_WIDTH, position + _MEDIAN_HALF_WIDTH],
                 [median, median],
                 color=BLACK,
                 linewidth=2.2,
@@ -100,7 +100,7 @@ def _draw_table(axes: Axes, table: ThresholdTable) -> None:
     ratio_ticks(axes.yaxis, low, high)
 
 
-def _legend(tables: Sequence[ThresholdTable]) -> list[Line2D]:
+def _legend_handles(tables: Sequence[ThresholdTable]) -> list[Line2D]:
     handles = [
         Line2D([], [], color=GREY, marker=participant_marker(0), linewidth=0.7, label="a participant"),
         Line2D([], [], color=BLACK, linewidth=2.2, label="median of what is shown"),

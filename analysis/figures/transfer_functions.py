@@ -23,9 +23,9 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 _BIN_OCTAVES = 1 / 24
 """Width of a bin in which lines are averaged for drawing, octaves."""
-_DIM = "#B8B8B8"
+_UNRELIABLE_COLOUR = "#B8B8B8"
 """Colour of bins that are not reliable."""
-_BAND = "#EEF3E6"
+_BAND_COLOUR = "#EEF3E6"
 """Colour of a marked frequency band."""
 
 
@@ -65,20 +65,20 @@ def draw_transfer_functions(
     grid = figure.subplots(outputs, inputs, sharex=True, sharey=True, squeeze=False)
     bins = octave_bins(response, _BIN_OCTAVES)
     for row, output in enumerate(response.output_channels):
-        for column, entry in enumerate(response.input_channels):
+        for column, input_ in enumerate(response.input_channels):
             axes: Axes = grid[row][column]
             _draw_entry(axes, bins, row, column)
             if band_hz is not None:
-                axes.axvspan(*band_hz, color=_BAND, zorder=0)
+                axes.axvspan(*band_hz, color=_BAND_COLOUR, zorder=0)
             if model is not None:
                 axes.plot(model.frequency_hz, np.abs(model.response[:, row, column]), "--", color=VERMILLION, lw=1.2)
-            axes.set_title(f"{entry} → {output}", fontsize=9, loc="left", pad=3)
+            axes.set_title(f"{input_} → {output}", fontsize=9, loc="left", pad=3)
     _scale_axes(grid[0][0], bins)
     figure.supylabel(
         f"Magnitude ({_unit_text(response.output_unit)} per {_unit_text(response.input_unit)})", fontsize=10
     )
     figure.supxlabel("Frequency (Hz)", fontsize=10)
-    handles = _legend(bins, model, band_hz)
+    handles = _legend_handles(bins, model, band_hz)
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=8.5, frameon=False)
     return figure
 
@@ -88,19 +88,24 @@ def _draw_entry(axes: Axes, bins: OctaveBins, row: int, column: int) -> None:
     plain_axes(axes)
     mean = np.abs(bins.response[:, row, column])
     low, high = bins.lowest[:, row, column], bins.highest[:, row, column]
-    for where, line, shade in ((~bins.reliable, _DIM, "#E6E6E6"), (bins.reliable, BLUE, SKY)):
-        wide = _extend_mask(where)
-        axes.fill_between(bins.frequency_hz, low, high, where=wide.tolist(), color=shade, alpha=0.45, linewidth=0)
-        axes.plot(bins.frequency_hz, np.where(wide, mean, np.nan), color=line, linewidth=1.2)
+    for mask, line_colour, shade_colour in (
+        (~bins.reliable, _UNRELIABLE_COLOUR, "#E6E6E6"),
+        (bins.reliable, BLUE, SKY),
+    ):
+        extended = _extend_mask(mask)
+        axes.fill_between(
+            bins.frequency_hz, low, high, where=extended.tolist(), color=shade_colour, alpha=0.45, linewidth=0
+        )
+        axes.plot(bins.frequency_hz, np.where(extended, mean, np.nan), color=line_colour, linewidth=1.2)
     floor = np.sqrt(bins.noise_variance[:, row, column])
     axes.plot(bins.frequency_hz, floor, ":", color=ORANGE, linewidth=1.1)
 
 
-def _extend_mask(where: BoolArray) -> BoolArray:
+def _extend_mask(mask: BoolArray) -> BoolArray:
     """The mask, with the bin after each true bin included, so that a curve that changes its colour has no gap."""
-    wide = where.copy()
-    wide[1:] |= where[:-1]
-    return wide
+    extended = mask.copy()
+    extended[1:] |= mask[:-1]
+    return extended
 
 
 def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
@@ -109,9 +114,9 @@ def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     lowest_hz = 1.0 if bins.frequency_hz[-1] > 1.0 else 0.0  # of slow or untimed recordings, all is shown
-    shown = bins.frequency_hz >= lowest_hz
+    in_range = bins.frequency_hz >= lowest_hz
     axes.set_xlim(max(lowest_hz, float(bins.frequency_hz[0])), float(bins.frequency_hz[-1]))
-    magnitude = np.abs(bins.response[shown & bins.reliable if (shown & bins.reliable).any() else shown])
+    magnitude = np.abs(bins.response[in_range & bins.reliable if (in_range & bins.reliable).any() else in_range])
     axes.set_ylim(0.5 * float(np.quantile(magnitude, 0.01)), 2.0 * float(magnitude.max()))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -119,7 +124,7 @@ def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _legend(
+def _legend_handles(
     bins: OctaveBins, model: ResponseCurve | None, band_hz: tuple[float, float] | None
 ) -> Sequence[Line2D | Patch]:
     """Handles of the legend, for what the figure shows."""
@@ -129,12 +134,12 @@ def _legend(
         Line2D([], [], color=ORANGE, linestyle=":", linewidth=1.4, label="noise of a line"),
     ]
     if not bins.reliable.all():
-        handles.append(Line2D([], [], color=_DIM, linewidth=1.4, label="not reliable"))
+        handles.append(Line2D([], [], color=_UNRELIABLE_COLOUR, linewidth=1.4, label="not reliable"))
     if model is not None:
         handles.append(Line2D([], [], color=VERMILLION, linestyle="--", linewidth=1.4, label=model.name))
     if band_hz is not None:
         handles.append(
-            Patch(facecolor=_BAND, edgecolor=GREY, linewidth=0.4, label=f"{band_hz[0]:g} to {band_hz[1]:g} Hz")
+            Patch(facecolor=_BAND_COLOUR, edgecolor=GREY, linewidth=0.4, label=f"{band_hz[0]:g} to {band_hz[1]:g} Hz")
         )
     return handles
 

@@ -35,7 +35,7 @@ class Channel:
         return f"{self.role} '{self.name}'"
 
     @property
-    def known(self) -> FloatArray:
+    def finite_samples(self) -> FloatArray:
         """The samples without missing ones."""
         return self.samples[np.isfinite(self.samples)]
 

@@ -23,6 +23,6 @@ class Check:
     """Advice; empty where there is nothing to do."""
 
 
-def fine_if_none(name: str, found: tuple[Check, ...], text: str) -> tuple[Check, ...]:
-    """The findings, or where there are none a single "fine" check of this name with this text."""
-    return found or (Check(name, "fine", text),)
+def add_fine_if_none(name: str, checks: tuple[Check, ...], text: str) -> tuple[Check, ...]:
+    """The checks; where there are none, a single "fine" check with this name and text."""
+    return checks or (Check(name, "fine", text),)

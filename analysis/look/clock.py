@@ -14,9 +14,9 @@ from analysis.look.check import Check
 from equalizer.signals.recording import Recording
 
 CLOCK = "clock"
-GAP = 1.5
+GAP_PERIODS = 1.5
 """Difference of two successive stamps, in sample periods, above which samples were lost between them."""
-JITTER, WILD = 0.02, 0.2
+JITTER, WRONG_JITTER = 0.02, 0.2
 """Rms deviation of the stamps from the fitted line, in sample periods: above the first it is a notice; above the
 second it is "wrong", because phases are then not reliable."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1e5
@@ -42,22 +42,22 @@ def check_clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Che
     if recording.time_s is None:
         checks = (*_check_resampling(recording), *_rate_checks(recording.sample_rate_hz))
         return checks or (Check(CLOCK, "fine", _clock_source(recording)),)
-    found = tuple(check for start, stop in stretches for check in _stamp_checks(recording, start, stop))
-    return found or (Check(CLOCK, "fine", "All time stamps are evenly spaced."),)
+    stamp_checks = tuple(check for start, stop in stretches for check in _stamp_checks(recording, start, stop))
+    return stamp_checks or (Check(CLOCK, "fine", "All time stamps are evenly spaced."),)
 
 
 def rate_objection(rate_hz: float) -> str:
     """Sentence on an implausible rate, as it comes from stamps in another unit; empty for a plausible rate."""
     if SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
         return ""
-    other = "s, called ms" if rate_hz > FASTEST_HZ else "ms, called s"
-    return f"{rate_hz:g} Hz is an unlikely rate of a haptic device: the time may be in another unit ({other})."
+    mislabelling = "s, called ms" if rate_hz > FASTEST_HZ else "ms, called s"
+    return f"{rate_hz:g} Hz is an unlikely rate of a haptic device: the time may be in another unit ({mislabelling})."
 
 
 def _rate_checks(rate_hz: float) -> tuple[Check, ...]:
     """A notice where the rate is implausible; else empty."""
-    odd = rate_objection(rate_hz)
-    return (Check(CLOCK, "notice", odd, "Check the unit of the time, and import again."),) if odd else ()
+    objection = rate_objection(rate_hz)
+    return (Check(CLOCK, "notice", objection, "Check the unit of the time, and import again."),) if objection else ()
 
 
 def _clock_source(recording: Recording) -> str:
@@ -87,16 +87,16 @@ def _stamp_checks(recording: Recording, start: int, stop: int) -> tuple[Check, .
     if len(stamps) < 3:
         return ()
     steps = np.diff(stamps) * rate_hz
-    gaps = steps > GAP
-    places = np.concatenate([[0.0], np.cumsum(np.where(gaps, np.round(steps), 1.0))])
-    slope, begin = np.polyfit(places, stamps - stamps[0], 1)
-    off = (stamps - stamps[0] - begin - slope * places) / slope
-    jitter, drift_ppm = float(np.std(off)), (slope * rate_hz - 1) * 1e6
+    gaps = steps > GAP_PERIODS
+    sample_numbers = np.concatenate([[0.0], np.cumsum(np.where(gaps, np.round(steps), 1.0))])
+    slope, offset_s = np.polyfit(sample_numbers, stamps - stamps[0], 1)
+    deviations = (stamps - stamps[0] - offset_s - slope * sample_numbers) / slope
+    jitter, drift_ppm = float(np.std(deviations)), (slope * rate_hz - 1) * 1e6
     return tuple(
         check
         for check in (
             _gap_check(steps, gaps, stamps, rate_hz),
-            _jitter_check(jitter, float(np.abs(off).max()), slope),
+            _jitter_check(jitter, float(np.abs(deviations).max()), slope),
             _drift_check(drift_ppm, rate_hz),
         )
         if check is not None
@@ -104,7 +104,8 @@ def _stamp_checks(recording: Recording, start: int, stop: int) -> tuple[Check, .
 
 
 def _gap_check(steps: np.ndarray, gaps: np.ndarray, stamps: np.ndarray, rate_hz: float) -> Check | None:
-    """steps: (n - 1,), differences of successive stamps in sample periods; gaps: (n - 1,), those above `GAP`."""
+    """steps: (n - 1,), differences of successive stamps in sample periods; gaps: (n - 1,), those above
+    `GAP_PERIODS`."""
     if not gaps.any():
         return None
     first, longest = int(np.argmax(gaps)), float(steps.max())
@@ -117,13 +118,13 @@ def _gap_check(steps: np.ndarray, gaps: np.ndarray, stamps: np.ndarray, rate_hz:
     )
 
 
-def _jitter_check(jitter: float, most: float, step_s: float) -> Check | None:
-    """jitter, most: rms and largest deviation, in sample periods of step_s seconds."""
+def _jitter_check(jitter: float, largest: float, step_s: float) -> Check | None:
+    """jitter, largest: rms and largest deviation, in sample periods of step_s seconds."""
     text = (
         f"Time stamps deviate by {jitter * step_s * 1e6:.3g} us rms from even spacing ({jitter:.1%} of a step), "
-        f"{most * step_s * 1e6:.3g} us at most."
+        f"{largest * step_s * 1e6:.3g} us at most."
     )
-    if jitter > WILD:
+    if jitter > WRONG_JITTER:
         return Check(CLOCK, "wrong", text, "Import with the stamps as the clock, and resample.")
     if jitter > JITTER:
         return Check(CLOCK, "notice", text, "Expect noise near strong lines; resample by the stamps where it matters.")

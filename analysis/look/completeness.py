@@ -10,11 +10,11 @@ from itertools import combinations
 import numpy as np
 
 from analysis.look.channels import Channel, rms
-from analysis.look.check import Check, fine_if_none
+from analysis.look.check import Check, add_fine_if_none
 from equalizer.signals.signal import FloatArray, runs_of
 
 MISSING, CONSTANT, COPIES = "missing samples", "constant channels", "copied channels"
-_MANY = 0.2
+_USELESS_SHARE = 0.2
 """Share of missing samples above which a channel is useless to most analyses."""
 _SAME_STORED = 1e-6
 """Largest rms difference between a channel and its copy, relative to the rms: rounding in single precision."""
@@ -24,20 +24,20 @@ _FIRST_FEW = 1000
 
 def check_missing_samples(channels: Sequence[Channel], rate_hz: float) -> tuple[Check, ...]:
     """A check of each channel with missing samples; a single "fine" check where no channel has any."""
-    found = tuple(_check_missing(channel, rate_hz) for channel in channels if not np.isfinite(channel.samples).all())
-    return fine_if_none(MISSING, found, "No sample is missing in any channel.")
+    checks = tuple(_check_missing(channel, rate_hz) for channel in channels if not np.isfinite(channel.samples).all())
+    return add_fine_if_none(MISSING, checks, "No sample is missing in any channel.")
 
 
 def _check_missing(channel: Channel, rate_hz: float) -> Check:
-    """The check of a channel with at least one missing sample: "wrong" above the share `_MANY`."""
-    lost = ~np.isfinite(channel.samples)
-    count, first = int(lost.sum()), int(np.argmax(lost))
-    longest = max(stop - start for start, stop in runs_of(lost))
+    """The check of a channel with at least one missing sample: "wrong" above the share `_USELESS_SHARE`."""
+    is_missing = ~np.isfinite(channel.samples)
+    count, first = int(is_missing.sum()), int(np.argmax(is_missing))
+    longest = max(stop - start for start, stop in runs_of(is_missing))
     return Check(
         MISSING,
-        "wrong" if count > _MANY * len(lost) else "notice",
-        f"{channel.label} lacks {count} of {len(lost)} samples, the first at {first / rate_hz:.4g} s; the longest gap "
-        f"is {longest} samples.",
+        "wrong" if count > _USELESS_SHARE * len(is_missing) else "notice",
+        f"{channel.label} lacks {count} of {len(is_missing)} samples, the first at {first / rate_hz:.4g} s; the "
+        f"longest gap is {longest} samples.",
         "Cut the gaps out with segments, or record again; analyses that need every sample refuse them by name.",
     )
 
@@ -46,13 +46,17 @@ def check_constant_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
     """A check of each constant command or sensor; a single "fine" check where all change. Conditions and excitations
     are left out: they may be constant."""
     measured = [channel for channel in channels if channel.role not in ("condition", "excitation")]
-    found = tuple(_constant_check(channel) for channel in measured if channel.known.size and np.ptp(channel.known) == 0)
-    return fine_if_none(CONSTANT, found, "Every command and every sensor changes.")
+    checks = tuple(
+        _constant_check(channel)
+        for channel in measured
+        if channel.finite_samples.size and np.ptp(channel.finite_samples) == 0
+    )
+    return add_fine_if_none(CONSTANT, checks, "Every command and every sensor changes.")
 
 
 def _constant_check(channel: Channel) -> Check:
     """The check of a constant channel: a notice for a command, "wrong" for a sensor."""
-    text = f"{channel.label} is {channel.format(float(channel.known[0]))} throughout."
+    text = f"{channel.label} is {channel.format(float(channel.finite_samples[0]))} throughout."
     if channel.role == "command":
         return Check(CONSTANT, "notice", text, "Its effect cannot be determined; leave it out, or record it driven.")
     return Check(CONSTANT, "wrong", text, "Check the cable and the map: a working sensor is never exactly constant.")
@@ -61,43 +65,43 @@ def _constant_check(channel: Channel) -> Check:
 def check_copied_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
     """A check of each channel that is a copy of another, also scaled or shifted; a single "fine" check without copies.
     An excitation may equal its command: without feedback they are the same signal."""
-    found = tuple(_copy_checks(channels))
-    return fine_if_none(COPIES, found, "No channel is a copy of another.")
+    checks = tuple(_copy_checks(channels))
+    return add_fine_if_none(COPIES, checks, "No channel is a copy of another.")
 
 
 def _copy_checks(channels: Sequence[Channel]) -> Iterator[Check]:
     """Compare each pair of channels that change; "wrong" where both are commands or responses, else a notice."""
-    moving = [channel for channel in channels if channel.known.size and np.ptp(channel.known) > 0]
-    for each, other in combinations(moving, 2):
-        if {each.role, other.role} == {"command", "excitation"}:
+    changing = [channel for channel in channels if channel.finite_samples.size and np.ptp(channel.finite_samples) > 0]
+    for first, second in combinations(changing, 2):
+        if {first.role, second.role} == {"command", "excitation"}:
             continue
-        factor = _find_copy_factor(each.samples, other.samples)
+        factor = _find_copy_factor(first.samples, second.samples)
         if factor is None:
             continue
         scaled = "" if abs(factor - 1) < _SAME_STORED else f" times {factor:.6g}, up to an offset"
-        independent = {each.role, other.role} <= {"command", "response"}
+        independent = {first.role, second.role} <= {"command", "response"}
         yield Check(
             COPIES,
             "wrong" if independent else "notice",
-            f"{other.label} is {each.label}{scaled}, sample by sample.",
+            f"{second.label} is {first.label}{scaled}, sample by sample.",
             "Check the map: two sensors never agree to the last digit; leave one of them out.",
         )
 
 
 def _find_copy_factor(first: FloatArray, second: FloatArray) -> float | None:
     """Factor from the first channel to the second; None where the second is no copy. Both: (n,)."""
-    few = slice(None, None, max(1, len(first) // _FIRST_FEW))
-    if len(first) > _FIRST_FEW and _copy_factor(first[few], second[few]) is None:
+    subset = slice(None, None, max(1, len(first) // _FIRST_FEW))
+    if len(first) > _FIRST_FEW and _copy_factor(first[subset], second[subset]) is None:
         return None
     return _copy_factor(first, second)
 
 
 def _copy_factor(values: FloatArray, copy: FloatArray) -> float | None:
     """Least-squares factor between both channels about their means; None where the residual exceeds rounding."""
-    known = np.isfinite(values) & np.isfinite(copy)
-    if known.sum() < 3:
+    is_finite = np.isfinite(values) & np.isfinite(copy)
+    if is_finite.sum() < 3:
         return None
-    first, second = values[known] - values[known].mean(), copy[known] - copy[known].mean()
+    first, second = values[is_finite] - values[is_finite].mean(), copy[is_finite] - copy[is_finite].mean()
     size, energy = rms(second), float(first @ first)
     if energy == 0 or size == 0:
         return None

@@ -44,8 +44,10 @@ class CrossSpectra:
 
     def coherence(self, first: int, second: int) -> FloatArray:
         """(lines,): magnitude-squared coherence of two channels, 0 to 1; 0 where either has no power."""
-        both = np.sqrt(self.power(first)) * np.sqrt(self.power(second))
-        return np.asarray((np.abs(self.matrix[:, first, second]) / np.where(both > 0, both, np.inf)) ** 2)
+        amplitude_product = np.sqrt(self.power(first)) * np.sqrt(self.power(second))
+        return np.asarray(
+            (np.abs(self.matrix[:, first, second]) / np.where(amplitude_product > 0, amplitude_product, np.inf)) ** 2
+        )
 
 
 def cross_spectra(
@@ -54,31 +56,39 @@ def cross_spectra(
     """Cross-spectral densities of the channels; None where no window is whole. stretches: at least one. rate_hz: sample
     rate. samples_per_window: 0: chosen by the length of the recording."""
     columns = np.column_stack([channel.samples for channel in channels])
-    total = sum(stop - start for start, stop in stretches)
-    usual = 2 ** int(np.log2(max(2 * total / _WINDOWS, _SHORTEST)))
-    length = min(samples_per_window or min(usual, _LONGEST), max(stop - start for start, stop in stretches))
+    sample_count = sum(stop - start for start, stop in stretches)
+    target_length = 2 ** int(np.log2(max(2 * sample_count / _WINDOWS, _SHORTEST)))
+    length = min(samples_per_window or min(target_length, _LONGEST), max(stop - start for start, stop in stretches))
     length -= length % 2  # even, so that the last line is at the Nyquist frequency
     if length < _SHORTEST:
         return None
-    starts = [at for start, stop in stretches for at in range(start, stop - length + 1, max(1, length // 2))]
-    whole = [at for at in starts if np.isfinite(columns[at : at + length]).all()]
-    chosen = whole[:: max(1, -(-len(whole) // MOST_WINDOWS))]
-    if not chosen:
+    window_starts = [
+        window_start
+        for start, stop in stretches
+        for window_start in range(start, stop - length + 1, max(1, length // 2))
+    ]
+    complete_starts = [
+        window_start
+        for window_start in window_starts
+        if np.isfinite(columns[window_start : window_start + length]).all()
+    ]
+    used_starts = complete_starts[:: max(1, -(-len(complete_starts) // MOST_WINDOWS))]
+    if not used_starts:
         return None
-    window, ramp = np.hanning(length + 1)[:-1], _straight_lines(length)
-    summed = np.zeros((length // 2, len(channels), len(channels)), dtype=np.complex128)
-    for at in chosen:
-        piece = columns[at : at + length]
-        piece = piece - ramp @ (ramp.T @ piece)
-        lines = np.fft.rfft(piece * window[:, None], axis=0)[1 : length // 2 + 1]
-        summed += np.einsum("li,lj->lij", lines.conj(), lines)
-    summed[-1] /= 2  # the line at the Nyquist frequency stands for itself alone
-    scale = 2.0 / (rate_hz * float(np.sum(window**2)) * len(chosen))
+    window, line_basis = np.hanning(length + 1)[:-1], _straight_lines(length)
+    product_sums = np.zeros((length // 2, len(channels), len(channels)), dtype=np.complex128)
+    for window_start in used_starts:
+        detrended = columns[window_start : window_start + length]
+        detrended = detrended - line_basis @ (line_basis.T @ detrended)
+        lines = np.fft.rfft(detrended * window[:, None], axis=0)[1 : length // 2 + 1]
+        product_sums += np.einsum("li,lj->lij", lines.conj(), lines)
+    product_sums[-1] /= 2  # the line at the Nyquist frequency stands for itself alone
+    scale = 2.0 / (rate_hz * float(np.sum(window**2)) * len(used_starts))
     frequency_hz = np.arange(1, length // 2 + 1) * (rate_hz / length)
     return CrossSpectra(
         frequency_hz,
-        np.asarray(summed * scale, dtype=np.complex128),
-        len(chosen),
+        np.asarray(product_sums * scale, dtype=np.complex128),
+        len(used_starts),
         tuple(channel.label for channel in channels),
     )
 

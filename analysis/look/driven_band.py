@@ -16,10 +16,10 @@ BELOW_PEAK = 1e-2
 """Share of the highest density below which a line is not driven."""
 LEAST_DRIVE = 1e-4
 """Power relative to the strongest command of the same unit, below which a command is not driven."""
-LOW, POOR = 0.8, 0.1
+LOW_COHERENCE, POOR_COHERENCE = 0.8, 0.1
 """Coherent share of a response's power below which it is reported, and below which the channel may be a wrong one."""
-_BROAD = frozenset({"multisine", "noise", "binary", "sweep", "rest"})
-_HEARD = 0.01
+_BROADBAND_KINDS = frozenset({"multisine", "noise", "binary", "sweep", "rest"})
+_NOTABLE_SHARE = 0.01
 """Share of a response's power in an octave that is worth naming."""
 
 
@@ -49,20 +49,22 @@ class ResponseCoherence:
 
 def find_driven_bands(spectra: CrossSpectra, channels: Sequence[Channel]) -> tuple[DrivenBand, ...]:
     """Driven band of each excitation where it was recorded, else of each command."""
-    role = "excitation" if any(_is_moving(c) and c.role == "excitation" for c in channels) else "command"
-    found = []
+    role = "excitation" if any(_does_change(c) and c.role == "excitation" for c in channels) else "command"
+    bands = []
     powers = {k: spectra.power(k) for k, channel in enumerate(channels) if channel.role == role}
     for k, power in powers.items():
-        rivals = [other.sum() for j, other in powers.items() if channels[j].unit == channels[k].unit]
-        if power.max() <= 0 or power.sum() < LEAST_DRIVE * max(rivals):
+        same_unit_powers = [
+            other_power.sum() for j, other_power in powers.items() if channels[j].unit == channels[k].unit
+        ]
+        if power.max() <= 0 or power.sum() < LEAST_DRIVE * max(same_unit_powers):
             continue
         lines = spectra.frequency_hz[power > BELOW_PEAK * power.max()]
-        found.append(DrivenBand(channels[k].name, float(lines[0]), float(lines[-1])))
-    return tuple(found)
+        bands.append(DrivenBand(channels[k].name, float(lines[0]), float(lines[-1])))
+    return tuple(bands)
 
 
-def _is_moving(channel: Channel) -> bool:
-    return bool(channel.known.size and np.ptp(channel.known) > 0)
+def _does_change(channel: Channel) -> bool:
+    return bool(channel.finite_samples.size and np.ptp(channel.finite_samples) > 0)
 
 
 def response_coherences(
@@ -74,16 +76,16 @@ def response_coherences(
     if not inputs or spectra.windows < 2 * len(inputs) + 2:
         return ()
     low, high = min(band.low_hz for band in bands), max(band.high_hz for band in bands)
-    inside = (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high)
-    found = []
+    in_band = (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high)
+    coherences = []
     for k, channel in enumerate(channels):
-        if channel.role == "response" and _is_moving(channel):
+        if channel.role == "response" and _does_change(channel):
             multiple = _multiple_coherence(spectra, inputs, k)
-            power = spectra.power(k)[inside]
-            worst_hz, worst = _worst_octave(spectra.frequency_hz[inside], multiple[inside], power)
-            share = float(np.sum(multiple[inside] * power) / np.sum(power))
-            found.append(ResponseCoherence(channel.name, multiple, share, worst_hz, worst))
-    return tuple(found)
+            power = spectra.power(k)[in_band]
+            worst_hz, worst = _worst_octave(spectra.frequency_hz[in_band], multiple[in_band], power)
+            share = float(np.sum(multiple[in_band] * power) / np.sum(power))
+            coherences.append(ResponseCoherence(channel.name, multiple, share, worst_hz, worst))
+    return tuple(coherences)
 
 
 def _multiple_coherence(spectra: CrossSpectra, inputs: list[int], response: int) -> FloatArray:
@@ -92,21 +94,23 @@ def _multiple_coherence(spectra: CrossSpectra, inputs: list[int], response: int)
     # A hint of independent noise in every command keeps collinear ones from being divided by nothing.
     floor = 1e-9 * np.trace(power_in, axis1=1, axis2=2).real.clip(min=np.finfo(np.float64).tiny)
     regular = power_in + floor[:, None, None] * np.eye(len(inputs))
-    across = spectra.matrix[:, inputs, response]
-    explained = np.einsum("li,li->l", across.conj(), np.linalg.solve(regular, across[..., None])[..., 0]).real
+    cross_power = spectra.matrix[:, inputs, response]
+    coherent_power = np.einsum(
+        "li,li->l", cross_power.conj(), np.linalg.solve(regular, cross_power[..., None])[..., 0]
+    ).real
     power = spectra.power(response)
-    raw = np.clip(explained / np.where(power > 0, power, np.inf), 0.0, 1.0)
-    by_chance = len(inputs) / spectra.windows
-    return np.asarray(np.clip((raw - by_chance) / (1 - by_chance), 0.0, 1.0))
+    uncorrected = np.clip(coherent_power / np.where(power > 0, power, np.inf), 0.0, 1.0)
+    chance_share = len(inputs) / spectra.windows
+    return np.asarray(np.clip((uncorrected - chance_share) / (1 - chance_share), 0.0, 1.0))
 
 
 def _worst_octave(frequency_hz: FloatArray, coherence: FloatArray, power: FloatArray) -> tuple[float, float]:
     octaves = np.floor(np.log2(frequency_hz))
     shares = {}
     for octave in np.unique(octaves):
-        here = power[octaves == octave]
-        if here.sum() >= _HEARD * power.sum():
-            shares[float(octave)] = float(np.sum(coherence[octaves == octave] * here) / here.sum())
+        octave_power = power[octaves == octave]
+        if octave_power.sum() >= _NOTABLE_SHARE * power.sum():
+            shares[float(octave)] = float(np.sum(coherence[octaves == octave] * octave_power) / octave_power.sum())
     worst = min(shares, key=lambda octave: shares[octave])
     return float(2.0 ** (worst + 0.5)), shares[worst]
 
@@ -115,7 +119,7 @@ def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tupl
     """Commands that never move, and segments that name an excitation that is not there."""
     driven = {band.command for band in bands}
     idle = [name for name in recording.command.channels if name not in driven]
-    found = [
+    checks = [
         Check(
             DRIVEN,
             "notice",
@@ -124,30 +128,30 @@ def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tupl
         )
         for name in idle
     ]
-    found += [Check(DRIVEN, "wrong", sentence, "Correct the segments.") for sentence in silent_segments(recording)]
+    checks += [Check(DRIVEN, "wrong", sentence, "Correct the segments.") for sentence in silent_segments(recording)]
     text = "; ".join(f"'{band.command}' is driven from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands)
-    return (*found, *((Check(DRIVEN, "fine", f"Command {text}."),) if text else ()))
+    return (*checks, *((Check(DRIVEN, "fine", f"Command {text}."),) if text else ()))
 
 
 def silent_segments(recording: Recording) -> tuple[str, ...]:
     """Segments that state an amplitude, but in which no command moves."""
-    found = []
+    sentences = []
     for number, segment in enumerate(recording.segments, start=1):
-        piece = recording.command.samples[segment.start : segment.stop]
-        known = piece[np.isfinite(piece)]
-        still = known.size > 0 and not known.any()
-        if segment.kind not in ("rest", "free", "impact") and segment.amplitude > 0 and still:
-            found.append(
+        segment_samples = recording.command.samples[segment.start : segment.stop]
+        finite = segment_samples[np.isfinite(segment_samples)]
+        is_silent = finite.size > 0 and not finite.any()
+        if segment.kind not in ("rest", "free", "impact") and segment.amplitude > 0 and is_silent:
+            sentences.append(
                 f"Segment {number} is a {segment.kind} of amplitude {segment.amplitude:g}, but no command moves in it."
             )
-    return tuple(found)
+    return tuple(sentences)
 
 
 def coherence_checks(coherences: Sequence[ResponseCoherence], recording: Recording) -> tuple[Check, ...]:
     """Checks of the coherences. For single steps, slow signals and controllers, windows are no good estimate: a notice
     at most."""
     kinds = {segment.kind for segment in recording.segments}
-    broad = bool(kinds) and kinds <= _BROAD and recording.excitation is None
+    broad = bool(kinds) and kinds <= _BROADBAND_KINDS and recording.excitation is None
     return tuple(_coherence_check(coherence, broad) for coherence in coherences)
 
 
@@ -156,11 +160,11 @@ def _coherence_check(coherence: ResponseCoherence, broad: bool) -> Check:
         f"Of the power of response '{coherence.response}' in the driven band, {coherence.share:.1%} is linear in the "
         f"commands, least around {coherence.lowest_hz:.3g} Hz ({coherence.lowest:.0%})."
     )
-    if coherence.share < POOR and broad:
+    if coherence.share < POOR_COHERENCE and broad:
         return Check(
             COHERENCE, "wrong", text, "Look for a wrong channel, a large time shift, or an input that was not recorded."
         )
-    if coherence.share < LOW:
+    if coherence.share < LOW_COHERENCE:
         return Check(
             COHERENCE,
             "notice",

@@ -55,20 +55,20 @@ def estimate_gain_and_lag(
     power_first, power_second = spectra.power(first), spectra.power(second)
     nyquist_hz = float(spectra.frequency_hz[-1])
     usable = spectra.frequency_hz <= 2 * _HIGHEST_LINE * nyquist_hz
-    good = usable & (spectra.coherence(first, second) > COHERENT) & (power_first > 0)
-    if not good.any() or power_second[usable].sum() <= 0:
+    is_coherent = usable & (spectra.coherence(first, second) > COHERENT) & (power_first > 0)
+    if not is_coherent.any() or power_second[usable].sum() <= 0:
         return None
-    weight = power_second[good] / power_second[good].sum()
-    gains = np.sqrt(power_second[good] / power_first[good])
+    weight = power_second[is_coherent] / power_second[is_coherent].sum()
+    gains = np.sqrt(power_second[is_coherent] / power_first[is_coherent])
     if difference_gain is not None:
-        gains = gains * difference_gain[good]
+        gains = gains * difference_gain[is_coherent]
     order = np.argsort(gains)
     median = float(gains[order][np.searchsorted(np.cumsum(weight[order]), 0.5)])
     spread = float(np.sqrt(np.sum(weight * np.log(gains / median) ** 2)))
-    cross = spectra.matrix[good, first, second]
-    cycles = spectra.frequency_hz[good] / (2 * nyquist_hz)
+    cross = spectra.matrix[is_coherent, first, second]
+    cycles = spectra.frequency_hz[is_coherent] / (2 * nyquist_hz)
     sign, lag = _sign_and_lag(cross / np.abs(cross), cycles, weight)
-    return GainAndLag(sign * median, spread, lag, float(power_second[good].sum() / power_second[usable].sum()))
+    return GainAndLag(sign * median, spread, lag, float(power_second[is_coherent].sum() / power_second[usable].sum()))
 
 
 def _sign_and_lag(phasors: ComplexArray, cycles: FloatArray, weight: FloatArray) -> tuple[float, float]:

@@ -17,22 +17,24 @@ _HALF_CYCLES = 4
 """Length, in half cycles, of the stretches in which the motion is compared with ramps or sinusoids."""
 _REVERSAL = 0.1
 """Least reversal that ends a half cycle, as a fraction of the signal's range."""
-_KEPT = 0.7
+_TRIM_QUANTILE = 0.7
 """Fraction of the samples that a fit keeps: the rest lie at the corners of ramps and trapezoids. Also the fraction of
 unchanged samples above which a signal is a series of steps."""
-_RESTS = 0.1
+_REST_SHARE = 0.1
 """Speed squared below which the signal rests, as between the ramps of a trapezoid, relative to its 90 % quantile."""
-FOLLOWS = 0.1
+LARGEST_MISFIT = 0.1
 """Misfit below which a signal obeys the law of ramps or sines; that of a random signal is about 0.25."""
-CLEARLY = 3.0
+LEAST_MISFIT_RATIO = 3.0
 """Least ratio of the force's misfit to the motion's at which the motion is the command."""
 
 
 def is_imposed(motion: FloatArray, force: FloatArray) -> bool:
     """Whether the motion (n,) obeys the law of ramps, or of ramps and sines, and the force (n,) clearly less so."""
     for ramps in (True, False):
-        of_motion, of_force = law_misfit(motion, ramps=ramps), law_misfit(force, ramps=ramps)
-        if of_motion < FOLLOWS and of_force > max(FOLLOWS / 2, CLEARLY * of_motion):
+        motion_misfit, force_misfit = law_misfit(motion, ramps=ramps), law_misfit(force, ramps=ramps)
+        if motion_misfit < LARGEST_MISFIT and force_misfit > max(
+            LARGEST_MISFIT / 2, LEAST_MISFIT_RATIO * motion_misfit
+        ):
             return True
     return False
 
@@ -40,16 +42,19 @@ def is_imposed(motion: FloatArray, force: FloatArray) -> bool:
 def law_misfit(values: FloatArray, *, ramps: bool = False) -> float:
     """Mean absolute residual of the fit relative to the mean speed squared, median over the stretches of a signal (n,).
     ramps: fit a constant in place of the quadratic. 0 for a series of steps; 1 where the samples do not suffice."""
-    known = np.isfinite(values)
-    if known.sum() < 2 * _BLOCKS or not np.ptp(values[known]) > 0:
+    is_finite = np.isfinite(values)
+    if is_finite.sum() < 2 * _BLOCKS or not np.ptp(values[is_finite]) > 0:
         return 1.0
-    filled = np.interp(np.arange(len(values)), np.flatnonzero(known), values[known])
-    filled = (filled - filled.mean()) / np.ptp(filled)
-    if np.mean(np.diff(filled) == 0) > _KEPT and len(np.unique(filled)) < len(filled) / _BLOCKS:
+    interpolated = np.interp(np.arange(len(values)), np.flatnonzero(is_finite), values[is_finite])
+    interpolated = (interpolated - interpolated.mean()) / np.ptp(interpolated)
+    if (
+        np.mean(np.diff(interpolated) == 0) > _TRIM_QUANTILE
+        and len(np.unique(interpolated)) < len(interpolated) / _BLOCKS
+    ):
         return 0.0
-    half_cycles = _half_cycles(filled)
-    size = max(len(filled) // (half_cycles * _BLOCKS), 1)
-    means = filled[: len(filled) // size * size].reshape(-1, size).mean(axis=1)
+    half_cycles = _half_cycles(interpolated)
+    size = max(len(interpolated) // (half_cycles * _BLOCKS), 1)
+    means = interpolated[: len(interpolated) // size * size].reshape(-1, size).mean(axis=1)
     length = _HALF_CYCLES * _BLOCKS
     starts = range(0, max(len(means) - length // 2, 1), length)
     return float(np.median([_misfit(means[start : start + length], 1 if ramps else 3) for start in starts]))
@@ -72,15 +77,15 @@ def _misfit(values: FloatArray, count: int) -> float:
     if len(values) < _BLOCKS // 2:
         return 1.0
     squared = ((values[4:] - values[:-4]) / 4) ** 2
-    moves = squared > _RESTS * np.quantile(squared, 0.9)
-    at, squared = values[2:-2][moves], squared[moves]
-    if len(at) < _BLOCKS // 4:
+    above_rest = squared > _REST_SHARE * np.quantile(squared, 0.9)
+    positions, squared = values[2:-2][above_rest], squared[above_rest]
+    if len(positions) < _BLOCKS // 4:
         return 1.0
-    terms = np.stack([np.ones_like(at), at, at**2], axis=1)[:, :count]
-    kept = np.full(len(at), True)
+    terms = np.stack([np.ones_like(positions), positions, positions**2], axis=1)[:, :count]
+    well_fitted = np.full(len(positions), True)
     for _ in range(3):
-        found = np.linalg.lstsq(terms[kept], squared[kept], rcond=None)[0]
-        residual = np.abs(squared - terms @ found)
-        kept = residual <= np.quantile(residual, _KEPT)
+        coefficients = np.linalg.lstsq(terms[well_fitted], squared[well_fitted], rcond=None)[0]
+        residual = np.abs(squared - terms @ coefficients)
+        well_fitted = residual <= np.quantile(residual, _TRIM_QUANTILE)
     scale = float(np.mean(squared))
-    return float(np.mean(residual[kept])) / scale if scale > 0 else 0.0
+    return float(np.mean(residual[well_fitted])) / scale if scale > 0 else 0.0

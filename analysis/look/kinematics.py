@@ -26,12 +26,12 @@ LEAST_SHARE = 0.3
 """Least coherent share of a channel's power; below it, the channel measures a different motion and is not compared."""
 SAME_SHARE, SAME_SPREAD = 0.8, 0.2
 """Least coherent share, and largest spread of the ratio, of two channels that measure the same quantity."""
-CLOSE, FAR = 0.05, 0.2
+LARGEST_GAIN_ERROR, WRONG_GAIN_ERROR = 0.05, 0.2
 """Deviation of the gain from 1 above which it is reported, and above which it counts as wrong."""
-LATE = 0.6
+LARGEST_LAG = 0.6
 """Largest lag (samples) that is not reported: a zero-order hold of the force delays the acceleration by half a sample,
 and a backward difference delays a derivative by as much."""
-_FILTERED = (
+_FILTER_ADVICE = (
     "It is delayed as well as smaller, as by a sensor's filter or a flexible part between both: model this, or "
     "compare the channels only below its corner frequency. A wrong unit or factor would cause no delay."
 )
@@ -63,56 +63,63 @@ def find_kinematic_pairs(
 ) -> tuple[KinematicPair, ...]:
     """For each velocity and acceleration, the channel whose derivative has the largest coherent share with it; none
     where that share is below `LEAST_SHARE`."""
-    moving = [
-        channel for channel in channels if channel.unit in _ORDER and channel.known.size and np.ptp(channel.known) > 0
+    changing = [
+        channel
+        for channel in channels
+        if channel.unit in _ORDER and channel.finite_samples.size and np.ptp(channel.finite_samples) > 0
     ]
-    return tuple(pair for later in moving if (pair := _best_pair(later, moving, stretches, rate_hz)))
+    return tuple(pair for candidate in changing if (pair := _best_pair(candidate, changing, stretches, rate_hz)))
 
 
 def _best_pair(
-    later: Channel, moving: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
+    higher_channel: Channel, changing: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
 ) -> KinematicPair | None:
-    """The pair of `later` and the channel among `moving` whose derivative agrees best with it; None where none does."""
-    found = []
-    for earlier in moving:
-        order = _ORDER[later.unit] - _ORDER[earlier.unit]
-        if order > 0 and later.unit.startswith(earlier.unit.split("/")[0]) and later.role != "excitation":
-            agreed = _compare_derivative(earlier, later, order, (stretches, rate_hz))
-            if agreed is not None and agreed.coherent_share >= LEAST_SHARE:
-                found.append(KinematicPair(earlier.label, later.label, order, agreed))
-    return max(found, key=lambda pair: pair.agreement.coherent_share, default=None)
+    """The pair of `higher_channel` and the channel among `changing` whose derivative agrees best with it; None where
+    none does."""
+    pairs = []
+    for lower_channel in changing:
+        order = _ORDER[higher_channel.unit] - _ORDER[lower_channel.unit]
+        if (
+            order > 0
+            and higher_channel.unit.startswith(lower_channel.unit.split("/")[0])
+            and higher_channel.role != "excitation"
+        ):
+            agreement = _compare_derivative(lower_channel, higher_channel, order, (stretches, rate_hz))
+            if agreement is not None and agreement.coherent_share >= LEAST_SHARE:
+                pairs.append(KinematicPair(lower_channel.label, higher_channel.label, order, agreement))
+    return max(pairs, key=lambda pair: pair.agreement.coherent_share, default=None)
 
 
 def _compare_derivative(
-    earlier: Channel, later: Channel, order: int, timing: tuple[Sequence[Stretch], float]
+    lower_channel: Channel, higher_channel: Channel, order: int, timing: tuple[Sequence[Stretch], float]
 ) -> GainAndLag | None:
-    """Gain and lag of `later` relative to the derivative of `earlier`. timing: stretches, and sample rate in Hz. None
-    where no stretch is long enough or no line is coherent."""
+    """Gain and lag of `higher_channel` relative to the derivative of `lower_channel`. timing: stretches, and sample
+    rate in Hz. None where no stretch is long enough or no line is coherent."""
     stretches, rate_hz = timing
-    differentiated = replace(earlier, samples=derivative(earlier.samples, order, rate_hz))
+    differentiated = replace(lower_channel, samples=derivative(lower_channel.samples, order, rate_hz))
     # The central difference has no value at the first and the last sample of a stretch.
-    inner = [(start + 1, stop - 1) for start, stop in stretches if stop - start > 4]
-    spectra = cross_spectra((differentiated, later), inner, rate_hz) if inner else None
+    inner_stretches = [(start + 1, stop - 1) for start, stop in stretches if stop - start > 4]
+    spectra = cross_spectra((differentiated, higher_channel), inner_stretches, rate_hz) if inner_stretches else None
     return estimate_gain_and_lag(spectra, 0, 1, _difference_gain(spectra, order, rate_hz)) if spectra else None
 
 
 def derivative(samples: FloatArray, order: int, rate_hz: float) -> FloatArray:
     """Derivative (n,) of samples (n,) by central differences, which shift nothing in time; NaN at both ends. order: 1
     or 2."""
-    found = np.full(len(samples), np.nan)
+    differences = np.full(len(samples), np.nan)
     if order == 1:
-        found[1:-1] = (samples[2:] - samples[:-2]) * (rate_hz / 2)
+        differences[1:-1] = (samples[2:] - samples[:-2]) * (rate_hz / 2)
     else:
-        found[1:-1] = (samples[2:] - 2 * samples[1:-1] + samples[:-2]) * rate_hz**2
-    return found
+        differences[1:-1] = (samples[2:] - 2 * samples[1:-1] + samples[:-2]) * rate_hz**2
+    return differences
 
 
 def _difference_gain(spectra: CrossSpectra, order: int, rate_hz: float) -> FloatArray:
     """(lines,): gain of central differences relative to the exact derivative, with w = 2 pi f / rate: sin(w) / w for
     the first, (sin(w / 2) / (w / 2))^2 for the second derivative."""
     angle = 2 * np.pi * spectra.frequency_hz / rate_hz
-    shrunk = np.sin(angle) / angle if order == 1 else (np.sin(angle / 2) / (angle / 2)) ** 2
-    return np.maximum(shrunk, 1e-6)
+    gain = np.sin(angle) / angle if order == 1 else (np.sin(angle / 2) / (angle / 2)) ** 2
+    return np.maximum(gain, 1e-6)
 
 
 def kinematic_checks(pairs: Sequence[KinematicPair], rate_hz: float) -> tuple[Check, ...]:
@@ -122,23 +129,28 @@ def kinematic_checks(pairs: Sequence[KinematicPair], rate_hz: float) -> tuple[Ch
 
 def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
     """The finding about one pair: the most serious of sign, gain and lag."""
-    agreed = pair.agreement
-    late = _lag_text(agreed.lag_samples, rate_hz)
+    agreement = pair.agreement
+    lag_text = _lag_text(agreement.lag_samples, rate_hz)
     text = (
-        f"{pair.derivative} is {typeset(f'{agreed.gain:.4g}')} times {_WORDS[pair.order]} of {pair.place}{late} "
-        f"(lines with {agreed.coherent_share:.0%} of its power)."
+        f"{pair.derivative} is {typeset(f'{agreement.gain:.4g}')} times {_WORDS[pair.order]} of {pair.place}{lag_text} "
+        f"(lines with {agreement.coherent_share:.0%} of its power)."
     )
-    off = abs(abs(agreed.gain) - 1)
-    if agreed.gain < 0:
-        return Check(KINEMATICS, "wrong", text, f"Reverse the sign of one of them{_cause_text(agreed.gain)}.")
-    if off > FAR and agreed.gain < 1 and agreed.lag_samples > LATE and not _cause_text(agreed.gain):
+    gain_error = abs(abs(agreement.gain) - 1)
+    if agreement.gain < 0:
+        return Check(KINEMATICS, "wrong", text, f"Reverse the sign of one of them{_cause_text(agreement.gain)}.")
+    if (
+        gain_error > WRONG_GAIN_ERROR
+        and agreement.gain < 1
+        and agreement.lag_samples > LARGEST_LAG
+        and not _cause_text(agreement.gain)
+    ):
         # A wrong unit or factor causes no delay; a gain below 1 with a lag is typical of a filter or a flexible part.
-        return Check(KINEMATICS, "notice", text, _FILTERED)
-    if off > FAR:
-        return Check(KINEMATICS, "wrong", text, f"Check the units and factors of both{_cause_text(agreed.gain)}.")
-    if off > CLOSE:
+        return Check(KINEMATICS, "notice", text, _FILTER_ADVICE)
+    if gain_error > WRONG_GAIN_ERROR:
+        return Check(KINEMATICS, "wrong", text, f"Check the units and factors of both{_cause_text(agreement.gain)}.")
+    if gain_error > LARGEST_GAIN_ERROR:
         return Check(KINEMATICS, "notice", text, "Check the calibration of both, and filters between them.")
-    if abs(agreed.lag_samples) > LATE:
+    if abs(agreement.lag_samples) > LARGEST_LAG:
         return Check(
             KINEMATICS,
             "notice",
@@ -149,38 +161,42 @@ def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
 
 
 def _lag_text(lag: float, rate_hz: float) -> str:
-    """The lag (samples) in ms and samples, for a sentence; empty up to `LATE`."""
-    if abs(lag) <= LATE:
+    """The lag (samples) in ms and samples, for a sentence; empty up to `LARGEST_LAG`."""
+    if abs(lag) <= LARGEST_LAG:
         return ""
     return f", {abs(lag) / rate_hz * 1e3:.3g} ms ({abs(lag):.2g} samples) {'later' if lag > 0 else 'earlier'}"
 
 
 def _cause_text(factor: float) -> str:
-    """Text on the unit error with this factor or its reciprocal, within `CLOSE`; empty where none is known."""
+    """Text on the unit error with this factor or its reciprocal, within `LARGEST_GAIN_ERROR`; empty where none is
+    known."""
     size = abs(factor)
-    for known, words in _CAUSES:
-        if min(abs(size / known - 1), abs(size * known - 1)) < CLOSE:
-            return f"; {known:.4g} is {words}, or the other way round"
+    for unit_factor, words in _CAUSES:
+        if min(abs(size / unit_factor - 1), abs(size * unit_factor - 1)) < LARGEST_GAIN_ERROR:
+            return f"; {unit_factor:.4g} is {words}, or the other way round"
     return ""
 
 
 def lag_checks(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> tuple[Check, ...]:
     """Lags between channels that measure the same quantity, such as a command and its measurement or two sensors of one
     motion."""
-    found = tuple(_lag_pairs(channels, spectra, rate_hz))
-    return found or (Check(LAGS, "fine", "No two channels measure the same quantity, so no lag can be measured."),)
+    checks = tuple(_lag_pairs(channels, spectra, rate_hz))
+    return checks or (Check(LAGS, "fine", "No two channels measure the same quantity, so no lag can be measured."),)
 
 
 def _lag_pairs(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> Iterator[Check]:
     """A check for every two channels of the same unit with a nearly constant gain (`SAME_SHARE`, `SAME_SPREAD`)."""
-    for each, other in combinations(range(len(channels)), 2):
-        first, second = channels[each], channels[other]
+    for first_index, second_index in combinations(range(len(channels)), 2):
+        first, second = channels[first_index], channels[second_index]
         if first.unit != second.unit or {first.role, second.role} == {"command", "excitation"}:
             continue
-        agreed = estimate_gain_and_lag(spectra, each, other)
-        if agreed is None or agreed.coherent_share < SAME_SHARE or agreed.gain_spread > SAME_SPREAD:
+        agreement = estimate_gain_and_lag(spectra, first_index, second_index)
+        if agreement is None or agreement.coherent_share < SAME_SHARE or agreement.gain_spread > SAME_SPREAD:
             continue
-        late = _lag_text(agreed.lag_samples, rate_hz)
-        text = f"{second.label} is {typeset(f'{agreed.gain:.4g}')} times {first.label}{late or ', at the same time'}."
-        do = "Shift the later one, or model what delays it." if late else ""
-        yield Check(LAGS, "notice" if late else "fine", text, do)
+        lag_words = _lag_text(agreement.lag_samples, rate_hz)
+        text = (
+            f"{second.label} is {typeset(f'{agreement.gain:.4g}')} times {first.label}"
+            f"{lag_words or ', at the same time'}."
+        )
+        advice = "Shift the later one, or model what delays it." if lag_words else ""
+        yield Check(LAGS, "notice" if lag_words else "fine", text, advice)

@@ -15,9 +15,9 @@ from analysis.wording import typeset
 from equalizer.signals.recording import Recording, Segment
 
 LEVELS = "levels"
-_APART = 1.5
+_LEAST_LEVEL_RATIO = 1.5
 """Least ratio of the strongest to the weakest command for which gains are compared."""
-EVEN, UNEVEN = 0.05, 0.3
+NOTABLE_CHANGE, LARGE_CHANGE = 0.05, 0.3
 """Relative change of the gain (rms of response over rms of command) above which it is reported, and called large."""
 
 
@@ -39,7 +39,7 @@ class SegmentLevel:
 
 def segment_levels(recording: Recording, channels: Sequence[Channel]) -> tuple[SegmentLevel, ...]:
     """Levels of all segments, or of the whole recording where it has no segments."""
-    whole = (Segment(0, len(recording), "unmarked"),)
+    full_record = (Segment(0, len(recording), "unmarked"),)
     rate_hz = recording.sample_rate_hz
     return tuple(
         SegmentLevel(
@@ -49,16 +49,16 @@ def segment_levels(recording: Recording, channels: Sequence[Channel]) -> tuple[S
             segment.start / rate_hz,
             (segment.stop - segment.start) / rate_hz,
             segment.period,
-            tuple(rms(_known_samples(channel, segment)) for channel in channels),
+            tuple(rms(_finite_samples(channel, segment)) for channel in channels),
         )
-        for number, segment in enumerate(recording.segments or whole, start=1)
+        for number, segment in enumerate(recording.segments or full_record, start=1)
     )
 
 
-def _known_samples(channel: Channel, segment: Segment) -> np.ndarray:
+def _finite_samples(channel: Channel, segment: Segment) -> np.ndarray:
     """Finite samples of the channel in the segment."""
-    piece = channel.samples[segment.start : segment.stop]
-    return np.asarray(piece[np.isfinite(piece)])
+    segment_samples = channel.samples[segment.start : segment.stop]
+    return np.asarray(segment_samples[np.isfinite(segment_samples)])
 
 
 def level_checks(levels: Sequence[SegmentLevel], channels: Sequence[Channel]) -> tuple[Check, ...]:
@@ -68,16 +68,16 @@ def level_checks(levels: Sequence[SegmentLevel], channels: Sequence[Channel]) ->
     kinds = [level.kind for level in levels if level.kind not in ("rest", "free")]
     if not kinds or len({channels[k].unit for k in commands}) > 1:
         return ()
-    usual = max(set(kinds), key=kinds.count)
-    rows = [(_command_level(level, commands), level) for level in levels if level.kind == usual]
+    main_kind = max(set(kinds), key=kinds.count)
+    rows = [(_command_level(level, commands), level) for level in levels if level.kind == main_kind]
     # Different axes may have different gains: only segments that drive the same axes are compared.
     groups = {_active_commands(level, commands) for _, level in rows}
-    found = []
+    checks = []
     for group in groups:
-        alike = [(size, level) for size, level in rows if _active_commands(level, commands) == group and size > 0]
-        if len(alike) > 1 and max(s for s, _ in alike) > _APART * min(s for s, _ in alike):
-            found += [_proportion_check(alike, k, c) for k, c in enumerate(channels) if c.role == "response"]
-    return tuple(check for check in found if check is not None)
+        comparable = [(size, level) for size, level in rows if _active_commands(level, commands) == group and size > 0]
+        if len(comparable) > 1 and max(s for s, _ in comparable) > _LEAST_LEVEL_RATIO * min(s for s, _ in comparable):
+            checks += [_proportion_check(comparable, k, c) for k, c in enumerate(channels) if c.role == "response"]
+    return tuple(check for check in checks if check is not None)
 
 
 def _command_level(level: SegmentLevel, commands: Sequence[int]) -> float:
@@ -91,12 +91,14 @@ def _active_commands(level: SegmentLevel, commands: Sequence[int]) -> tuple[bool
     return tuple(level.rms[k] > 0.1 * strongest for k in commands)
 
 
-def _proportion_check(alike: Sequence[tuple[float, SegmentLevel]], response: int, channel: Channel) -> Check | None:
+def _proportion_check(
+    comparable: Sequence[tuple[float, SegmentLevel]], response: int, channel: Channel
+) -> Check | None:
     """Compare the gains of one response in the weakest and the strongest segment; None where it does not move.
 
-    alike: (rms of the command, segment) of comparable segments. response: index of the channel.
+    comparable: (rms of the command, segment) of comparable segments. response: index of the channel.
     """
-    ordered = sorted(alike, key=lambda row: row[0])
+    ordered = sorted(comparable, key=lambda row: row[0])
     weakest, strongest = ordered[0], ordered[-1]
     if weakest[1].rms[response] == 0 or strongest[1].rms[response] == 0:
         return None
@@ -106,8 +108,8 @@ def _proportion_check(alike: Sequence[tuple[float, SegmentLevel]], response: int
         f"From the weakest to the strongest {weakest[1].kind} ({strongest[0] / weakest[0]:.3g} times) the rms of "
         f"{channel.label} over that of the command changes by {typeset(f'{100 * change:+.3g}')} %."
     )
-    if abs(change) < EVEN:
+    if abs(change) < NOTABLE_CHANGE:
         return Check(LEVELS, "fine", text)
-    large = abs(change) > UNEVEN
-    do = "The device is far from linear: friction, stops, hardening or saturation." if large else ""
-    return Check(LEVELS, "notice", text, do or "The device is slightly nonlinear, or noise contributes to the rms.")
+    large = abs(change) > LARGE_CHANGE
+    advice = "The device is far from linear: friction, stops, hardening or saturation." if large else ""
+    return Check(LEVELS, "notice", text, advice or "The device is slightly nonlinear, or noise contributes to the rms.")

@@ -29,14 +29,14 @@ from analysis.look.driven_band import (
 from analysis.look.kinematics import KinematicPair, find_kinematic_pairs, kinematic_checks, lag_checks
 from analysis.look.levels import SegmentLevel, level_checks, segment_levels
 from analysis.look.plausibility import check_offsets, check_units
-from analysis.look.repeats import Repeats, find_repeats, repeat_checks
-from analysis.wording import write_without_time
+from analysis.look.repeats import Repeats, check_repeats, find_repeats
+from analysis.wording import replace_time_units
 from equalizer.signals.recording import Recording
 from equalizer.signals.summary import Summarised, Summary
 
 RESOLUTION = "resolution"
 """Name of the check of quantization."""
-COARSE, ROUGH, UNSEEN = 3.0, 30.0, 1000.0
+HIDDEN_STEPS, ROUGH_STEPS, FINE_STEPS = 3.0, 30.0, 1000.0
 """Limits of a channel's rms over its quantization step. Below the first, the check is "wrong", because quantization
 hides the motion; below the second, it is a notice; from the last on, nothing is reported."""
 _SENSORS = ("response", "position")
@@ -46,21 +46,21 @@ _SENSORS = ("response", "position")
 def check_resolution(channels: Sequence[Channel]) -> tuple[Check, ...]:
     """Check the quantization of sensor channels, one check per channel with a step that matters, else a single one.
     Commands are left out: they may have few values by design."""
-    found = [_resolution_check(channel) for channel in channels if channel.role in _SENSORS]
-    known = tuple(check for check in found if check is not None)
-    return known or (Check(RESOLUTION, "fine", "No sensor is limited by the resolution of its converter."),)
+    candidates = [_resolution_check(channel) for channel in channels if channel.role in _SENSORS]
+    checks = tuple(check for check in candidates if check is not None)
+    return checks or (Check(RESOLUTION, "fine", "No sensor is limited by the resolution of its converter."),)
 
 
 def _resolution_check(channel: Channel) -> Check | None:
     """Check of one channel; None where it has no quantization step, or one below a thousandth of its rms."""
     step = rounding_step(channel.samples)
-    steps = rms(channel.known) / step if step else UNSEEN
-    if steps >= UNSEEN:
+    steps = rms(channel.finite_samples) / step if step else FINE_STEPS
+    if steps >= FINE_STEPS:
         return None
     text = f"{channel.label} has a resolution of {channel.format(step)}; its rms is {steps:.3g} of these steps."
-    if steps < COARSE:
+    if steps < HIDDEN_STEPS:
         return Check(RESOLUTION, "wrong", text, "Use a finer sensor or range, or move more: rounding hides the motion.")
-    if steps < ROUGH:
+    if steps < ROUGH_STEPS:
         return Check(
             RESOLUTION,
             "notice",
@@ -114,10 +114,10 @@ class Overview(Summarised):
             (
                 *(
                     (
-                        f"{each.role} {each.name}",
-                        f"{each.lowest:.4g} to {each.highest:.4g} {each.unit}, rms {each.rms:.3g}",
+                        f"{row.role} {row.name}",
+                        f"{row.lowest:.4g} to {row.highest:.4g} {row.unit}, rms {row.rms:.3g}",
                     )
-                    for each in self.summaries
+                    for row in self.summaries
                 ),
                 *((check.level, check.seen) for check in noticed),
             ),
@@ -132,7 +132,7 @@ def overview(name: str, recording: Recording) -> Overview:
     coherences = response_coherences(spectra, channels, bands) if spectra else ()
     pairs = find_kinematic_pairs(channels, stretches, rate_hz)
     levels = segment_levels(recording, channels)
-    repeated = find_repeats(recording, stretches)
+    repeats = find_repeats(recording, stretches)
     checks = (
         *check_missing_samples(channels, rate_hz),
         *check_constant_channels(channels),
@@ -147,7 +147,7 @@ def overview(name: str, recording: Recording) -> Overview:
         *check_driven_axes(recording, bands),
         *coherence_checks(coherences, recording),
         *level_checks(levels, channels),
-        *repeat_checks(recording, repeated),
+        *check_repeats(recording, repeats),
     )
     return Overview(
         name=name,
@@ -160,7 +160,7 @@ def overview(name: str, recording: Recording) -> Overview:
         bands=bands,
         coherences=coherences,
         pairs=pairs,
-        repeats=repeated,
+        repeats=repeats,
         checks=_worst_first(checks if recording.is_timed else tuple(map(_count_in_samples, checks))),
     )
 
@@ -176,20 +176,20 @@ def _count_in_samples(check: Check) -> Check:
     unchanged."""
     if check.name == CLOCK:
         return check
-    return replace(check, seen=write_without_time(check.seen), do=write_without_time(check.do))
+    return replace(check, seen=replace_time_units(check.seen), do=replace_time_units(check.do))
 
 
 def _summarise_channel(channel: Channel) -> ChannelSummary:
     """Summary of the known samples; NaN where there are none."""
-    known = channel.known if channel.known.size else np.array([np.nan])
+    finite = channel.finite_samples if channel.finite_samples.size else np.array([np.nan])
     return ChannelSummary(
         channel.role,
         channel.name,
         channel.quantity,
         channel.unit,
-        float(known.min()),
-        float(known.max()),
-        float(known.mean()),
-        rms(channel.known),
-        len(channel.samples) - channel.known.size,
+        float(finite.min()),
+        float(finite.max()),
+        float(finite.mean()),
+        rms(channel.finite_samples),
+        len(channel.samples) - channel.finite_samples.size,
     )

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from analysis.look.channels import Channel, rms
-from analysis.look.check import Check, fine_if_none
+from analysis.look.check import Check, add_fine_if_none
 from equalizer.signals.units import UNSTATED
 
 UNITS, OFFSETS = "units", "static offset"
@@ -25,20 +25,20 @@ _SMALLEST = {
 """Rms about the mean, by unit, below which the unit is doubted."""
 G, IN_G = 9.80665, (0.97, 1.03)
 """Standard gravity (m/s²), and the range of a mean reading in m/s² that suggests a value in multiples of gravity."""
-STRONG = 0.5
+LEAST_OFFSET = 0.5
 """Least ratio of the mean's magnitude to the rms about it for which an offset is reported."""
 
 
 def check_units(channels: Sequence[Channel]) -> tuple[Check, ...]:
     """A check of each channel whose values are doubtful in its unit; a single "fine" check where none is."""
-    found = tuple(check for channel in channels if (check := _unit_check(channel)))
-    return fine_if_none(UNITS, found, "All amplitudes are plausible in their units.")
+    checks = tuple(check for channel in channels if (check := _unit_check(channel)))
+    return add_fine_if_none(UNITS, checks, "All amplitudes are plausible in their units.")
 
 
 def _unit_check(channel: Channel) -> Check | None:
     """The doubt about one channel's unit: unstated, too large, too small, or an acceleration in g; None without one."""
-    known = channel.known
-    if not known.size:
+    finite = channel.finite_samples
+    if not finite.size:
         return None
     if channel.unit == UNSTATED and channel.role != "condition":
         return Check(
@@ -48,14 +48,14 @@ def _unit_check(channel: Channel) -> Check | None:
             "State the unit in the map; otherwise masses, damping and stiffnesses are relative to this channel's "
             "scale.",
         )
-    peak, moves = float(np.max(np.abs(known))), rms(known)
+    peak, rms_value = float(np.max(np.abs(finite))), rms(finite)
     if peak > _LARGEST.get(channel.unit, np.inf):
         return _doubt_unit(channel, f"{channel.label} reaches {channel.format(peak)}.")
-    if 0 < moves < _SMALLEST.get(channel.unit, 0.0):
-        return _doubt_unit(channel, f"{channel.label} moves by {channel.format(moves)} rms.")
-    mean = abs(float(known.mean()))
-    if channel.unit == "m/s^2" and IN_G[0] < mean < IN_G[1] and moves < mean:
-        text = f"{channel.label} rests at {channel.format(float(known.mean()))}, where an accelerometer shows {G:.2f}."
+    if 0 < rms_value < _SMALLEST.get(channel.unit, 0.0):
+        return _doubt_unit(channel, f"{channel.label} moves by {channel.format(rms_value)} rms.")
+    mean = abs(float(finite.mean()))
+    if channel.unit == "m/s^2" and IN_G[0] < mean < IN_G[1] and rms_value < mean:
+        text = f"{channel.label} rests at {channel.format(float(finite.mean()))}, where an accelerometer shows {G:.2f}."
         return Check(UNITS, "wrong", text, "State the unit g in the map: the numbers look like multiples of gravity.")
     return None
 
@@ -67,23 +67,23 @@ def _doubt_unit(channel: Channel, text: str) -> Check:
 
 def check_offsets(channels: Sequence[Channel]) -> tuple[Check, ...]:
     """Check commands and responses for static offsets; positions, velocities and conditions are exempt."""
-    found = tuple(
+    checks = tuple(
         check
         for channel in channels
         if channel.role in ("command", "response") and channel.unit not in ("m", "rad", "m/s", "rad/s")
         if (check := _offset_check(channel))
     )
-    return fine_if_none(OFFSETS, found, "No command, force, acceleration or voltage has a large offset.")
+    return add_fine_if_none(OFFSETS, checks, "No command, force, acceleration or voltage has a large offset.")
 
 
 def _offset_check(channel: Channel) -> Check | None:
-    """The offset of one channel; None where it is below `STRONG` times the rms, or the channel is constant."""
-    known = channel.known
-    moves = rms(known)
-    if not known.size or moves == 0 or abs(float(known.mean())) < STRONG * moves:
+    """The offset of one channel; None where it is below `LEAST_OFFSET` times the rms, or the channel is constant."""
+    finite = channel.finite_samples
+    rms_value = rms(finite)
+    if not finite.size or rms_value == 0 or abs(float(finite.mean())) < LEAST_OFFSET * rms_value:
         return None
-    mean = float(known.mean())
-    text = f"The mean of {channel.label} is {channel.format(mean)} ({abs(mean) / moves:.3g} times its rms)."
+    mean = float(finite.mean())
+    text = f"The mean of {channel.label} is {channel.format(mean)} ({abs(mean) / rms_value:.3g} times its rms)."
     if channel.unit == "m/s^2" and abs(abs(mean) / G - 1) < 0.03:
         return Check(OFFSETS, "fine", f"{text} That is gravity.")
     if channel.role == "command":

@@ -57,25 +57,27 @@ def one_way_anova(groups: Mapping[str, Sequence[float | None]]) -> OneWayAnova:
     gaps = sum(len(values) for values in groups.values()) - sum(len(sample) for sample in samples.values())
     notes = [f"{gaps} missing value{'s' if gaps != 1 else ''} left out."] if gaps else []
     notes += [f"There is no value at {group.name}." for group in summaries if group.n == 0]
-    filled = [sample for sample in samples.values() if len(sample)]
-    if len(filled) < 2:
-        notes.append(f"A comparison needs values in at least two groups; there are {len(filled)}.")
+    nonempty_groups = [sample for sample in samples.values() if len(sample)]
+    if len(nonempty_groups) < 2:
+        notes.append(f"A comparison needs values in at least two groups; there are {len(nonempty_groups)}.")
         return _empty_anova(summaries, notes)
-    df_between, df_within = len(filled) - 1, sum(map(len, filled)) - len(filled)
+    df_between, df_within = len(nonempty_groups) - 1, sum(map(len, nonempty_groups)) - len(nonempty_groups)
     if df_within < 1:
         notes.append("Every group holds a single value, so there is no spread within groups to compare with.")
         return _empty_anova(summaries, notes, df_between, df_within)
-    return _compute_anova(filled, summaries, notes)
+    return _compute_anova(nonempty_groups, summaries, notes)
 
 
-def _compute_anova(filled: list[FloatArray], summaries: tuple[GroupSummary, ...], notes: list[str]) -> OneWayAnova:
-    """The equations of the module. filled: at least two groups, not empty, with more values than groups."""
-    everything = np.concatenate(filled)
-    grand = everything.mean()
-    ss_between = float(sum(len(sample) * (sample.mean() - grand) ** 2 for sample in filled))
-    ss_within = float(sum(((sample - sample.mean()) ** 2).sum() for sample in filled))
-    df_between, df_within = len(filled) - 1, len(everything) - len(filled)
-    if is_rounding(ss_within, everything):
+def _compute_anova(
+    nonempty_groups: list[FloatArray], summaries: tuple[GroupSummary, ...], notes: list[str]
+) -> OneWayAnova:
+    """The equations of the module. nonempty_groups: at least two groups, not empty, with more values than groups."""
+    all_values = np.concatenate(nonempty_groups)
+    grand_mean = all_values.mean()
+    ss_between = float(sum(len(sample) * (sample.mean() - grand_mean) ** 2 for sample in nonempty_groups))
+    ss_within = float(sum(((sample - sample.mean()) ** 2).sum() for sample in nonempty_groups))
+    df_between, df_within = len(nonempty_groups) - 1, len(all_values) - len(nonempty_groups)
+    if is_rounding(ss_within, all_values):
         notes.append("All values within each group are equal, so there is no spread to compare with: no F, no p.")
         return _empty_anova(summaries, notes, df_between, df_within)
     mean_square = ss_within / df_within

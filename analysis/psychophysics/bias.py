@@ -33,21 +33,23 @@ class ResponseBias:
 def response_bias(directions_shown: Sequence[int], correct: Sequence[bool]) -> ResponseBias | None:
     """Sensitivity d' = z(H) - z(F) and criterion c of identification answers. directions_shown: 1 or 2 per trial, as
     many as `correct`. None where one of the directions was never shown."""
-    hits = [right for shown, right in zip(directions_shown, correct, strict=True) if shown == 1]
-    false_alarms = [not right for shown, right in zip(directions_shown, correct, strict=True) if shown == 2]
+    hits = [is_correct for direction, is_correct in zip(directions_shown, correct, strict=True) if direction == 1]
+    false_alarms = [
+        not is_correct for direction, is_correct in zip(directions_shown, correct, strict=True) if direction == 2
+    ]
     if not hits or not false_alarms:
         return None
     z_hit, z_false_alarm = _correct_z(hits), _correct_z(false_alarms)
     return ResponseBias(d_prime=z_hit - z_false_alarm, criterion=-0.5 * (z_hit + z_false_alarm))
 
 
-def criterion_variance(right: int, first: float, second: float) -> float:
+def criterion_variance(correct_count: int, first: float, second: float) -> float:
     """Binomial variance of c of an unbiased observer, for whom z(H) and -z(F) have the same mean, z at the share p of
     right answers: p (1 - p) / phi(z)^2 (1 / first + 1 / second) / 4 by the delta method, with the log-linear correction
-    of p. right: correct answers; first, second: trials of each direction, above 0."""
-    rate = (right + 0.5) / (first + second + 1.0)
-    by_answer = rate * (1.0 - rate) / NormalDist().pdf(NormalDist().inv_cdf(rate)) ** 2
-    return by_answer * (1.0 / first + 1.0 / second) / 4.0
+    of p. correct_count: correct answers; first, second: trials of each direction, above 0."""
+    share_correct = (correct_count + 0.5) / (first + second + 1.0)
+    z_variance = share_correct * (1.0 - share_correct) / NormalDist().pdf(NormalDist().inv_cdf(share_correct)) ** 2
+    return z_variance * (1.0 / first + 1.0 / second) / 4.0
 
 
 def _correct_z(answers: Sequence[bool]) -> float:

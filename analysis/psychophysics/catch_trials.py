@@ -46,13 +46,13 @@ def catch_tallies(trials: Iterable[Trial]) -> tuple[CatchTally, ...]:
     )
 
 
-def wilson_interval(wrong: int, given: int) -> tuple[float, float]:
-    """Wilson score interval of the rate wrong / given; given >= 1. Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927),
+def wilson_interval(count: int, total: int) -> tuple[float, float]:
+    """Wilson score interval of the rate count / total; total >= 1. Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927),
     209-212."""
-    interval = binomtest(wrong, given).proportion_ci(CONFIDENCE, method="wilson")
+    interval = binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
     return float(interval.low), float(interval.high)
 
 
-def _tally(subject: str, frequency_hz: float, wrong: int, given: int) -> CatchTally:
+def _tally(subject: str, frequency_hz: float, wrong: int, answered: int) -> CatchTally:
     """Tally from the numbers of wrong and of all answers."""
-    return CatchTally(subject, frequency_hz, given, wrong, wrong / given, *wilson_interval(wrong, given))
+    return CatchTally(subject, frequency_hz, answered, wrong, wrong / answered, *wilson_interval(wrong, answered))

@@ -77,15 +77,15 @@ def tukey_kramer(
     if len(means) != len(groups) or len(groups) < 2:
         raise ValueError(f"a comparison needs two or more groups that all have a mean; got {len(means)}")
     sizes = [group.n for group in groups]
-    critical = float(studentized_range.ppf(confidence, len(groups), df_within))
-    half_widths = comparison_half_widths(sizes, mean_square_within, critical)
+    critical_range = float(studentized_range.ppf(confidence, len(groups), df_within))
+    half_widths = comparison_half_widths(sizes, mean_square_within, critical_range)
     pairs = []
     for i, j in itertools.combinations(range(len(groups)), 2):
         difference = means[j] - means[i]
         # Kramer's form: the range is studentized by the mean of the two variances.
         scale = math.sqrt(mean_square_within / 2 * (1 / sizes[i] + 1 / sizes[j]))
         p = float(studentized_range.sf(abs(difference) / scale, len(groups), df_within))
-        margin = critical * scale
+        margin = critical_range * scale
         # The tail is a numerical integral and may leave [0, 1] by its rounding.
         pairs.append(
             PairDifference(
@@ -98,10 +98,10 @@ def tukey_kramer(
             )
         )
     intervals = tuple(
-        ComparisonInterval(group.name, mean, mean - half, mean + half)
-        for group, mean, half in zip(groups, means, half_widths, strict=True)
+        ComparisonInterval(group.name, mean, mean - half_width, mean + half_width)
+        for group, mean, half_width in zip(groups, means, half_widths, strict=True)
     )
-    return Comparisons(confidence, critical, tuple(pairs), intervals, ())
+    return Comparisons(confidence, critical_range, tuple(pairs), intervals, ())
 
 
 def comparison_half_widths(sizes: Sequence[int], mean_square_within: float, critical_range: float) -> tuple[float, ...]:
@@ -115,6 +115,6 @@ def comparison_half_widths(sizes: Sequence[int], mean_square_within: float, crit
     variances = mean_square_within / np.asarray(sizes, dtype=np.float64)
     d = np.sqrt(variances[:, None] + variances[None, :])
     np.fill_diagonal(d, 0.0)
-    each, total = d.sum(axis=1), d.sum() / 2
-    widths = each / 2 if k == 2 else ((k - 1) * each - total) / ((k - 1) * (k - 2))
+    row_sums, pair_sum = d.sum(axis=1), d.sum() / 2
+    widths = row_sums / 2 if k == 2 else ((k - 1) * row_sums - pair_sum) / ((k - 1) * (k - 2))
     return tuple(float(width) for width in critical_range / math.sqrt(2) * widths)

@@ -33,7 +33,7 @@ class CriterionDrift:
 
 FEWEST_RUNS = 4
 """Fewest runs with a criterion. With one left out (`p_without_a_run`), three remain; two would always fit a line."""
-SHARED_FREEDOM = 6
+PRIOR_FREEDOM = 6
 """Prior degrees of freedom of the dispersion of all sessions (d0 of Smyth), chosen by hand. A session of five runs has
 3 of its own."""
 
@@ -48,15 +48,17 @@ def criterion_drifts(sessions: Sequence[Sequence[_Run]]) -> tuple[CriterionDrift
     trials before their middles. sessions: of one study, each with its runs in order. None for a session with fewer than
     `FEWEST_RUNS` runs in which both directions were shown.
     """
-    lines = [_line(runs) for runs in sessions]
-    fits = [_fit(points) for points in lines if points is not None]
-    freedom = sum(fit.freedom for fit in fits)
-    shared = max(1.0, sum(fit.chi_squared for fit in fits) / freedom) if fits else 1.0
-    return tuple(None if points is None else _drift(points, shared, freedom) for points in lines)
+    points_by_session = [_regression_points(runs) for runs in sessions]
+    fits = [_fit_line(points) for points in points_by_session if points is not None]
+    all_freedom = sum(fit.freedom for fit in fits)
+    shared_dispersion = max(1.0, sum(fit.chi_squared for fit in fits) / all_freedom) if fits else 1.0
+    return tuple(
+        None if points is None else _test_drift(points, shared_dispersion, all_freedom) for points in points_by_session
+    )
 
 
 @dataclass(frozen=True, slots=True)
-class _Fit:
+class _LineFit:
     """Straight line fitted by weighted least squares."""
 
     slope: float
@@ -66,41 +68,48 @@ class _Fit:
     freedom: int
 
 
-def _line(runs: Sequence[_Run]) -> list[_Point] | None:
+def _regression_points(runs: Sequence[_Run]) -> list[_Point] | None:
     """Points of the regression; None with fewer than `FEWEST_RUNS`."""
-    points, before = list[_Point](), 0
-    for shown, correct in runs:
-        if (bias := response_bias(shown, correct)) is not None:
-            points.append((before + len(shown) / 2.0, bias.criterion, 1.0 / _criterion_variance(shown, correct)))
-        before += len(shown)
+    points, trials_before = list[_Point](), 0
+    for directions, correct in runs:
+        if (bias := response_bias(directions, correct)) is not None:
+            points.append(
+                (trials_before + len(directions) / 2.0, bias.criterion, 1.0 / _criterion_variance(directions, correct))
+            )
+        trials_before += len(directions)
     return points if len(points) >= FEWEST_RUNS else None
 
 
-def _fit(points: Sequence[_Point]) -> _Fit:
+def _fit_line(points: Sequence[_Point]) -> _LineFit:
     """Weighted least squares of the criteria on the number of trials."""
     weight = sum(w for _, _, w in points)
-    middle = sum(w * place for place, _, w in points) / weight
+    mean_position = sum(w * position for position, _, w in points) / weight
     mean = sum(w * criterion for _, criterion, w in points) / weight
-    spread = sum(w * (place - middle) ** 2 for place, _, w in points)
-    slope = sum(w * (place - middle) * criterion for place, criterion, w in points) / spread
-    chi_squared = sum(w * (criterion - mean - slope * (place - middle)) ** 2 for place, criterion, w in points)
-    return _Fit(slope, slope * math.sqrt(spread), chi_squared, len(points) - 2)
+    spread = sum(w * (position - mean_position) ** 2 for position, _, w in points)
+    slope = sum(w * (position - mean_position) * criterion for position, criterion, w in points) / spread
+    chi_squared = sum(
+        w * (criterion - mean - slope * (position - mean_position)) ** 2 for position, criterion, w in points
+    )
+    return _LineFit(slope, slope * math.sqrt(spread), chi_squared, len(points) - 2)
 
 
-def _drift(points: Sequence[_Point], shared: float, all_freedom: int) -> CriterionDrift:
-    """Slope of a session and its tests. shared: dispersion of all sessions; all_freedom: its degrees of freedom."""
-    fit = _fit(points)
-    freedom = fit.freedom + SHARED_FREEDOM
-    dispersion = (fit.chi_squared + SHARED_FREEDOM * shared) / freedom
+def _test_drift(points: Sequence[_Point], shared_dispersion: float, all_freedom: int) -> CriterionDrift:
+    """Slope of a session and its tests. shared_dispersion: dispersion of all sessions; all_freedom: its degrees of
+    freedom."""
+    fit = _fit_line(points)
+    freedom = fit.freedom + PRIOR_FREEDOM
+    dispersion = (fit.chi_squared + PRIOR_FREEDOM * shared_dispersion) / freedom
     # In a study of one session the shared dispersion is its own: it adds no degrees of freedom.
     freedom = min(freedom, all_freedom)
-    others = [_fit([*points[:left], *points[left + 1 :]]).z for left in range(len(points))]
+    z_without_a_run = [_fit_line([*points[:omitted], *points[omitted + 1 :]]).z for omitted in range(len(points))]
     return CriterionDrift(
-        100.0 * fit.slope, _p(fit.z, dispersion, freedom), max(_p(z, dispersion, freedom) for z in others)
+        100.0 * fit.slope,
+        _two_sided_p(fit.z, dispersion, freedom),
+        max(_two_sided_p(z, dispersion, freedom) for z in z_without_a_run),
     )
 
 
-def _p(z: float, dispersion: float, freedom: int) -> float:
+def _two_sided_p(z: float, dispersion: float, freedom: int) -> float:
     """Two-sided p value. A dispersion of 1 or less counts as 1, a known value: normal test; above 1 it is estimated:
     Student's test. The p value jumps at 1. Student's test throughout would be continuous, but would detect far fewer
     drifts (docs/statistics.md)."""
@@ -112,5 +121,5 @@ def _p(z: float, dispersion: float, freedom: int) -> float:
 def _criterion_variance(directions_shown: Sequence[int], correct: Sequence[bool]) -> float:
     """Variance of a run's criterion, computed for both directions at the run's overall share of right answers, as if
     there were no bias. With the rates of each direction, runs with a strong bias would get little weight."""
-    first = sum(shown == 1 for shown in directions_shown)
+    first = sum(direction == 1 for direction in directions_shown)
     return criterion_variance(sum(correct), first, len(directions_shown) - first)

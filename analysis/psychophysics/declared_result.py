@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 from analysis.psychophysics.comparisons import Comparisons
-from analysis.psychophysics.hierarchy.primary import FAR_ABOVE, PrimaryAnalysis
+from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_NOTE, PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
 from analysis.threshold_words import threshold_words
 from analysis.wording import capitalise, conjoin
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule
 
-UNSETTLED = "The fit did not converge: do not use these numbers."
+NOT_CONVERGED = "The fit did not converge: do not use these numbers."
 TUKEY = "{means} in newtons, one-way; Tukey's interval and p, which hold for all pairs together."
 NO_MODEL = "The model needs answers of two participants, at two frequencies."
 NO_DIFFERENCE = (
@@ -81,8 +81,8 @@ def declared_result(
     if declared.contrast_hz:
         pair_hz = (declared.contrast_hz[0], declared.contrast_hz[1])
         results = [
-            _by_model(pair_hz, primary, declared.primary == "hierarchical"),
-            _as_published(
+            _contrast_by_model(pair_hz, primary, declared.primary == "hierarchical"),
+            _contrast_as_published(
                 pair_hz,
                 comparisons,
                 table,
@@ -104,7 +104,7 @@ def declared_result(
     )
 
 
-def _by_model(pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, declared: bool) -> ContrastResult:
+def _contrast_by_model(pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, declared: bool) -> ContrastResult:
     """The contrast by the hierarchical model, in dB; without values, and with the reason, where there is none."""
     contrast = primary.declared_contrast if primary is not None else None
     if primary is None or contrast is None:
@@ -119,14 +119,14 @@ def _by_model(pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, dec
         lower=contrast.lower_db,
         upper=contrast.upper_db,
         p=contrast.p,
-        notes=(*_cap_notes(pair_hz, primary), *(() if primary.converged else (UNSETTLED,))),
+        notes=(*_cap_notes(pair_hz, primary), *(() if primary.converged else (NOT_CONVERGED,))),
     )
 
 
 def _no_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
     """Sentence on why the model gives no contrast."""
     if set(pair_hz) <= set(primary.far_above_hz):
-        return FAR_ABOVE
+        return FAR_ABOVE_NOTE
     missing = [f"{frequency_hz:g} Hz" for frequency_hz in pair_hz if frequency_hz in primary.missing_hz]
     return f"There is no answer at {conjoin(missing)} yet." if missing else NO_DIFFERENCE
 
@@ -134,29 +134,31 @@ def _no_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
 def _cap_notes(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[str, ...]:
     """Notes on the interval of a contrast where a median lies above the cap. Such a median is known only to be high, so
     the difference, first minus second, has a valid lower end for the first and a valid upper end for the second."""
-    above = [median.frequency_hz for median in primary.medians if median.above_cap and median.frequency_hz in pair_hz]
-    if len(above) == 2:
+    above_cap_hz = [
+        median.frequency_hz for median in primary.medians if median.above_cap and median.frequency_hz in pair_hz
+    ]
+    if len(above_cap_hz) == 2:
         return ("Both medians are above the cap: the size of their difference is not known.",)
-    known = {pair_hz[0]: "lower", pair_hz[1]: "upper"}
+    valid_end = {pair_hz[0]: "lower", pair_hz[1]: "upper"}
     return tuple(
-        f"The median at {frequency_hz:g} Hz is above the cap: the interval holds at its {known[frequency_hz]} end."
-        for frequency_hz in above
+        f"The median at {frequency_hz:g} Hz is above the cap: the interval holds at its {valid_end[frequency_hz]} end."
+        for frequency_hz in above_cap_hz
     )
 
 
-def _as_published(
-    pair_hz: tuple[float, float], comparisons: Comparisons, table: ThresholdTable, declared: bool, meaning: str
+def _contrast_as_published(
+    pair_hz: tuple[float, float], comparisons: Comparisons, table: ThresholdTable, declared: bool, first_note: str
 ) -> ContrastResult:
-    """The contrast by the one-way analysis, in newtons, with Tukey's interval. meaning: first note."""
+    """The contrast by the one-way analysis, in newtons, with Tukey's interval. first_note: first note."""
     first, second = (frequency_name(frequency_hz) for frequency_hz in pair_hz)
     groups = table.groups()
     sizes = [sum(value is not None for value in groups.get(name, ())) for name in (first, second)]
     people = (sizes[0], sizes[1])
-    notes = (meaning, *filter(None, [table.coverage]))
+    notes = (first_note, *filter(None, [table.coverage]))
     pair = next((pair for pair in comparisons.pairs if {pair.first, pair.second} == {first, second}), None)
     if pair is None:
         return ContrastResult("published", declared, "N", people, None, None, None, None, (NO_PAIR,))
     # A pair is stored as its second group minus its first.
-    ends = (pair.lower, pair.upper) if pair.second == first else (-pair.upper, -pair.lower)
+    limits = (pair.lower, pair.upper) if pair.second == first else (-pair.upper, -pair.lower)
     difference = pair.difference if pair.second == first else -pair.difference
-    return ContrastResult("published", declared, "N", people, difference, *ends, pair.p, notes)
+    return ContrastResult("published", declared, "N", people, difference, *limits, pair.p, notes)

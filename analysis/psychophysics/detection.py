@@ -15,7 +15,7 @@ from analysis.psychophysics.runs import recompute_runs
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import Threshold, threshold_of
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.procedure.run_rules import staircase_rule
+from protocols.procedure.run_rules import make_staircase_rule
 from protocols.procedure.staircase import to_db
 from protocols.trial import Phase, Trial
 
@@ -37,7 +37,7 @@ def detection_thresholds(trials: Iterable[Trial], protocol: StudyProtocol) -> tu
 
     Raises InconsistentTrialsError (a ValueError) where the trials contradict the rule.
     """
-    rule = staircase_rule(protocol, Phase.DETECTION)
+    rule = make_staircase_rule(protocol, Phase.DETECTION)
     rows = (threshold_of(run, rule) for run in recompute_runs(trials, rule, Phase.DETECTION))
     # The decision depends on the difference of two intervals, whose variance is twice that of one.
     return tuple(row if row.d_prime is None else replace(row, d_prime=row.d_prime / math.sqrt(2)) for row in rows)
@@ -46,20 +46,24 @@ def detection_thresholds(trials: Iterable[Trial], protocol: StudyProtocol) -> tu
 def above_detection(direction: ThresholdTable, detection: ThresholdTable) -> ThresholdTable:
     """Direction thresholds in dB above the detection threshold of the same participant and frequency; None where either
     is missing. Both tables in newtons. A value is marked as cut where the cap cut either threshold."""
-    values, cut = [], []
-    for subject, row, bounds in zip(direction.subjects, direction.values, direction.censored, strict=True):
-        felt = [_felt(detection, subject, frequency_hz) for frequency_hz in direction.frequencies_hz]
-        values.append(
+    rows_db, censored = [], []
+    for subject, row, cut_flags in zip(direction.subjects, direction.values, direction.censored, strict=True):
+        detection_cells = [
+            _detection_cell(detection, subject, frequency_hz) for frequency_hz in direction.frequencies_hz
+        ]
+        rows_db.append(
             tuple(
-                None if threshold is None or from_n is None else to_db(threshold) - to_db(from_n)
-                for threshold, (from_n, _) in zip(row, felt, strict=True)
+                None if threshold is None or detection_n is None else to_db(threshold) - to_db(detection_n)
+                for threshold, (detection_n, _) in zip(row, detection_cells, strict=True)
             )
         )
-        cut.append(tuple(threshold or bound for threshold, (_, bound) in zip(bounds, felt, strict=True)))
-    return replace(direction, quantity="above_detection_db", values=tuple(values), censored=tuple(cut), notes=())
+        censored.append(
+            tuple(threshold or is_cut for threshold, (_, is_cut) in zip(cut_flags, detection_cells, strict=True))
+        )
+    return replace(direction, quantity="above_detection_db", values=tuple(rows_db), censored=tuple(censored), notes=())
 
 
-def _felt(detection: ThresholdTable, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
+def _detection_cell(detection: ThresholdTable, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
     """Detection threshold (N; None where missing), and whether the cap cut it."""
     if subject not in detection.subjects or frequency_hz not in detection.frequencies_hz:
         return None, False
@@ -70,15 +74,15 @@ def _felt(detection: ThresholdTable, subject: str, frequency_hz: float) -> tuple
 def directions_below_detection(direction: ThresholdTable, detection: ThresholdTable) -> tuple[BelowDetection, ...]:
     """Participants and frequencies whose direction threshold lies below their detection threshold. Both tables in
     newtons; direction thresholds that the cap cut are left out."""
-    felt = {
-        (subject, frequency_hz): value
+    detection_n = {
+        (subject, frequency_hz): threshold_n
         for subject, row in zip(detection.subjects, detection.values, strict=True)
-        for frequency_hz, value in zip(detection.frequencies_hz, row, strict=True)
-        if value is not None
+        for frequency_hz, threshold_n in zip(detection.frequencies_hz, row, strict=True)
+        if threshold_n is not None
     }
     return tuple(
-        BelowDetection(subject, frequency_hz, value, felt[subject, frequency_hz])
-        for subject, row, bounds in zip(direction.subjects, direction.values, direction.censored, strict=True)
-        for frequency_hz, value, bound in zip(direction.frequencies_hz, row, bounds, strict=True)
-        if value is not None and not bound and value < felt.get((subject, frequency_hz), 0.0)
+        BelowDetection(subject, frequency_hz, threshold_n, detection_n[subject, frequency_hz])
+        for subject, row, cut_flags in zip(direction.subjects, direction.values, direction.censored, strict=True)
+        for frequency_hz, threshold_n, is_cut in zip(direction.frequencies_hz, row, cut_flags, strict=True)
+        if threshold_n is not None and not is_cut and threshold_n < detection_n.get((subject, frequency_hz), 0.0)
     )

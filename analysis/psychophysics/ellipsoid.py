@@ -97,16 +97,16 @@ def ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None)
             f"an acceleration ellipsoid needs a response of 3 accelerations, not {response.samples.shape[1]} "
             f"channels of {response.quantity}"
         )
-    described = _descriptions(recording)
+    descriptions = _descriptions(recording)
     rotation = np.eye(3) if sensor_to_device is None else np.asarray(sensor_to_device, dtype=np.float64)
     results = []
-    for number, (segment, about) in enumerate(zip(recording.segments, described, strict=True), start=1):
+    for number, (segment, description) in enumerate(zip(recording.segments, descriptions, strict=True), start=1):
         if segment.kind != "sine":
             continue
         samples = response.samples[segment.start : segment.stop] @ rotation.T
         if not np.isfinite(samples).all():
             raise ValueError(f"segment {number} (sine): the response has missing values")
-        results.append(_result(samples, recording.sample_rate_hz, segment, about))
+        results.append(_segment_result(samples, recording.sample_rate_hz, segment, description))
     if not results:
         raise ValueError(
             "the recording has no segment of kind sine, so there is no ellipsoid to compute; "
@@ -122,11 +122,11 @@ def sensor_frame(recording: Recording) -> FloatArray | None:
     would mirror it.
     """
     sensor = recording.meta.get("sensor")
-    stated = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
-    if stated is None:
+    stated_rotation = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
+    if stated_rotation is None:
         return None
     try:
-        rotation = np.asarray(stated, dtype=np.float64)
+        rotation = np.asarray(stated_rotation, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise ValueError("the sensor's frame is not a matrix of numbers") from error
     if rotation.shape != (3, 3):
@@ -155,8 +155,8 @@ def direction_frame(unit_vector: FloatArray) -> FloatArray:
 def moment_ellipsoid(samples: FloatArray) -> MomentEllipsoid:
     """Ellipsoid of second moments. samples: (n, 3), m/s^2, in the test direction's frame; their mean is subtracted
     (gravity, sensor offset). Raises ValueError where they are constant."""
-    moving = samples - samples.mean(axis=0)
-    mean_square = moving.T @ moving / len(moving)
+    centred = samples - samples.mean(axis=0)
+    mean_square = centred.T @ centred / len(centred)
     eigenvalues, vectors = np.linalg.eigh(mean_square)
     if eigenvalues[-1] <= 0.0:
         raise ValueError("the response does not move at all: there is no ellipsoid")
@@ -182,49 +182,52 @@ def phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency_hz: flo
     if axes[0] <= 0.0:
         raise ValueError("the response does not move at all: there is no ellipse")
     tilt_deg, turn_deg = _angles_deg(directions[:, 0])
-    along, across = abs(fundamental[0]), float(np.linalg.norm(fundamental[1:]))
+    on_axis, off_axis = abs(fundamental[0]), float(np.linalg.norm(fundamental[1:]))
     energy = np.sum(np.abs(tones) ** 2, axis=1)
     return PhasorEllipse(
         semi_axes_mps2=(float(axes[0]), float(axes[1])),
         tilt_deg=tilt_deg,
         turn_deg=turn_deg,
         ellipticity=float(axes[1] / axes[0]),
-        on_axis_mps2=float(along),
-        off_axis_ratio=float(across / along) if along > 0 else None,
+        on_axis_mps2=float(on_axis),
+        off_axis_ratio=float(off_axis / on_axis) if on_axis > 0 else None,
         harmonic_share=float(energy[1:].sum() / energy[0]),
     )
 
 
-def _result(samples: FloatArray, sample_rate_hz: float, segment: Segment, about: dict[str, Any]) -> EllipsoidResult:
-    """Result of one segment. samples: (n, 3), m/s^2, in the device's frame. about: its entry of meta["segments"]."""
-    frequency_hz = float(about["frequency_hz"])
-    framed = samples @ direction_frame(np.asarray(about["unit_vector"], dtype=np.float64)).T
-    whole = int(len(framed) * frequency_hz / sample_rate_hz + 1e-9)
-    if whole < 1:
+def _segment_result(
+    samples: FloatArray, sample_rate_hz: float, segment: Segment, description: dict[str, Any]
+) -> EllipsoidResult:
+    """Result of one segment. samples: (n, 3), m/s^2, in the device's frame. description: its entry of
+    meta["segments"]."""
+    frequency_hz = float(description["frequency_hz"])
+    in_frame = samples @ direction_frame(np.asarray(description["unit_vector"], dtype=np.float64)).T
+    whole_periods = int(len(in_frame) * frequency_hz / sample_rate_hz + 1e-9)
+    if whole_periods < 1:
         raise ValueError(f"the sinusoid of {frequency_hz:g} Hz is shorter than one period")
     return EllipsoidResult(
         frequency_hz=frequency_hz,
-        along=str(about["along"]),
+        along=str(description["along"]),
         amplitude_n=segment.amplitude,
         # Only whole periods: a partial period would bias the mean squares.
-        moments=moment_ellipsoid(framed[: round(whole * sample_rate_hz / frequency_hz)]),
-        phasor=phasor_ellipse(framed, sample_rate_hz, frequency_hz),
+        moments=moment_ellipsoid(in_frame[: round(whole_periods * sample_rate_hz / frequency_hz)]),
+        phasor=phasor_ellipse(in_frame, sample_rate_hz, frequency_hz),
     )
 
 
 def _descriptions(recording: Recording) -> Sequence[dict[str, Any]]:
     """The entries of meta["segments"]. Raises ValueError unless there is a complete one for every sinusoid."""
-    described = recording.meta.get("segments")
-    if not isinstance(described, Sequence) or len(described) != len(recording.segments):
+    descriptions = recording.meta.get("segments")
+    if not isinstance(descriptions, Sequence) or len(descriptions) != len(recording.segments):
         raise ValueError(
             'meta["segments"] must describe each of the '
             f"{len(recording.segments)} segments in order (frequency_hz, along, unit_vector)"
         )
-    for number, (segment, about) in enumerate(zip(recording.segments, described, strict=True), start=1):
-        missing = [key for key in ("frequency_hz", "along", "unit_vector") if key not in about]
+    for number, (segment, description) in enumerate(zip(recording.segments, descriptions, strict=True), start=1):
+        missing = [key for key in ("frequency_hz", "along", "unit_vector") if key not in description]
         if segment.kind == "sine" and missing:
             raise ValueError(f'meta["segments"]: segment {number} (sine) lacks {", ".join(missing)}')
-    return described
+    return descriptions
 
 
 def _angles_deg(axis: FloatArray) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from statistics import median
 from analysis.wording import conjoin
 from protocols.trial import Trial
 
-NEAR = 0.1
+TOLERANCE = 0.1
 """Relative deviation from the wanted acceleration, along or off the direction, above which a warning names the
 frequency."""
 
@@ -30,9 +30,12 @@ class Delivery:
     """Amplitude off the direction over that along it, both as delivered."""
 
     @property
-    def is_as_wanted(self) -> bool:
-        """Whether the delivered acceleration is within `NEAR` of the wanted one, along the direction and off it."""
-        return self.off_axis <= NEAR and all(abs(ratio - 1) <= NEAR for ratio in self.along if ratio is not None)
+    def is_within_tolerance(self) -> bool:
+        """Whether the delivered acceleration is within `TOLERANCE` of the wanted one, along the direction and off
+        it."""
+        return self.off_axis <= TOLERANCE and all(
+            abs(ratio - 1) <= TOLERANCE for ratio in self.along if ratio is not None
+        )
 
 
 def deliveries(trials: Sequence[Trial]) -> tuple[Delivery, ...]:
@@ -45,33 +48,33 @@ def deliveries(trials: Sequence[Trial]) -> tuple[Delivery, ...]:
     )
 
 
-def delivery_warning(found: Sequence[Delivery]) -> str:
-    """Sentence that names the frequencies with a deviation above `NEAR`; empty where there are none."""
-    off = [delivery for delivery in found if not delivery.is_as_wanted]
-    if not off:
+def delivery_warning(results: Sequence[Delivery]) -> str:
+    """Sentence that names the frequencies with a deviation above `TOLERANCE`; empty where there are none."""
+    deviating = [delivery for delivery in results if not delivery.is_within_tolerance]
+    if not deviating:
         return ""
     texts = [
         f"{delivery.frequency_hz:g} Hz "
-        f"({' and '.join(f'{100 * along:.0f} %' for along in delivery.along if along is not None)} "
+        f"({' and '.join(f'{100 * ratio:.0f} %' for ratio in delivery.along if ratio is not None)} "
         f"of what was wanted, {100 * delivery.off_axis:.0f} % off the direction)"
-        for delivery in off
+        for delivery in deviating
     ]
     return (
-        f"The accelerations that arrived are not those that were wanted, by more than {100 * NEAR:.0f} % at the "
+        f"The accelerations that arrived are not those that were wanted, by more than {100 * TOLERANCE:.0f} % at the "
         f"median: {conjoin(texts)}. Take the delivered accelerations, not the levels, for what was felt there."
     )
 
 
 def _summarise_delivery(frequency_hz: float, trials: list[Trial], first_deg: float | None) -> Delivery:
     """Medians of the trials at one frequency. first_deg: angle of direction 1; None where it is not known."""
-    sides: list[float | None] = []
-    for number in (1, 2):
-        ratios = [_delivery_ratio(trial) for trial in trials if _find_played_direction(trial, first_deg) == number]
-        sides.append(median(ratios) if ratios else None)
+    medians: list[float | None] = []
+    for direction in (1, 2):
+        ratios = [_delivery_ratio(trial) for trial in trials if _find_played_direction(trial, first_deg) == direction]
+        medians.append(median(ratios) if ratios else None)
     return Delivery(
         frequency_hz,
         len(trials),
-        (sides[0], sides[1]),
+        (medians[0], medians[1]),
         median((trial.off_axis_mps2 or 0.0) / (trial.delivered_mps2 or 1.0) for trial in trials),
     )
 

@@ -69,25 +69,32 @@ class MeanErrors:
     """Degrees of freedom for Student's t."""
 
 
-def mean_errors(values: FloatArray, known: NDArray[np.bool_]) -> MeanErrors:
-    """Standard errors of the means of pseudo-values. values: (n, m), a row per person; known: (n, m), True where the
-    value rests on answers of the person there, False where it rests only on answers at other frequencies.
+def mean_errors(values: FloatArray, has_answers: NDArray[np.bool_]) -> MeanErrors:
+    """Standard errors of the means of pseudo-values. values: (n, m), a row per person; has_answers: (n, m), True where
+    the value rests on answers of the person there, False where it rests only on answers at other frequencies.
 
-    Where all are known this is s / sqrt(n) with n - 1 degrees of freedom. Otherwise the variances of both groups add,
-    with the degrees of freedom of F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110-114: the estimate depends mostly
-    on the few people with answers, so that their number counts, not that of all.
+    Where all have answers this is s / sqrt(n) with n - 1 degrees of freedom. Otherwise the variances of both groups
+    add, with the degrees of freedom of F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110-114: the estimate depends
+    mostly on the few people with answers, so that their number counts, not that of all.
     """
     n = len(values)
-    people = known.sum(axis=0)
+    people = has_answers.sum(axis=0)
     squares = ((values - values.mean(axis=0)) / n) ** 2
-    known_df = np.maximum(people - 1, 1)
-    inside = np.sum(squares * known, axis=0) * people / known_df
-    outside, others = np.sum(squares * ~known, axis=0), np.maximum(n - people, 1)
-    error = np.where(people == n, values.std(axis=0, ddof=1) / math.sqrt(n), np.sqrt(inside + outside))
-    # Where all values are equal both variances are 0, and df stays that of the known group.
-    below = inside**2 / known_df + outside**2 / others
-    df = np.where(people == n, n - 1.0, known_df)
-    df = np.divide((inside + outside) ** 2, below, out=df, where=(people < n) & (below > 0))
+    answered_df = np.maximum(people - 1, 1)
+    answered_variance = np.sum(squares * has_answers, axis=0) * people / answered_df
+    unanswered_variance, unanswered_df = np.sum(squares * ~has_answers, axis=0), np.maximum(n - people, 1)
+    error = np.where(
+        people == n, values.std(axis=0, ddof=1) / math.sqrt(n), np.sqrt(answered_variance + unanswered_variance)
+    )
+    # Where all values are equal both variances are 0, and df stays that of the people with answers.
+    df_denominator = answered_variance**2 / answered_df + unanswered_variance**2 / unanswered_df
+    df = np.where(people == n, n - 1.0, answered_df)
+    df = np.divide(
+        (answered_variance + unanswered_variance) ** 2,
+        df_denominator,
+        out=df,
+        where=(people < n) & (df_denominator > 0),
+    )
     return MeanErrors(people, np.where(people < 2, math.inf, error), df)
 
 
@@ -95,23 +102,26 @@ def contrasts(
     frequencies_hz: Sequence[float],
     values_db: FloatArray,
     confidence: float,
-    known: NDArray[np.bool_] | None = None,
+    has_answers: NDArray[np.bool_] | None = None,
 ) -> tuple[Contrast, ...]:
     """Contrasts of each frequency against the first. values_db: (n, k), NaN for a gap. Contrasts with fewer than two
     participants, or with the same difference in all, are left out, but count in Holm's family: its size is planned, not
-    chosen by the data. known: (n, k), for pseudo-values, which have no gaps; see `mean_errors`."""
-    known = np.isfinite(values_db) if known is None else known
-    found = []
-    for place in range(1, len(frequencies_hz)):
-        both = values_db[:, [0, place]]
-        whole = np.isfinite(both).all(axis=1)
-        both, having = both[whole], np.asarray(known[whole][:, [0, place]].all(axis=1))
-        if having.sum() >= 2 and np.ptp(both[:, 1] - both[:, 0]) > ROUNDING_DB:
-            found.append((frequencies_hz[place], _Pair(both, having)))
-    corrected = holm_correction([pair.p for _, pair in found], len(frequencies_hz) - 1)
+    chosen by the data. has_answers: (n, k), for pseudo-values, which have no gaps; see `mean_errors`."""
+    has_answers = np.isfinite(values_db) if has_answers is None else has_answers
+    pairs = []
+    for index in range(1, len(frequencies_hz)):
+        paired_db = values_db[:, [0, index]]
+        is_complete = np.isfinite(paired_db).all(axis=1)
+        paired_db, answered_both = (
+            paired_db[is_complete],
+            np.asarray(has_answers[is_complete][:, [0, index]].all(axis=1)),
+        )
+        if answered_both.sum() >= 2 and np.ptp(paired_db[:, 1] - paired_db[:, 0]) > ROUNDING_DB:
+            pairs.append((frequencies_hz[index], _Pair(paired_db, answered_both)))
+    corrected = holm_correction([pair.p for _, pair in pairs], len(frequencies_hz) - 1)
     return tuple(
         _compute_contrast(frequency, frequencies_hz[0], pair, p_holm, confidence)
-        for (frequency, pair), p_holm in zip(found, corrected, strict=True)
+        for (frequency, pair), p_holm in zip(pairs, corrected, strict=True)
     )
 
 
@@ -120,9 +130,9 @@ def pair_contrast(
     values_db: FloatArray,
     pair_hz: Sequence[float],
     confidence: float,
-    known: NDArray[np.bool_] | None = None,
+    has_answers: NDArray[np.bool_] | None = None,
 ) -> Contrast | None:
-    """Contrast of the first frequency of the pair minus the second. values_db, known: (n, k), as for `contrasts`.
+    """Contrast of the first frequency of the pair minus the second. values_db, has_answers: (n, k), as for `contrasts`.
 
     None without a pair, where one of the two was not played, and where `contrasts` leaves it out. The family has one
     test, so that `p_holm` equals `p`.
@@ -130,30 +140,30 @@ def pair_contrast(
     if len(pair_hz) != 2 or not set(pair_hz) <= set(frequencies_hz):
         return None
     first, second = (list(frequencies_hz).index(frequency_hz) for frequency_hz in pair_hz)
-    places = [second, first]
-    having = None if known is None else known[:, places]
-    return next(iter(contrasts((pair_hz[1], pair_hz[0]), values_db[:, places], confidence, having)), None)
+    columns = [second, first]
+    pair_has_answers = None if has_answers is None else has_answers[:, columns]
+    return next(iter(contrasts((pair_hz[1], pair_hz[0]), values_db[:, columns], confidence, pair_has_answers)), None)
 
 
 def holm_correction(p_values: Sequence[float], planned: int | None = None) -> tuple[float, ...]:
     """p values with Holm's step-down correction, in the order given. planned: size of the family, including tests
     without a p value, which rank last; None: the number of p values."""
     size = len(p_values) if planned is None else planned
-    corrected, worst = [0.0] * len(p_values), 0.0
+    corrected, largest = [0.0] * len(p_values), 0.0
     for rank, index in enumerate(sorted(range(len(p_values)), key=lambda i: p_values[i])):
-        worst = max(worst, min(1.0, (size - rank) * p_values[index]))
-        corrected[index] = worst
+        largest = max(largest, min(1.0, (size - rank) * p_values[index]))
+        corrected[index] = largest
     return tuple(corrected)
 
 
 class _Pair:
     """Values (n, 2) in dB at two frequencies, with mean, standard error, degrees of freedom and p value of their
-    differences, second minus first. having: (n,), `known` of `mean_errors`."""
+    differences, second minus first. answered_both: (n,), `has_answers` of `mean_errors`."""
 
-    def __init__(self, both: FloatArray, having: NDArray[np.bool_]) -> None:
-        self.both, self.differences = both, both[:, 1] - both[:, 0]
-        errors = mean_errors(self.differences[:, None], having[:, None])
-        self.people, self.whole = int(errors.people[0]), bool(having.all())
+    def __init__(self, paired_db: FloatArray, answered_both: NDArray[np.bool_]) -> None:
+        self.paired_db, self.differences = paired_db, paired_db[:, 1] - paired_db[:, 0]
+        errors = mean_errors(self.differences[:, None], answered_both[:, None])
+        self.people, self.all_answered = int(errors.people[0]), bool(answered_both.all())
         self.mean, self.error, self.df = float(self.differences.mean()), float(errors.error[0]), float(errors.df[0])
         self.p = float(2.0 * student.sf(abs(self.mean) / self.error, self.df))
 
@@ -162,21 +172,21 @@ def _compute_contrast(
     frequency_hz: float, against_hz: float, pair: _Pair, p_holm: float, confidence: float
 ) -> Contrast:
     """The contrast of a pair, with its interval at this confidence and its further tests."""
-    half = float(student.ppf(0.5 + confidence / 2, pair.df)) * pair.error
-    equivalence = _equivalence_p(pair.mean, pair.error, pair.df)
+    half_width = float(student.ppf(0.5 + confidence / 2, pair.df)) * pair.error
+    p_equivalence = _equivalence_p(pair.mean, pair.error, pair.df)
     return Contrast(
         frequency_hz=frequency_hz,
         against_hz=against_hz,
         participants=pair.people,
         difference_db=pair.mean,
-        lower_db=pair.mean - half,
-        upper_db=pair.mean + half,
+        lower_db=pair.mean - half_width,
+        upper_db=pair.mean + half_width,
         p=pair.p,
         p_holm=p_holm,
-        effect_size=pair.mean / float(pair.differences.std(ddof=1)) if pair.whole else None,
-        p_equivalence=equivalence if max(frequency_hz, against_hz) <= EQUIVALENCE_UP_TO_HZ else None,
-        p_spread=float(pearsonr(pair.both.sum(axis=1), pair.differences).pvalue)
-        if pair.whole and pair.people > 2
+        effect_size=pair.mean / float(pair.differences.std(ddof=1)) if pair.all_answered else None,
+        p_equivalence=p_equivalence if max(frequency_hz, against_hz) <= EQUIVALENCE_UP_TO_HZ else None,
+        p_spread=float(pearsonr(pair.paired_db.sum(axis=1), pair.differences).pvalue)
+        if pair.all_answered and pair.people > 2
         else None,
     )
 

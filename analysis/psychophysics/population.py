@@ -36,17 +36,17 @@ def split_by_population(trials: Iterable[Trial]) -> dict[Population, tuple[Trial
 def _population_of(subject: str, session: str, rows: list[Trial]) -> Population:
     """Population of one session, whose trials are `rows`; raises ValueError where they disagree."""
     # Only answered trials count, if there are any: `felt` may not be known yet for a trial without an answer.
-    kinds = {_kind(trial) for trial in rows if trial.counts} or {_kind(trial) for trial in rows}
+    kinds = {_trial_population(trial) for trial in rows if trial.counts} or {_trial_population(trial) for trial in rows}
     if len(kinds) > 1:
-        named = " and ".join(kind.value for kind in Population if kind in kinds)
+        kind_names = " and ".join(kind.value for kind in Population if kind in kinds)
         raise ValueError(
-            f"session {session} of {subject} mixes trials of {named} (column felt): a session contains trials of one "
-            "kind only; find the cause, remove the wrong rows, and analyse it again"
+            f"session {session} of {subject} mixes trials of {kind_names} (column felt): a session contains trials of "
+            "one kind only; find the cause, remove the wrong rows, and analyse it again"
         )
     return kinds.pop()
 
 
-def _kind(trial: Trial) -> Population:
+def _trial_population(trial: Trial) -> Population:
     """Population of a trial, by its column `felt`."""
     if trial.felt is None:
         return Population.SIMULATED

@@ -101,10 +101,10 @@ class RepeatedMeasures:
 
 def repeated_measures(subjects: Sequence[str], values: Sequence[Sequence[float | None]]) -> RepeatedMeasures:
     """Analysis of values[subject][condition], any unit; None, NaN and infinity count as missing."""
-    full = [all(value is not None and math.isfinite(value) for value in row) for row in values]
-    left_out = tuple(subject for subject, whole in zip(subjects, full, strict=True) if not whole)
+    complete = [all(value is not None and math.isfinite(value) for value in row) for row in values]
+    left_out = tuple(subject for subject, is_complete in zip(subjects, complete, strict=True) if not is_complete)
     conditions = len(values[0]) if values else 0
-    rows = np.array([row for row, whole in zip(values, full, strict=True) if whole], dtype=np.float64)
+    rows = np.array([row for row, is_complete in zip(values, complete, strict=True) if is_complete], dtype=np.float64)
     notes = [f"Left out because a value is missing: {', '.join(left_out)}."] if left_out else []
     if len(rows) < 2:
         notes.append(f"The analysis within participants needs two who have every condition; there are {len(rows)}.")
@@ -151,9 +151,9 @@ def mauchly(rows: FloatArray) -> tuple[float, float] | None:
     df = p * (p + 1) // 2 - 1
     scale = (n - 1) - (2 * p**2 + p + 2) / (6 * p)
     chi_squared = -scale * math.log(w)
-    second = (p + 2) * (p - 1) * (p - 2) * (2 * p**3 + 6 * p**2 + 3 * p + 2) / (288 * p**2 * scale**2)
-    first = float(chi2.sf(chi_squared, df))
-    return w, min(1.0, first + second * (float(chi2.sf(chi_squared, df + 4)) - first))
+    correction = (p + 2) * (p - 1) * (p - 2) * (2 * p**3 + 6 * p**2 + 3 * p + 2) / (288 * p**2 * scale**2)
+    p_first_order = float(chi2.sf(chi_squared, df))
+    return w, min(1.0, p_first_order + correction * (float(chi2.sf(chi_squared, df + 4)) - p_first_order))
 
 
 def _sums_of_squares(rows: FloatArray) -> tuple[float, float, float]:

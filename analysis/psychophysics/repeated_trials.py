@@ -10,7 +10,7 @@ key is limited, but pauses and leaving are not; without a limit the repeats lowe
 from collections.abc import Callable, Sequence
 
 from analysis.wording import conjoin
-from protocols.trial import AT_WILL, Phase, Trial
+from protocols.trial import PARTICIPANT_CAUSES, Phase, Trial
 
 OFTEN_COUNT = 3
 """Fewest void presentations, of a run or a participant, that give a warning."""
@@ -42,11 +42,11 @@ def repeat_warning(trials: Sequence[Trial]) -> str:
 
 def _frequent_repeats(trials: Sequence[Trial], name_of: Callable[[Trial], str]) -> list[str]:
     """Text for each group of trials of the same name in which presentations were often made void at will."""
-    void: dict[str, list[bool]] = {}
+    void_by_name: dict[str, list[bool]] = {}
     for trial in trials:
-        void.setdefault(name_of(trial), []).append(trial.void_cause in AT_WILL)
+        void_by_name.setdefault(name_of(trial), []).append(trial.void_cause in PARTICIPANT_CAUSES)
     return [
-        f"{name} {sum(made)} of {len(made)} presentations ({100 * sum(made) / len(made):.1f} %)"
-        for name, made in void.items()
-        if is_often(sum(made), len(made))
+        f"{name} {sum(is_void)} of {len(is_void)} presentations ({100 * sum(is_void) / len(is_void):.1f} %)"
+        for name, is_void in void_by_name.items()
+        if is_often(sum(is_void), len(is_void))
     ]

@@ -10,8 +10,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from protocols.definition.staircase_rule import StaircaseRule
-from protocols.procedure.staircase import StaircaseState, begin, is_complete, is_finished, level_n, step, to_db
-from protocols.trial import AT_WILL, Phase, Trial, TrialStatus
+from protocols.procedure.staircase import (
+    StaircaseState,
+    begin_staircase,
+    is_complete,
+    is_finished,
+    level_n,
+    step,
+    to_db,
+)
+from protocols.trial import PARTICIPANT_CAUSES, Phase, Trial, TrialStatus
 
 LEVEL_TOLERANCE = 1e-4
 """Relative tolerance of a level, about 0.001 dB: above rounding in a table, and far below any step."""
@@ -69,28 +77,28 @@ def recompute_runs(
 def _recompute(rows: list[Trial], rule: StaircaseRule, rove_db: float) -> Run:
     """The run of these rows, at least one, of one subject, session and run number."""
     first = rows[0]
-    counted = tuple(sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial))
-    _refuse_strange_rows(rows, counted)
-    state = _replay_answers(counted, rule, rove_db)
-    steering = [trial for trial in rows if trial.phase is not Phase.CATCH]
+    valid_trials = tuple(sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial))
+    _refuse_inconsistent_rows(rows, valid_trials)
+    state = _replay_answers(valid_trials, rule, rove_db)
+    staircase_trials = [trial for trial in rows if trial.phase is not Phase.CATCH]
     return Run(
         subject=first.subject,
         session=first.session,
         run=first.run,
         frequency_hz=first.frequency_hz,
-        answered=tuple(trial for trial in counted if trial.phase is not Phase.CATCH),
-        spoiled_trials=sum(trial.status is TrialStatus.SPOILED for trial in steering),
+        answered=tuple(trial for trial in valid_trials if trial.phase is not Phase.CATCH),
+        spoiled_trials=sum(trial.status is TrialStatus.SPOILED for trial in staircase_trials),
         state=state,
         complete=is_complete(rule, state),
         presentations=len(rows),
-        repeats_at_will=sum(trial.void_cause in AT_WILL for trial in rows),
+        repeats_at_will=sum(trial.void_cause in PARTICIPANT_CAUSES for trial in rows),
     )
 
 
-def _replay_answers(counted: tuple[Trial, ...], rule: StaircaseRule, rove_db: float) -> StaircaseState:
+def _replay_answers(valid_trials: tuple[Trial, ...], rule: StaircaseRule, rove_db: float) -> StaircaseState:
     """State of the rule after all counted answers; each level is compared with that of the rule."""
-    state = begin(rule)
-    for trial in counted:
+    state = begin_staircase(rule)
+    for trial in valid_trials:
         if is_finished(rule, state):
             raise InconsistentTrialsError(
                 f"{_trial_text(trial)}: an answer follows although the run was over after {state.trials} trials "
@@ -135,7 +143,7 @@ def _refuse_weak_catch_trial(trial: Trial, rule: StaircaseRule) -> None:
         )
 
 
-def _refuse_strange_rows(rows: list[Trial], counted: tuple[Trial, ...]) -> None:
+def _refuse_inconsistent_rows(rows: list[Trial], valid_trials: tuple[Trial, ...]) -> None:
     """Raise where a run has two frequencies, or counted trials that are doubled or not numbered in sequence."""
     first = rows[0]
     for trial in rows:
@@ -143,14 +151,15 @@ def _refuse_strange_rows(rows: list[Trial], counted: tuple[Trial, ...]) -> None:
             raise InconsistentTrialsError(
                 f"{_trial_text(trial)}: {trial.frequency_hz:g} Hz in a run that began at {first.frequency_hz:g} Hz"
             )
-    for before, after in itertools.pairwise(counted):
-        if after.trial == before.trial:
+    for previous, following in itertools.pairwise(valid_trials):
+        if following.trial == previous.trial:
             raise InconsistentTrialsError(
-                f"{_trial_text(after)}: two attempts of this trial have an answer that counts"
+                f"{_trial_text(following)}: two attempts of this trial have an answer that counts"
             )
-        if after.trial != before.trial + 1:
+        if following.trial != previous.trial + 1:
             raise InconsistentTrialsError(
-                f"{_trial_text(after)}: the trial before it with an answer is {before.trial}; those between are missing"
+                f"{_trial_text(following)}: the trial before it with an answer is {previous.trial}; those between are "
+                "missing"
             )
 
 

@@ -32,10 +32,10 @@ from analysis.psychophysics.threshold_table import ThresholdTable, threshold_tab
 from analysis.psychophysics.thresholds import Threshold, threshold_of
 from analysis.psychophysics.tobit import tobit_contrasts
 from analysis.psychophysics.two_analyses import comparison_text, declaration_text
-from analysis.wording import f_text, p_text
+from analysis.wording import format_f_text, format_p_text
 from equalizer.signals.summary import Summarised, Summary
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.procedure.practice import PracticeState, practice_over, practice_passed, right_of_last
+from protocols.procedure.practice import PracticeState, count_right_of_last, is_practice_over, is_practice_passed
 from protocols.trial import Phase, Trial
 
 
@@ -58,32 +58,32 @@ class PracticeRun:
     """Whether the run ended by its rule: passed, or its trials used up. False: it was broken off before."""
 
 
-def practice_runs(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[PracticeRun, ...]:
-    """Practice runs in the order in which they first occur. Their trials have the phase TRAINING, and their run numbers
-    follow those of the training staircases."""
+def evaluate_practice_runs(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[PracticeRun, ...]:
+    """Evaluate the practice runs, in the order in which they first occur. Their trials have the phase TRAINING, and
+    their run numbers follow those of the training staircases."""
     first = len(protocol.training.frequencies_hz)
-    places = range(first, first + len(protocol.practice.frequencies_hz))
+    practice_numbers = range(first, first + len(protocol.practice.frequencies_hz))
     grouped: dict[tuple[str, str, int], list[Trial]] = {}
     for trial in trials:
-        if trial.phase is Phase.TRAINING and trial.run in places:
+        if trial.phase is Phase.TRAINING and trial.run in practice_numbers:
             grouped.setdefault((trial.subject, trial.session, trial.run), []).append(trial)
-    return tuple(_practice_run(rows, protocol) for rows in grouped.values())
+    return tuple(_evaluate_practice_run(rows, protocol) for rows in grouped.values())
 
 
-def _practice_run(rows: list[Trial], protocol: StudyProtocol) -> PracticeRun:
+def _evaluate_practice_run(rows: list[Trial], protocol: StudyProtocol) -> PracticeRun:
     first, settings = rows[0], protocol.practice
-    counted = sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial)
-    state = PracticeState(tuple(bool(trial.correct) for trial in counted))
+    valid_trials = sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial)
+    state = PracticeState(tuple(bool(trial.correct) for trial in valid_trials))
     return PracticeRun(
         subject=first.subject,
         session=first.session,
         run=first.run,
         frequency_hz=first.frequency_hz,
-        trials=len(counted),
+        trials=len(valid_trials),
         right=sum(state.correct),
-        right_of_last=right_of_last(settings, state),
-        passed=practice_passed(settings, state),
-        over=practice_over(settings, state),
+        right_of_last=count_right_of_last(settings, state),
+        passed=is_practice_passed(settings, state),
+        over=is_practice_over(settings, state),
     )
 
 
@@ -134,16 +134,16 @@ class StudyAnalysis(Summarised):
         return Summary(
             f"{len(table.subjects)} participants, {len(self.runs)} runs, {len(self.trials)} trials",
             (
-                *((name, _mean_text(values)) for name, values in table.groups().items()),
+                *((name, _format_mean(values)) for name, values in table.groups().items()),
                 *(("warning", warning) for warning in self.warnings),
             ),
         )
 
 
-def _mean_text(values: Sequence[float | None]) -> str:
-    """The mean of the known thresholds (N) and their number, in words."""
-    known = [value for value in values if value is not None]
-    return f"mean threshold {sum(known) / len(known):.3g} N of {len(known)}" if known else "no threshold"
+def _format_mean(values: Sequence[float | None]) -> str:
+    """Format the mean of the known thresholds (N) and their number."""
+    measured = [value for value in values if value is not None]
+    return f"mean threshold {sum(measured) / len(measured):.3g} N of {len(measured)}" if measured else "no threshold"
 
 
 def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Sequence[str] = ()) -> StudyAnalysis:
@@ -153,7 +153,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
     Raises ValueError when the trials mix people, simulated participants and people who felt nothing (split them
     with `split_by_population` first), and InconsistentTrialsError when rows contradict the protocol's staircase.
     """
-    population, rule = _single_population(trials), protocol.staircase
+    population, rule = _find_single_population(trials), protocol.staircase
     runs = recompute_runs(trials, rule, rove_db=protocol.stimulus.rove_db)
     rows = tuple(threshold_of(run, rule) for run in runs)
     tested = tuple(trial for trial in trials if trial.phase is Phase.TEST)
@@ -161,13 +161,17 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
     detection, catches = detection_thresholds(trials, protocol), catch_tallies(trials)
     detection_table = threshold_table(detection, protocol.detection.frequencies_hz)
     anova, within = one_way_anova(table.groups()), repeated_measures(table.subjects, table.values)
-    comparisons, (primary, single) = compare_all(anova, CONFIDENCE), _models(tested, protocol)
-    (means, tobit), cues, gaps = _mean_contrasts(rows, primary, protocol), cue_findings(tested), cue_gaps(tested)
+    comparisons, (primary, single) = compare_all(anova, CONFIDENCE), _fit_models(tested, protocol)
+    (means, tobit), cues, gaps = (
+        _compute_mean_contrasts(rows, primary, protocol),
+        cue_findings(tested),
+        cue_gaps(tested),
+    )
     return StudyAnalysis(
         protocol=protocol, population=population, trials=tested, runs=runs, thresholds=rows, table=table,
         anova=anova, comparisons=comparisons, within=within,
         ranks=friedman(table.values),
-        difference=design_difference(anova, within),
+        difference=describe_design_difference(anova, within),
         primary=primary,
         single=single,
         mean_contrasts=means,
@@ -181,22 +185,24 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
             *side_warnings(catches, detection, table, detection_table),
         ),
         detection=detection, detection_table=detection_table, catches=catches,
-        practice=practice_runs(trials, protocol), cues=cues, cue_gaps=gaps,
+        practice=evaluate_practice_runs(trials, protocol), cues=cues, cue_gaps=gaps,
     )  # fmt: skip
 
 
-def _single_population(trials: Sequence[Trial]) -> Population | None:
-    """The population of all trials; None without trials. Raises ValueError where populations are mixed."""
-    parts = split_by_population(trials)
-    if len(parts) > 1:
+def _find_single_population(trials: Sequence[Trial]) -> Population | None:
+    """Find the population of all trials; None without trials. Raises ValueError where populations are mixed."""
+    by_population = split_by_population(trials)
+    if len(by_population) > 1:
         raise ValueError(
-            f"trials of {' and '.join(kind.value for kind in parts)} cannot enter one analysis; analyse each kind "
-            "separately"
+            f"trials of {' and '.join(kind.value for kind in by_population)} cannot enter one analysis; analyse each "
+            "kind separately"
         )
-    return next(iter(parts), None)
+    return next(iter(by_population), None)
 
 
-def _models(trials: Sequence[Trial], protocol: StudyProtocol) -> tuple[PrimaryAnalysis | None, SinglePersons | None]:
+def _fit_models(
+    trials: Sequence[Trial], protocol: StudyProtocol
+) -> tuple[PrimaryAnalysis | None, SinglePersons | None]:
     """The hierarchical model; where it has too few participants or frequencies, thresholds of single persons instead.
     At most one of the two is not None."""
     answers, cap_n = count_answers(trials, protocol.stimulus.frequencies_hz), protocol.staircase.cap_n
@@ -204,7 +210,7 @@ def _models(trials: Sequence[Trial], protocol: StudyProtocol) -> tuple[PrimaryAn
     return primary, fit_single_persons(answers, cap_n) if primary is None and answers is not None else None
 
 
-def _mean_contrasts(
+def _compute_mean_contrasts(
     rows: Sequence[Threshold], primary: PrimaryAnalysis | None, protocol: StudyProtocol
 ) -> tuple[tuple[Contrast, ...], tuple[Contrast, ...]]:
     """Contrasts of the reversal means and of Tobit's model of them (dB). They use the frequencies of the primary model
@@ -218,9 +224,9 @@ def _mean_contrasts(
     return means, tobit_contrasts(table.frequencies_hz, values, np.array(table.censored), CONFIDENCE)
 
 
-def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
-    """The statistics as JSON values, format `hapteq-anova`, version 1. A number that the data do not determine is
-    None; the notes of the same entry give the reason."""
+def make_anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
+    """Convert the statistics to JSON values, format `hapteq-anova`, version 1. A number that the data do not determine
+    is None; the notes of the same entry give the reason."""
     return {
         "format": "hapteq-anova",
         "version": 1,
@@ -242,7 +248,7 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "mean_contrasts_db": [asdict(contrast) for contrast in analysis.mean_contrasts],
         "tobit_contrasts_db": [asdict(contrast) for contrast in analysis.tobit],
         "declared": asdict(analysis.protocol.analysis),
-        "declared_result": _write_declared_result(analysis.declared_result),
+        "declared_result": _anonymise_declared_result(analysis.declared_result),
         "compared": analysis.compared,
         "cues": [asdict(cue) for cue in analysis.cues],
         "cue_gaps": [asdict(gap) for gap in analysis.cue_gaps],
@@ -250,7 +256,7 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
     }
 
 
-def _write_declared_result(result: DeclaredResult) -> dict[str, Any]:
+def _anonymise_declared_result(result: DeclaredResult) -> dict[str, Any]:
     """The declared result with the number of left-out sessions and trials only, because the sentences about them name
     sessions of people who withdrew."""
     document = asdict(result)
@@ -258,29 +264,30 @@ def _write_declared_result(result: DeclaredResult) -> dict[str, Any]:
     return document
 
 
-def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
-    """Comparison of the published analysis with the analysis within participants, in words and numbers."""
+def describe_design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
+    """Compare the published analysis with the analysis within participants, in words and numbers."""
     if anova.p is None or within.p is None:
         text = "neither" if anova.p is None and within.p is None else "only one"
         return (
             f"The published analysis is one-way, between groups; the design is within participants. Of the two, {text} "
             "can be computed from these data, so they cannot be compared."
         )
-    agree = (anova.p < 0.05) == (within.p < 0.05)
+    is_same_verdict = (anova.p < 0.05) == (within.p < 0.05)
     return (
         "The published analysis is one-way: it treats every threshold as that of another person, so differences "
-        f"between people count as error: {f_text(anova.df_between, anova.df_within, anova.f)}, {p_text(anova.p)}. "
+        f"between people count as error: {format_f_text(anova.df_between, anova.df_within, anova.f)}, "
+        f"{format_p_text(anova.p)}. "
         "Every participant was tested at every frequency; the analysis within participants removes those differences "
-        f"({_write_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
-        f"{f_text(within.df_conditions, within.df_error, within.f)}, Greenhouse-Geisser epsilon {within.epsilon:.2f}, "
-        f"{p_text(within.p)}. "
-        + ("Both agree at the 5 % level. " if agree else "They disagree at the 5 % level. ")
+        f"({_format_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
+        f"{format_f_text(within.df_conditions, within.df_error, within.f)}, Greenhouse-Geisser epsilon "
+        f"{within.epsilon:.2f}, {format_p_text(within.p)}. "
+        + ("Both agree at the 5 % level. " if is_same_verdict else "They disagree at the 5 % level. ")
         + "The second matches the design; the first is given for comparison with the published result."
     )
 
 
-def _write_removed_percent(within: RepeatedMeasures) -> str:
+def _format_removed_percent(within: RepeatedMeasures) -> str:
     """Share of the spread within frequencies that is due to participants: SS_participants / (SS_participants +
     SS_error), in per cent."""
-    between, error = within.ss_participants or 0.0, within.ss_error or 0.0
-    return f"{100 * between / (between + error):.0f} %"
+    ss_participants, ss_error = within.ss_participants or 0.0, within.ss_error or 0.0
+    return f"{100 * ss_participants / (ss_participants + ss_error):.0f} %"

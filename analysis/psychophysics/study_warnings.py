@@ -36,7 +36,7 @@ they named 3 of 1000 simulated sessions with a constant criterion, and 438 of 10
 trials (tests/references/drift_flag.py)."""
 MANY_LAPSES = 0.1
 """Lapse rate on catch trials above which a participant is named: the published staircase assumes attentive people."""
-FELT_BY_ALL_HZ = 15.0
+PERCEIVED_BY_ALL_HZ = 15.0
 """Highest frequency (Hz) at which all participants are expected to feel the direction at full level, so that an error
 in a catch trial there is a lapse."""
 REPEAT_SD_DB = 2.4
@@ -70,46 +70,49 @@ def study_warnings(
 
 
 def side_warnings(
-    catches: Sequence[CatchTally], detection: Sequence[Threshold], table: ThresholdTable, felt: ThresholdTable
+    catches: Sequence[CatchTally],
+    detection: Sequence[Threshold],
+    table: ThresholdTable,
+    detection_table: ThresholdTable,
 ) -> tuple[str, ...]:
-    """Warnings about catch trials and detection runs. table: direction thresholds; felt: detection thresholds, both in
-    newtons."""
-    broken = [_run_text(row) for row in detection if not row.complete]
-    cut = [_run_text(row) for row in detection if row.complete and row.censored]
+    """Warnings about catch trials and detection runs. table: direction thresholds; detection_table: detection
+    thresholds, both in newtons."""
+    incomplete = [_run_text(row) for row in detection if not row.complete]
+    censored = [_run_text(row) for row in detection if row.complete and row.censored]
     candidates = (
         _lapse_warning(catches),
-        f"{_count_text(broken, 'detection run')} not complete and without a threshold: {conjoin(broken)}."
-        if broken
+        f"{_count_text(incomplete, 'detection run')} not complete and without a threshold: {conjoin(incomplete)}."
+        if incomplete
         else "",
-        f"{_count_text(cut, 'detection threshold')} cut by the cap: {conjoin(cut)}." if cut else "",
+        f"{_count_text(censored, 'detection threshold')} cut by the cap: {conjoin(censored)}." if censored else "",
         _warn_of_undetected(detection),
-        _below_detection_warning(table, felt),
-        *felt.notes,
+        _below_detection_warning(table, detection_table),
+        *detection_table.notes,
     )
     return tuple(sentence for sentence in candidates if sentence)
 
 
 def _incomplete_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
-    cut = [
+    runs = [
         f"{_run_text(row)} ({_progress(row, rule)})"
         for row in rows
         if not row.complete and row.ended is not RunEnd.TRIAL_LIMIT
     ]
-    return f"{_count_text(cut, 'run')} not complete and without a threshold: {conjoin(cut)}." if cut else ""
+    return f"{_count_text(runs, 'run')} not complete and without a threshold: {conjoin(runs)}." if runs else ""
 
 
 def _warn_of_stopped(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
-    stopped = [
+    stopped_runs = [
         f"{_run_text(row)} ({_progress(row, rule)}, {row.trials_at_cap} trials at the cap)"
         for row in rows
         if row.ended is RunEnd.TRIAL_LIMIT
     ]
-    if not stopped:
+    if not stopped_runs:
         return ""
     return (
-        f"{_count_text(stopped, 'run')} stopped by the limit of {rule.trial_limit} trials, without a threshold: "
-        f"{conjoin(stopped)}. The limit stops participants who cannot discriminate the directions far more often than "
-        "others, so the remaining means are too low."
+        f"{_count_text(stopped_runs, 'run')} stopped by the limit of {rule.trial_limit} trials, without a threshold: "
+        f"{conjoin(stopped_runs)}. The limit stops participants who cannot discriminate the directions far more often "
+        "than others, so the remaining means are too low."
     )
 
 
@@ -126,18 +129,18 @@ def _warn_of_missing(table: ThresholdTable) -> str:
 
 
 def _warn_of_censored(table: ThresholdTable, rule: StaircaseRule) -> str:
-    cut = [
+    cases = [
         f"{subject} at {frequency:g} Hz"
         for subject, row in zip(table.subjects, table.censored, strict=True)
         for frequency, censored in zip(table.frequencies_hz, row, strict=True)
         if censored
     ]
-    if not cut:
+    if not cases:
         return ""
     return (
-        f"{_count_text(cut, 'threshold')} cut by the cap of {rule.cap_n:g} N, {threshold_words(rule).cut}: "
-        f"{conjoin(cut)}. As in the published analysis they enter means and tests as plain numbers, so means near the "
-        "cap are too low, differences towards it too small, and intervals and effect sizes without coverage."
+        f"{_count_text(cases, 'threshold')} cut by the cap of {rule.cap_n:g} N, {threshold_words(rule).cut}: "
+        f"{conjoin(cases)}. As in the published analysis they enter means and tests as plain numbers, so means near "
+        "the cap are too low, differences towards it too small, and intervals and effect sizes without coverage."
     )
 
 
@@ -178,26 +181,26 @@ def _runs_at_chance(rows: Sequence[Threshold]) -> list[str]:
 
 def _is_above_chance(percent_correct: float, trials: int) -> bool:
     """Whether a one-sided binomial test at the 5 % level rejects a probability of 1/2 for a right answer."""
-    right = round(percent_correct / 100.0 * trials)
-    return bool(binom.sf(right - 1, trials, 0.5) < 0.05)
+    correct_count = round(percent_correct / 100.0 * trials)
+    return bool(binom.sf(correct_count - 1, trials, 0.5) < 0.05)
 
 
 def _bias_warning(rows: Sequence[Threshold]) -> str:
-    leaning = [
+    biased_runs = [
         f"{_run_text(row)} (criterion {format_signed(row.criterion)})"
         for row in rows
-        if row.criterion is not None and _leans(row, row.criterion)
+        if row.criterion is not None and _is_biased(row, row.criterion)
     ]
-    if not leaning:
+    if not biased_runs:
         return ""
-    return f"A bias towards one of the two answers, which raises a threshold, was found in {conjoin(leaning)}."
+    return f"A bias towards one of the two answers, which raises a threshold, was found in {conjoin(biased_runs)}."
 
 
-def _leans(row: Threshold, criterion: float) -> bool:
+def _is_biased(row: Threshold, criterion: float) -> bool:
     """Whether the criterion exceeds both limits. Its standard error is that of a run with both directions equally
     often."""
-    half, right = row.trials / 2.0, round(row.trials * (row.percent_correct or 0.0) / 100.0)
-    return abs(criterion) > max(STRONG_BIAS, BIAS_ERRORS * math.sqrt(criterion_variance(right, half, half)))
+    half, correct = row.trials / 2.0, round(row.trials * (row.percent_correct or 0.0) / 100.0)
+    return abs(criterion) > max(STRONG_BIAS, BIAS_ERRORS * math.sqrt(criterion_variance(correct, half, half)))
 
 
 def _drift_warning(trials: Iterable[Trial]) -> str:
@@ -206,7 +209,9 @@ def _drift_warning(trials: Iterable[Trial]) -> str:
     for trial in trials:
         if trial.counts:
             sessions.setdefault((trial.subject, trial.session), {}).setdefault(trial.run, []).append(trial)
-    drifts = criterion_drifts([[_answers(runs[run]) for run in sorted(runs)] for runs in sessions.values()])
+    drifts = criterion_drifts(
+        [[_directions_and_answers(runs[run]) for run in sorted(runs)] for runs in sessions.values()]
+    )
     drifting = [
         f"{subject} ({session}, criterion {format_signed(drift.per_100_trials)} per 100 trials)"
         for (subject, session), drift in zip(sessions, drifts, strict=True)
@@ -221,7 +226,7 @@ def _drift_warning(trials: Iterable[Trial]) -> str:
     )
 
 
-def _answers(run: Sequence[Trial]) -> tuple[list[int], list[bool]]:
+def _directions_and_answers(run: Sequence[Trial]) -> tuple[list[int], list[bool]]:
     """Directions shown (1 or 2), and whether each answer was right."""
     return [trial.direction_shown for trial in run], [bool(trial.correct) for trial in run]
 
@@ -251,20 +256,20 @@ def _warn_of_unmeasured(trials: Iterable[Trial]) -> str:
 
 
 def _lapse_warning(catches: Sequence[CatchTally]) -> str:
-    """Sentence on participants with many wrong catch trials up to `FELT_BY_ALL_HZ`; empty without any."""
+    """Sentence on participants with many wrong catch trials up to `PERCEIVED_BY_ALL_HZ`; empty without any."""
     lapsing = []
-    slow = [tally for tally in catches if tally.frequency_hz <= FELT_BY_ALL_HZ]
-    for subject in dict.fromkeys(tally.subject for tally in slow):
-        wrong = sum(tally.wrong for tally in slow if tally.subject == subject)
-        given = sum(tally.given for tally in slow if tally.subject == subject)
-        if wrong > MANY_LAPSES * given:
-            lower, upper = wilson_interval(wrong, given)
-            lapsing.append(f"{subject} ({wrong} of {given}; 95 % interval {100 * lower:.0f} to {100 * upper:.0f} %)")
+    felt_tallies = [tally for tally in catches if tally.frequency_hz <= PERCEIVED_BY_ALL_HZ]
+    for subject in dict.fromkeys(tally.subject for tally in felt_tallies):
+        wrong = sum(tally.wrong for tally in felt_tallies if tally.subject == subject)
+        answered = sum(tally.given for tally in felt_tallies if tally.subject == subject)
+        if wrong > MANY_LAPSES * answered:
+            lower, upper = wilson_interval(wrong, answered)
+            lapsing.append(f"{subject} ({wrong} of {answered}; 95 % interval {100 * lower:.0f} to {100 * upper:.0f} %)")
     if not lapsing:
         return ""
     return (
-        f"More than {100 * MANY_LAPSES:.0f} % wrong in catch trials at full level, up to {FELT_BY_ALL_HZ:g} Hz, where "
-        f"inattention raises a threshold: {conjoin(lapsing)}."
+        f"More than {100 * MANY_LAPSES:.0f} % wrong in catch trials at full level, up to {PERCEIVED_BY_ALL_HZ:g} Hz, "
+        f"where inattention raises a threshold: {conjoin(lapsing)}."
     )
 
 
@@ -273,15 +278,15 @@ def _warn_of_undetected(detection: Sequence[Threshold]) -> str:
     return f"Detection not shown to be better than chance: {conjoin(guessed)}." if guessed else ""
 
 
-def _below_detection_warning(table: ThresholdTable, felt: ThresholdTable) -> str:
-    found = [
-        f"{each.subject} at {each.frequency_hz:g} Hz ({each.direction_n:.2f} N, detected from {each.detection_n:.2f} N)"
-        for each in directions_below_detection(table, felt)
+def _below_detection_warning(table: ThresholdTable, detection_table: ThresholdTable) -> str:
+    texts = [
+        f"{case.subject} at {case.frequency_hz:g} Hz ({case.direction_n:.2f} N, detected from {case.detection_n:.2f} N)"
+        for case in directions_below_detection(table, detection_table)
     ]
-    if not found:
+    if not texts:
         return ""
     return (
-        f"The direction was identified at a level below the detection threshold of the vibration: {conjoin(found)}. "
+        f"The direction was identified at a level below the detection threshold of the vibration: {conjoin(texts)}. "
         f"Two runs of one threshold differ by {REPEAT_SD_DB:g} dB (standard deviation); a difference of more than "
         "twice that suggests another cue than touch, or a lapse of attention in the detection run."
     )
@@ -291,5 +296,5 @@ def _run_text(row: Threshold) -> str:
     return f"{row.subject} at {row.frequency_hz:g} Hz"
 
 
-def _count_text(things: Sequence[str], noun: str) -> str:
-    return f"1 {noun} is" if len(things) == 1 else f"{len(things)} {noun}s are"
+def _count_text(items: Sequence[str], noun: str) -> str:
+    return f"1 {noun} is" if len(items) == 1 else f"{len(items)} {noun}s are"

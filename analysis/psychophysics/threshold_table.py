@@ -41,9 +41,13 @@ class ThresholdTable:
     @property
     def coverage(self) -> str:
         """Why intervals and effect sizes of this table have no stated coverage; empty where nothing is cut."""
-        lost = sum(map(sum, self.stopped))
+        missing_count = sum(map(sum, self.stopped))
         causes = [f"{self.cut} of the values {'is' if self.cut == 1 else 'are'} cut by the cap"] if self.cut else []
-        causes += [f"{lost} {'is' if lost == 1 else 'are'} missing because of the trial limit"] if lost else []
+        causes += (
+            [f"{missing_count} {'is' if missing_count == 1 else 'are'} missing because of the trial limit"]
+            if missing_count
+            else []
+        )
         if not causes:
             return ""
         return (
@@ -70,28 +74,28 @@ def threshold_table(
     notes. Participants in the order of their first row; those without any completed run have a row of gaps.
     """
     subjects = tuple(dict.fromkeys(row.subject for row in rows))
-    first: dict[tuple[str, float], Threshold] = {}
-    limited = {(row.subject, row.frequency_hz) for row in rows if row.ended is RunEnd.TRIAL_LIMIT}
+    first_runs: dict[tuple[str, float], Threshold] = {}
+    limited_cells = {(row.subject, row.frequency_hz) for row in rows if row.ended is RunEnd.TRIAL_LIMIT}
     notes = []
     for row in rows:
         key = (row.subject, row.frequency_hz)
         if row.frequency_hz not in frequencies_hz:
             notes.append(f"{row.subject} has a run at {row.frequency_hz:g} Hz, which the protocol does not name.")
-        elif row.complete and key in first:
+        elif row.complete and key in first_runs:
             notes.append(
                 f"{row.subject} completed more than one run at {row.frequency_hz:g} Hz; the first one counts "
-                f"(session {first[key].session}), not run {row.run} of session {row.session}."
+                f"(session {first_runs[key].session}), not run {row.run} of session {row.session}."
             )
         elif row.complete:
-            first[key] = row
+            first_runs[key] = row
     ordered = tuple(sorted(frequencies_hz))
     return ThresholdTable(
         quantity=quantity,
         subjects=subjects,
         frequencies_hz=ordered,
-        values=tuple(tuple(_value(first.get((s, f)), quantity) for f in ordered) for s in subjects),
-        censored=tuple(tuple((s, f) in first and first[s, f].censored for f in ordered) for s in subjects),
-        stopped=tuple(tuple((s, f) in limited and (s, f) not in first for f in ordered) for s in subjects),
+        values=tuple(tuple(_value(first_runs.get((s, f)), quantity) for f in ordered) for s in subjects),
+        censored=tuple(tuple((s, f) in first_runs and first_runs[s, f].censored for f in ordered) for s in subjects),
+        stopped=tuple(tuple((s, f) in limited_cells and (s, f) not in first_runs for f in ordered) for s in subjects),
         notes=tuple(notes),
     )
 

@@ -13,7 +13,7 @@ from analysis.psychophysics.bias import response_bias
 from analysis.psychophysics.repeated_trials import is_often
 from analysis.psychophysics.runs import Run, recompute_runs
 from protocols.definition.staircase_rule import StaircaseRule
-from protocols.procedure.psi import estimate, posterior
+from protocols.procedure.psi import compute_posterior, estimate_threshold
 from protocols.procedure.staircase import is_finished, to_db, to_newton
 from protocols.trial import Phase, Trial
 
@@ -45,8 +45,8 @@ class Threshold:
     threshold_db: float | None
     """Mean of the same levels in dB re 1 N; for Psi, the posterior mean."""
     censored: bool
-    """Whether the cap cut into the threshold (`is_censored`; Psi: `MAYBE_ABOVE`). The value is then no bound: the true
-    threshold may lie above or below it."""
+    """Whether the cap cut into the threshold (`is_censored`; Psi: `CUT_PROBABILITY`). The value is then no bound: the
+    true threshold may lie above or below it."""
     reversals: int
     trials: int
     cap_reversals: int
@@ -90,19 +90,19 @@ def thresholds(trials: Iterable[Trial], rule: StaircaseRule, rove_db: float = 0.
 def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
     """Threshold of a run by its reversals or Psi's posterior, with response bias and counts. Where the run is not
     complete, thresholds are None in every unit."""
-    found = _from_posterior(run, rule) if rule.is_bayesian else _from_reversals(run, rule)
+    run_estimate = _estimate_from_posterior(run, rule) if rule.is_bayesian else _estimate_from_reversals(run, rule)
     state = run.state
     correct = [bool(trial.correct) for trial in run.answered]
     bias = response_bias([trial.direction_shown for trial in run.answered], correct)
     return Threshold(
         subject=run.subject,
         frequency_hz=run.frequency_hz,
-        threshold_n=found.newton if run.complete else None,
-        threshold_db=found.db if run.complete else None,
-        censored=found.censored,
+        threshold_n=run_estimate.newton if run.complete else None,
+        threshold_db=run_estimate.db if run.complete else None,
+        censored=run_estimate.censored,
         reversals=state.reversals,
         trials=state.trials,
-        cap_reversals=found.cap_reversals,
+        cap_reversals=run_estimate.cap_reversals,
         trials_at_cap=state.trials_at_cap,
         pushes_against_cap=state.pushes_against_cap,
         complete=run.complete,
@@ -112,13 +112,13 @@ def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
         d_prime=bias.d_prime if bias else None,
         criterion=bias.criterion if bias else None,
         spoiled_trials=run.spoiled_trials,
-        threshold_mps2=_mean_of_measured([_at_level(t, t.delivered_mps2, n) for t, n in found.measured])
+        threshold_mps2=_mean_of_measured([_scale_to_level(t, t.delivered_mps2, n) for t, n in run_estimate.measured])
         if run.complete
         else None,
-        threshold_mm=_mean_of_measured([_at_level(t, t.displacement_mm, n) for t, n in found.measured])
+        threshold_mm=_mean_of_measured([_scale_to_level(t, t.displacement_mm, n) for t, n in run_estimate.measured])
         if run.complete
         else None,
-        measured_reversals=sum(trial.delivered_mps2 is not None for trial, _ in found.measured),
+        measured_reversals=sum(trial.delivered_mps2 is not None for trial, _ in run_estimate.measured),
         ended=_run_end(run, rule),
         repeats_at_will=run.repeats_at_will,
         repeat_rate=run.repeats_at_will / run.presentations if run.presentations else 0.0,
@@ -127,7 +127,7 @@ def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
 
 
 @dataclass(frozen=True, slots=True)
-class _Found:
+class _RunEstimate:
     """Threshold of a run before the other columns are added."""
 
     newton: float | None
@@ -138,40 +138,42 @@ class _Found:
     """Trials whose measurements give the threshold in other units, each with the level (N) to which it is scaled."""
 
 
-def _from_reversals(run: Run, rule: StaircaseRule) -> _Found:
+def _estimate_from_reversals(run: Run, rule: StaircaseRule) -> _RunEstimate:
     """Means of the last `averaged_reversals` reversal levels, in newtons and in dB."""
     state = run.state
     averaged_db = state.reversal_levels_db[-rule.averaged_reversals :]
     averaged_n = [min(to_newton(level), rule.cap_n) for level in averaged_db]
-    turned = [run.answered[index] for index in state.reversal_trials[-rule.averaged_reversals :]]
+    averaged_trials = [run.answered[index] for index in state.reversal_trials[-rule.averaged_reversals :]]
     cap_reversals = sum(level >= rule.cap_n * (1.0 - _SAME_LEVEL) for level in averaged_n)
-    return _Found(
+    return _RunEstimate(
         newton=fmean(averaged_n) if averaged_n else None,
         db=fmean(averaged_db) if averaged_db else None,
         censored=is_censored(cap_reversals),
         cap_reversals=cap_reversals,
-        measured=tuple((trial, trial.staircase_n) for trial in turned),
+        measured=tuple((trial, trial.staircase_n) for trial in averaged_trials),
     )
 
 
-def _from_posterior(run: Run, rule: StaircaseRule) -> _Found:
+def _estimate_from_posterior(run: Run, rule: StaircaseRule) -> _RunEstimate:
     """Posterior mean, limited by the cap; cut where the posterior probability of a threshold above the cap exceeds
-    `MAYBE_ABOVE`."""
+    `CUT_PROBABILITY`."""
     cap_db = to_db(rule.cap_n)
-    found = estimate(posterior(run.state.answered, cap_db), cap_db)
-    db = min(found.mean_db, cap_db)
-    latest = run.answered[-rule.averaged_reversals :]
+    posterior_estimate = estimate_threshold(compute_posterior(run.state.answered, cap_db), cap_db)
+    db = min(posterior_estimate.mean_db, cap_db)
+    last_trials = run.answered[-rule.averaged_reversals :]
     newton = min(to_newton(db), rule.cap_n)
-    return _Found(newton, db, found.above_cap > MAYBE_ABOVE, 0, tuple((trial, newton) for trial in latest))
+    return _RunEstimate(
+        newton, db, posterior_estimate.above_cap > CUT_PROBABILITY, 0, tuple((trial, newton) for trial in last_trials)
+    )
 
 
-def _at_level(trial: Trial, measured: float | None, level_n: float) -> float | None:
+def _scale_to_level(trial: Trial, measured: float | None, level_n: float) -> float | None:
     """Measured value of a trial, scaled in proportion from the level played to another level (N); None where nothing
     was measured."""
     return None if measured is None else measured * level_n / trial.level_n
 
 
-MAYBE_ABOVE = 0.1
+CUT_PROBABILITY = 0.1
 """Posterior probability (Psi) of a threshold above the cap above which the threshold is marked as cut."""
 
 

@@ -55,34 +55,34 @@ def tobit_contrasts(
     A frequency without an uncut run is left out, because its likelihood has no maximum. Empty where no run is cut (the
     analysis of the plain means then suffices), the first frequency is left out, or there are fewer than three people.
     """
-    known = np.isfinite(values_db)
-    bounded: NDArray[np.bool_] = np.asarray((known & ~cut).any(axis=0))
-    if not (cut & known).any() or len(values_db) < 3 or not bounded[0]:
+    is_measured = np.isfinite(values_db)
+    has_uncut: NDArray[np.bool_] = np.asarray((is_measured & ~cut).any(axis=0))
+    if not (cut & is_measured).any() or len(values_db) < 3 or not has_uncut[0]:
         return ()
-    frequencies_hz = [frequency_hz for frequency_hz, kept in zip(frequencies_hz, bounded, strict=True) if kept]
-    values_db, cut, known = values_db[:, bounded], cut[:, bounded], known[:, bounded]
+    frequencies_hz = [frequency_hz for frequency_hz, is_kept in zip(frequencies_hz, has_uncut, strict=True) if is_kept]
+    values_db, cut, is_measured = values_db[:, has_uncut], cut[:, has_uncut], is_measured[:, has_uncut]
     fit = fit_tobit(values_db, cut)
     k, df = len(frequencies_hz), len(values_db) - 1
     sizes = fit.parameters[1:k] - fit.parameters[0]
     errors = np.sqrt(np.diag(fit.covariance)[1:k] + fit.covariance[0, 0] - 2.0 * fit.covariance[0, 1:k])
-    half = float(student.ppf(0.5 + confidence / 2, df)) * errors
+    half_widths = float(student.ppf(0.5 + confidence / 2, df)) * errors
     p_values = [float(p) for p in 2.0 * student.sf(np.abs(sizes / errors), df)]
-    both = (known[:, 1:] & known[:, :1]).sum(axis=0)
+    pair_counts = (is_measured[:, 1:] & is_measured[:, :1]).sum(axis=0)
     return tuple(
         Contrast(
-            frequency_hz=frequencies_hz[place + 1],
+            frequency_hz=frequencies_hz[index + 1],
             against_hz=frequencies_hz[0],
-            participants=int(both[place]),
-            difference_db=float(sizes[place]),
-            lower_db=float(sizes[place] - half[place]),
-            upper_db=float(sizes[place] + half[place]),
-            p=p_values[place],
+            participants=int(pair_counts[index]),
+            difference_db=float(sizes[index]),
+            lower_db=float(sizes[index] - half_widths[index]),
+            upper_db=float(sizes[index] + half_widths[index]),
+            p=p_values[index],
             p_holm=p_holm,
             effect_size=None,
             p_equivalence=None,
             p_spread=None,
         )
-        for place, p_holm in enumerate(holm_correction(p_values))
+        for index, p_holm in enumerate(holm_correction(p_values))
     )
 
 
@@ -90,32 +90,32 @@ def fit_tobit(values_db: FloatArray, cut: NDArray[np.bool_]) -> TobitFit:
     """Maximum-likelihood fit of the Tobit model (L-BFGS-B). values_db: (n, k), dB, NaN for a gap; cut: (n, k). Each
     column needs a value that is not cut. Raises LinAlgError where the Hessian is singular."""
     k = values_db.shape[1]
-    begin = np.concatenate([np.nanmean(values_db, axis=0), [0.7, 0.7]])
+    start = np.concatenate([np.nanmean(values_db, axis=0), [0.7, 0.7]])
 
     def cost(parameters: FloatArray) -> float:
         return -_log_likelihood(parameters, values_db, cut)
 
     bounds = [(None, None)] * k + [SD_BOUNDS_DB] * 2
-    found = minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-12, "gtol": 1e-6})
+    solution = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-12, "gtol": 1e-6})
     steps = STEP * np.eye(k + 2)
-    curvature = np.array([[_second(cost, found.x, a, b) for b in steps] for a in steps]) / STEP**2
+    curvature = np.array([[_second_difference(cost, solution.x, a, b) for b in steps] for a in steps]) / STEP**2
     # At a bound, the Hessian by a standard deviation is meaningless: that parameter is held fixed in the covariance.
-    free = np.array([True] * k + [SD_BOUNDS_DB[0] + STEP < value < SD_BOUNDS_DB[1] - STEP for value in found.x[k:]])
+    free = np.array([True] * k + [SD_BOUNDS_DB[0] + STEP < value < SD_BOUNDS_DB[1] - STEP for value in solution.x[k:]])
     covariance = np.zeros((k + 2, k + 2))
     covariance[np.ix_(free, free)] = np.linalg.inv(curvature[np.ix_(free, free)])
-    return TobitFit(found.x, covariance, -float(found.fun))
+    return TobitFit(solution.x, covariance, -float(solution.fun))
 
 
-def _second(cost: Callable[[FloatArray], float], at: FloatArray, a: FloatArray, b: FloatArray) -> float:
+def _second_difference(cost: Callable[[FloatArray], float], centre: FloatArray, a: FloatArray, b: FloatArray) -> float:
     """Central second difference of the cost along the steps a and b, not divided by their lengths."""
-    return (cost(at + a + b) - cost(at + a - b) - cost(at - a + b) + cost(at - a - b)) / 4.0
+    return (cost(centre + a + b) - cost(centre + a - b) - cost(centre - a + b) + cost(centre - a - b)) / 4.0
 
 
 def _log_likelihood(parameters: FloatArray, values_db: FloatArray, cut: NDArray[np.bool_]) -> float:
     """Log-likelihood of the module's model at `parameters` (k + 2,); gaps contribute nothing."""
     k = values_db.shape[1]
-    spread, error = math.exp(parameters[k]), math.exp(parameters[k + 1])
-    z = (values_db[:, :, None] - parameters[:k, None] - spread * NODES) / error
-    exact = -0.5 * z**2 - math.log(error) - 0.5 * math.log(2.0 * math.pi)
+    person_sd, error_sd = math.exp(parameters[k]), math.exp(parameters[k + 1])
+    z = (values_db[:, :, None] - parameters[:k, None] - person_sd * NODES) / error_sd
+    exact = -0.5 * z**2 - math.log(error_sd) - 0.5 * math.log(2.0 * math.pi)
     cells = np.where(np.isnan(z), 0.0, np.where(cut[:, :, None], log_ndtr(-z), exact))
     return float(logsumexp(cells.sum(axis=1), b=WEIGHTS / math.sqrt(2.0 * math.pi), axis=1).sum())

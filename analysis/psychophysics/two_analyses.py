@@ -14,7 +14,7 @@ from analysis.psychophysics.group_contrasts import Contrast
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
 from analysis.threshold_words import threshold_words
-from analysis.wording import capitalise, conjoin, format_signed, p_text
+from analysis.wording import capitalise, conjoin, format_p_text, format_signed
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 
@@ -33,7 +33,10 @@ NEAR_CAP = (
 )
 
 
-_NAMED = {"hierarchical": "the hierarchical model of all answers", "published": "the published one-way analysis"}
+_ANALYSIS_NOUNS = {
+    "hierarchical": "the hierarchical model of all answers",
+    "published": "the published one-way analysis",
+}
 _INTERVALS = {
     "hierarchical": "95 %, over people's pseudo-thresholds in dB, paired, t with n − 1 "
     "degrees of freedom; a single test, so uncorrected.",
@@ -52,10 +55,12 @@ def declaration_text(declared: AnalysisSettings) -> str:
             "cap distorts it least; a choice made after the data were seen is not a declaration."
         )
     else:
-        named = "Its interval" if declared.interval == "undeclared" else f"Declared interval ({declared.interval})"
+        interval_words = (
+            "Its interval" if declared.interval == "undeclared" else f"Declared interval ({declared.interval})"
+        )
         primary = (
-            f"Declared as primary in the protocol: {_NAMED[declared.primary]}. "
-            f"{named} of the contrast: {_INTERVALS[declared.primary]}"
+            f"Declared as primary in the protocol: {_ANALYSIS_NOUNS[declared.primary]}. "
+            f"{interval_words} of the contrast: {_INTERVALS[declared.primary]}"
         )
     first, second = declared.contrast_hz or (0.0, 0.0)
     parts = [
@@ -86,10 +91,12 @@ def comparison_text(
             "only the published analysis is given."
         )
     missing = [f"{frequency_hz:g} Hz" for frequency_hz in primary.missing_hz]
-    left_out = f"The model leaves {conjoin(missing)} out, where there is no answer yet." if missing else ""
-    cut = [NEAR_CAP, *coverage_notes(("means", "tukey", "one-way"), table, rule)] if table.cut else []
+    missing_text = f"The model leaves {conjoin(missing)} out, where there is no answer yet." if missing else ""
+    cap_sentences = [NEAR_CAP, *coverage_notes(("means", "tukey", "one-way"), table, rule)] if table.cut else []
     return " ".join(
-        filter(None, [left_out, _sizes_text(primary, means, rule), _verdict_text(primary, comparisons), *cut])
+        filter(
+            None, [missing_text, _sizes_text(primary, means, rule), _verdict_text(primary, comparisons), *cap_sentences]
+        )
     )
 
 
@@ -104,23 +111,25 @@ def coverage_notes(analyses: Sequence[str], table: ThresholdTable, rule: Stairca
 def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: StaircaseRule) -> str:
     """Sentence on the differences in dB by the model and by the thresholds of runs: equal within `NOTABLE_DB`, or where
     not."""
-    named = threshold_words(rule).means
+    means_noun = threshold_words(rule).means
     by_frequency = {contrast.frequency_hz: contrast for contrast in means}
-    against = f"{primary.frequencies_hz[0]:g} Hz"
+    reference = f"{primary.frequencies_hz[0]:g} Hz"
     pairs = [(contrast, by_frequency.get(contrast.frequency_hz)) for contrast in primary.contrasts]
     if not pairs:
-        return f"The model gives no difference to {against}."
+        return f"The model gives no difference to {reference}."
     if not any(mean for _, mean in pairs):
-        return f"{capitalise(named)} give no difference to {against} yet that could be compared with the model's."
-    apart = [
+        return (
+            f"{capitalise(means_noun)} give no difference to {reference} yet that could be compared with the model's."
+        )
+    differing = [
         f"at {contrast.frequency_hz:g} Hz {format_signed(contrast.difference_db, 1)} dB compared with "
         f"{format_signed(mean.difference_db, 1)} dB"
         for contrast, mean in pairs
         if mean is not None and abs(contrast.difference_db - mean.difference_db) >= NOTABLE_DB
     ]
-    if apart:
-        return f"Differences to {against} by the model and by {named} differ: {conjoin(apart)}."
-    return f"Differences to {against} by the model and by {named} agree within {NOTABLE_DB:g} dB."
+    if differing:
+        return f"Differences to {reference} by the model and by {means_noun} differ: {conjoin(differing)}."
+    return f"Differences to {reference} by the model and by {means_noun} agree within {NOTABLE_DB:g} dB."
 
 
 def _verdict_text(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:
@@ -128,14 +137,14 @@ def _verdict_text(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:
     no pair in common."""
     lowest = frequency_name(primary.frequencies_hz[0])
     pairs = {pair.second: pair.p for pair in comparisons.pairs if pair.first == lowest}
-    split = [
-        f"{contrast.frequency_hz:g} Hz (Holm {p_text(contrast.p_holm)}, Tukey {p_text(tukey)})"
+    disagreeing = [
+        f"{contrast.frequency_hz:g} Hz (Holm {format_p_text(contrast.p_holm)}, Tukey {format_p_text(tukey)})"
         for contrast in primary.contrasts
         if (tukey := pairs.get(frequency_name(contrast.frequency_hz))) is not None
         and (tukey < 0.05) != (contrast.p_holm < 0.05)
     ]
     if not any(frequency_name(contrast.frequency_hz) in pairs for contrast in primary.contrasts):
         return ""
-    if not split:
+    if not disagreeing:
         return f"Both agree which frequencies differ from {lowest} at the 5 % level."
-    return f"At the 5 % level they disagree whether these differ from {lowest}: {conjoin(split)}."
+    return f"At the 5 % level they disagree whether these differ from {lowest}: {conjoin(disagreeing)}."

@@ -12,11 +12,16 @@ from analysis.evaluation.blind_test.controlled import ControlOutcome
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.evaluation.blind_test.score import Score
-from analysis.evaluation.blind_test.wording import answer_text, describe_concealed, figure_text, strength_text
+from analysis.evaluation.blind_test.wording import (
+    describe_answer,
+    describe_concealed,
+    describe_strengths,
+    format_figure,
+)
 from analysis.figures.picture import Picture
 from analysis.reports.page import Page, Section, Table, render_page
 
-HOW = (
+METHOD_PARAGRAPHS = (
     "Each device is simulated by a separate bench with its own integrator, step, friction law, sensor chain and "
     "small extras that no label names. It shares no code with the catalogue of the diagnosis. The model that comes "
     "with a recording is calibrated within its tolerances, or re-tuned to the device with the concealed effect, so "
@@ -57,12 +62,12 @@ def render_blind_test_report(
 ) -> str:
     """The report as an HTML page. generated: local time of the report; provenance: versions and hashes by name."""
     sections = (
-        Section(f"Misses: {len(score.misses)}", tables=(_miss_table(score.misses),) if score.misses else ()),
-        Section("Figures", tables=(_figure_table(score),)),
-        *_follow_up_sections(facts.followed),
-        *_control_sections(facts.controls),
+        Section(f"Misses: {len(score.misses)}", tables=(_make_miss_table(score.misses),) if score.misses else ()),
+        Section("Figures", tables=(_make_figure_table(score),)),
+        *_make_follow_up_sections(facts.followed),
+        *_make_control_sections(facts.controls),
         Section("Which, from where on, how sure", pictures=tuple(pictures)),
-        Section("How it was done", HOW, points=_fact_points(facts)),
+        Section("How it was done", METHOD_PARAGRAPHS, points=_list_facts(facts)),
     )
     return render_page(
         Page(
@@ -77,7 +82,7 @@ def render_blind_test_report(
     )
 
 
-def _control_sections(controls: Sequence[ControlOutcome]) -> tuple[Section, ...]:
+def _make_control_sections(controls: Sequence[ControlOutcome]) -> tuple[Section, ...]:
     """Section on the controls: changes with a known effect on the answer; empty without controls."""
     if not controls:
         return ()
@@ -89,17 +94,18 @@ def _control_sections(controls: Sequence[ControlOutcome]) -> tuple[Section, ...]
     return (Section("Controls", tables=(table,)),)
 
 
-def _follow_up_sections(found: Sequence[FollowUp]) -> tuple[Section, ...]:
+def _make_follow_up_sections(follow_ups: Sequence[FollowUp]) -> tuple[Section, ...]:
     """Section on ambiguous answers after the proposed and after a random further recording; empty without any."""
-    if not found:
+    if not follow_ups:
         return ()
     rows = tuple(
         (
-            str(each.number), each.effect, ", ".join(each.returned), each.proposed or "nothing would tell",
-            _describe_returned(each.proposed, each.after_proposed), each.drawn or "-",
-            _describe_returned(each.drawn, each.after_drawn),
+            str(follow_up.number), follow_up.effect, ", ".join(follow_up.returned),
+            follow_up.proposed or "nothing would tell",
+            _describe_returned(follow_up.proposed, follow_up.after_proposed), follow_up.drawn or "-",
+            _describe_returned(follow_up.drawn, follow_up.after_drawn),
         )
-        for each in found
+        for follow_up in follow_ups
     )  # fmt: skip
     header = ("number", "concealed", "left at first", "proposed", "left then", "drawn at random", "left then")
     notes = ("A random recording comes from the same menu, and may be the proposed one.",)
@@ -112,7 +118,8 @@ def _describe_returned(recorded: str, returned: Sequence[str]) -> str:
     return (", ".join(returned) or "no name") if recorded else "-"
 
 
-def _fact_points(facts: BlindTestFacts) -> tuple[str, ...]:
+def _list_facts(facts: BlindTestFacts) -> tuple[str, ...]:
+    """Points on how the test can be reproduced and checked."""
     return (
         f"Seeds {facts.seeds}.",
         f"SHA-256 of labels.sha256: {facts.seal}.",
@@ -121,12 +128,12 @@ def _fact_points(facts: BlindTestFacts) -> tuple[str, ...]:
     )
 
 
-def _miss_table(misses: Sequence[Outcome]) -> Table:
+def _make_miss_table(misses: Sequence[Outcome]) -> Table:
     """Table of all wrong answers, with the error over the noise of the re-tuned model and of the model found."""
     rows = tuple(
         (
-            str(miss.number), f"{miss.kind}, {miss.bank}", describe_concealed(miss), strength_text(miss) or "-",
-            answer_text(miss), f"{miss.left('retuned'):.2f}", f"{miss.left('after'):.2f}",
+            str(miss.number), f"{miss.kind}, {miss.bank}", describe_concealed(miss), describe_strengths(miss) or "-",
+            describe_answer(miss), f"{miss.worst_error('retuned'):.2f}", f"{miss.worst_error('after'):.2f}",
         )
         for miss in misses
     )  # fmt: skip
@@ -134,13 +141,13 @@ def _miss_table(misses: Sequence[Outcome]) -> Table:
     return Table("Every answer that is not as it should be", header, rows)
 
 
-def _figure_table(score: Score) -> Table:
+def _make_figure_table(score: Score) -> Table:
     """Table of all scores with 95 % intervals, the expected calibration error last."""
     calibration = score.calibration
-    whole = Figure(
+    calibration_figure = Figure(
         "expected calibration error, 10 bins of equal count", calibration.error, calibration.low, calibration.high,
-        sum(part.of for part in calibration.bins),
+        sum(probability_bin.of for probability_bin in calibration.bins),
     )  # fmt: skip
-    rows = tuple((figure.name, figure_text(figure)) for figure in (*score.figures, whole))
+    rows = tuple((figure.name, format_figure(figure)) for figure in (*score.figures, calibration_figure))
     notes = ("95 % intervals: shares after Wilson, others by resampling. Singles, pairs and outside: the detectable.",)
     return Table("With 95 % intervals", ("what", "measured"), rows, notes)

@@ -8,13 +8,13 @@ the answers depended on the cue (`answers_on_delivery`, logistic regression).
 
 from collections.abc import Sequence
 
-from analysis.psychophysics.cues.answers_on_delivery import RELYING, AnswersOnDelivery
+from analysis.psychophysics.cues.answers_on_delivery import CUE_ONLY_SLOPE, AnswersOnDelivery
 from analysis.psychophysics.cues.cue_ability import INTERNAL_NOISE_DB, USUAL_NOISE_DB
 from analysis.psychophysics.cues.cue_findings import CueFinding, cue_warnings, gap_text
 from analysis.psychophysics.cues.delivered_cues import CueGap
 from analysis.reports.page import Section, Table
 from analysis.threshold_words import threshold_words
-from analysis.wording import NONE, conjoin, format_signed, number, p_value
+from analysis.wording import MISSING, conjoin, format_number, format_p, format_signed
 from protocols.definition.staircase_rule import StaircaseRule
 
 _MEANING = (
@@ -25,32 +25,36 @@ _MEANING = (
 )
 
 
-def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap], rule: StaircaseRule) -> list[Section]:
-    """Section on cues other than the direction; empty where no trial was measured. found: a finding per cue and
+def cue_section(findings: Sequence[CueFinding], gaps: Sequence[CueGap], rule: StaircaseRule) -> list[Section]:
+    """Section on cues other than the direction; empty where no trial was measured. findings: a finding per cue and
     frequency. gaps: trials without a measurement of a cue. rule: the staircase rule, which sets the target d'."""
-    if not found:
+    if not findings:
         return []
-    sentences = (*(cue_warnings(found) or (_no_cue_text(found),)), *filter(None, [gap_text(gaps)]))
-    tables = (_ability_table(found, threshold_words(rule).sensitivity), _answer_table(found))
+    sentences = (*(cue_warnings(findings) or (_no_cue_text(findings),)), *filter(None, [gap_text(gaps)]))
+    tables = (_ability_table(findings, threshold_words(rule).sensitivity), _answer_table(findings))
     return [Section("Was direction the cue?", paragraphs=(_MEANING, *sentences), tables=tables)]
 
 
-def _no_cue_text(found: Sequence[CueFinding]) -> str:
+def _no_cue_text(findings: Sequence[CueFinding]) -> str:
     """The result where no cue is shown to be noticeable or followed, with the cues that could not be tested."""
-    unclear = [f"{each.cue.value} at {each.frequency_hz:g} Hz" for each in found if not each.answers.is_conclusive]
+    untestable = [
+        f"{finding.cue.value} at {finding.frequency_hz:g} Hz"
+        for finding in findings
+        if not finding.answers.is_conclusive
+    ]
     return (
         f"No measured difference is one that a participant with an internal noise of {USUAL_NOISE_DB:g} dB notices, "
         "and no answers are shown to depend on what was delivered."
         + (
-            f" Delivery varied too little within a direction to test whether answers depend on it: {conjoin(unclear)}. "
-            "A roved level (rove_db of [stimulus]) allows the test for intensity."
-            if unclear
+            " Delivery varied too little within a direction to test whether answers depend on it: "
+            f"{conjoin(untestable)}. A roved level (rove_db of [stimulus]) allows the test for intensity."
+            if untestable
             else ""
         )
     )
 
 
-def _ability_table(found: Sequence[CueFinding], sensitivity: str) -> Table:
+def _ability_table(findings: Sequence[CueFinding], sensitivity: str) -> Table:
     """Table of d' by each cue alone, a row per cue and frequency. sensitivity: sentence on the staircase's target
     d'."""
     return Table(
@@ -61,12 +65,12 @@ def _ability_table(found: Sequence[CueFinding], sensitivity: str) -> Table:
         ),
         rows=tuple(
             (
-                each.cue.value, f"{each.frequency_hz:g} Hz", format_signed(each.difference_db),
-                format_signed(each.largest_db), number(each.spread_db),
-                *(number(ability) for ability in each.abilities), number(each.observed_d_prime),
-                f"{len(each.noticed_by)} of {len(each.people)}",
+                finding.cue.value, f"{finding.frequency_hz:g} Hz", format_signed(finding.difference_db),
+                format_signed(finding.largest_db), format_number(finding.spread_db),
+                *(format_number(ability) for ability in finding.abilities), format_number(finding.observed_d_prime),
+                f"{len(finding.noticed_by)} of {len(finding.people)}",
             )
-            for each in found
+            for finding in findings
         ),
         notes=(
             "Difference: first direction minus second, by their angles; medians over participants, and the largest of "
@@ -79,24 +83,24 @@ def _ability_table(found: Sequence[CueFinding], sensitivity: str) -> Table:
     )  # fmt: skip
 
 
-def _answer_table(found: Sequence[CueFinding]) -> Table:
+def _answer_table(findings: Sequence[CueFinding]) -> Table:
     """Table of the logistic regression of answers on each cue, a row per cue and frequency."""
     return Table(
         caption="Whether answers depend on the delivery within a direction",
         header=("Cue", "Frequency", "Trials", "Spread (dB)", "Logits per dB", "95 % interval", "p (Holm)", "Answers"),
         rows=tuple(
             (
-                each.cue.value, f"{each.frequency_hz:g} Hz", str(each.answers.trials),
-                number(each.answers.residual_sd_db, 3), *_slope_texts(each.answers), p_value(each.p_holm),
-                _verdict(each),
+                finding.cue.value, f"{finding.frequency_hz:g} Hz", str(finding.answers.trials),
+                format_number(finding.answers.residual_sd_db, 3), *_slope_texts(finding.answers),
+                format_p(finding.p_holm), _verdict(finding),
             )
-            for each in found
+            for finding in findings
         ),
         notes=(
             "Logistic regression of answers on each trial's deviation from the others of that participant, direction "
             "and level. "
             f"A participant with an internal noise of {USUAL_NOISE_DB:g} dB who answers by the cue alone has "
-            f"{number(RELYING, 1)} logits per dB; a participant who answers by the direction has 0.",
+            f"{format_number(CUE_ONLY_SLOPE, 1)} logits per dB; a participant who answers by the direction has 0.",
         ),
         folded=True,
     )  # fmt: skip
@@ -105,7 +109,7 @@ def _answer_table(found: Sequence[CueFinding]) -> Table:
 def _slope_texts(answers: AnswersOnDelivery) -> tuple[str, str]:
     """Slope of the regression (logits per dB) and its 95 % interval."""
     if answers.slope is None or answers.lower is None or answers.upper is None:
-        return NONE, NONE
+        return MISSING, MISSING
     return format_signed(answers.slope), f"{format_signed(answers.lower)} to {format_signed(answers.upper)}"
 
 

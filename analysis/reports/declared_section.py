@@ -6,7 +6,7 @@ distinguish it from results chosen afterwards.
 
 from analysis.psychophysics.declared_result import ContrastResult, DeclaredResult
 from analysis.reports.page import Section, Table
-from analysis.wording import NONE, format_signed, p_text, p_value
+from analysis.wording import MISSING, format_p, format_p_text, format_signed
 
 NAMES = {"hierarchical": "hierarchical model of all answers", "published": "published one-way analysis"}
 
@@ -18,13 +18,13 @@ def make_declared_section(declaration: str, result: DeclaredResult) -> Section:
     if not _is_anything_declared(result):
         return Section(heading, paragraphs=(declaration,))
     tables = (_contrast_table(result),) if result.results else ()
-    words = [_sentence(row, result) for row in result.results if row.declared]
-    return Section(heading, paragraphs=(declaration, *words), tables=(*tables, _sample_table(result)))
+    sentences = [_contrast_sentence(row, result) for row in result.results if row.declared]
+    return Section(heading, paragraphs=(declaration, *sentences), tables=(*tables, _sample_table(result)))
 
 
 def describe_declared(result: DeclaredResult) -> tuple[str, ...]:
     """A sentence on the declared contrast per analysis, the declared analysis first; empty without a contrast."""
-    return tuple(_sentence(row, result) for row in result.results)
+    return tuple(_contrast_sentence(row, result) for row in result.results)
 
 
 def _is_anything_declared(result: DeclaredResult) -> bool:
@@ -33,17 +33,17 @@ def _is_anything_declared(result: DeclaredResult) -> bool:
     )
 
 
-def _sentence(row: ContrastResult, result: DeclaredResult) -> str:
+def _contrast_sentence(row: ContrastResult, result: DeclaredResult) -> str:
     """Sentence on the contrast by one analysis, with interval, p and notes."""
     first, second = result.contrast_hz
     role = ", the declared analysis" if row.declared else ""
-    opening = f"Declared contrast, {first:g} Hz minus {second:g} Hz, by the {NAMES[row.analysis]}{role}:"
+    contrast_words = f"Declared contrast, {first:g} Hz minus {second:g} Hz, by the {NAMES[row.analysis]}{role}:"
     if row.difference is None:
-        return f"{opening} not known. {' '.join(row.notes)}"
-    digits, percent = _digits(row), f"{100 * result.confidence:g} %"
+        return f"{contrast_words} not known. {' '.join(row.notes)}"
+    digits, percent = _decimals(row), f"{100 * result.confidence:g} %"
     return (
-        f"{opening} {format_signed(row.difference, digits)} {row.unit} "
-        f"({percent} interval {_interval(row)} {row.unit}, {p_text(row.p)}). {' '.join(row.notes)}"
+        f"{contrast_words} {format_signed(row.difference, digits)} {row.unit} "
+        f"({percent} interval {_interval_text(row)} {row.unit}, {format_p_text(row.p)}). {' '.join(row.notes)}"
     ).strip()
 
 
@@ -54,10 +54,10 @@ def _contrast_table(result: DeclaredResult) -> Table:
     for row in result.results:
         role = " (declared)" if row.declared else ""
         n, m = row.participants
-        size = NONE if row.difference is None else f"{format_signed(row.difference, _digits(row))} {row.unit}"
-        interval = NONE if row.difference is None else f"{_interval(row)} {row.unit}"
+        size = MISSING if row.difference is None else f"{format_signed(row.difference, _decimals(row))} {row.unit}"
+        interval = MISSING if row.difference is None else f"{_interval_text(row)} {row.unit}"
         people = str(n) if n == m else f"{n} and {m}"
-        rows.append((f"{NAMES[row.analysis]}{role}", people, size, interval, p_value(row.p)))
+        rows.append((f"{NAMES[row.analysis]}{role}", people, size, interval, format_p(row.p)))
     notes = tuple(f"{NAMES[row.analysis].capitalize()}: {note}" for row in result.results for note in row.notes)
     return Table(
         caption=f"Declared contrast: threshold at {first:g} Hz minus that at {second:g} Hz",
@@ -87,12 +87,12 @@ def _sample_table(result: DeclaredResult) -> Table:
     )
 
 
-def _interval(row: ContrastResult) -> str:
-    """Limits of the interval as text without unit; `NONE` for a limit that is not determined."""
-    ends = [NONE if end is None else format_signed(end, _digits(row)) for end in (row.lower, row.upper)]
+def _interval_text(row: ContrastResult) -> str:
+    """Limits of the interval as text without unit; `MISSING` for a limit that is not determined."""
+    ends = [MISSING if end is None else format_signed(end, _decimals(row)) for end in (row.lower, row.upper)]
     return " to ".join(ends)
 
 
-def _digits(row: ContrastResult) -> int:
+def _decimals(row: ContrastResult) -> int:
     """Decimals of a difference: one in dB, two in N."""
     return 1 if row.unit == "dB" else 2

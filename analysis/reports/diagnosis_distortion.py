@@ -8,7 +8,7 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.settings import DISTORTION_P
 from analysis.diagnosis.unit_wording import share_text
 from analysis.reports.page import Section, Table
-from analysis.wording import NONE, conjoin
+from analysis.wording import MISSING, conjoin
 
 _KINDS: tuple[Kind, ...] = ("odd", "even", "either", "varying")
 _WORDS: Mapping[Kind, str] = {
@@ -28,13 +28,13 @@ _LEAST_RESPONSE = 0.1
 """Response relative to the largest of its quantity, input and level, below which a channel has no row. By hand."""
 
 
-def distortion_sections(found: Findings) -> list[Section]:
+def distortion_sections(findings: Findings) -> list[Section]:
     """The section on distortion, with trends over the level in words and a table; empty where distortion was not
     examined."""
-    measured = found.local.distortions
+    measured = findings.localisation.distortions
     if not measured.cells and not measured.remarks:
         return []
-    table = _distortion_table(found)
+    table = _distortion_table(findings)
     return [
         Section(
             "What kind of distortion the device shows",
@@ -55,22 +55,24 @@ def _trend_paragraphs(cells: Sequence[Distortion]) -> tuple[str, ...]:
     if not groups:
         return ("No distortion exceeds the noise: by repeats and silent lines the device appears linear.",)
     return tuple(
-        f"{_WORDS[kind]}{' distortion' if kind != 'varying' else ''} {_TREND_WORDS[series]}: "
-        f"{conjoin([f'{each.output} driven by {each.input}' for each in trends])}."
-        for (kind, series), trends in groups.items()
+        f"{_WORDS[kind]}{' distortion' if kind != 'varying' else ''} {_TREND_WORDS[dependence]}: "
+        f"{conjoin([f'{member.output} driven by {member.input}' for member in trends])}."
+        for (kind, dependence), trends in groups.items()
     )
 
 
-def _distortion_table(found: Findings) -> Table | None:
-    cells = [cell for cell in found.local.distortions.cells if cell.whole_band]
+def _distortion_table(findings: Findings) -> Table | None:
+    cells = [cell for cell in findings.localisation.distortions.cells if cell.whole_band]
     responding = [cell for cell in cells if _responds(cell, cells)]
-    kinds = [kind for kind in _KINDS if any(item.kind == kind for item in responding)]
+    kinds = [kind for kind in _KINDS if any(distortion.kind == kind for distortion in responding)]
     rows: dict[tuple[str, str, str, float], dict[Kind, Distortion]] = {}
-    for each in responding:
-        rows.setdefault((each.output, each.quantity, each.input, each.amplitude), {})[each.kind] = each
+    for responding_cell in responding:
+        rows.setdefault(
+            (responding_cell.output, responding_cell.quantity, responding_cell.input, responding_cell.amplitude), {}
+        )[responding_cell.kind] = responding_cell
     if not rows:
         return None
-    noise = _noise_rms(found)
+    noise = _noise_rms(findings)
     return Table(
         "Noise and distortion, per cent of the response there",
         ("Channel", "Driven by", "Level", "Noise", *(_WORDS[kind] for kind in kinds)),
@@ -78,11 +80,11 @@ def _distortion_table(found: Findings) -> Table | None:
             (
                 output,
                 input_,
-                f"{level:g}",
-                _share_of_signal(noise.get((output, quantity)), next(iter(of_level.values())).signal_rms),
-                *(_cell_text(of_level.get(kind)) for kind in kinds),
+                f"{amplitude:g}",
+                _share_of_signal(noise.get((output, quantity)), next(iter(by_kind.values())).signal_rms),
+                *(_cell_text(by_kind.get(kind)) for kind in kinds),
             )
-            for (output, quantity, input_, level), of_level in rows.items()
+            for (output, quantity, input_, amplitude), by_kind in rows.items()
         ),
         (
             "Root-mean-square over the driven band. <: below the detection limit, which is stated. "
@@ -94,31 +96,31 @@ def _distortion_table(found: Findings) -> Table | None:
 
 def _responds(cell: Distortion, cells: Sequence[Distortion]) -> bool:
     """Whether its response is at least `_LEAST_RESPONSE` of the strongest of its quantity, input and level."""
-    beside = [
-        each.signal_rms
-        for each in cells
-        if (each.quantity, each.input, each.amplitude, each.whole_band)
+    signal_rms = [
+        other_cell.signal_rms
+        for other_cell in cells
+        if (other_cell.quantity, other_cell.input, other_cell.amplitude, other_cell.whole_band)
         == (cell.quantity, cell.input, cell.amplitude, cell.whole_band)
     ]
-    return cell.signal_rms > _LEAST_RESPONSE * max(beside)
+    return cell.signal_rms > _LEAST_RESPONSE * max(signal_rms)
 
 
-def _noise_rms(found: Findings) -> dict[tuple[str, str], float]:
+def _noise_rms(findings: Findings) -> dict[tuple[str, str], float]:
     """Rms by channel and quantity."""
-    if found.floor is None or not found.time_series:
+    if findings.floor is None or not findings.time_series:
         return {}
-    rms = [*found.floor.response_rms, *(() if found.floor.position_rms is None else found.floor.position_rms)]
-    keys = dict.fromkeys((cell.output, cell.quantity) for cell in found.local.distortions.cells)
+    rms = [*findings.floor.response_rms, *(() if findings.floor.position_rms is None else findings.floor.position_rms)]
+    keys = dict.fromkeys((cell.output, cell.quantity) for cell in findings.localisation.distortions.cells)
     return {key: float(value) for key, value in zip(keys, rms, strict=False)}
 
 
 def _share_of_signal(rms: float | None, signal: float) -> str:
-    return NONE if rms is None or not signal > 0 else share_text(rms / signal)
+    return MISSING if rms is None or not signal > 0 else share_text(rms / signal)
 
 
 def _cell_text(cell: Distortion | None) -> str:
     if cell is None:
-        return NONE
+        return MISSING
     if cell.p_value < DISTORTION_P:
         return _share_of_signal(cell.rms, cell.signal_rms)
     return f"< {_share_of_signal(cell.limit_rms, cell.signal_rms)}"

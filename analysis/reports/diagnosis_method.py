@@ -7,15 +7,15 @@ from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUN
 from analysis.wording import conjoin
 
 # Parts of the sentences; free simulation is the output error, predicted force the equation error (inverse dynamics).
-_FREE = (
+_FREE_SIMULATION = (
     "The model was simulated from rest with the recorded commands only, and its response was compared with the "
     "measured one, sample by sample (free simulation)."
 )
-_FORCE = (
+_PREDICTED_FORCE = (
     "In a free simulation a model of this device drifts away. Instead, the force that it needs for the measured "
     "motion was compared with the commanded force (predicted force)."
 )
-_HOW = {
+_NOISE_SOURCES = {
     "repeats": "from what differs between repeats of the same excitation",
     "rest": "from the signals while nothing is driven",
     "quiet band": "from the frequencies above the driven band",
@@ -29,56 +29,60 @@ _ROLES = (
 """Use of each set of samples, by its key in `Findings.split_s`."""
 
 
-def method_paragraphs(found: Findings) -> tuple[str, ...]:
+def method_paragraphs(findings: Findings) -> tuple[str, ...]:
     """The paragraphs in this order: error measure, split of the samples, noise, re-tuning and choice of effects, map of
     the mismatch. Paragraphs without data are left out."""
     return (
-        _error_paragraph(found),
-        *_split_paragraphs(found),
-        *_noise_paragraphs(found),
-        *_choice_paragraphs(found),
+        _error_paragraph(findings),
+        *_split_paragraphs(findings),
+        *_noise_paragraphs(findings),
+        *_choice_paragraphs(findings),
         _map_paragraph(),
     )
 
 
-def _error_paragraph(found: Findings) -> str:
+def _error_paragraph(findings: Findings) -> str:
     """The error measure that was used, and the units of errors."""
-    measure = found.diagnosis.error
+    measure = findings.diagnosis.error
     if measure == "free simulation":
-        how = _FREE
+        measure_text = _FREE_SIMULATION
     elif measure == "predicted force":
-        how = _FORCE
+        measure_text = _PREDICTED_FORCE
     else:
-        how = (
+        measure_text = (
             f"In a free simulation a model of this device drifts away. Instead, it was simulated over {measure}, each "
             "started from the measured state, and compared sample by sample."
         )
     return (
-        f"{how} Errors in per cent are root-mean-square over the channels, each divided by its own rms; errors in "
-        "units of the noise are root-mean-square of one channel, divided by the rms of its noise."
+        f"{measure_text} Errors in per cent are root-mean-square over the channels, each divided by its own rms; "
+        "errors in units of the noise are root-mean-square of one channel, divided by the rms of its noise."
     )
 
 
-def _split_paragraphs(found: Findings) -> tuple[str, ...]:
+def _split_paragraphs(findings: Findings) -> tuple[str, ...]:
     """Seconds of the recordings that served for fitting, validation and test; none where no times are known."""
-    parts = [f"{found.split_s[part]:.3g} s {did}" for part, did in _ROLES if found.split_s.get(part)]
+    parts = [f"{findings.split_s[role]:.3g} s {use}" for role, use in _ROLES if findings.split_s.get(role)]
     return (f"Of the recorded time, {conjoin(parts)}.",) if parts else ()
 
 
-def _noise_paragraphs(found: Findings) -> tuple[str, ...]:
+def _noise_paragraphs(findings: Findings) -> tuple[str, ...]:
     """Source of the noise estimate, with its remarks; none without an estimate."""
-    if found.floor is None:
+    if findings.floor is None:
         return ()
-    how = _HOW.get(found.floor.how)
-    text = f"The noise was measured {how}." if how else "The noise of this recording could not be measured."
-    return (" ".join([text, *found.floor.remarks]),)
+    source_text = _NOISE_SOURCES.get(findings.floor.method)
+    text = (
+        f"The noise was measured {source_text}."
+        if source_text
+        else "The noise of this recording could not be measured."
+    )
+    return (" ".join([text, *findings.floor.remarks]),)
 
 
-def _choice_paragraphs(found: Findings) -> tuple[str, ...]:
+def _choice_paragraphs(findings: Findings) -> tuple[str, ...]:
     """Re-tuning within the calibration's tolerance, and the search for effects; none where nothing is missing."""
-    if not found.diagnosis.mismatch:
+    if not findings.diagnosis.mismatch:
         return ()
-    bound = RETUNING_BOUND if found.tuning is None else found.tuning.bound
+    bound = RETUNING_BOUND if findings.tuning is None else findings.tuning.bound
     return (
         "First the model's own parameters were re-tuned, each held by the stated standard deviation of its "
         f"calibration and moved by at most {bound:g} of them. Then every effect of the catalogue was tried at every "

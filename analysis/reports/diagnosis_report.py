@@ -12,19 +12,19 @@ from analysis.diagnosis.result.ceiling_wording import (
 )
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.plausibility import implausible_sentences
-from analysis.diagnosis.result.retuned_parameters import describe_retuning, doubtful_sentences
+from analysis.diagnosis.result.retuned_parameters import describe_doubtful_parameters, describe_retuning
 from analysis.diagnosis.result.wording import (
-    answer_of,
-    device_of,
-    effect_sentence,
-    effect_title,
-    final_moved_parameters,
-    inseparable_sentence,
-    next_experiment_sentence,
-    remainder_sentence,
-    rival_sentences,
-    share_sentence,
-    signature_texts,
+    collect_signature_texts,
+    describe_effect,
+    describe_equivalents,
+    describe_next_experiment,
+    describe_remainder,
+    describe_rivals,
+    describe_share,
+    extract_device,
+    find_final_moves,
+    format_effect_title,
+    write_answer,
 )
 from analysis.figures.picture import Picture
 from analysis.reports.diagnosis_distortion import distortion_sections
@@ -43,30 +43,31 @@ from analysis.wording import capitalise
 
 
 def render_diagnosis_report(
-    found: Findings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
+    findings: Findings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
 ) -> str:
-    """HTML. pictures: of `analysis.figures.diagnosis.diagnosis_pictures`, for the same findings."""
-    diagnosis = found.diagnosis
+    """The report as an HTML page. pictures: of `analysis.figures.diagnosis.diagnosis_pictures`, for the same
+    findings."""
+    diagnosis = findings.diagnosis
     sections = [
-        *_answer_sections(found),
-        _localisation_section(found, pictures),
-        *distortion_sections(found),
-        *(_effect_section(found, number, pictures) for number in range(len(diagnosis.effects))),
-        *_candidate_sections(found),
-        *_rival_sections(pictures),
-        _error_section(found, pictures),
-        _remainder_section(found, pictures),
-        _parameter_section(found),
-        *_black_box_sections(found),
-        *_sentence_sections("The next recording", next_experiment_sentence(diagnosis)),
-        *_remark_sections(found),
-        Section("How this was done", paragraphs=method_paragraphs(found)),
+        *_make_answer_sections(findings),
+        _make_localisation_section(findings, pictures),
+        *distortion_sections(findings),
+        *(_make_effect_section(findings, number, pictures) for number in range(len(diagnosis.effects))),
+        *_make_candidate_sections(findings),
+        *_make_rival_sections(pictures),
+        _make_error_section(findings, pictures),
+        _make_remainder_section(findings, pictures),
+        _make_parameter_section(findings),
+        *_make_black_box_sections(findings),
+        *_make_sentence_sections("The next recording", describe_next_experiment(diagnosis)),
+        *_make_remark_sections(findings),
+        Section("How this was done", paragraphs=method_paragraphs(findings)),
     ]
     return render_page(
         Page(
-            title=f"Diagnosis of {found.given.name}",
-            summary=answer_of(found),
-            banner=_banner(found),
+            title=f"Diagnosis of {findings.given.name}",
+            summary=write_answer(findings),
+            banner=_join_doubts(findings),
             sections=tuple(sections),
             generated=generated,
             provenance=provenance,
@@ -74,136 +75,143 @@ def render_diagnosis_report(
     )
 
 
-def _banner(found: Findings) -> str:
-    """Doubts about the answer."""
-    named = bool(found.diagnosis.effects)
-    doubts = [confirmation_sentence(found.diagnosis.fit.fit, found.diagnosis.fit.test)] if named else []
-    if named and found.black_box is not None and black_box_beats(found.black_box):
-        doubts.append(black_box_sentence(found.black_box, named))
+def _join_doubts(findings: Findings) -> str:
+    """Doubts about the answer as one text; empty without doubts."""
+    has_effects = bool(findings.diagnosis.effects)
+    doubts = [confirmation_sentence(findings.diagnosis.fit.fit, findings.diagnosis.fit.test)] if has_effects else []
+    if has_effects and findings.black_box is not None and black_box_beats(findings.black_box):
+        doubts.append(black_box_sentence(findings.black_box, has_effects))
     return " ".join(doubt for doubt in doubts if doubt)
 
 
-def _answer_sections(found: Findings) -> list[Section]:
+def _make_answer_sections(findings: Findings) -> list[Section]:
     """Sections of a diagnosis that names physics: one sentence for each effect, and what they leave open."""
-    effects, signatures = found.diagnosis.effects, signature_texts(found)
+    effects, signatures = findings.diagnosis.effects, collect_signature_texts(findings)
     if not effects:
         return []
     points = [
-        " ".join(filter(None, (_effect_text(found, effect, signatures), inseparable_sentence(effect))))
+        " ".join(filter(None, (_describe_effect(findings, effect, signatures), describe_equivalents(effect))))
         for effect in effects
     ]
-    after = [remainder_sentence(found.diagnosis, device_of(found)), next_experiment_sentence(found.diagnosis)]
-    return [Section("What the model lacks", points=(*points, *filter(None, after)))]
+    closing_sentences = [
+        describe_remainder(findings.diagnosis, extract_device(findings)),
+        describe_next_experiment(findings.diagnosis),
+    ]
+    return [Section("What the model lacks", points=(*points, *filter(None, closing_sentences)))]
 
 
-def _candidate_sections(found: Findings) -> list[Section]:
-    table = candidate_table(found)
+def _make_candidate_sections(findings: Findings) -> list[Section]:
+    """Section with the effects that may be missing but are not named; none without candidates."""
+    table = candidate_table(findings)
     return [] if table is None else [Section("What else may be missing", tables=(table,))]
 
 
-def _black_box_sections(found: Findings) -> list[Section]:
-    text = black_box_sentence(found.black_box, bool(found.diagnosis.effects))
-    paragraphs = tuple(filter(None, (*describe_ceiling(found.reached), text)))
+def _make_black_box_sections(findings: Findings) -> list[Section]:
+    """Section that compares the prediction with that of a black-box model; none without one."""
+    text = black_box_sentence(findings.black_box, bool(findings.diagnosis.effects))
+    paragraphs = tuple(filter(None, (*describe_ceiling(findings.balance_errors), text)))
     return [Section("Comparison with a black box", paragraphs=paragraphs)] if paragraphs else []
 
 
 _NO_MAP = "There is no map: the noise of this recording is not known."
 
 
-def _localisation_section(found: Findings, pictures: Sequence[Picture]) -> Section:
-    sentences = localisation_sentences(found.local) if found.maps else (_NO_MAP,)
-    listed = mismatch_table("The places that differ most, as given", found.diagnosis.mismatch, found.is_timed)
+def _make_localisation_section(findings: Findings, pictures: Sequence[Picture]) -> Section:
+    sentences = localisation_sentences(findings.localisation) if findings.maps else (_NO_MAP,)
+    table = mismatch_table("The places that differ most, as given", findings.diagnosis.mismatch, findings.is_timed)
     return Section(
         "Where model and device disagree",
         paragraphs=sentences,
         pictures=(*_select_pictures(pictures, "state"), *_select_pictures(pictures, "mismatch-map")),
-        tables=(listed,),
+        tables=(table,),
     )
 
 
-def _effect_section(found: Findings, number: int, pictures: Sequence[Picture]) -> Section:
-    effect = found.diagnosis.effects[number]
-    placed = next((each.effect for each in found.named if each.effect.name == effect.effect), None)
-    paragraphs = [share_sentence(effect)]
-    if placed is not None:
-        paragraphs += [f"Equation: {placed.equation}.", f"Source: {placed.source}."]
-    rivals = rival_sentences(effect)
-    if not rivals and not inseparable_sentence(effect):
+def _make_effect_section(findings: Findings, number: int, pictures: Sequence[Picture]) -> Section:
+    effect = findings.diagnosis.effects[number]
+    catalogue_effect = next((match.effect for match in findings.named if match.effect.name == effect.effect), None)
+    paragraphs = [describe_share(effect)]
+    if catalogue_effect is not None:
+        paragraphs += [f"Equation: {catalogue_effect.equation}.", f"Source: {catalogue_effect.source}."]
+    rivals = describe_rivals(effect)
+    if not rivals and not describe_equivalents(effect):
         paragraphs.append("No rival fits nearly as well.")
     return Section(
-        capitalise(effect_title(effect, _has_single_input(found))),
+        capitalise(format_effect_title(effect, _has_single_input(findings))),
         paragraphs=tuple(paragraphs),
-        pictures=_signature_pictures(found, effect, pictures),
+        pictures=_select_signatures(findings, effect, pictures),
         tables=(parameter_table(effect), *((rival_table(effect),) if effect.rivals else ())),
     )
 
 
-def _signature_pictures(found: Findings, effect: NamedEffect, pictures: Sequence[Picture]) -> tuple[Picture, ...]:
+def _select_signatures(findings: Findings, effect: NamedEffect, pictures: Sequence[Picture]) -> tuple[Picture, ...]:
     """Signatures of the effect: only those at its own axis where it has one there."""
-    of_effect = [
-        number for number, signature in enumerate(found.signatures, start=1) if signature.effect == effect.effect
+    effect_numbers = [
+        number for number, signature in enumerate(findings.signatures, start=1) if signature.effect == effect.effect
     ]
-    there = [number for number in of_effect if found.signatures[number - 1].axis == effect.axis]
-    names = {f"signature-{number}" for number in (there or of_effect)}
+    at_axis = [number for number in effect_numbers if findings.signatures[number - 1].axis == effect.axis]
+    names = {f"signature-{number}" for number in (at_axis or effect_numbers)}
     return tuple(picture for picture in pictures if picture.name in names)
 
 
-def _rival_sections(pictures: Sequence[Picture]) -> list[Section]:
-    shown = _select_pictures(pictures, "rivals")
-    return [Section("What else was tried", pictures=shown)] if shown else []
+def _make_rival_sections(pictures: Sequence[Picture]) -> list[Section]:
+    """Section with the pictures of rival effects; none without pictures."""
+    rival_pictures = _select_pictures(pictures, "rivals")
+    return [Section("What else was tried", pictures=rival_pictures)] if rival_pictures else []
 
 
-def _error_section(found: Findings, pictures: Sequence[Picture]) -> Section:
-    tables: list[Table] = [error_table(found)]
-    tables += [table for part in ("test", "fit") if (table := channel_table(found, part)) is not None]
+def _make_error_section(findings: Findings, pictures: Sequence[Picture]) -> Section:
+    tables: list[Table] = [error_table(findings)]
+    tables += [table for part in ("test", "fit") if (table := channel_table(findings, part)) is not None]
     return Section("How well it predicts", pictures=_select_pictures(pictures, "held-out"), tables=tuple(tables))
 
 
-def _remainder_section(found: Findings, pictures: Sequence[Picture]) -> Section:
-    left = found.diagnosis.remainder
-    tables = (mismatch_table("Remaining mismatch", left, found.is_timed),) if left else ()
+def _make_remainder_section(findings: Findings, pictures: Sequence[Picture]) -> Section:
+    remainder = findings.diagnosis.remainder
+    tables = (mismatch_table("Remaining mismatch", remainder, findings.is_timed),) if remainder else ()
     return Section(
         "What is still unexplained",
-        paragraphs=(remainder_sentence(found.diagnosis, device_of(found)),),
+        paragraphs=(describe_remainder(findings.diagnosis, extract_device(findings)),),
         pictures=_select_pictures(pictures, "remainder"),
         tables=tables,
     )
 
 
-_UNMOVED = {
+_UNMOVED_SENTENCES = {
     False: "No parameter changed by more than the standard deviation of its calibration.",
     True: "No parameter changed by more than the tolerance of the first fit.",
 }
 """Key: whether the model was fitted to the recordings first."""
 
 
-def _parameter_section(found: Findings) -> Section:
-    moved = final_moved_parameters(found)
-    text = describe_retuning(moved, found.fitted) or _UNMOVED[found.fitted]
-    table = tabulate_retuned(found)
+def _make_parameter_section(findings: Findings) -> Section:
+    moved_parameters = find_final_moves(findings)
+    text = describe_retuning(moved_parameters, findings.fitted) or _UNMOVED_SENTENCES[findings.fitted]
+    table = tabulate_retuned(findings)
     return Section(
         "The model's own parameters",
         paragraphs=(text,),
-        points=doubtful_sentences(moved, found.fitted),
+        points=describe_doubtful_parameters(moved_parameters, findings.fitted),
         tables=(table,) if table is not None else (),
     )
 
 
-def _remark_sections(found: Findings) -> list[Section]:
-    points = (*implausible_sentences(found), *found.remarks)
+def _make_remark_sections(findings: Findings) -> list[Section]:
+    points = (*implausible_sentences(findings), *findings.remarks)
     return [Section("Remarks", points=points)] if points else []
 
 
-def _sentence_sections(heading: str, sentence: str) -> list[Section]:
+def _make_sentence_sections(heading: str, sentence: str) -> list[Section]:
+    """Section with a single sentence; none for an empty sentence."""
     return [Section(heading, paragraphs=(sentence,))] if sentence else []
 
 
-def _effect_text(found: Findings, effect: NamedEffect, signatures: Mapping[str, str]) -> str:
-    return effect_sentence(effect, signatures.get(effect.effect, ""), _has_single_input(found))
+def _describe_effect(findings: Findings, effect: NamedEffect, signatures: Mapping[str, str]) -> str:
+    return describe_effect(effect, signatures.get(effect.effect, ""), _has_single_input(findings))
 
 
-def _has_single_input(found: Findings) -> bool:
-    return found.given.inputs == 1
+def _has_single_input(findings: Findings) -> bool:
+    return findings.given.inputs == 1
 
 
 def _select_pictures(pictures: Sequence[Picture], kind: str) -> tuple[Picture, ...]:

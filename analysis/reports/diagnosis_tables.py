@@ -11,11 +11,11 @@ from analysis.diagnosis.document import Errors, Estimate, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import estimate_text, noun_of, place_words
 from analysis.diagnosis.result.candidate_wording import candidate_parameters
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.retuned_parameters import all_parameters
-from analysis.diagnosis.result.wording import device_of
+from analysis.diagnosis.result.retuned_parameters import list_parameters
+from analysis.diagnosis.result.wording import extract_device
 from analysis.diagnosis.unit_wording import error_text, probability_text, share_text, value_text
 from analysis.reports.page import Table
-from analysis.wording import NONE, capitalise, end_sentence, format_signed, p_value
+from analysis.wording import MISSING, capitalise, end_sentence, format_p, format_signed
 
 _STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With the effects found"))
 """Attribute of each stage of the model, and its heading."""
@@ -54,18 +54,18 @@ def rival_table(effect: NamedEffect) -> Table:
     return Table("It and its rivals", ("Effect", "Probability", "Verdict", "Why"), tuple(rows))
 
 
-def candidate_table(found: Findings) -> Table | None:
+def candidate_table(findings: Findings) -> Table | None:
     """Table of candidate effects that were not confirmed, the best first; None without candidates."""
-    device = device_of(found)
+    device = extract_device(findings)
     rows = tuple(
         (
             f"{capitalise(noun_of(candidate.effect))} {place_words(candidate.place, candidate.axis, device.single)}",
-            candidate_parameters(candidate, device) or NONE,
+            candidate_parameters(candidate, device) or MISSING,
             share_text(candidate.held_out_gain),
             share_text(candidate.share_of_black_box),
             end_sentence(capitalise(candidate.why_not)),
         )
-        for candidate in found.diagnosis.candidates
+        for candidate in findings.diagnosis.candidates
     )
     if not rows:
         return None
@@ -78,39 +78,43 @@ def candidate_table(found: Findings) -> Table | None:
     return Table("The best candidates, not confirmed", header, rows, (note,))
 
 
-def error_table(found: Findings) -> Table:
+def error_table(findings: Findings) -> Table:
     """Table of root-mean-square errors over all channels as a share of the signal, on fitted and on held-out data, by
     stage of the model, with the noise."""
     rows = tuple(
         (f"On {_PARTS[part]}", *(_stage_error_text(errors, stage) for stage, _ in _STAGES), error_text(errors.noise))
-        for part, errors in (("fit", found.diagnosis.fit.fit), ("test", found.diagnosis.fit.test))
+        for part, errors in (("fit", findings.diagnosis.fit.fit), ("test", findings.diagnosis.fit.test))
     )
     header = ("Error, share of the signal", *(words for _, words in _STAGES), "Noise alone")
     return Table("Errors over all channels, root-mean-square", header, rows)
 
 
-def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None:
+def channel_table(findings: Findings, part: Literal["fit", "test"]) -> Table | None:
     """Table of the rms error of each channel in its unit, with its ratio to the noise, by stage of the model; None
     where there are no time series. Where a statistic was fitted, its chance error takes the place of the noise."""
-    if not found.time_series:
+    if not findings.time_series:
         return None
-    names, units, noises = found.time_series[0].channels, found.time_series[0].units, found.noise_rms
-    statistic, what = found.explanation.statistic, "noise"
+    names, units, noises = findings.time_series[0].channels, findings.time_series[0].units, findings.noise_rms
+    statistic, reference = findings.explanation.statistic, "noise"
     if statistic is not None:
-        units, noises, what = ("1",) * len(names), dict(zip(names, statistic.chance.tolist(), strict=True)), "chance"
-    stands = {stage: getattr(getattr(found.explanation, stage).score, part) for stage, _ in _STAGES}
+        units, noises, reference = (
+            ("1",) * len(names),
+            dict(zip(names, statistic.chance.tolist(), strict=True)),
+            "chance",
+        )
+    scores = {stage: getattr(getattr(findings.explanation, stage).score, part) for stage, _ in _STAGES}
     rows = []
     for k, (name, unit) in enumerate(zip(names, units, strict=True)):
         noise = noises.get(name)
         if noise is None:
             continue
         ratios = [
-            float(found.channel_errors.get(stage, {}).get(name, values[k]) if part == "test" else values[k])
-            for stage, values in stands.items()
+            float(findings.channel_errors.get(stage, {}).get(name, values[k]) if part == "test" else values[k])
+            for stage, values in scores.items()
         ]
         rows.append((name, *(f"{value_text(ratio * noise, unit)} ({_ratio_text(ratio)})" for ratio in ratios),
                      value_text(noise, unit)))  # fmt: skip
-    header = ("Channel", *(f"{words} (× {what})" for _, words in _STAGES), capitalise(what))
+    header = ("Channel", *(f"{words} (× {reference})" for _, words in _STAGES), capitalise(reference))
     return Table(f"By channel, on {_PARTS[part]}, rms", header, tuple(rows), folded=part == "fit")
 
 
@@ -120,33 +124,43 @@ def mismatch_table(caption: str, places: Sequence[Mismatch], is_timed: bool = Tr
     worst = places[:_MOST_PLACES]
     rows = tuple(
         (
-            each.output,
-            each.input,
-            f"{each.band_hz[0]:g} to {each.band_hz[1]:g} {'Hz' if is_timed else 'cycles per sample'}",
-            NONE if each.amplitude is None else f"{each.amplitude:g}",
-            each.state or NONE,
-            share_text(each.share),
-            p_value(each.p_value),
+            mismatch.output,
+            mismatch.input,
+            f"{mismatch.band_hz[0]:g} to {mismatch.band_hz[1]:g} {'Hz' if is_timed else 'cycles per sample'}",
+            MISSING if mismatch.amplitude is None else f"{mismatch.amplitude:g}",
+            mismatch.state or MISSING,
+            share_text(mismatch.share),
+            format_p(mismatch.p_value),
         )
-        for each in worst
+        for mismatch in worst
     )
-    more = len(places) - len(worst)
-    notes: tuple[str, ...] = (f"And {more} smaller {'place' if more == 1 else 'places'}.",) if more > 0 else ()
+    remaining_count = len(places) - len(worst)
+    notes: tuple[str, ...] = (
+        (f"And {remaining_count} smaller {'place' if remaining_count == 1 else 'places'}.",)
+        if remaining_count > 0
+        else ()
+    )
     notes += (_SHARE,) if worst else ()
     header = ("Channel", "Driven by", "Band", "Level", "State", "Share", "p")
     return Table(caption, header, rows, notes, folded=True)
 
 
-def tabulate_retuned(found: Findings) -> Table | None:
+def tabulate_retuned(findings: Findings) -> Table | None:
     """Folded table of all re-tuned parameters, before and after the found effects were added, with their deviations in
     standard deviations; None where nothing was re-tuned."""
-    if found.tuning is None:
+    if findings.tuning is None:
         return None
-    alone = all_parameters(found.tuning, found.explanation.retuned.fitted.deviations)
-    final = all_parameters(found.tuning, found.explanation.after.fitted.deviations)
+    retuned_parameters = list_parameters(findings.tuning, findings.explanation.retuned.fitted.deviations)
+    final_parameters = list_parameters(findings.tuning, findings.explanation.after.fitted.deviations)
     rows = tuple(
-        (before.name, before.size, format_signed(before.deviations), after.size, format_signed(after.deviations))
-        for before, after in zip(alone, final, strict=True)
+        (
+            retuned.name,
+            retuned.change_text,
+            format_signed(retuned.deviations),
+            completed.change_text,
+            format_signed(completed.deviations),
+        )
+        for retuned, completed in zip(retuned_parameters, final_parameters, strict=True)
     )
     header = ("Number", "Re-tuned", "Standard deviations", "With the effects found", "Standard deviations")
     return Table("Every free parameter, by the size of its change", header, rows, folded=True)
@@ -164,9 +178,9 @@ def _ratio_text(ratio: float) -> str:
 
 
 def _interval_text(estimate: Estimate) -> str:
-    """95 % interval of an estimate with the digits of `value_text`; `NONE` without an interval."""
+    """95 % interval of an estimate with the digits of `value_text`; `MISSING` without an interval."""
     if estimate.ci95 is None:
-        return NONE
+        return MISSING
     text = value_text(estimate.value, estimate.unit, estimate.ci95)
     low, high = text[text.index("[") + 1 : -1].split(", ")
     return f"{low} to {high}"

@@ -47,45 +47,49 @@ class IdentificationFindings:
     """Further sentences, shown as a list."""
 
 
-def identification_pictures(found: IdentificationFindings) -> tuple[Picture, ...]:
+def identification_pictures(findings: IdentificationFindings) -> tuple[Picture, ...]:
     """Pictures of the transfer functions (published figure 4), the bands (figure 1) and the choice of order; those
     without data are left out."""
-    low, high = found.model.band_hz
+    low, high = findings.model.band_hz
     curve_hz = np.geomspace(low, high, CURVE_LINES)
-    curve = ResponseCurve("model", curve_hz, model_response(found.model, curve_hz))
-    pictures = [transfer_functions_picture(found.estimate, curve, found.model.band_hz)]
-    if found.bands:
-        pictures.append(frequency_bands_picture(found.estimate, found.onset, found.bands, found.direction_limit_hz))
-    if found.order is not None:
-        pictures.append(model_order_picture(found.order, found.model.order))
+    curve = ResponseCurve("model", curve_hz, model_response(findings.model, curve_hz))
+    pictures = [transfer_functions_picture(findings.estimate, curve, findings.model.band_hz)]
+    if findings.bands:
+        pictures.append(
+            frequency_bands_picture(findings.estimate, findings.onset, findings.bands, findings.direction_limit_hz)
+        )
+    if findings.order is not None:
+        pictures.append(model_order_picture(findings.order, findings.model.order))
     return tuple(pictures)
 
 
 def render_identification_report(
-    found: IdentificationFindings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
+    findings: IdentificationFindings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
 ) -> str:
     """The report as an HTML page. pictures: those of `identification_pictures`, recognised by name; missing pictures
     are left out. generated: local time of the report; provenance: versions and hashes by name."""
     by_name = {picture.name: picture for picture in pictures}
-    low, high = found.model.band_hz
+    low, high = findings.model.band_hz
 
-    def shown(name: str) -> tuple[Picture, ...]:
+    def find_picture(name: str) -> tuple[Picture, ...]:
         """The picture of this name; empty where it is missing."""
         return (by_name[name],) if name in by_name else ()
 
     sections = (
-        Section("The model", paragraphs=found.results, points=found.remarks),
+        Section("The model", paragraphs=findings.results, points=findings.remarks),
         Section(
-            "Transfer functions", pictures=shown("transfer-functions"), tables=(_resonance_table(found.resonances),)
+            "Transfer functions",
+            pictures=find_picture("transfer-functions"),
+            tables=(_resonance_table(findings.resonances),),
         ),
-        Section("Bands", paragraphs=(_onset_sentence(found.onset),), pictures=shown("frequency-bands")),
-        Section("Order", pictures=shown("model-order"), tables=_order_tables(found.order)),
+        Section("Bands", paragraphs=(_onset_sentence(findings.onset),), pictures=find_picture("frequency-bands")),
+        Section("Order", pictures=find_picture("model-order"), tables=_order_tables(findings.order)),
     )
     return render_page(
         Page(
             title="Identified device",
-            summary=f"A model of order {found.model.order} for {low:g} to {high:g} Hz, "
-            f"{len(found.model.input_channels)} forces to {len(found.model.output_channels)} accelerations.",
+            summary=f"A model of order {findings.model.order} for {low:g} to {high:g} Hz, "
+            f"{len(findings.model.input_channels)} forces to {len(findings.model.output_channels)} accelerations.",
             banner="",
             sections=sections,
             generated=generated,
@@ -113,10 +117,10 @@ def _onset_sentence(onset: CouplingOnset) -> str:
     """Sentence on the frequency at which coupling begins, and the rule by which it was found."""
     if onset.frequency_hz is None:
         return f"No onset of coupling was found. Rule: {onset.rule}."
-    between = ""
+    interval_text = ""
     if onset.interval_hz is not None:
-        between = f" (95 % interval {onset.interval_hz[0]:.2f} to {onset.interval_hz[1]:.2f} Hz)"
-    return f"Coupling begins at {onset.frequency_hz:.2f} Hz{between}. Rule: {onset.rule}."
+        interval_text = f" (95 % interval {onset.interval_hz[0]:.2f} to {onset.interval_hz[1]:.2f} Hz)"
+    return f"Coupling begins at {onset.frequency_hz:.2f} Hz{interval_text}. Rule: {onset.rule}."
 
 
 def _order_tables(order: OrderReport | None) -> tuple[Table, ...]:

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 
 from analysis.evaluation.blind_test.confidence_intervals import Figure
 from analysis.evaluation.blind_test.injected import (
+    ANSWER_CLASSES,
     DETECTABLE,
-    JUDGED,
     InjectedOutcome,
     Tally,
-    injected_figures,
-    tallies,
+    make_tallies,
+    score_injections,
 )
 from analysis.reports.page import Section, Table
 
@@ -24,27 +24,27 @@ def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
     rates = Table(
         "How often it was right",
         ("what", "rate, 95 % interval"),
-        tuple((injected_figure.name, figure_text(injected_figure)) for injected_figure in injected_figures(outcomes)),
+        tuple((injected_figure.name, figure_text(injected_figure)) for injected_figure in score_injections(outcomes)),
     )
-    kinds = _tally_table("Detectable faults by kind", "injected", tallies(outcomes, kind_of))
-    where = _tally_table(
-        "Detectable faults by recording", "recording", tallies(outcomes, lambda outcome: outcome.recording)
+    by_kind = _tally_table("Detectable faults by kind", "injected", make_tallies(outcomes, kind_of))
+    by_recording = _tally_table(
+        "Detectable faults by recording", "recording", make_tallies(outcomes, lambda outcome: outcome.recording)
     )
     missed = [
-        outcome for outcome in outcomes if not outcome.right and (outcome.detectable or outcome.judged == "wrong")
+        outcome for outcome in outcomes if not outcome.right and (outcome.detectable or outcome.answer_class == "wrong")
     ]
-    listed = Table(
+    miss_table = Table(
         "Every miss, and every wrong fault named",
         ("recording", "injected", "error changes by", "judged", "named"),
         tuple(
             (
-                each.recording,
-                each.injected or "nothing",
-                _change_text(each.change),
-                each.judged,
-                ", ".join(each.named) or "-",
+                miss.recording,
+                miss.injected or "nothing",
+                _change_text(miss.change),
+                miss.answer_class,
+                ", ".join(miss.named) or "-",
             )
-            for each in missed
+            for miss in missed
         ),
     )
     return Section(
@@ -56,7 +56,7 @@ def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
             f"A fault is detectable where it changes the held-out error of a base model, fitted to the clean stretch "
             f"alone, by a factor of {DETECTABLE} or more, up or down.",
         ),
-        tables=tuple(table for table in (rates, kinds, where, listed) if table.rows),
+        tables=tuple(table for table in (rates, by_kind, by_recording, miss_table) if table.rows),
     )
 
 
@@ -65,20 +65,27 @@ def kind_of(injected_outcome: InjectedOutcome) -> str:
     return "two at once" if len(injected_outcome.effects) > 1 else injected_outcome.injected
 
 
-def _tally_table(title: str, what: str, rows: Sequence[Tally]) -> Table:
-    """Table of tallies, one row each. what: heading of the first column."""
-    head = (what, "drawn", "detectable", *JUDGED[:-1], "named or in class", "nothing injected, nothing named")
+def _tally_table(title: str, heading: str, rows: Sequence[Tally]) -> Table:
+    """Table of tallies, one row each. heading: heading of the first column."""
+    header = (
+        heading,
+        "drawn",
+        "detectable",
+        *ANSWER_CLASSES[:-1],
+        "named or in class",
+        "nothing injected, nothing named",
+    )
     return Table(
         title,
-        head,
+        header,
         tuple(
             (
-                row.what,
-                str(row.drawn),
+                row.name,
+                str(row.fault_count),
                 str(row.right.of),
                 *map(str, row.counts),
                 figure_text(row.right),
-                figure_text(row.nothing),
+                figure_text(row.faultless),
             )
             for row in rows
         ),

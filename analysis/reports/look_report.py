@@ -1,6 +1,6 @@
 """Report of recordings before any model: what is wrong, then per recording its checks, channels and figures.
 
-`brief` is the summary of a recording in a sentence. Checks and channels are values of
+`summarise_overview` is the summary of a recording in a sentence. Checks and channels are values of
 `analysis.look.overview`; here they become tables.
 """
 
@@ -11,22 +11,27 @@ from analysis.figures.picture import Picture
 from analysis.look.check import Check
 from analysis.look.overview import Overview
 from analysis.reports.page import Page, Section, Table, render_page
-from analysis.wording import typeset, write_without_time
+from analysis.wording import replace_time_units, typeset
 
 
 def render_look_report(
-    found: Sequence[Overview], pictures: Sequence[tuple[Picture, ...]], provenance: Mapping[str, str], generated: str
+    overviews: Sequence[Overview],
+    pictures: Sequence[tuple[Picture, ...]],
+    provenance: Mapping[str, str],
+    generated: str,
 ) -> str:
     """The page about recordings. pictures: of each recording, as `pictures_of` gives them."""
-    wrong = [(each.name, check) for each in found for check in each.checks if check.level == "wrong"]
+    wrong = [(overview.name, check) for overview in overviews for check in overview.checks if check.level == "wrong"]
     sections = [
-        section for each, drawn in zip(found, pictures, strict=True) for section in _sections(each, drawn, found)
+        section
+        for overview, overview_pictures in zip(overviews, pictures, strict=True)
+        for section in _recording_sections(overview, overview_pictures, overviews)
     ]
     return render_page(
         Page(
-            title="A look at " + ", ".join(dict.fromkeys(each.recording.device for each in found)),
-            summary=f"{len(found)} recording{'s' if len(found) > 1 else ''}, before any model. "
-            + " ".join(brief(each) for each in found[:3]),
+            title="A look at " + ", ".join(dict.fromkeys(overview.recording.device for overview in overviews)),
+            summary=f"{len(overviews)} recording{'s' if len(overviews) > 1 else ''}, before any model. "
+            + " ".join(summarise_overview(overview) for overview in overviews[:3]),
             banner=f"{len(wrong)} thing{'s' if len(wrong) > 1 else ''} would mislead an analysis: {wrong[0][1].seen}"
             if wrong
             else "",
@@ -37,38 +42,40 @@ def render_look_report(
     )
 
 
-def pictures_of(found: Sequence[Overview]) -> tuple[tuple[Picture, ...], ...]:
+def pictures_of(overviews: Sequence[Overview]) -> tuple[tuple[Picture, ...], ...]:
     """Pictures of each recording; recordings are numbered from 1."""
-    return tuple(look_pictures(each, place) for place, each in enumerate(found, start=1))
+    return tuple(look_pictures(overview, number) for number, overview in enumerate(overviews, start=1))
 
 
-def brief(found: Overview) -> str:
+def summarise_overview(overview: Overview) -> str:
     """One sentence: what was recorded, for how long, and the result of the checks."""
-    recording = found.recording
-    counts = {level: sum(check.level == level for check in found.checks) for level in ("wrong", "notice", "fine")}
+    recording = overview.recording
+    counts = {level: sum(check.level == level for check in overview.checks) for level in ("wrong", "notice", "fine")}
     text = (
-        f"{found.name}: {recording.response.duration_s:.4g} s at {recording.sample_rate_hz:.6g} Hz, "
-        f"{len(found.channels)} channels, {len(recording.segments)} segments; checks: {counts['wrong']} wrong, "
+        f"{overview.name}: {recording.response.duration_s:.4g} s at {recording.sample_rate_hz:.6g} Hz, "
+        f"{len(overview.channels)} channels, {len(recording.segments)} segments; checks: {counts['wrong']} wrong, "
         f"{counts['notice']} to notice, {counts['fine']} fine."
     )
-    return text if recording.is_timed else write_without_time(text)
+    return text if recording.is_timed else replace_time_units(text)
 
 
-def _sections(overview: Overview, pictures: Sequence[Picture], found: Sequence[Overview]) -> tuple[Section, ...]:
-    of = f" of {overview.name}" if len(found) > 1 else ""
+def _recording_sections(
+    overview: Overview, pictures: Sequence[Picture], overviews: Sequence[Overview]
+) -> tuple[Section, ...]:
+    suffix = f" of {overview.name}" if len(overviews) > 1 else ""
     return (
-        Section(f"Checks{of}", tables=(_checks(overview.checks),)),
-        Section(f"Channels{of}", tables=(_channels(overview),)),
-        Section(f"Pictures{of}", pictures=tuple(pictures), tables=(_segments(overview),)),
+        Section(f"Checks{suffix}", tables=(_check_table(overview.checks),)),
+        Section(f"Channels{suffix}", tables=(_channel_table(overview),)),
+        Section(f"Pictures{suffix}", pictures=tuple(pictures), tables=(_segment_table(overview),)),
     )
 
 
-def _checks(checks: Sequence[Check]) -> Table:
+def _check_table(checks: Sequence[Check]) -> Table:
     rows = tuple((check.name, check.level, check.seen, check.do) for check in checks)
     return Table("What was checked", ("Check", "Result", "Seen", "What to do"), rows)
 
 
-def _channels(overview: Overview) -> Table:
+def _channel_table(overview: Overview) -> Table:
     header = ("Channel", "Quantity", "Unit", "Lowest", "Highest", "Mean", "Rms about it", "Missing")
     rows = tuple(
         (
@@ -83,7 +90,7 @@ def _channels(overview: Overview) -> Table:
     return Table("Channels", header, rows)
 
 
-def _segments(overview: Overview) -> Table:
+def _segment_table(overview: Overview) -> Table:
     header = (
         "Segment",
         "Role",

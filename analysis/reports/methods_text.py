@@ -4,7 +4,7 @@ The text is generated from the protocol, so that its numbers are those of the st
 modules of `analysis.psychophysics` and in docs/statistics.md.
 """
 
-from analysis.psychophysics.thresholds import MAYBE_ABOVE
+from analysis.psychophysics.thresholds import CUT_PROBABILITY
 from analysis.wording import conjoin, typeset
 from protocols.definition.preparation import DemoSettings, PracticeSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepChange
@@ -25,7 +25,7 @@ _LEVELS = {
     "an identified model of the device. The level of a trial is the highest force that either direction needs for that "
     "acceleration; the table of trials has the acceleration that was wanted and the one that was measured.",
 }
-_PLAYED = {"commanded_force": "sinusoidal force", "delivered_acceleration": "sinusoidal vibration"}
+_STIMULUS_NOUNS = {"commanded_force": "sinusoidal force", "delivered_acceleration": "sinusoidal vibration"}
 _STEP_CHANGES = {
     StepChange.AFTER_REVERSAL: "the reversal that completed a phase still moved by that phase's step",
     StepChange.AT_REVERSAL: "the reversal that completed a phase already moved by the next step",
@@ -49,32 +49,32 @@ _SENSITIVITY = (
 )
 
 
-def methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
+def compose_methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
     """A paragraph each on task, stimulus, schedule, levels, threshold, further procedures (if any) and statistics."""
     rule = protocol.staircase
     return (
-        _task(protocol),
-        _stimulus(protocol),
-        _schedule(protocol),
-        _staircase(rule),
-        _threshold(rule),
-        *_side_procedures(protocol),
+        _describe_task(protocol),
+        _describe_stimulus(protocol),
+        _describe_schedule(protocol),
+        _describe_level_rule(rule),
+        _describe_threshold(rule),
+        *_describe_side_procedures(protocol),
         _STATISTICS,
     )
 
 
-def _task(protocol: StudyProtocol) -> str:
+def _describe_task(protocol: StudyProtocol) -> str:
     """Paragraph on the directions, the answer, feedback, void trials and swapped numbers."""
     trial, directions = protocol.trial, protocol.directions
     first, second, middle = (typeset(f"{directions.symmetry_deg + side:g}") for side in (45, -45, 0))
-    limit = f"within {trial.time_limit_s:g} s" if trial.time_limit_s else "without a limit of time"
-    text = "was told" if trial.feedback == "after_answer" else "was not told"
+    limit_text = f"within {trial.time_limit_s:g} s" if trial.time_limit_s else "without a limit of time"
+    feedback_text = "was told" if trial.feedback == "after_answer" else "was not told"
     return (
-        f"Every trial played one {_PLAYED[protocol.stimulus.quantity]} along one of two orthogonal directions, at "
-        f"{first}° (1) and "
+        f"Every trial played one {_STIMULUS_NOUNS[protocol.stimulus.quantity]} along one of two orthogonal directions, "
+        f"at {first}° (1) and "
         f"{second}° (2) in the {directions.plane} plane, mirrored about the linkage's line of symmetry at "
         f"{middle}°. The direction was {_DRAWS[protocol.schedule.directions]}. The participant said "
-        f"which of the two it was, {limit}, and {text} whether that was right."
+        f"which of the two it was, {limit_text}, and {feedback_text} whether that was right."
         + (
             " A void trial was presented again with the same stimulus: after pauses and faults, and where the "
             f"participant asked for it, at most {trial.repeats_per_run} times in a run. (Sessions begun before this "
@@ -88,7 +88,7 @@ def _task(protocol: StudyProtocol) -> str:
     )
 
 
-def _stimulus(protocol: StudyProtocol) -> str:
+def _describe_stimulus(protocol: StudyProtocol) -> str:
     """Paragraph on the envelope, polarity, quantity and roving of the stimulus, and the virtual spring."""
     stimulus = protocol.stimulus
     polarity = "to either side at random" if stimulus.onset_polarity == "random" else "always to the same side"
@@ -111,34 +111,36 @@ def _stimulus(protocol: StudyProtocol) -> str:
     )
 
 
-def _schedule(protocol: StudyProtocol) -> str:
+def _describe_schedule(protocol: StudyProtocol) -> str:
     """Paragraph on the frequencies, their order, rests and training."""
     frequencies = conjoin([f"{frequency:g}" for frequency in protocol.stimulus.frequencies_hz])
     training = conjoin([f"{frequency:g} Hz" for frequency in protocol.training.frequencies_hz])
-    rest = f", at least {protocol.rests.after_run_s:g} s apart" if protocol.rests.after_run_s else ""
+    rest_text = f", at least {protocol.rests.after_run_s:g} s apart" if protocol.rests.after_run_s else ""
     return (
-        f"The frequencies were {frequencies} Hz, one whole {_track(protocol.staircase)} each, "
-        f"{_ORDERS[protocol.schedule.order]}{rest}. "
+        f"The frequencies were {frequencies} Hz, one whole {_name_run(protocol.staircase)} each, "
+        f"{_ORDERS[protocol.schedule.order]}{rest_text}. "
         + (f"Training came first ({training}) and enters no result." if training else "There was no training.")
     )
 
 
-def _staircase(rule: StaircaseRule) -> str:
+def _describe_level_rule(rule: StaircaseRule) -> str:
     """Paragraph on how levels are chosen (staircase or Psi) and when a run ends. Under 1 up, m down a run converges
     where m right answers in a row have the probability 1/2: at a share of 0.5^(1/m)."""
     if rule.is_bayesian:
-        early = f", or once its standard deviation was below {rule.bayesian.spread_db:g} dB"
+        spread_text = f", or once its standard deviation was below {rule.bayesian.spread_db:g} dB"
         return (
             f"The level began at {rule.start_n:g} N; each later level was the one that was expected to give the most "
             "information on threshold and slope, given all previous answers of the run (Psi: Kontsevich and Tyler "
             f"1999; Weibull curve, 2 % lapses, flat prior). It never passed {rule.cap_n:g} N. A run ended after "
-            f"{rule.bayesian.trials} trials{early if rule.bayesian.spread_db else ''}."
+            f"{rule.bayesian.trials} trials{spread_text if rule.bayesian.spread_db else ''}."
         )
     phases = conjoin([f"{phase.step_db:g} dB for {phase.reversals} reversals" for phase in rule.steps])
-    up = "every wrong answer" if rule.up_after_wrong == 1 else f"{rule.up_after_wrong} wrong answers in a row"
-    down = "every right answer" if rule.down_after_right == 1 else f"{rule.down_after_right} right answers in a row"
+    up_rule = "every wrong answer" if rule.up_after_wrong == 1 else f"{rule.up_after_wrong} wrong answers in a row"
+    down_rule = (
+        "every right answer" if rule.down_after_right == 1 else f"{rule.down_after_right} right answers in a row"
+    )
     sentences = [
-        f"The level began at {rule.start_n:g} N, rose after {up} and fell after {down}, by {phases}; "
+        f"The level began at {rule.start_n:g} N, rose after {up_rule} and fell after {down_rule}, by {phases}; "
         f"{_STEP_CHANGES[rule.step_change]}.",
         f"It never passed {rule.cap_n:g} N; a push against this cap moved nothing and was no reversal.",
         f"A reversal is a change of the level's direction, and the run ended at once with reversal {rule.reversals}"
@@ -151,13 +153,13 @@ def _staircase(rule: StaircaseRule) -> str:
     return " ".join(sentences)
 
 
-def _threshold(rule: StaircaseRule) -> str:
+def _describe_threshold(rule: StaircaseRule) -> str:
     """Paragraph on the threshold of a run, the mark of the cap, and the measures of response bias."""
     if rule.is_bayesian:
         return (
             "The threshold is the mean of its posterior in dB, at most the cap. It was recomputed from the answers, "
             "and every level on record was checked against the rule. It is marked as cut by the cap where it lies "
-            f"above it with a probability over {MAYBE_ABOVE:g}. {_SENSITIVITY}"
+            f"above it with a probability over {CUT_PROBABILITY:g}. {_SENSITIVITY}"
         )
     return (
         f"The threshold is the arithmetic mean, in newtons, of the levels at the last {rule.averaged_reversals} "
@@ -167,14 +169,14 @@ def _threshold(rule: StaircaseRule) -> str:
     )
 
 
-def _side_procedures(protocol: StudyProtocol) -> tuple[str, ...]:
+def _describe_side_procedures(protocol: StudyProtocol) -> tuple[str, ...]:
     """Paragraph on demonstration, gate, practice, catch trials and detection, as far as the protocol has them."""
     demo, practice, catch, detection = protocol.demo, protocol.practice, protocol.catch, protocol.detection
     sentences = []
     if demo.level_n:
         sentences.append(
             f"Before the first answer, both directions were played at every frequency, labelled, for {demo.seconds:g} "
-            f"s each at {levels_words(demo)}."
+            f"s each at {describe_levels(demo)}."
         )
     if protocol.gate.radius_mm:
         sentences.append(f"A trial began with the handle within {protocol.gate.radius_mm:g} mm of its place.")
@@ -182,31 +184,31 @@ def _side_procedures(protocol: StudyProtocol) -> tuple[str, ...]:
         fixed = "" if practice.rove_db else "a fixed level of "
         feedback = "with" if practice.feedback == "after_answer" else "without"
         sentences.append(
-            f"Practice at {_hz(practice.frequencies_hz)} was at {fixed}{levels_words(practice)}, {feedback} "
-            f"feedback, until {practice.right_needed} of the last {practice.of_last} answers were right or "
+            f"Practice at {_format_frequencies(practice.frequencies_hz)} was at {fixed}{describe_levels(practice)}, "
+            f"{feedback} feedback, until {practice.right_needed} of the last {practice.of_last} answers were right or "
             f"{practice.trial_limit} trials were over. It excluded no participant and enters no result."
         )
     if catch.one_in:
         sentences.append(
             f"One in {catch.one_in} trials of a test run, at a place drawn by lot, was a catch trial at "
-            f"{protocol.staircase.cap_n:g} N. It changed no level of the {_track(protocol.staircase)} and enters no "
+            f"{protocol.staircase.cap_n:g} N. It changed no level of the {_name_run(protocol.staircase)} and enters no "
             "threshold."
         )
     if detection.frequencies_hz:
         sentences.append(
-            f"Detection was tested after the test runs, at {_hz(detection.frequencies_hz)}: one of two intervals of "
-            f"{detection.interval_s:g} s, {detection.gap_s:g} s apart, held a stimulus, and the participant said "
-            f"which. The rule of the levels was the same, from {detection.start_n:g} N."
+            f"Detection was tested after the test runs, at {_format_frequencies(detection.frequencies_hz)}: one of two "
+            f"intervals of {detection.interval_s:g} s, {detection.gap_s:g} s apart, held a stimulus, and the "
+            f"participant said which. The rule of the levels was the same, from {detection.start_n:g} N."
         )
     return (" ".join(sentences),) if sentences else ()
 
 
-def _track(rule: StaircaseRule) -> str:
+def _name_run(rule: StaircaseRule) -> str:
     """Noun for a run: "staircase", or under Psi "run"."""
     return "run" if rule.is_bayesian else "staircase"
 
 
-def levels_words(settings: DemoSettings | PracticeSettings) -> str:
+def describe_levels(settings: DemoSettings | PracticeSettings) -> str:
     """Text for the fixed level, or for the range in N from which each level was drawn."""
     if not settings.rove_db:
         return f"{settings.level_n:g} N"
@@ -214,6 +216,6 @@ def levels_words(settings: DemoSettings | PracticeSettings) -> str:
     return f"levels drawn evenly in dB from {settings.level_n / half:.2f} to {settings.level_n * half:.2f} N"
 
 
-def _hz(frequencies_hz: tuple[float, ...]) -> str:
+def _format_frequencies(frequencies_hz: tuple[float, ...]) -> str:
     """Frequencies as text, with the unit once."""
     return f"{conjoin([f'{frequency:g}' for frequency in frequencies_hz])} Hz"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from analysis.figures.picture import Picture, picture_svg
+from analysis.figures.picture import Picture, render_picture_svg
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,5 +67,5 @@ def render_page(page: Page) -> str:
 
 def _svg(picture: Picture) -> Markup:
     """Inline SVG of a picture, not escaped again."""
-    # Safe as markup: drawn by this program, and `inline_svg` escapes its title.
-    return Markup(picture_svg(picture))
+    # Safe as markup: drawn by this program, and `render_inline_svg` escapes its title.
+    return Markup(render_picture_svg(picture))

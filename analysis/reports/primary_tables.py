@@ -18,7 +18,7 @@ from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.two_analyses import coverage_notes
 from analysis.reports.page import Section, Table
 from analysis.threshold_words import threshold_words
-from analysis.wording import NONE, conjoin, format_signed, number, p_text, p_value
+from analysis.wording import MISSING, conjoin, format_number, format_p, format_p_text, format_signed
 
 AT_BOUND = 0.01
 """Distance of the logarithm of a spread from its upper bound below which the search counts as ended at the bound."""
@@ -56,21 +56,21 @@ def primary_section(analysis: StudyAnalysis) -> Section:
     if primary is None:
         return _single_section(analysis)
     words = threshold_words(analysis.protocol.staircase)
-    by_means = [_contrasts(f"Differences by {words.means} (dB)", means, (), _measured(analysis, "means"))]
+    by_means = [_contrast_table(f"Differences by {words.means} (dB)", means, (), _coverage_notes(analysis, "means"))]
     if analysis.tobit:
-        notes = (TOBIT_MEANING.format(too_low=words.too_low), *_measured(analysis, "tobit"))
-        by_means.append(_contrasts("Sensitivity: differences by Tobit's model (dB)", analysis.tobit, (), notes))
-    model = _measured(analysis, "model")
+        notes = (TOBIT_MEANING.format(too_low=words.too_low), *_coverage_notes(analysis, "tobit"))
+        by_means.append(_contrast_table("Sensitivity: differences by Tobit's model (dB)", analysis.tobit, (), notes))
+    model = _coverage_notes(analysis, "model")
     return Section(
         "All answers in one model",
-        paragraphs=(MEANING, analysis.compared, _overall(primary), limit_words(primary)),
+        paragraphs=(MEANING, analysis.compared, _overall_paragraph(primary), limit_words(primary)),
         tables=(
-            _medians(primary),
-            _contrasts("Differences by the model (dB)", primary.contrasts, primary.medians, model),
+            _median_table(primary),
+            _contrast_table("Differences by the model (dB)", primary.contrasts, primary.medians, model),
             *(by_means if means else []),
-            _runs(primary.runs, primary.confidence, (RUN_MEANING, *_measured(analysis, "run"))),
-            _persons(primary),
-            _goodness(primary),
+            _run_table(primary.runs, primary.confidence, (RUN_MEANING, *_coverage_notes(analysis, "run"))),
+            _person_table(primary),
+            _goodness_table(primary),
         ),
     )
 
@@ -80,31 +80,32 @@ def _single_section(analysis: StudyAnalysis) -> Section:
     single = analysis.single
     if single is None:
         return Section("All answers in one model", paragraphs=(analysis.compared,))
-    notes = (SINGLE_MEANING, *_measured(analysis, "single"))
-    table = _runs(single.runs, single.confidence, notes)
+    notes = (SINGLE_MEANING, *_coverage_notes(analysis, "single"))
+    table = _run_table(single.runs, single.confidence, notes)
     return Section("Thresholds by likelihood", paragraphs=(analysis.compared,), tables=(replace(table, folded=False),))
 
 
-def _measured(analysis: StudyAnalysis, name: str) -> tuple[str, ...]:
+def _coverage_notes(analysis: StudyAnalysis, name: str) -> tuple[str, ...]:
     """Notes on the measured coverage of an analysis's intervals where the cap cut the data (`coverage_notes`)."""
     return coverage_notes((name,), analysis.table, analysis.protocol.staircase)
 
 
-def _overall(primary: PrimaryAnalysis) -> str:
+def _overall_paragraph(primary: PrimaryAnalysis) -> str:
     """Paragraph on the test over all frequencies, the spread between people, and the common parameters."""
     overall = primary.overall
     people = f" ({overall.participants} people with enough answers at each)" if overall.left_out else ""
     test = (
-        f"Frequencies differ{people}: F = {number(overall.f)}, Huynh-Feldt epsilon "
-        f"{number(overall.epsilon_huynh_feldt)}, {p_text(overall.p_huynh_feldt)}. "
+        f"Frequencies differ{people}: F = {format_number(overall.f)}, Huynh-Feldt epsilon "
+        f"{format_number(overall.epsilon_huynh_feldt)}, {format_p_text(overall.p_huynh_feldt)}. "
         if overall.f is not None
         else ""
     )
     return (
-        f"{test}People differ by {number(primary.person_sd_db, 1)} dB (standard deviation) at all frequencies, and by "
-        f"{number(primary.frequency_sd_db, 1)} dB more from frequency to frequency. Median slope "
-        f"{number(primary.slope)} ({primary.family.value}), lapse rate {number(100 * primary.lapse, 1)} %, response "
-        f"bias {number(primary.criterion_sd)} (standard deviation, in units of d')."
+        f"{test}People differ by {format_number(primary.person_sd_db, 1)} dB (standard deviation) at all frequencies, "
+        f"and by {format_number(primary.frequency_sd_db, 1)} dB more from frequency to frequency. Median slope "
+        f"{format_number(primary.slope)} ({primary.family.value}), lapse rate "
+        f"{format_number(100 * primary.lapse, 1)} %, response bias "
+        f"{format_number(primary.criterion_sd)} (standard deviation, in units of d')."
         + ("" if primary.converged else " The fit did not converge: do not use these numbers.")
         + describe_undetermined(primary)
         + far_above_words(primary)
@@ -123,11 +124,11 @@ def far_above_words(primary: PrimaryAnalysis) -> str:
 def describe_undetermined(primary: PrimaryAnalysis) -> str:
     """Sentences, with a leading space, where a spread between people ended at the upper bound of its search; else
     empty. This happens with few people, whose answers make slopes of 2 and of 20 almost equally likely."""
-    found = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
+    spreads = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
     names = ("thresholds", "thresholds from frequency to frequency", "slopes", "response biases")
     at_bound = [
         name
-        for name, spread, (_, highest) in zip(names, found, LOG_SD_BOUNDS, strict=True)
+        for name, spread, (_, highest) in zip(names, spreads, LOG_SD_BOUNDS, strict=True)
         if math.log(spread) > highest - AT_BOUND
     ]
     if not at_bound:
@@ -154,15 +155,21 @@ def limit_words(primary: PrimaryAnalysis) -> str:
     )
 
 
-def _medians(primary: PrimaryAnalysis) -> Table:
+def _median_table(primary: PrimaryAnalysis) -> Table:
     """Table of the median thresholds with intervals, in N and in dB re 1 N."""
     rows = []
     for median in primary.medians:
-        shown = interval_words(median.lower_n, median.upper_n, median.above_cap)
-        db = interval_words(median.lower_db, median.upper_db, median.above_cap, 1)
-        size = "above the cap" if median.above_cap else number(median.newton)
+        interval_n = interval_words(median.lower_n, median.upper_n, median.above_cap)
+        interval_db = interval_words(median.lower_db, median.upper_db, median.above_cap, 1)
+        size = "above the cap" if median.above_cap else format_number(median.newton)
         rows.append(
-            (f"{median.frequency_hz:g} Hz", size, shown, NONE if median.above_cap else number(median.db, 1), db)
+            (
+                f"{median.frequency_hz:g} Hz",
+                size,
+                interval_n,
+                MISSING if median.above_cap else format_number(median.db, 1),
+                interval_db,
+            )
         )
     percent = f"{100 * primary.confidence:g} %"
     return Table(
@@ -178,10 +185,14 @@ def interval_words(lower: float | None, upper: float | None, above_cap: bool, di
     lower bound was found above the cap."""
     if lower is None:
         return "no lower bound" if above_cap else "no interval: too few people"
-    return f"above {number(lower, digits)}" if upper is None else f"{number(lower, digits)} to {number(upper, digits)}"
+    return (
+        f"above {format_number(lower, digits)}"
+        if upper is None
+        else f"{format_number(lower, digits)} to {format_number(upper, digits)}"
+    )
 
 
-def _contrasts(
+def _contrast_table(
     caption: str, rows: Sequence[Contrast], medians: Sequence[MedianThreshold], notes: Sequence[str]
 ) -> Table:
     """Table of differences between two frequencies in dB; frequencies whose medians are above the cap are marked."""
@@ -195,11 +206,11 @@ def _contrasts(
                 str(c.participants),
                 format_signed(c.difference_db, 1),
                 f"{format_signed(c.lower_db, 1)} to {format_signed(c.upper_db, 1)}",
-                p_value(c.p),
-                p_value(c.p_holm),
-                number(c.effect_size),
-                p_value(c.p_equivalence),
-                p_value(c.p_spread),
+                format_p(c.p),
+                format_p(c.p_holm),
+                format_number(c.effect_size),
+                format_p(c.p_equivalence),
+                format_p(c.p_spread),
             )
             for c in rows
         ),
@@ -213,7 +224,7 @@ def _contrasts(
     )
 
 
-def _runs(runs: Sequence[RunLikelihood], confidence: float, notes: tuple[str, ...]) -> Table:
+def _run_table(runs: Sequence[RunLikelihood], confidence: float, notes: tuple[str, ...]) -> Table:
     """Table of the maximum-likelihood thresholds of single runs, in N."""
     return Table(
         caption="Single thresholds by maximum likelihood (N)",
@@ -230,15 +241,15 @@ def run_words(run: RunLikelihood) -> tuple[str, str]:
     if run.below:
         size = "below the levels played"
     else:
-        size = "above the cap" if run.db is None else number(newton_or_none(run.db))
+        size = "above the cap" if run.db is None else format_number(newton_or_none(run.db))
     if lower is not None and upper is not None:
-        return size, f"{number(lower)} to {number(upper)}"
+        return size, f"{format_number(lower)} to {format_number(upper)}"
     if upper is not None:
-        return size, f"below {number(upper)}"
-    return size, NONE if lower is None else f"above {number(lower)}"
+        return size, f"below {format_number(upper)}"
+    return size, MISSING if lower is None else f"above {format_number(lower)}"
 
 
-def _persons(primary: PrimaryAnalysis) -> Table:
+def _person_table(primary: PrimaryAnalysis) -> Table:
     """Table of the model's estimates per person: thresholds in N, slope, criterion (shrunk towards the population)."""
     return Table(
         caption="Thresholds of the participants by the model (N)",
@@ -247,10 +258,10 @@ def _persons(primary: PrimaryAnalysis) -> Table:
             (
                 person.subject,
                 *(
-                    "above the cap" if above else number(value)
+                    "above the cap" if above else format_number(value)
                     for value, above in zip(person.thresholds_n, person.above_cap, strict=True)
                 ),
-                number(person.slope),
+                format_number(person.slope),
                 format_signed(person.criterion),
             )
             for person in primary.persons
@@ -263,7 +274,7 @@ def _persons(primary: PrimaryAnalysis) -> Table:
     )
 
 
-def _goodness(primary: PrimaryAnalysis) -> Table:
+def _goodness_table(primary: PrimaryAnalysis) -> Table:
     """Table of predicted and observed shares of right answers, by bins of trials."""
     return Table(
         caption="Predicted and observed shares of right answers",

@@ -26,8 +26,8 @@ VERDICT_WORDS = {
 class Trouble:
     """A folder or file that could not be used."""
 
-    where: str
-    why: str
+    location: str
+    reason: str
 
 
 def render_real_report(
@@ -42,17 +42,19 @@ def render_real_report(
     sections = [Section("All recordings", tables=(overview_table(answers),))]
     if troubles:
         sections.append(
-            Section("What could not be used", points=tuple(f"{trouble.where}: {trouble.why}" for trouble in troubles))
+            Section(
+                "What could not be used", points=tuple(f"{trouble.location}: {trouble.reason}" for trouble in troubles)
+            )
         )
-    sections += [_section(answer, pictures.get((answer.folder, answer.recording))) for answer in answers]
+    sections += [_recording_section(answer, pictures.get((answer.folder, answer.recording))) for answer in answers]
     if injected:
         sections.append(make_injected_section(injected))
-    named = sum(bool(answer.effects) for answer in answers)
+    named_count = sum(bool(answer.effects) for answer in answers)
     return render_page(
         Page(
             title="Diagnosis of real recordings",
-            summary=f"{len(answers)} recordings of real devices were compared with simple models; in {named} of them "
-            "physics was named. The remaining error and the objections to each answer are given with it.",
+            summary=f"{len(answers)} recordings of real devices were compared with simple models; in {named_count} of "
+            "them physics was named. The remaining error and the objections to each answer are given with it.",
             banner=_banner(troubles),
             sections=tuple(sections),
             generated=generated,
@@ -75,21 +77,23 @@ def overview_table(answers: Sequence[RealAnswer]) -> Table:
         "noise",
         "s",
     )
-    return Table("Errors on held-out data, shares of the signal", header, tuple(_row(answer) for answer in answers))
+    return Table(
+        "Errors on held-out data, shares of the signal", header, tuple(_overview_row(answer) for answer in answers)
+    )
 
 
-def _row(real_answer: RealAnswer) -> tuple[str, ...]:
+def _overview_row(real_answer: RealAnswer) -> tuple[str, ...]:
     errors = real_answer.held_out
-    shown = (
+    error_texts = (
         ("", "", "", "") if errors is None else tuple(map(error_text, (errors.before, errors.retuned, errors.noise)))
     )
-    before, retuned, noise = shown[:3]
-    after = error_text(errors.after) if errors is not None and real_answer.effects else "-"
-    named = ", ".join(real_answer.effects) or _first_candidate(real_answer) or "-"
-    box = "-" if real_answer.black_box is None else error_text(real_answer.black_box)
+    before_text, retuned_text, noise_text = error_texts[:3]
+    after_text = error_text(errors.after) if errors is not None and real_answer.effects else "-"
+    effect_names = ", ".join(real_answer.effects) or _first_candidate(real_answer) or "-"
+    black_box_text = "-" if real_answer.black_box is None else error_text(real_answer.black_box)
     return (
-        _title(real_answer), VERDICT_WORDS[real_answer.verdict], named,
-        before, retuned, after, box, noise, f"{real_answer.seconds:.0f}",
+        _recording_title(real_answer), VERDICT_WORDS[real_answer.verdict], effect_names,
+        before_text, retuned_text, after_text, black_box_text, noise_text, f"{real_answer.seconds:.0f}",
     )  # fmt: skip
 
 
@@ -107,14 +111,14 @@ def _banner(troubles: Sequence[Trouble]) -> str:
     return f"{len(troubles)} folders or files could not be used; they are named below."
 
 
-def _section(real_answer: RealAnswer, picture: Picture | None) -> Section:
+def _recording_section(real_answer: RealAnswer, picture: Picture | None) -> Section:
     points = (
         *real_answer.where,
         *real_answer.named,
         *(parameter_sentence(number) for number in real_answer.numbers),
         *_pair_points(real_answer.pair),
     )
-    further = tuple(_further_sentence(*test) for test in _further_tests(real_answer))
+    further_sentences = tuple(_further_sentence(*test) for test in _further_tests(real_answer))
     objections = tuple(f"An expert would object: {objection}" for objection in real_answer.objections)
     paragraphs = (
         *((real_answer.title,) if real_answer.title else ()),
@@ -124,60 +128,63 @@ def _section(real_answer: RealAnswer, picture: Picture | None) -> Section:
         *((real_answer.left,) if real_answer.left else ()),
     )
     return Section(
-        _title(real_answer),
+        _recording_title(real_answer),
         paragraphs=paragraphs,
-        points=(*points, *real_answer.not_confirmed, *further, *real_answer.remarks, *objections),
+        points=(*points, *real_answer.not_confirmed, *further_sentences, *real_answer.remarks, *objections),
         pictures=(picture,) if picture is not None and error_rows(real_answer) else (),
-        tables=_tables(real_answer),
+        tables=_stretch_tables(real_answer),
     )
 
 
-def _tables(real_answer: RealAnswer) -> tuple[Table, ...]:
-    every = (*real_answer.stretches, *(each for test in real_answer.further for each in test.stretches))
-    if not every:
+def _stretch_tables(real_answer: RealAnswer) -> tuple[Table, ...]:
+    stretches = (*real_answer.stretches, *(stretch for test in real_answer.further for stretch in test.stretches))
+    if not stretches:
         return ()
     rows = tuple(
         (
-            f"{each.record}, {each.channel}, {each.start_s:.4g} to {each.stop_s:.4g} s",
-            value_text(each.signal, each.unit),
-            value_text(each.retuned, each.unit),
-            value_text(each.after, each.unit),
-            f"{each.after / each.retuned:.2f}" if each.retuned > 0 else "-",
+            f"{stretch.record}, {stretch.channel}, {stretch.start_s:.4g} to {stretch.stop_s:.4g} s",
+            value_text(stretch.signal, stretch.unit),
+            value_text(stretch.retuned, stretch.unit),
+            value_text(stretch.after, stretch.unit),
+            f"{stretch.after / stretch.retuned:.2f}" if stretch.retuned > 0 else "-",
         )
-        for each in every
+        for stretch in stretches
     )
     header = ("held-out stretch", "signal", "re-tuned", "with the effects found", "ratio")
     return (Table("Root-mean-square errors, stretch by stretch", header, rows),)
 
 
-def parameter_sentence(number: OwnParameter) -> str:
+def parameter_sentence(parameter: OwnParameter) -> str:
     """Sentence that compares a fitted parameter of the model with its value known by other means, where there is such a
     value."""
-    ends = None if number.low is None or number.high is None else (number.low, number.high)
-    text = f"The model's {number.name} is {value_text(number.value, number.unit, ends)} after everything"
-    if number.nominal is None:
+    interval = None if parameter.low is None or parameter.high is None else (parameter.low, parameter.high)
+    text = f"The model's {parameter.name} is {value_text(parameter.value, parameter.unit, interval)} after everything"
+    if parameter.nominal is None:
         return f"{text}."
-    off = 100 * (number.value / number.nominal - 1)
-    inside = {True: ", and the interval holds it", False: ", and the interval does not hold it", None: ""}
-    known = value_text(number.nominal, number.unit)
-    return f"{text}; known by other means is {known}, {typeset(f'{off:+.2g}')} % off{inside[number.holds_nominal]}."
+    deviation_percent = 100 * (parameter.value / parameter.nominal - 1)
+    interval_words = {True: ", and the interval holds it", False: ", and the interval does not hold it", None: ""}
+    nominal_text = value_text(parameter.nominal, parameter.unit)
+    return (
+        f"{text}; known by other means is {nominal_text}, {typeset(f'{deviation_percent:+.2g}')} % off"
+        f"{interval_words[parameter.holds_nominal]}."
+    )
 
 
 def _pair_points(pair: PairOutcome | None) -> tuple[str, ...]:
     if pair is None:
         return ()
-    named = ", ".join(pair.named) if pair.named else "no effect of the catalogue"
+    effect_names = ", ".join(pair.named) if pair.named else "no effect of the catalogue"
     return (
         f"A change that was really made: {pair.changed} ({pair.before}, then {pair.after}). What the model missed "
         f"before the change, {error_text(pair.expected_left)} of the signal, counts as no mismatch.",
-        f"Named as the change: {named}. Errors after it on held-out data: the model of before as it is "
+        f"Named as the change: {effect_names}. Errors after it on held-out data: the model of before as it is "
         f"{error_text(pair.as_before)}, with one factor re-tuned {error_text(pair.gain)}, re-tuned within its "
         f"tolerances {error_text(pair.retuned)}, with what is named {error_text(pair.with_effects)}.",
     )
 
 
 def _further_tests(real_answer: RealAnswer) -> list[tuple[str, str, float | None, float | None, str]]:
-    return [(each.recording, each.error, each.retuned, each.after, each.problem) for each in real_answer.further]
+    return [(test.recording, test.error, test.retuned, test.after, test.problem) for test in real_answer.further]
 
 
 def _further_sentence(recording: str, error: str, retuned: float | None, after: float | None, problem: str) -> str:
@@ -189,7 +196,7 @@ def _further_sentence(recording: str, error: str, retuned: float | None, after: 
     )
 
 
-def _title(real_answer: RealAnswer) -> str:
+def _recording_title(real_answer: RealAnswer) -> str:
     """A folder's only recording is often called like it."""
     return (
         real_answer.recording

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from analysis.evaluation.reproduction.document import FigureFindings, Finding, PlayedRow, Reproduction
 from analysis.figures.picture import Picture
 from analysis.reports.page import Page, Section, Table, render_page
-from analysis.wording import NONE, number
+from analysis.wording import MISSING, format_number
 
 BANNER = (
     "Everything here was simulated: the device, and those who answered. The simulation was set up to show the "
@@ -19,11 +19,11 @@ BANNER = (
     "kind."
 )
 
-_SAYS: dict[bool | None, str] = {True: "yes", False: "no", None: "–"}
+_AGREEMENT_WORDS: dict[bool | None, str] = {True: "yes", False: "no", None: "–"}
 """Text for whether a finding is as published; None: not compared."""
 
 _MEASURES = ("Flatness", "Worst coupling", "Median coupling", "Axis error", "Error")
-"""Column headings of `_numbers`."""
+"""Column headings of `_measure_cells`."""
 
 _MODEL_NOTE = (
     "Root mean squares relative to the response, as measured. Held out: the prediction of a record that the fit did "
@@ -53,11 +53,11 @@ def render_reproduction_report(
 ) -> str:
     """The report as an HTML page. pictures: by the number of the published figure. generated: local time of the report;
     provenance: versions and hashes by name."""
-    sections = [*_models(reproduction), _overview(reproduction)]
-    for figure in sorted(reproduction.figures, key=lambda each: each.figure):
-        played = _tabulate_played(reproduction) if figure.figure == 5 else ()
-        tables = (_findings_table(figure), *played)
-        sections.append(_section(figure, pictures.get(figure.figure, ()), tables))
+    sections = [*_model_sections(reproduction), _overview_section(reproduction)]
+    for figure in sorted(reproduction.figures, key=lambda figure_findings: figure_findings.figure):
+        played_tables = _tabulate_played(reproduction) if figure.figure == 5 else ()
+        tables = (_findings_table(figure), *played_tables)
+        sections.append(_figure_section(figure, pictures.get(figure.figure, ()), tables))
     low, high = reproduction.band_hz
     return render_page(
         Page(
@@ -82,12 +82,17 @@ def overview_lines(reproduction: Reproduction) -> tuple[str, ...]:
     )
 
 
-def _models(reproduction: Reproduction) -> list[Section]:
+def _model_sections(reproduction: Reproduction) -> list[Section]:
     """Section on the models' errors, placed before the results that depend on them; empty without models."""
     if not reproduction.models:
         return []
     rows = tuple(
-        (model.name, _percent(model.held_out_error), _percent(model.held_out_noise), _percent(model.expected_error))
+        (
+            model.name,
+            _percent_text(model.held_out_error),
+            _percent_text(model.held_out_noise),
+            _percent_text(model.expected_error),
+        )
         for model in reproduction.models
     )
     header = ("Model", "Held-out error", "Noise of that record", "Expected error")
@@ -95,15 +100,15 @@ def _models(reproduction: Reproduction) -> list[Section]:
     return [Section("How good the models are", tables=(table,))]
 
 
-def _percent(share: float | None) -> str:
-    return NONE if share is None else f"{100 * share:.2f} %"
+def _percent_text(share: float | None) -> str:
+    return MISSING if share is None else f"{100 * share:.2f} %"
 
 
-def _overview(reproduction: Reproduction) -> Section:
+def _overview_section(reproduction: Reproduction) -> Section:
     """Section with the number of findings as published, and a list of those that differ."""
     compared = [finding for figure in reproduction.figures for finding in figure.findings if _is_compared(finding)]
     agreeing = sum(finding.as_published is True for finding in compared)
-    otherwise = tuple(
+    differing = tuple(
         f"Figure {figure.figure}, {finding.what}: published {finding.published}; here {finding.here}."
         for figure in sorted(reproduction.figures, key=lambda figure: figure.figure)
         for finding in figure.findings
@@ -113,11 +118,11 @@ def _overview(reproduction: Reproduction) -> Section:
         f"Of {len(compared)} things that the paper says of its figures and that can be compared by a rule, {agreeing} "
         "came out as published. The rules are ours and are given below each table."
     )
-    named = " These did not:" if otherwise else ""
-    return Section("What came out", paragraphs=(sentence + named,), points=otherwise)
+    introduction = " These did not:" if differing else ""
+    return Section("What came out", paragraphs=(sentence + introduction,), points=differing)
 
 
-def _section(figure: FigureFindings, pictures: Sequence[Picture], tables: tuple[Table, ...]) -> Section:
+def _figure_section(figure: FigureFindings, pictures: Sequence[Picture], tables: tuple[Table, ...]) -> Section:
     """Section on one figure: what was published, differences in the method, pictures and tables."""
     return Section(
         f"Figure {figure.figure}: {figure.title}",
@@ -127,14 +132,14 @@ def _section(figure: FigureFindings, pictures: Sequence[Picture], tables: tuple[
         ),
         points=figure.differs,
         pictures=tuple(pictures),
-        tables=(*tables, *_remarks(figure)),
+        tables=(*tables, *_remark_tables(figure)),
     )
 
 
 def _findings_table(figure: FigureFindings) -> Table:
     """Table of published and reproduced findings of a figure; the rules of comparison are its notes."""
     rows = tuple(
-        (finding.what, finding.published or "–", finding.here, _SAYS[finding.as_published])
+        (finding.what, finding.published or "–", finding.here, _AGREEMENT_WORDS[finding.as_published])
         for finding in figure.findings
     )
     rules = tuple(f"{finding.what}: as published means {finding.rule}." for finding in figure.findings if finding.rule)
@@ -143,7 +148,7 @@ def _findings_table(figure: FigureFindings) -> Table:
     )
 
 
-def _remarks(figure: FigureFindings) -> tuple[Table, ...]:
+def _remark_tables(figure: FigureFindings) -> tuple[Table, ...]:
     """Folded table of the remarks of the analyses; empty without remarks."""
     if not figure.remarks:
         return ()
@@ -154,27 +159,27 @@ def _remarks(figure: FigureFindings) -> tuple[Table, ...]:
 def _tabulate_played(reproduction: Reproduction) -> tuple[Table, ...]:
     """Table of the quality of every row of figure 5, and if known a table of other ways to drive the device."""
     header = ("", "Device", "Wanted", *_MEASURES)
-    rows = tuple((row.name, row.device, row.signal, *_numbers(row)) for row in reproduction.played)
+    rows = tuple((row.name, row.device, row.signal, *_measure_cells(row)) for row in reproduction.played)
     tables = [Table("What was played, row by row", header, rows, notes=_ROW_NOTES)]
     if reproduction.baselines:
-        costed = ("", *_MEASURES, "Cost")
-        others = tuple((row.name, *_numbers(row), _cost(row)) for row in reproduction.baselines)
-        tables.append(Table("Other ways of driving the device", costed, others, notes=_BASELINE_NOTES))
+        baseline_header = ("", *_MEASURES, "Cost")
+        baseline_rows = tuple((row.name, *_measure_cells(row), _cost_text(row)) for row in reproduction.baselines)
+        tables.append(Table("Other ways of driving the device", baseline_header, baseline_rows, notes=_BASELINE_NOTES))
     return tuple(tables)
 
 
-def _numbers(row: PlayedRow) -> tuple[str, ...]:
+def _measure_cells(row: PlayedRow) -> tuple[str, ...]:
     """The values of `_MEASURES` as text with units."""
     return (
-        f"{number(row.flatness_db)} dB",
-        f"{number(row.coupling_db, 1)} dB",
-        f"{number(row.median_coupling_db, 1)} dB",
+        f"{format_number(row.flatness_db)} dB",
+        f"{format_number(row.coupling_db, 1)} dB",
+        f"{format_number(row.median_coupling_db, 1)} dB",
         f"{row.axis_error_deg:.1f}°",
         f"{100 * row.error:.1f} %",
     )
 
 
-def _cost(row: PlayedRow) -> str:
+def _cost_text(row: PlayedRow) -> str:
     return "–" if row.multiply_adds is None else f"{row.multiply_adds}"
 
 

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from analysis.psychophysics.bias import CRITERION_WORDS
 from analysis.psychophysics.equalized_delivery import deliveries
 from analysis.psychophysics.study_analysis import StudyAnalysis
-from analysis.reports.methods_text import levels_words
+from analysis.reports.methods_text import describe_levels
 from analysis.reports.page import Table
 from analysis.threshold_words import threshold_words
-from analysis.wording import NONE, format_signed, mark_cut, number
+from analysis.wording import MISSING, format_number, format_signed, mark_cut
 from protocols.procedure.staircase import to_db
 
 
@@ -20,7 +20,7 @@ def detection_table(analysis: StudyAnalysis) -> Table:
     """Table of detection and direction thresholds (N) per participant and frequency, with their ratio in dB."""
     table = analysis.detection_table
     rows = [
-        (subject, f"{frequency:g} Hz", *_beside_direction(analysis, subject, frequency, value, bound))
+        (subject, f"{frequency:g} Hz", *_detection_cells(analysis, subject, frequency, value, bound))
         for subject, values, bounds in zip(table.subjects, table.values, table.censored, strict=True)
         for frequency, value, bound in zip(table.frequencies_hz, values, bounds, strict=True)
     ]
@@ -39,15 +39,16 @@ def detection_table(analysis: StudyAnalysis) -> Table:
 def detection_run_table(analysis: StudyAnalysis) -> Table:
     """Folded table of all detection runs: thresholds in newtons, trials, share of right answers, d' of two intervals,
     and criterion."""
-    turns = () if analysis.protocol.staircase.is_bayesian else ("Reversals",)
+    reversal_header = () if analysis.protocol.staircase.is_bayesian else ("Reversals",)
     return Table(
         caption="All detection runs",
-        header=("Participant", "Session", "Run", "Hz", "N", *turns, "Trials", "% right", "d'", "Criterion"),
+        header=("Participant", "Session", "Run", "Hz", "N", *reversal_header, "Trials", "% right", "d'", "Criterion"),
         rows=tuple(
             (
                 row.subject, row.session, str(row.run), f"{row.frequency_hz:g}",
-                mark_cut(row.threshold_n, row.censored), *([str(row.reversals)] if turns else []), str(row.trials),
-                number(row.percent_correct, 0), number(row.d_prime), number(row.criterion),
+                mark_cut(row.threshold_n, row.censored), *([str(row.reversals)] if reversal_header else []),
+                str(row.trials), format_number(row.percent_correct, 0), format_number(row.d_prime),
+                format_number(row.criterion),
             )
             for row in analysis.detection
         ),
@@ -62,8 +63,8 @@ def delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
         (
             f"{delivery.frequency_hz:g} Hz",
             str(delivery.trials),
-            *map(_percent, delivery.along),
-            _percent(delivery.off_axis),
+            *map(_percent_text, delivery.along),
+            _percent_text(delivery.off_axis),
         )
         for delivery in deliveries(analysis.trials)
     )
@@ -74,8 +75,8 @@ def delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
     return (Table("What arrived of what was wanted", header, rows, notes=(note,)),)
 
 
-def _percent(share: float | None) -> str:
-    return NONE if share is None else f"{100 * share:.0f} %"
+def _percent_text(share: float | None) -> str:
+    return MISSING if share is None else f"{100 * share:.0f} %"
 
 
 def catch_table(analysis: StudyAnalysis) -> Table:
@@ -127,26 +128,26 @@ def practice_table(analysis: StudyAnalysis) -> Table:
             )
             for run in analysis.practice
         ),
-        notes=(f"At {levels_words(settings)}; passed with {settings.right_needed} right.",),
+        notes=(f"At {describe_levels(settings)}; passed with {settings.right_needed} right.",),
         folded=True,
     )
 
 
-def _beside_direction(
-    analysis: StudyAnalysis, subject: str, frequency_hz: float, felt_n: float | None, felt_bound: bool
+def _detection_cells(
+    analysis: StudyAnalysis, subject: str, frequency_hz: float, detection_n: float | None, detection_is_cut: bool
 ) -> Iterator[str]:
-    """Cells with the detection threshold, the direction threshold, and their ratio in dB where neither is cut. felt_n:
-    detection threshold (N); felt_bound: whether the cap cut it."""
-    told_n, told_bound = _direction(analysis, subject, frequency_hz)
-    yield mark_cut(felt_n, felt_bound)
-    yield mark_cut(told_n, told_bound)
-    if felt_n is None or told_n is None or felt_bound or told_bound:
-        yield NONE
+    """Cells with the detection threshold, the direction threshold, and their ratio in dB where neither is cut.
+    detection_n: detection threshold (N); detection_is_cut: whether the cap cut it."""
+    direction_n, direction_is_cut = _direction_cell(analysis, subject, frequency_hz)
+    yield mark_cut(detection_n, detection_is_cut)
+    yield mark_cut(direction_n, direction_is_cut)
+    if detection_n is None or direction_n is None or detection_is_cut or direction_is_cut:
+        yield MISSING
     else:
-        yield format_signed(to_db(told_n) - to_db(felt_n), 1)
+        yield format_signed(to_db(direction_n) - to_db(detection_n), 1)
 
 
-def _direction(analysis: StudyAnalysis, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
+def _direction_cell(analysis: StudyAnalysis, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
     """Direction threshold (N; None where missing), and whether the cap cut it."""
     table = analysis.table
     if subject not in table.subjects or frequency_hz not in table.frequencies_hz:

@@ -15,7 +15,7 @@ from analysis.psychophysics.population import Population
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.cue_section import cue_section
 from analysis.reports.declared_section import make_declared_section
-from analysis.reports.methods_text import methods_text
+from analysis.reports.methods_text import compose_methods_text
 from analysis.reports.page import Page, Section, render_page
 from analysis.reports.primary_tables import primary_section
 from analysis.reports.side_tables import (
@@ -61,21 +61,21 @@ def render_study_report(
     """
     by_name = {picture.name: picture for picture in pictures}
     sections = [
-        *_declared(analysis),
-        *_models(qualities),
-        _warnings(analysis),
-        *_results(analysis, by_name),
+        *_declared_sections(analysis),
+        *_model_sections(qualities),
+        _warning_section(analysis),
+        *_result_sections(analysis, by_name),
         *_side_sections(analysis),
-        *_delivery(analysis, by_name),
+        *_delivery_sections(analysis, by_name),
         *cue_section(analysis.cues, analysis.cue_gaps, analysis.protocol.staircase),
-        *_ellipsoids(ellipsoids, by_name),
-        *_runs(analysis, pictures),
-        Section("Methods", paragraphs=methods_text(analysis.protocol)),
+        *_ellipsoid_sections(ellipsoids, by_name),
+        *_run_sections(analysis, pictures),
+        Section("Methods", paragraphs=compose_methods_text(analysis.protocol)),
     ]
     return render_page(
         Page(
             title=analysis.protocol.title,
-            summary=_summary(analysis),
+            summary=_summary_line(analysis),
             banner=_BANNERS[analysis.population] if analysis.population else "",
             sections=tuple(sections),
             generated=generated,
@@ -84,7 +84,7 @@ def render_study_report(
     )
 
 
-def _summary(analysis: StudyAnalysis) -> str:
+def _summary_line(analysis: StudyAnalysis) -> str:
     """Line under the title: numbers of participants, runs, complete runs and counted trials."""
     if not analysis.thresholds:
         return _detection_summary(analysis)
@@ -104,14 +104,14 @@ def _detection_summary(analysis: StudyAnalysis) -> str:
     return f"No test run; {runs} detection run{'s' if runs != 1 else ''}."
 
 
-def _declared(analysis: StudyAnalysis) -> list[Section]:
+def _declared_sections(analysis: StudyAnalysis) -> list[Section]:
     """Section on the declared (preregistered) contrast, the first of the report; empty without frequencies."""
     if not analysis.protocol.stimulus.frequencies_hz:
         return []
     return [make_declared_section(analysis.declared, analysis.declared_result)]
 
 
-def _models(qualities: Sequence[tuple[str, str]]) -> list[Section]:
+def _model_sections(qualities: Sequence[tuple[str, str]]) -> list[Section]:
     """Section on the quality of the models that converted accelerations to forces, placed before all values that depend
     on them; empty without models."""
     if not qualities:
@@ -120,14 +120,14 @@ def _models(qualities: Sequence[tuple[str, str]]) -> list[Section]:
     return [Section("How good the model of the device is", points=points)]
 
 
-def _warnings(analysis: StudyAnalysis) -> Section:
-    none = ("No irregularities: all runs are complete, and no threshold touched the cap.",)
+def _warning_section(analysis: StudyAnalysis) -> Section:
+    no_warning_note = ("No irregularities: all runs are complete, and no threshold touched the cap.",)
     return Section(
-        "Before you read the numbers", paragraphs=() if analysis.warnings else none, points=analysis.warnings
+        "Before you read the numbers", paragraphs=() if analysis.warnings else no_warning_note, points=analysis.warnings
     )
 
 
-def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Section]:
+def _result_sections(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Section]:
     """Thresholds, the primary analysis, and the published comparison, in this order; empty without a test run."""
     if not analysis.thresholds:
         return []
@@ -153,19 +153,25 @@ def _side_sections(analysis: StudyAnalysis) -> list[Section]:
     """Detection runs, catch trials and practice runs, each only where the study has them."""
     sections = []
     if analysis.detection:
-        felt = "Which of two intervals held a vibration, in any direction: the level from which it is felt at all."
+        detection_note = (
+            "Which of two intervals held a vibration, in any direction: the level from which it is felt at all."
+        )
         tables = (detection_table(analysis), detection_run_table(analysis))
-        sections.append(Section("Is the vibration felt at all?", paragraphs=(felt,), tables=tables))
+        sections.append(Section("Is the vibration felt at all?", paragraphs=(detection_note,), tables=tables))
     if analysis.catches:
-        steer = "Trials at full level, mixed into the test runs. They changed no level of a run and enter no threshold."
-        sections.append(Section("Catch trials", paragraphs=(steer,), tables=(catch_table(analysis),)))
+        catch_note = (
+            "Trials at full level, mixed into the test runs. They changed no level of a run and enter no threshold."
+        )
+        sections.append(Section("Catch trials", paragraphs=(catch_note,), tables=(catch_table(analysis),)))
     if analysis.practice:
-        enter = "Short runs at a fixed level, before the test runs. They enter no result and excluded no participant."
-        sections.append(Section("Practice", paragraphs=(enter,), tables=(practice_table(analysis),)))
+        practice_note = (
+            "Short runs at a fixed level, before the test runs. They enter no result and excluded no participant."
+        )
+        sections.append(Section("Practice", paragraphs=(practice_note,), tables=(practice_table(analysis),)))
     return sections
 
 
-def _delivery(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Section]:
+def _delivery_sections(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Section]:
     """Section on the accelerations that the device delivered; empty where the figure `delivered` does not exist."""
     if "delivered" not in by_name:
         return []
@@ -173,14 +179,14 @@ def _delivery(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[S
     return [Section("What the device delivered", pictures=(by_name["delivered"],), tables=tables)]
 
 
-def _ellipsoids(results: Sequence[EllipsoidResult], by_name: Mapping[str, Picture]) -> list[Section]:
+def _ellipsoid_sections(results: Sequence[EllipsoidResult], by_name: Mapping[str, Picture]) -> list[Section]:
     if not results:
         return []
     pictures = (by_name["ellipsoids"],) if "ellipsoids" in by_name else ()
     return [Section("Acceleration ellipses", pictures=pictures, tables=(ellipsoid_table(results),))]
 
 
-def _runs(analysis: StudyAnalysis, pictures: Sequence[Picture]) -> list[Section]:
+def _run_sections(analysis: StudyAnalysis, pictures: Sequence[Picture]) -> list[Section]:
     if not analysis.runs:
         return []
     tracks = tuple(picture for picture in pictures if picture.name.startswith("staircases-"))

@@ -14,7 +14,7 @@ from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.psychophysics.two_analyses import coverage_notes
 from analysis.reports.page import Table
 from analysis.threshold_words import threshold_words
-from analysis.wording import NONE, count, format_signed, mark_cut, number, p_value
+from analysis.wording import MISSING, format_count, format_number, format_p, format_signed, mark_cut
 
 
 def threshold_table_text(analysis: StudyAnalysis) -> Table:
@@ -45,11 +45,11 @@ def group_table(analysis: StudyAnalysis) -> Table:
         for cells in (analysis.table.censored, analysis.table.stopped)
     )
     rows = []
-    for group, cut, stopped in zip(analysis.anova.groups, cuts, stops, strict=True):
+    for group, cut, stop_count in zip(analysis.anova.groups, cuts, stops, strict=True):
         interval = intervals.get(group.name)
-        shown = f"{number(interval.lower)} to {number(interval.upper)}" if interval else NONE
-        mean = mark_cut(group.mean, bool(cut or stopped))
-        rows.append((group.name, str(group.n), mean, number(group.sd), shown, str(cut), str(stopped)))
+        interval_text = f"{format_number(interval.lower)} to {format_number(interval.upper)}" if interval else MISSING
+        mean = mark_cut(group.mean, bool(cut or stop_count))
+        rows.append((group.name, str(group.n), mean, format_number(group.sd), interval_text, str(cut), str(stop_count)))
     percent = f"{100 * analysis.comparisons.confidence:g} %"
     return Table(
         caption="Groups (N)",
@@ -65,7 +65,7 @@ def group_table(analysis: StudyAnalysis) -> Table:
         rows=tuple(rows),
         notes=(
             "Comparison intervals are for comparing means with each other; they are not confidence intervals.",
-            *_coverage(analysis),
+            *_coverage_notes(analysis),
         ),
     )
 
@@ -76,7 +76,7 @@ def _coverage_suffix(analysis: StudyAnalysis) -> str:
     return ", without coverage" if analysis.table.coverage else ""
 
 
-def _coverage(analysis: StudyAnalysis) -> tuple[str, ...]:
+def _coverage_notes(analysis: StudyAnalysis) -> tuple[str, ...]:
     """Note on why confidence levels do not hold (`ThresholdTable.coverage`); empty without cut or stopped runs."""
     return (analysis.table.coverage,) if analysis.table.coverage else ()
 
@@ -88,12 +88,23 @@ def one_way_table(analysis: StudyAnalysis) -> Table:
     rows: tuple[tuple[str, ...], ...] = ()
     effect: tuple[str, ...] = ()
     if anova.f is not None and anova.ss_between is not None and anova.df_between:
-        between = (number(anova.ss_between, 3), count(anova.df_between), number(anova.ss_between / anova.df_between, 3))
-        within = (number(anova.ss_within, 3), count(anova.df_within), number(anova.mean_square_within, 3))
-        rows = (("Frequency", *between, number(anova.f), p_value(anova.p)), ("Within", *within, "", ""))
+        between_cells = (
+            format_number(anova.ss_between, 3),
+            format_count(anova.df_between),
+            format_number(anova.ss_between / anova.df_between, 3),
+        )
+        within_cells = (
+            format_number(anova.ss_within, 3),
+            format_count(anova.df_within),
+            format_number(anova.mean_square_within, 3),
+        )
+        rows = (
+            ("Frequency", *between_cells, format_number(anova.f), format_p(anova.p)),
+            ("Within", *within_cells, "", ""),
+        )
         effect = (
-            f"Effect size{_coverage_suffix(analysis)}: η² = {number(anova.eta_squared)}, "
-            f"ω² = {number(anova.omega_squared)}.",
+            f"Effect size{_coverage_suffix(analysis)}: η² = {format_number(anova.eta_squared)}, "
+            f"ω² = {format_number(anova.omega_squared)}.",
         )
     return Table(
         caption="One-way analysis of variance, as published",
@@ -115,13 +126,13 @@ def pair_table(analysis: StudyAnalysis) -> Table:
                 f"{pair.second} − {pair.first}",
                 format_signed(pair.difference),
                 f"{format_signed(pair.lower)} to {format_signed(pair.upper)}",
-                p_value(pair.p),
+                format_p(pair.p),
             )
             for pair in comparisons.pairs
         ),
         notes=(
             *comparisons.notes,
-            *_coverage(analysis),
+            *_coverage_notes(analysis),
             *coverage_notes(("tukey",), analysis.table, analysis.protocol.staircase),
         ),
     )
@@ -134,24 +145,28 @@ def within_table(analysis: StudyAnalysis) -> Table:
     rows: list[tuple[str, ...]] = []
     effects = []
     if within.epsilon is not None and within.df_conditions is not None and within.df_error is not None:
-        f = f"F = {number(within.f)}"
+        f = f"F = {format_number(within.f)}"
         corrected = f"{within.epsilon * within.df_conditions:.2f}, {within.epsilon * within.df_error:.2f}"
-        rows.append((f"Greenhouse-Geisser, ε = {number(within.epsilon)}", corrected, f, p_value(within.p)))
+        rows.append((f"Greenhouse-Geisser, ε = {format_number(within.epsilon)}", corrected, f, format_p(within.p)))
         huynh = within.epsilon_huynh_feldt or 1.0
         corrected = f"{huynh * within.df_conditions:.2f}, {huynh * within.df_error:.2f}"
-        rows.append((f"Huynh-Feldt, ε = {number(huynh)}", corrected, f, p_value(within.p_huynh_feldt)))
+        rows.append((f"Huynh-Feldt, ε = {format_number(huynh)}", corrected, f, format_p(within.p_huynh_feldt)))
         rows.append(
-            ("Without correction", f"{within.df_conditions}, {within.df_error}", f, p_value(within.p_uncorrected))
+            ("Without correction", f"{within.df_conditions}, {within.df_error}", f, format_p(within.p_uncorrected))
         )
         effects.append(
-            f"Effect size{_coverage_suffix(analysis)}: partial η² = {number(within.partial_eta_squared)}, "
-            f"generalized η² = {number(within.generalized_eta_squared)}."
+            f"Effect size{_coverage_suffix(analysis)}: partial η² = {format_number(within.partial_eta_squared)}, "
+            f"generalized η² = {format_number(within.generalized_eta_squared)}."
         )
     if within.mauchly_w is not None:
-        effects.append(f"Sphericity (Mauchly): W = {number(within.mauchly_w)}, p = {p_value(within.mauchly_p)}.")
+        effects.append(
+            f"Sphericity (Mauchly): W = {format_number(within.mauchly_w)}, p = {format_p(within.mauchly_p)}."
+        )
     if ranks.p is not None:
-        rows.append(("Friedman (ranks)", count(ranks.df), f"χ² = {number(ranks.chi_squared)}", p_value(ranks.p)))
-        effects.append(f"Agreement of the rankings: Kendall's W = {number(ranks.kendall_w)}.")
+        rows.append(
+            ("Friedman (ranks)", format_count(ranks.df), f"χ² = {format_number(ranks.chi_squared)}", format_p(ranks.p))
+        )
+        effects.append(f"Agreement of the rankings: Kendall's W = {format_number(ranks.kendall_w)}.")
     return Table(
         caption=f"Within participants ({within.participants} without a gap)",
         header=("Test", "df", "Statistic", "p"),
@@ -160,14 +175,14 @@ def within_table(analysis: StudyAnalysis) -> Table:
     )
 
 
-TURNS = "Reversals at the cap: of the averaged ones. Pushes: how often the rule required more than the cap."
+REVERSALS_NOTE = "Reversals at the cap: of the averaged ones. Pushes: how often the rule required more than the cap."
 """Note below the table of runs, for staircases."""
 
 
 def run_table(analysis: StudyAnalysis) -> Table:
     """Table of all runs with their trials, thresholds, d' and criterion; reversals only for staircases."""
     by_reversals = not analysis.protocol.staircase.is_bayesian
-    turns: tuple[tuple[str, Callable[[Threshold], str]], ...] = (
+    reversal_columns: tuple[tuple[str, Callable[[Threshold], str]], ...] = (
         ("Reversals", lambda row: str(row.reversals)),
         ("at cap", lambda row: str(row.cap_reversals)),
     )
@@ -177,26 +192,26 @@ def run_table(analysis: StudyAnalysis) -> Table:
         ("Session", lambda row: row.session),
         ("Run", lambda row: str(row.run)),
         ("Hz", lambda row: f"{row.frequency_hz:g}"),
-        ("N", _threshold),
-        ("dB re 1 N", lambda row: number(row.threshold_db)),
-        ("m/s²", lambda row: number(row.threshold_mps2)),
-        ("mm", lambda row: number(row.threshold_mm, 3)),
-        *(turns if by_reversals else ()),
+        ("N", _threshold_text),
+        ("dB re 1 N", lambda row: format_number(row.threshold_db)),
+        ("m/s²", lambda row: format_number(row.threshold_mps2)),
+        ("mm", lambda row: format_number(row.threshold_mm, 3)),
+        *(reversal_columns if by_reversals else ()),
         ("Trials", lambda row: str(row.trials)),
         ("at cap", lambda row: str(row.trials_at_cap)),
         *(pushes if by_reversals else ()),
         ("Spoiled", lambda row: str(row.spoiled_trials)),
-        ("At will", _repeats),
-        ("% right", lambda row: number(row.percent_correct, 0)),
-        ("d'", lambda row: number(row.d_prime)),
-        ("Criterion", lambda row: number(row.criterion)),
+        ("At will", _repeats_text),
+        ("% right", lambda row: format_number(row.percent_correct, 0)),
+        ("d'", lambda row: format_number(row.d_prime)),
+        ("Criterion", lambda row: format_number(row.criterion)),
     )
     return Table(
         caption="All runs",
         header=tuple(name for name, _ in columns),
         rows=tuple(tuple(text(row) for _, text in columns) for row in analysis.thresholds),
         notes=(
-            *([TURNS] if by_reversals else []),
+            *([REVERSALS_NOTE] if by_reversals else []),
             f"m/s² and mm: as measured in {threshold_words(analysis.protocol.staircase).measured_in}.",
             f"At will: presentations that the participant made void (asked for again, paused, left, answered outside "
             f"the time), with their share; ! {OFTEN_WORDS}.",
@@ -206,12 +221,12 @@ def run_table(analysis: StudyAnalysis) -> Table:
     )
 
 
-def _threshold(row: Threshold) -> str:
+def _threshold_text(row: Threshold) -> str:
     """Threshold in N, or "stopped" where the trial limit ended the run."""
     return "stopped" if row.ended is RunEnd.TRIAL_LIMIT else mark_cut(row.threshold_n, row.censored)
 
 
-def _repeats(row: Threshold) -> str:
+def _repeats_text(row: Threshold) -> str:
     """Number and share of presentations that the participant made void; "!" marks frequent ones."""
     if not row.repeats_at_will:
         return "0"
@@ -229,10 +244,10 @@ def ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
         ),
         rows=tuple(
             (
-                f"{result.frequency_hz:g} Hz", result.along.replace("_", " "), number(result.amplitude_n),
-                number(result.phasor.on_axis_mps2), f"1 : {number(result.moments.normalised_axes[1])}",
-                f"{number(result.moments.tilt_deg, 0)}°", f"1 : {number(result.phasor.ellipticity)}",
-                f"{number(result.phasor.tilt_deg, 0)}°", number(result.phasor.off_axis_ratio),
+                f"{result.frequency_hz:g} Hz", result.along.replace("_", " "), format_number(result.amplitude_n),
+                format_number(result.phasor.on_axis_mps2), f"1 : {format_number(result.moments.normalised_axes[1])}",
+                f"{format_number(result.moments.tilt_deg, 0)}°", f"1 : {format_number(result.phasor.ellipticity)}",
+                f"{format_number(result.phasor.tilt_deg, 0)}°", format_number(result.phasor.off_axis_ratio),
                 f"{100 * result.phasor.harmonic_share:.1f} %",
             )
             for result in results

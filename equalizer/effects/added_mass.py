@@ -11,32 +11,32 @@ import numpy as np
 
 from equalizer.effects.effect import ALL_SITES, Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, value_along
+from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, quadratic_form
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
-_GUESS = 0.1
+_INITIAL_MASS_SHARE = 0.1
 """Second starting value, as a share of the model's own mass: re-tuning the model may have absorbed the missing mass."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
-    along = driven_axes(model)[:, axis]
-    return replace(model, mass=model.mass + values["mass"] * np.outer(along, along))
+    direction = driven_axes(model)[:, axis]
+    return replace(model, mass=model.mass + values["mass"] * np.outer(direction, direction))
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Mass by linear regression of the missing force on -dv/dt, with position, velocity and a constant as nuisances
     (the median over all axes for ALL_SITES); then a share of the model's mass. Only positive values."""
     sites = range(evidence.model.inputs) if axis == ALL_SITES else (axis,)
-    found = []
+    estimates = []
     for site in sites:
         motion = axis_motion(evidence, site)
         nuisances = np.column_stack([motion.position, motion.velocity, np.ones_like(motion.force)])
-        beside = PartialRegression(motion.force, nuisances)
-        found.append(float(beside.fit(-motion.acceleration).strengths[0]))
-    known = min(value_along(evidence.model.mass, driven_axes(evidence.model)[:, site]) for site in sites)
-    guesses = (float(np.median(found)), _GUESS * known)
-    return tuple({"mass": guess} for guess in guesses if guess > 0)
+        regression = PartialRegression(motion.force, nuisances)
+        estimates.append(float(regression.fit(-motion.acceleration).strengths[0]))
+    model_mass = min(quadratic_form(evidence.model.mass, driven_axes(evidence.model)[:, site]) for site in sites)
+    candidates = (float(np.median(estimates)), _INITIAL_MASS_SHARE * model_mass)
+    return tuple({"mass": mass} for mass in candidates if mass > 0)
 
 
 EFFECT = Effect(
@@ -46,7 +46,7 @@ EFFECT = Effect(
     signature="the missing force is a straight line over the acceleration, at every level; nothing appears at silent "
     "lines",
     parameters=(Parameter("mass", 1e-9, 1e6, none=0.0),),
-    acts=Structure(_change),
+    action=Structure(_change),
     starts=_starts,
     sites=("all", "one"),
 )

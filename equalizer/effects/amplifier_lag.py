@@ -39,7 +39,7 @@ EFFECT = Effect(
     signature="the missing force follows the command's rate of change at every level alike, and position and response "
     "are late by the same",
     parameters=(Parameter("time_constant", 1e-6, 1.0, none=0.0),),
-    acts=OnCommand(_lag_force, fine=True, at_end=_lag_force_at_end),
+    action=OnCommand(_lag_force, fine=True, at_end=_lag_force_at_end),
     starts=_starts,
     sites=("all", "one"),
 )

@@ -9,33 +9,45 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_
 from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import regress_beside_linear, select_sliding_motion
+from equalizer.effects.starts.starting_values import regress_out_linear_terms, select_sliding_motion
 from equalizer.signals.signal import FloatArray
 
-_GUESS = 1.3
+_INITIAL_LEVEL_RATIO = 1.3
 """Ratio of the two levels in the starting values that are tried in addition to the measured ones."""
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Mean friction force over the step. memory: deflection of the bristle."""
+    """Mean friction force (N) over the step. memory: deflection of the bristle (m); at: motion in the step, as laid out
+    in `simulation.instant`."""
     return float(friction_force(parameters[0], parameters[1], memory[0], memory, at))
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Levels by regression of the missing force on either direction of sliding, then two guesses with the same mean.
-    Empty where the mean level is not positive."""
+    """Starting values: the levels by regression of the missing force on either direction of sliding, then two pairs of
+    levels with the same mean and the ratio `_INITIAL_LEVEL_RATIO`. Empty where the mean level is not positive."""
     motion = select_sliding_motion(evidence, axis)
-    forward = np.asarray(motion.velocity > 0, dtype=np.float64)
+    is_forward = np.asarray(motion.velocity > 0, dtype=np.float64)
     # No constant force among the regressors: it would absorb the asymmetry.
-    positive, negative = regress_beside_linear(motion, constant=False).fit(-forward, 1 - forward).strengths.tolist()
+    positive, negative = (
+        regress_out_linear_terms(motion, constant=False).fit(-is_forward, 1 - is_forward).strengths.tolist()
+    )
     mean = (positive + negative) / 2
     if mean <= 0:
         return ()
     measured = {"level_positive": max(positive, 0.05 * mean), "level_negative": max(negative, 0.05 * mean)}
-    more, less = 2 * mean * _GUESS / (1 + _GUESS), 2 * mean / (1 + _GUESS)
-    guesses = ((more, less), (less, more))
-    return (measured, *({"level_positive": each, "level_negative": other} for each, other in guesses))
+    high_level, low_level = (
+        2 * mean * _INITIAL_LEVEL_RATIO / (1 + _INITIAL_LEVEL_RATIO),
+        2 * mean / (1 + _INITIAL_LEVEL_RATIO),
+    )
+    candidates = ((high_level, low_level), (low_level, high_level))
+    return (
+        measured,
+        *(
+            {"level_positive": positive_level, "level_negative": negative_level}
+            for positive_level, negative_level in candidates
+        ),
+    )
 
 
 EFFECT = Effect(
@@ -45,7 +57,7 @@ EFFECT = Effect(
     signature="the missing force flips its sign with the velocity, by unequal amounts: there is a mean force while "
     "the axis moves; its odd harmonics, and weaker even ones, fall as the level rises",
     parameters=(Parameter("level_positive", 1e-9, 1e6, none=0.0), Parameter("level_negative", 1e-9, 1e6, none=0.0)),
-    acts=AxisForce(_law, pack_values("level_positive", "level_negative"), memory=1),
+    action=AxisForce(_law, pack_values("level_positive", "level_negative"), memory=1),
     starts=_starts,
     simpler=("coulomb_friction",),
 )

@@ -7,7 +7,7 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
+from equalizer.effects.starts.starting_values import axis_motion, regress_out_linear_terms
 from equalizer.signals.signal import FloatArray
 
 
@@ -28,7 +28,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """k2 by regression of the missing force on -x^2, the linear terms projected out."""
     motion = axis_motion(evidence, axis)
-    k2 = float(regress_beside_linear(motion).fit(-(motion.position**2)).strengths[0])
+    k2 = float(regress_out_linear_terms(motion).fit(-(motion.position**2)).strengths[0])
     return ({"k2": k2},) if k2 != 0 else ()
 
 
@@ -39,6 +39,6 @@ EFFECT = Effect(
     signature="the missing force is an even curve over the position; its even harmonics rise with the level and the "
     "mean position moves",
     parameters=(Parameter("k2", -1e12, 1e12, none=0.0, scale="signed"),),
-    acts=AxisForce(_law, pack_values("k2")),
+    action=AxisForce(_law, pack_values("k2")),
     starts=_starts,
 )

@@ -12,24 +12,28 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
-RATIOS = (0.1, 0.3, 0.8, 2.0)
+DAMPING_RATIOS = (0.1, 0.3, 0.8, 2.0)
 """Damping ratios that are tried for starting values."""
 
 
-def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
-    along = driven_axes(model)[:, axis]
-    return with_oscillator(model, along, values["mass"], values["damping"], values["stiffness"])
+def _add_body(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+    """The model with the body, its damper and its spring attached to a driven axis."""
+    direction = driven_axes(model)[:, axis]
+    return with_oscillator(model, direction, values["mass"], values["damping"], values["stiffness"])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """The two oscillators that explain most of the missing force, with k = m w² and c = 2 ratio m w."""
+    """The two oscillators that explain most of the missing force: k = m w², c = 2 ratio m w, w = 2 pi natural_hz."""
     missing = missing_force_spectra(evidence, axis)
-    natural = np.geomspace(2.0, 0.4 * evidence.sample_rate_hz, 50).tolist()
+    natural_hz = np.geomspace(2.0, 0.4 * evidence.sample_rate_hz, 50).tolist()
     starts = []
-    for each in likely_oscillators(missing, axis, natural, RATIOS)[:2]:
-        wave = 2 * np.pi * each.natural_hz
-        damping, stiffness = 2 * each.damping_ratio * each.mass * wave, each.mass * wave**2
-        starts.append({"mass": each.mass, "damping": damping, "stiffness": stiffness})
+    for oscillator in likely_oscillators(missing, axis, natural_hz, DAMPING_RATIOS)[:2]:
+        natural_rad_s = 2 * np.pi * oscillator.natural_hz
+        damping, stiffness = (
+            2 * oscillator.damping_ratio * oscillator.mass * natural_rad_s,
+            oscillator.mass * natural_rad_s**2,
+        )
+        starts.append({"mass": oscillator.mass, "damping": damping, "stiffness": stiffness})
     return tuple(starts)
 
 
@@ -44,7 +48,7 @@ EFFECT = Effect(
         Parameter("damping", 1e-9, 1e6, none=None, step=0.03),
         Parameter("stiffness", 1e-6, 1e12, none=None, step=0.03),
     ),
-    acts=Structure(_change),
+    action=Structure(_add_body),
     starts=_starts,
     # An extra mode is the special case of one axis and light damping.
     simpler=("extra_mode",),

@@ -11,7 +11,7 @@ clock of the response and 0 where it has that of the commands.
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.simulation.interpolated_response import read_other_times
+from equalizer.effects.simulation.interpolated_response import resample_response
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
@@ -29,7 +29,7 @@ LEAST_SIGMA = 5.0
 def _read_drifting(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    return read_other_times(response, 1 + 1e-6 * values["ppm"], 0.0, values.get("interpolated", 0.0))
+    return resample_response(response, 1 + 1e-6 * values["ppm"], 0.0, values.get("interpolated", 0.0))
 
 
 def _read_position(position: FloatArray, sample_rate_hz: float, values: Values) -> FloatArray:
@@ -42,9 +42,10 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     slope = _lateness_per_second(evidence) if channel <= 0 else None
     if slope is None:
         return ()
-    with_position = _position_drifts_along(evidence, slope)
+    with_position = _position_drift_flag(evidence, slope)
     starts = [
-        {"ppm": -1e6 * slope, "interpolated": straight, "with_position": with_position} for straight in (0.0, 1.0)
+        {"ppm": -1e6 * slope, "interpolated": linear_share, "with_position": with_position}
+        for linear_share in (0.0, 1.0)
     ]
     return tuple(sorted(starts, key=lambda values: _misfit(evidence, values)))
 
@@ -55,24 +56,24 @@ def _misfit(evidence: Evidence, values: Values) -> float:
     return float(np.sum((((evidence.response - read) / evidence.noise) ** 2)[evidence.used > 0]))
 
 
-def _position_drifts_along(evidence: Evidence, slope: float) -> float:
+def _position_drift_flag(evidence: Evidence, slope: float) -> float:
     """1 where the measured position has the same clock error as the response, 0 where it is read by the commands'
     clock."""
     if evidence.position is None or evidence.predicted_position is None or evidence.position_noise is None:
         return 1.0
     noise = evidence.position_noise
-    own = _lateness_slope(evidence, evidence.position / noise, evidence.predicted_position / noise)
-    return 1.0 if own is None or abs(own[0] - slope) < abs(own[0]) else 0.0
+    position_slope = _lateness_slope(evidence, evidence.position / noise, evidence.predicted_position / noise)
+    return 1.0 if position_slope is None or abs(position_slope[0] - slope) < abs(position_slope[0]) else 0.0
 
 
 def _lateness_per_second(evidence: Evidence) -> float | None:
     """Slope of the response's time shift (s per s, equal to -1e-6 ppm); None where it is not significant or too
     large."""
-    found = _lateness_slope(evidence, evidence.response / evidence.noise, evidence.predicted / evidence.noise)
-    if found is None:
+    slope_and_error = _lateness_slope(evidence, evidence.response / evidence.noise, evidence.predicted / evidence.noise)
+    if slope_and_error is None:
         return None
-    slope, error = found
-    return slope if abs(slope) > LEAST_SIGMA * error and abs(slope) < 1e-6 * LARGEST_PPM else None
+    slope, standard_error = slope_and_error
+    return slope if abs(slope) > LEAST_SIGMA * standard_error and abs(slope) < 1e-6 * LARGEST_PPM else None
 
 
 def _lateness_slope(evidence: Evidence, measured: FloatArray, predicted: FloatArray) -> tuple[float, float] | None:
@@ -82,21 +83,21 @@ def _lateness_slope(evidence: Evidence, measured: FloatArray, predicted: FloatAr
     length = int(WINDOW_S * rate)
     if LONGEST_S * rate < 1:
         return None
-    at, late = [], []
+    window_times_s, shifts_s = [], []
     for start in range(0, len(measured) - length + 1, length):
-        inside = slice(start, start + length)
-        if evidence.used[inside].mean() > 0.5 and np.any(predicted[inside]):
-            at.append((start + 0.5 * length) / rate)
-            late.append(lateness(measured[inside], predicted[inside], int(LONGEST_S * rate)) / rate)
-    if len(at) < LEAST_WINDOWS:
+        window = slice(start, start + length)
+        if evidence.used[window].mean() > 0.5 and np.any(predicted[window]):
+            window_times_s.append((start + 0.5 * length) / rate)
+            shifts_s.append(lateness(measured[window], predicted[window], int(LONGEST_S * rate)) / rate)
+    if len(window_times_s) < LEAST_WINDOWS:
         return None
     # Windows with almost no motion give arbitrary shifts; the median of pairwise slopes is robust against them.
-    when, by = np.array(at), np.array(late)
-    first, second = np.triu_indices(len(when), 1)
-    slope = float(np.median((by[second] - by[first]) / (when[second] - when[first])))
-    rest = by - slope * when
-    spread = 1.5 * float(np.median(np.abs(rest - np.median(rest))))
-    return slope, spread / (np.sqrt(len(when)) * float(when.std()))
+    times_s, time_shifts_s = np.array(window_times_s), np.array(shifts_s)
+    first, second = np.triu_indices(len(times_s), 1)
+    slope = float(np.median((time_shifts_s[second] - time_shifts_s[first]) / (times_s[second] - times_s[first])))
+    residual = time_shifts_s - slope * times_s
+    spread = 1.5 * float(np.median(np.abs(residual - np.median(residual))))
+    return slope, spread / (np.sqrt(len(times_s)) * float(times_s.std()))
 
 
 EFFECT = Effect(
@@ -110,7 +111,7 @@ EFFECT = Effect(
         Parameter("interpolated", 0.0, 1.0, none=None, scale="linear", step=0.05),
         Parameter("with_position", 0.0, 1.0, none=None, scale="linear", step=1.0, fixed=True),
     ),
-    acts=OnResponse(_read_drifting, stage=4, on_position=_read_position),
+    action=OnResponse(_read_drifting, stage=4, on_position=_read_position),
     starts=_starts,
     of_time=True,
     sites=("all",),

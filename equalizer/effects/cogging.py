@@ -12,7 +12,12 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import AxisMotion, PartialRegression, axis_motion, regress_beside_linear
+from equalizer.effects.starts.starting_values import (
+    AxisMotion,
+    PartialRegression,
+    axis_motion,
+    regress_out_linear_terms,
+)
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
@@ -20,7 +25,7 @@ CELLS = 4096
 """Number of cells into which the travel is divided; the shortest pitch that is found is four cells long."""
 PITCHES = 3
 """Number of pitches that are tried, strongest peak of the periodogram first. By hand."""
-_FINER = 8
+_ZERO_PADDING = 8
 """Factor of zero padding: spectral points per period over the travel, so that a peak between two lines is found."""
 _LEAST_PERIODS = 2
 """Least number of periods over the travel: fewer cannot be distinguished from a nonlinear spring."""
@@ -49,43 +54,43 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """A set of values for each likely pitch, the set that explains most of the missing force first."""
     motion = axis_motion(evidence, axis)
-    beside = regress_beside_linear(motion)
-    found = [_fit_pitch(motion, beside, pitch) for pitch in _likely_pitches(motion, beside)]
-    return tuple(values for _, values in sorted(found, key=lambda item: -item[0]))
+    regression = regress_out_linear_terms(motion)
+    fits = [_fit_pitch(motion, regression, pitch) for pitch in _likely_pitches(motion, regression)]
+    return tuple(values for _, values in sorted(fits, key=lambda item: -item[0]))
 
 
-def _likely_pitches(motion: AxisMotion, beside: PartialRegression) -> list[float]:
+def _likely_pitches(motion: AxisMotion, regression: PartialRegression) -> list[float]:
     """Starting values of the pitch (m) from a periodogram of the missing force over the position, strongest first; none
-    where the axis does not move. beside: regression with the linear terms projected out of the missing force."""
-    way = float(np.ptp(motion.position))
-    if way == 0:
+    where the axis does not move. regression: regression with the linear terms projected out of the missing force."""
+    travel_range = float(np.ptp(motion.position))
+    if travel_range == 0:
         return []
-    cell = ((motion.position - motion.position.min()) / way * (CELLS - 1)).astype(int)
-    force = np.bincount(cell, beside.force, CELLS)
+    cell = ((motion.position - motion.position.min()) / travel_range * (CELLS - 1)).astype(int)
+    force = np.bincount(cell, regression.force, CELLS)
     density = np.bincount(cell, minlength=CELLS).astype(float)
     smooth = np.convolve(density, np.ones(9) / 9, "same")
     # Cells are weighted alike: noise from where the axis dwells would otherwise hide the pattern.
     weight = 1 / np.sqrt(np.maximum(smooth, 1.0))
-    power = np.abs(np.fft.rfft(force * weight, CELLS * _FINER)) ** 2
-    power[: _LEAST_PERIODS * _FINER] = 0
-    power[CELLS * _FINER // 4 :] = 0
+    power = np.abs(np.fft.rfft(force * weight, CELLS * _ZERO_PADDING)) ** 2
+    power[: _LEAST_PERIODS * _ZERO_PADDING] = 0
+    power[CELLS * _ZERO_PADDING // 4 :] = 0
     pitches = []
     for _ in range(PITCHES):
         line = int(np.argmax(power))
         if power[line] <= 0:
             break
-        pitches.append(way * CELLS / (CELLS - 1) * _FINER / line)
-        power[max(line - _FINER, 0) : line + _FINER + 1] = 0
+        pitches.append(travel_range * CELLS / (CELLS - 1) * _ZERO_PADDING / line)
+        power[max(line - _ZERO_PADDING, 0) : line + _ZERO_PADDING + 1] = 0
     return pitches
 
 
-def _fit_pitch(motion: AxisMotion, beside: PartialRegression, pitch: float) -> tuple[float, Values]:
+def _fit_pitch(motion: AxisMotion, regression: PartialRegression, pitch: float) -> tuple[float, Values]:
     """Share of the missing force that sine and cosine of this pitch (m) explain beyond linear terms, and the values:
     A sin(angle + phase) = A cos(phase) sin(angle) + A sin(phase) cos(angle), by linear least squares."""
     angle = 2 * np.pi * motion.position / pitch
-    fit = beside.fit(np.sin(angle), np.cos(angle))
+    fit = regression.fit(np.sin(angle), np.cos(angle))
     sine, cosine = fit.strengths.tolist()
-    return fit.explained, {
+    return fit.explained_share, {
         "amplitude": float(np.hypot(sine, cosine)), "pitch": pitch, "phase": float(np.arctan2(cosine, sine))
     }  # fmt: skip
 
@@ -101,6 +106,6 @@ EFFECT = Effect(
         Parameter("pitch", 1e-9, 1e3, none=None, step=0.002),
         Parameter("phase", -1e3, 1e3, none=None, scale="linear", step=0.02),
     ),
-    acts=AxisForce(_law, _pack),
+    action=AxisForce(_law, _pack),
     starts=_starts,
 )

@@ -2,9 +2,8 @@
 
 The positive direction of a driven axis is that in which a positive command pushes. Where the sign of the command is
 reversed, the coordinate x of the axis and all forces along it reverse too: F(x, v) becomes -F(-x, -v). Odd laws, such
-as friction or springs, stay the same; `SIGN_REVERSED`, `SWAPPED` and `TILTED` list the parameters of other laws that
-change.
-"""
+as friction or springs, stay the same; `SIGN_REVERSED`, `DIRECTION_PAIRS` and `CROSS_AXIS_TILTS` list the parameters of
+other laws that change."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -24,9 +23,9 @@ SIGN_REVERSED: Mapping[str, tuple[str, ...]] = {
     "pose_dependent_inertia": ("per_m",),
 }  # fmt: skip
 """Effects that depend on the sign of the axis, and their parameters that change sign with it."""
-SWAPPED = {"asymmetric_friction": ("level_positive", "level_negative")}
+DIRECTION_PAIRS = {"asymmetric_friction": ("level_positive", "level_negative")}
 """Effects with one parameter per direction of motion; the two values are exchanged."""
-TILTED = {"extra_mode": ("tilt_next", "tilt_after_next")}
+CROSS_AXIS_TILTS = {"extra_mode": ("tilt_next", "tilt_after_next")}
 """Parameters that couple an axis to the next axis and the one after it; they change sign where one of the two axes is
 reversed and the other is not."""
 
@@ -36,64 +35,71 @@ def with_reversed_commands(
 ) -> MechanicalModel:
     """The model whose response to the command times `signs` (1 or -1 per input) equals that of `model` to the command.
     inputs, outputs: channel names. Raises PlacingError for an effect on an unknown axis."""
-    way = np.asarray(signs, dtype=np.float64)
-    effects = [each for effect in model.effects for each in _reverse_effects(model, effect, way, (inputs, outputs))]
-    return replace(model, input=model.input * way, effects=tuple(effects))
+    axis_signs = np.asarray(signs, dtype=np.float64)
+    effects = [
+        reversed_effect
+        for effect in model.effects
+        for reversed_effect in _reverse_effects(model, effect, axis_signs, (inputs, outputs))
+    ]
+    return replace(model, input=model.input * axis_signs, effects=tuple(effects))
 
 
 def _reverse_effects(
-    model: MechanicalModel, effect: ModelEffect, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]
+    model: MechanicalModel,
+    effect: ModelEffect,
+    axis_signs: FloatArray,
+    channels: tuple[tuple[str, ...], tuple[str, ...]],
 ) -> tuple[ModelEffect, ...]:
     """The effect for the reversed axes; one entry per axis where an effect that depends on the sign acts on several."""
     inputs, outputs = channels
-    if effect.law is None and effect.kind not in (*SIGN_REVERSED, *SWAPPED, *TILTED):
+    if effect.law is None and effect.kind not in (*SIGN_REVERSED, *DIRECTION_PAIRS, *CROSS_AXIS_TILTS):
         return (effect,)
     if effect.law is not None and effect.law.acts_on == "response":
         return (effect,)
     sites = find_sites(effect, inputs, outputs)
     if effect.law is not None:
-        return (replace(effect, law=_reverse_law(effect.law, sites[0], way, channels)),)
+        return (replace(effect, law=_reverse_law(effect.law, sites[0], axis_signs, channels)),)
     letters = [effect.axis] if effect.axis is not None else [axis_letter(inputs[site], inputs) for site in sites]
     return tuple(
-        replace(effect, axis=letter, parameters=_reverse_parameters(effect, site, way))
+        replace(effect, axis=letter, parameters=_reverse_parameters(effect, site, axis_signs))
         for site, letter in zip(sites, letters, strict=True)
     )
 
 
-def _reverse_parameters(effect: ModelEffect, site: int, way: FloatArray) -> dict[str, float]:
-    """The effect's parameters at axis `site`. way: (m,), 1 or -1 per axis."""
-    numbers = dict(effect.parameters)
-    for place, name in enumerate(TILTED.get(effect.kind, ()), start=1):
-        if name in numbers:
-            numbers[name] *= float(way[site] * way[(site + place) % len(way)])
-    if way[site] > 0:
-        return numbers
-    for turned in SIGN_REVERSED.get(effect.kind, ()):
-        if turned in numbers:
-            numbers[turned] = -numbers[turned]
-    if effect.kind in SWAPPED:
-        first, second = SWAPPED[effect.kind]
-        numbers[first], numbers[second] = numbers[second], numbers[first]
-    return numbers
+def _reverse_parameters(effect: ModelEffect, site: int, axis_signs: FloatArray) -> dict[str, float]:
+    """The effect's parameters at axis `site`. axis_signs: (m,), 1 or -1 per axis."""
+    values = dict(effect.parameters)
+    for offset, name in enumerate(CROSS_AXIS_TILTS.get(effect.kind, ()), start=1):
+        if name in values:
+            values[name] *= float(axis_signs[site] * axis_signs[(site + offset) % len(axis_signs)])
+    if axis_signs[site] > 0:
+        return values
+    for parameter in SIGN_REVERSED.get(effect.kind, ()):
+        if parameter in values:
+            values[parameter] = -values[parameter]
+    if effect.kind in DIRECTION_PAIRS:
+        first, second = DIRECTION_PAIRS[effect.kind]
+        values[first], values[second] = values[second], values[first]
+    return values
 
 
-def _reverse_law(law: Law, site: int, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]) -> Law:
+def _reverse_law(law: Law, site: int, axis_signs: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]) -> Law:
     """The law with the signals of reversed axes negated in its formula, and its result negated where its own axis
     (site) is reversed."""
     inputs, outputs = channels
-    letters, against = axis_names(inputs), set[str]()
-    for axis in np.flatnonzero(way < 0):
-        against |= {inputs[axis], *(prefix + letters[axis] for prefix in (*DERIVATIVES, COMMAND))}
-        against |= {outputs[axis]} if len(outputs) == len(inputs) else set()
-    tree = _negate_variables(law.tree, against)
-    return replace(law, expression=format_formula(Apply("neg", (tree,)) if way[site] < 0 else tree, None, None))
+    letters, reversed_names = axis_names(inputs), set[str]()
+    for axis in np.flatnonzero(axis_signs < 0):
+        reversed_names |= {inputs[axis], *(prefix + letters[axis] for prefix in (*DERIVATIVES, COMMAND))}
+        reversed_names |= {outputs[axis]} if len(outputs) == len(inputs) else set()
+    tree = _negate_variables(law.tree, reversed_names)
+    return replace(law, expression=format_formula(Apply("neg", (tree,)) if axis_signs[site] < 0 else tree, None, None))
 
 
-def _negate_variables(node: Node, against: set[str]) -> Node:
-    """The syntax tree with each variable named in `against` replaced by its negative."""
+def _negate_variables(node: Node, reversed_names: set[str]) -> Node:
+    """The syntax tree with each variable named in `reversed_names` replaced by its negative."""
     match node:
-        case Variable(name) if name in against:
+        case Variable(name) if name in reversed_names:
             return Apply("neg", (node,))
         case Apply(name, parts):
-            return Apply(name, tuple(_negate_variables(part, against) for part in parts))
+            return Apply(name, tuple(_negate_variables(part, reversed_names) for part in parts))
     return node

@@ -23,10 +23,10 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Mean of the missing force, and the constant of its regression with position, velocity and acceleration."""
     motion = axis_motion(evidence, axis)
     # Re-tuning of a linear model can change its stiffness but not its equilibrium: a constant is no nuisance here.
-    beside = PartialRegression(motion.force, linear_part(motion, constant=False))
-    force = float(beside.fit(np.ones_like(motion.force)).strengths[0])
-    mean = float(np.mean(motion.force))
-    return tuple({"force": guess} for guess in (mean, force) if guess != 0)
+    regression = PartialRegression(motion.force, linear_part(motion, constant=False))
+    regressed_force = float(regression.fit(np.ones_like(motion.force)).strengths[0])
+    mean_force = float(np.mean(motion.force))
+    return tuple({"force": force} for force in (mean_force, regressed_force) if force != 0)
 
 
 EFFECT = Effect(
@@ -35,6 +35,6 @@ EFFECT = Effect(
     source="weight, or the pull of a cable",
     signature="the missing force is the same everywhere and at every level; the place of rest is another",
     parameters=(Parameter("force", -1e6, 1e6, none=0.0, scale="signed"),),
-    acts=AxisForce(_law, pack_values("force")),
+    action=AxisForce(_law, pack_values("force")),
     starts=_starts,
 )

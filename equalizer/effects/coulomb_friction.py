@@ -12,7 +12,7 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_
 from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import regress_beside_linear, select_sliding_motion
+from equalizer.effects.starts.starting_values import regress_out_linear_terms, select_sliding_motion
 from equalizer.signals.signal import FloatArray
 
 
@@ -24,7 +24,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Level by linear regression of the missing force on -sgn(v) where the axis slides; empty unless positive."""
     motion = select_sliding_motion(evidence, axis)
-    level = float(regress_beside_linear(motion).fit(-np.sign(motion.velocity)).strengths[0])
+    level = float(regress_out_linear_terms(motion).fit(-np.sign(motion.velocity)).strengths[0])
     return ({"level": level},) if level > 0 else ()
 
 
@@ -35,6 +35,6 @@ EFFECT = Effect(
     signature="the missing force flips its sign with the velocity and does not grow with it; its odd harmonics fall "
     "as the level rises",
     parameters=(Parameter("level", 1e-9, 1e6, none=0.0),),
-    acts=AxisForce(_law, pack_values("level"), memory=1),
+    action=AxisForce(_law, pack_values("level"), memory=1),
     starts=_starts,
 )

@@ -8,40 +8,42 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import shares_of
+from equalizer.effects.starts.response_starts import regression_coefficients
 from equalizer.signals.signal import FloatArray
 
-FROM = ("from_next", "from_after_next")
+SHARE_NAMES = ("from_next", "from_after_next")
 """Parameter names: share of the next channel, and of the channel after it, counted cyclically."""
-LARGEST = 1.0
+LARGEST_SHARE = 1.0
 """Largest share of another channel: a larger one means exchanged channels, which is a wiring error."""
-LEAST = 1e-4
+LEAST_SHARE = 1e-4
 """Least share that is tried: a hundredth of the cross-axis sensitivity that accelerometer data sheets allow (1 %)."""
 
 
 def _next_channels(channel: int, channels: int) -> list[int]:
     """Indices of the one or two channels that follow this one, cyclically."""
-    return [(channel + ahead) % channels for ahead in range(1, min(channels, 3))]
+    return [(channel + offset) % channels for offset in range(1, min(channels, 3))]
 
 
 def _mix_channels(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
     read = response.copy()
     for channel in channels:
-        for name, other in zip(FROM, _next_channels(channel, response.shape[1]), strict=False):
-            read[:, channel] += values[name] * response[:, other]
+        for name, source_channel in zip(SHARE_NAMES, _next_channels(channel, response.shape[1]), strict=False):
+            read[:, channel] += values[name] * response[:, source_channel]
     return read
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """Shares by linear regression of the channel's residual on the other predicted channels and its own (its gain)."""
-    others = _next_channels(channel, evidence.response.shape[1])
+    source_channels = _next_channels(channel, evidence.response.shape[1])
     residual = evidence.response - evidence.predicted
-    if not others:
+    if not source_channels:
         return ()
-    shares = shares_of(residual[:, channel], evidence.predicted[:, [*others, channel]], evidence.used)[: len(others)]
-    if not LEAST < float(np.abs(shares).max()) < LARGEST:
+    shares = regression_coefficients(
+        residual[:, channel], evidence.predicted[:, [*source_channels, channel]], evidence.used
+    )[: len(source_channels)]
+    if not LEAST_SHARE < float(np.abs(shares).max()) < LARGEST_SHARE:
         return ()
-    return ({**dict.fromkeys(FROM, 0.0), **dict(zip(FROM, shares.tolist(), strict=False))},)
+    return ({**dict.fromkeys(SHARE_NAMES, 0.0), **dict(zip(SHARE_NAMES, shares.tolist(), strict=False))},)
 
 
 EFFECT = Effect(
@@ -50,8 +52,10 @@ EFFECT = Effect(
     source="IEEE Std 1293, single-axis accelerometers: cross-axis sensitivity",
     signature="one channel contains a constant share of other channels at every frequency and level, and they "
     "contain no share of it, while the position agrees",
-    parameters=tuple(Parameter(name, -LARGEST, LARGEST, none=0.0, scale="linear", step=1e-3) for name in FROM),
-    acts=OnResponse(_mix_channels, stage=-1),
+    parameters=tuple(
+        Parameter(name, -LARGEST_SHARE, LARGEST_SHARE, none=0.0, scale="linear", step=1e-3) for name in SHARE_NAMES
+    ),
+    action=OnResponse(_mix_channels, stage=-1),
     starts=_starts,
     sites=("one", "each"),
     simpler=("sensor_misalignment",),

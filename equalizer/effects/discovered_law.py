@@ -13,14 +13,14 @@ from keyword import iskeyword
 
 import numpy as np
 
-from equalizer.effects.effect import Acts, AxisForce, Effect, OnCommand, OnResponse, Parameter, Values
+from equalizer.effects.effect import Action, AxisForce, Effect, OnCommand, OnResponse, Parameter, Values
 from equalizer.effects.simulation.law_kernel import PER_AXIS, law_force
 from equalizer.laws.evaluate import evaluate, evaluate_held
 from equalizer.laws.law import Law, Role, roles
 from equalizer.laws.parse import FUNCTIONS, MEMORY
-from equalizer.laws.program import DEEPEST, program_of
-from equalizer.laws.tree import Apply, Node, Variable, nodes
-from equalizer.laws.units import FORCE, NONE, SECOND, motion_dimension, units_of
+from equalizer.laws.program import STACK_SIZE, compile_program
+from equalizer.laws.tree import Apply, Node, Variable, iterate_nodes
+from equalizer.laws.units import DIMENSIONLESS, FORCE, SECOND, motion_dimension, units_of
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.recording import Recording
@@ -29,7 +29,7 @@ from equalizer.signals.unit_system import UnitSystem
 
 LETTERS, DERIVATIVES, COMMAND = "xyz", ("", "v", "a"), "f"
 """Letters of the axes, and prefixes of position, velocity, acceleration and command: x, vx, ax, fx."""
-_TAKEN = {
+_RESERVED_NAMES = {
     "t",
     "pi",
     "q",
@@ -39,7 +39,7 @@ _TAKEN = {
     *(prefix + letter for letter in LETTERS for prefix in (*DERIVATIVES, COMMAND)),
 }
 """Names that a recorded condition cannot have in a formula, because they have another meaning."""
-LARGEST, STEEPEST = 1e15, 20.0
+LARGEST_PARAMETER, LARGEST_EXPONENT = 1e15, 20.0
 """Largest magnitude of a free parameter, and of an exponent."""
 
 
@@ -70,39 +70,39 @@ def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
     the channel names do not end in x, y, z, these letters denote the axes in their order. Raises LawError for a signal
     that the recording lacks.
     """
-    make: dict[str, Callable[[Law, Channels], Acts]] = {
+    action_makers: dict[str, Callable[[Law, Channels], Action]] = {
         "force": _force_action, "command": _command_action, "response": _response_action
     }  # fmt: skip
-    known = set(condition_names(channels))
-    needs = law.acts_on == "force" and not known.isdisjoint(law.variables)
+    conditions = set(condition_names(channels))
+    reads_conditions = law.acts_on == "force" and not conditions.isdisjoint(law.variables)
     return Effect(
         name=DISCOVERED_LAW,
         equation=f"{_left_hand_side(law)} {law.text}",
         source="found in these recordings",
         signature=f"it depends on {', '.join(law.variables) or 'nothing'} as the formula states",
         parameters=law_parameters(law),
-        acts=make[law.acts_on](law, channels),
+        action=action_makers[law.acts_on](law, channels),
         starts=lambda evidence, axis: (),
         law=law,
-        of_time="t" in law.variables or needs,
-        with_conditions=partial(_force_action, law, channels) if needs else None,
+        of_time="t" in law.variables or reads_conditions,
+        with_conditions=partial(_force_action, law, channels) if reads_conditions else None,
     )
 
 
 def condition_names(channels: Channels) -> tuple[str, ...]:
     """Names by which a formula calls the recorded conditions: their channel names where these are valid and not taken
     by another signal, else c1, c2, … in their order."""
-    conditions, others = channels.conditions, (*channels.inputs, *channels.outputs)
+    conditions, signal_names = channels.conditions, (*channels.inputs, *channels.outputs)
     return tuple(
-        name if _is_free(name) and name not in others and conditions.count(name) == 1 else f"c{place}"
-        for place, name in enumerate(conditions, 1)
+        name if _is_usable_name(name) and name not in signal_names and conditions.count(name) == 1 else f"c{number}"
+        for number, name in enumerate(conditions, 1)
     )
 
 
-def _is_free(name: str) -> bool:
+def _is_usable_name(name: str) -> bool:
     """Whether a condition's channel name is valid in a formula and has no other meaning there."""
-    known = iskeyword(name) or name in _TAKEN or re.fullmatch(r"[pc]\d+", name)
-    return name.isidentifier() and not known
+    is_reserved = iskeyword(name) or name in _RESERVED_NAMES or re.fullmatch(r"[pc]\d+", name)
+    return name.isidentifier() and not is_reserved
 
 
 def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ...]:
@@ -111,56 +111,60 @@ def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ..
     if law.units:
         return law.units
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity, 0)
-    orders = [motion_dimension(number) for number in range(len(DERIVATIVES))]
+    orders = [motion_dimension(derivative) for derivative in range(len(DERIVATIVES))]
     signals = {"t": SECOND, **dict.fromkeys(channels.outputs, orders[order]), **dict.fromkeys(channels.inputs, FORCE)}
     for letter in LETTERS:
-        signals |= {prefix + letter: orders[number] for number, prefix in enumerate(DERIVATIVES)}
+        signals |= {prefix + letter: orders[derivative] for derivative, prefix in enumerate(DERIVATIVES)}
         signals[COMMAND + letter] = FORCE
     # A formula divides a condition by its own unit, so conditions are counted in that unit.
-    signals = dict.fromkeys(law.variables, NONE) | signals
+    signals = dict.fromkeys(law.variables, DIMENSIONLESS) | signals
     return units_of(law.tree, law.numbers, signals, orders[order] if law.acts_on == "response" else FORCE, system)
 
 
 def law_values(law: Law) -> Values:
     """Values p0, p1, … of the law's effect: the law's free parameters in their order."""
-    return {f"p{place}": number for place, number in enumerate(law.numbers)}
+    return {f"p{number}": value for number, value in enumerate(law.numbers)}
 
 
 def law_with_values(law: Law, values: Values) -> Law:
     """The law with the values p0, p1, … as its free parameters; the inverse of `law_values`."""
-    return law.with_numbers([values[f"p{place}"] for place in range(len(law.numbers))])
+    return law.with_numbers([values[f"p{number}"] for number in range(len(law.numbers))])
 
 
 def law_parameters(law: Law) -> tuple[Parameter, ...]:
     """Parameters p0, p1, … for a fit: range and scale follow from each parameter's role in the formula, and its
     sign."""
-    found = roles(law.tree)
-    none = 0.0 if law.acts_on == "force" or _adds_to_signal(law.tree) else None
-    return tuple(_parameter(f"p{place}", number, found[place], none) for place, number in enumerate(law.numbers))
+    parameter_roles = roles(law.tree)
+    vanishing_value = 0.0 if law.acts_on == "force" or _adds_to_signal(law.tree) else None
+    return tuple(
+        _parameter(f"p{index}", value, parameter_roles[index], vanishing_value)
+        for index, value in enumerate(law.numbers)
+    )
 
 
 def _adds_to_signal(tree: Node) -> bool:
     """Whether the formula is the signal itself plus terms: with all terms zero, it changes nothing."""
     while isinstance(tree, Apply) and tree.name in ("+", "-"):
-        tree = tree.parts[0]
+        tree = tree.arguments[0]
     return isinstance(tree, Variable)
 
 
-def _parameter(name: str, number: float, role: Role, none: float | None) -> Parameter:
-    """Fit parameter of a role (`equalizer.laws.law.Role`). none: value at which a factor makes the effect vanish."""
+def _parameter(name: str, value: float, role: Role, vanishing_value: float | None) -> Parameter:
+    """Fit parameter of a role (`equalizer.laws.law.Role`). vanishing_value: value at which a factor makes the effect
+    vanish."""
     if role == "factor":
-        return Parameter(name, -LARGEST, LARGEST, none, scale="signed")
+        return Parameter(name, -LARGEST_PARAMETER, LARGEST_PARAMETER, vanishing_value, scale="signed")
     if role == "phase":
         return Parameter(name, -1e3, 1e3, None, scale="linear", step=0.02)
     if role == "exponent":
         return (
-            Parameter(name, 1e-3, STEEPEST, None)
-            if number > 0
-            else Parameter(name, -STEEPEST, STEEPEST, None, "linear")
+            Parameter(name, 1e-3, LARGEST_EXPONENT, None)
+            if value > 0
+            else Parameter(name, -LARGEST_EXPONENT, LARGEST_EXPONENT, None, "linear")
         )
-    if role == "positive" and number > 0:
-        return Parameter(name, 1 / LARGEST, LARGEST, None)
-    return Parameter(name, -LARGEST, LARGEST, None, scale="signed")
+    if role == "positive" and value > 0:
+        return Parameter(name, 1 / LARGEST_PARAMETER, LARGEST_PARAMETER, None)
+    return Parameter(name, -LARGEST_PARAMETER, LARGEST_PARAMETER, None, scale="signed")
 
 
 def _left_hand_side(law: Law) -> str:
@@ -169,7 +173,7 @@ def _left_hand_side(law: Law) -> str:
 
 def has_memory(law: Law) -> bool:
     """Whether the formula has an operator with memory (lag, play, delay, integral): it depends on past signals."""
-    return any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree))
+    return any(isinstance(node, Apply) and node.name in MEMORY for node in iterate_nodes(law.tree))
 
 
 def axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
@@ -181,12 +185,12 @@ def axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(LETTERS[: len(channels)])
 
 
-def names_of_readings(channels: Channels) -> tuple[str, ...]:
+def response_signal_names(channels: Channels) -> tuple[str, ...]:
     """Names of the response's channels in a formula: ax, ay, az of accelerations, or the recording's channel names."""
-    found: dict[int, str] = {}
-    for name, number in _response_signals(channels).items():
-        found.setdefault(number, name)
-    return tuple(found[number] for number in sorted(found))
+    name_by_column: dict[int, str] = {}
+    for name, column in _response_signals(channels).items():
+        name_by_column.setdefault(column, name)
+    return tuple(name_by_column[column] for column in sorted(name_by_column))
 
 
 def force_signals(channels: Channels) -> dict[str, int]:
@@ -194,8 +198,8 @@ def force_signals(channels: Channels) -> dict[str, int]:
     axis, then the conditions."""
     names = condition_names(channels)
     first = 1 + PER_AXIS * len(channels.inputs)
-    conditions = {name: place for place, name in enumerate(names, first)}
-    return conditions | {"t": 0, **{name: 1 + place for name, place in _motion_signals(channels)}}
+    conditions = {name: index for index, name in enumerate(names, first)}
+    return conditions | {"t": 0, **{name: 1 + index for name, index in _motion_signals(channels)}}
 
 
 def _motion_signals(channels: Channels) -> Iterator[tuple[str, int]]:
@@ -217,25 +221,25 @@ def _force_action(law: Law, channels: Channels, samples: FloatArray | None = Non
     unknown. The action's `pack` raises ValueError for a model with another number of axes, and for missing conditions.
     """
     signals = force_signals(channels)
-    program, axes, conditions = program_of(law.tree, signals), len(channels.inputs), len(channels.conditions)
-    places = {signals[name] for name in law.variables if name not in ("t", "pi")}
-    heavy = any((place - 1) % PER_AXIS == 2 for place in places if place <= PER_AXIS * axes)
-    needed = any(place > PER_AXIS * axes for place in places)
+    program, axes, conditions = compile_program(law.tree, signals), len(channels.inputs), len(channels.conditions)
+    signal_indices = {signals[name] for name in law.variables if name not in ("t", "pi")}
+    reads_acceleration = any((index - 1) % PER_AXIS == 2 for index in signal_indices if index <= PER_AXIS * axes)
+    reads_conditions = any(index > PER_AXIS * axes for index in signal_indices)
     table = np.empty((0, conditions)) if samples is None else samples
 
     def pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
         if model.inputs != axes:
             raise ValueError(f"the law {law.text} is for {axes} axes; the model has {model.inputs}")
-        if needed and not len(table):
+        if reads_conditions and not len(table):
             raise ValueError(
                 f"the law {law.text} needs conditions that were not recorded; record them, or leave the law out"
             )
-        head = [axes, heavy, conditions if len(table) else 0, len(table), rate_hz]
+        header = [axes, reads_acceleration, conditions if len(table) else 0, len(table), rate_hz]
         numbers = program.with_numbers(law_with_values(law, values).numbers)
-        return np.concatenate([head, table.ravel(), numbers])
+        return np.concatenate([header, table.ravel(), numbers])
 
-    memory = DEEPEST + 1 + PER_AXIS * axes + conditions + program.memory
-    return AxisForce(law_force, pack, memory=memory, acceleration=heavy, sees=True)
+    memory = STACK_SIZE + 1 + PER_AXIS * axes + conditions + program.memory
+    return AxisForce(law_force, pack, memory=memory, acceleration=reads_acceleration, reads_all_axes=True)
 
 
 def _command_action(law: Law, channels: Channels) -> OnCommand:
@@ -243,12 +247,12 @@ def _command_action(law: Law, channels: Channels) -> OnCommand:
     signals = {COMMAND + letter: axis for axis, letter in enumerate(axis_names(channels.inputs))}
     signals |= {name: axis for axis, name in enumerate(channels.inputs)}
     # Compiled only to raise LawError now, instead of in the first simulation.
-    program_of(law.tree, {**signals, "t": -1})
+    compile_program(law.tree, {**signals, "t": -1})
 
     def of_all(commands: FloatArray, channel: int, step_s: float, values: Values) -> tuple[FloatArray, FloatArray]:
-        signal_values = {name: commands[:, number] for name, number in signals.items()}
-        held = evaluate_held(law_with_values(law, values), signal_values, 1 / step_s)
-        return np.asarray(held.mean(axis=0)), held[1]
+        signal_values = {name: commands[:, channel_index] for name, channel_index in signals.items()}
+        step_values = evaluate_held(law_with_values(law, values), signal_values, 1 / step_s)
+        return np.asarray(step_values.mean(axis=0)), step_values[1]
 
     return OnCommand(lambda commands, step_s, values: commands, fine=has_memory(law), of_all=of_all)
 
@@ -256,11 +260,11 @@ def _command_action(law: Law, channels: Channels) -> OnCommand:
 def _response_action(law: Law, channels: Channels) -> OnResponse:
     """Action of a law that replaces its response channel. Raises LawError for a signal that is no response channel."""
     signals = _response_signals(channels)
-    program_of(law.tree, {**signals, "t": -1})
+    compile_program(law.tree, {**signals, "t": -1})
 
     def change(response: FloatArray, sample_rate_hz: float, sites: tuple[int, ...], values: Values) -> FloatArray:
         read = response.copy()
-        signal_values = {name: response[:, number] for name, number in signals.items()}
+        signal_values = {name: response[:, column] for name, column in signals.items()}
         read[:, list(sites)] = evaluate(law_with_values(law, values), signal_values, sample_rate_hz)[:, None]
         return read
 
@@ -271,5 +275,5 @@ def _response_signals(channels: Channels) -> Mapping[str, int]:
     """Column in the response of each name that a formula can use."""
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
     letters = axis_names(channels.outputs) if order is not None else ()
-    named = {DERIVATIVES[order or 0] + letter: number for number, letter in enumerate(letters)}
-    return {**named, **{name: number for number, name in enumerate(channels.outputs)}}
+    derivative_names = {DERIVATIVES[order or 0] + letter: column for column, letter in enumerate(letters)}
+    return {**derivative_names, **{name: column for column, name in enumerate(channels.outputs)}}

@@ -71,7 +71,7 @@ class AxisForce:
     """Least number of integration steps per sample."""
     acceleration: bool = False
     """Whether the law reads accelerations, which are computed only then."""
-    sees: bool = False
+    reads_all_axes: bool = False
     """Whether the law reads the motion of all driven axes and the commands, which are passed only then."""
 
 
@@ -122,21 +122,21 @@ class OnResponse:
     stage: int = 0
     """Order of the effects, ascending, all after the low pass: alignment of axes (-2, -1), gain and nonlinearity (0),
     range (1), added signals (2), rounding (3), clock (4), lost samples (5)."""
-    of_whole: bool = False
+    needs_full_length: bool = False
     """Whether the effect depends on the length of the recording, which must then be given for an excerpt."""
     bandwidth_hz: Callable[[float, Values], float] | None = None
     """Bandwidth of the channels' low pass in Hz, from the model's bandwidth and the values; 0 = no low pass."""
     on_position: Callable[[FloatArray, float, Values], FloatArray] | None = None
     """Changes the positions (n, p) that the same clock samples. Arguments: positions, sample rate in Hz, values. None:
     the effect leaves positions unchanged."""
-    given: Callable[[FloatArray, FloatArray, FloatArray, tuple[int, ...], Values], FloatArray] | None = None
+    conditioned: Callable[[FloatArray, FloatArray, FloatArray, tuple[int, ...], Values], FloatArray] | None = None
     """For a random effect, the response conditioned on a measurement: samples (n, p), measured (n, p), its noise (p,),
     channels, values. Without a measurement `change` draws a realisation."""
-    given_position: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray] | None = None
+    conditioned_position: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray] | None = None
     """Likewise for the position. Arguments: response before and after, position (n, p), measured position (n, p)."""
 
 
-Acts = Structure | AxisForce | JointForce | OnCommand | OnResponse
+Action = Structure | AxisForce | JointForce | OnCommand | OnResponse
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)
@@ -150,7 +150,7 @@ class Effect:
     signature: str
     """Features of the effect in the data, as the end of a sentence that begins with its name."""
     parameters: tuple[Parameter, ...]
-    acts: Acts
+    action: Action
     starts: Callable[[Evidence, int], tuple[Values, ...]]
     """Arguments: evidence, index of an axis or channel (or ALL_SITES). Returns sets of starting values, the likeliest
     first; empty where the data contradict the effect."""
@@ -161,23 +161,23 @@ class Effect:
     """Names of effects that it contains as special cases."""
     report: Callable[[Values], Values] = dict
     """Converts fitted parameters to the reported ones of the vocabulary, where a fit has more."""
-    alike: Callable[[Values], tuple[Values, ...]] = lambda values: ()
+    near_equivalents: Callable[[Values], tuple[Values, ...]] = lambda values: ()
     """Other values with almost the same effect, at which a fit may have converged by mistake."""
     law: Law | None = None
     """Formula of an effect that has no name in the vocabulary."""
     of_time: bool = False
     """Whether the effect depends on time within a recording, or on rare events, so that no excerpt represents the whole
     recording."""
-    with_conditions: Callable[[FloatArray, float], Acts] | None = None
+    with_conditions: Callable[[FloatArray, float], Action] | None = None
     """For an effect that depends on recorded conditions: the effect under given conditions (n, q), sampled at a rate in
     Hz from a simulation's first sample on."""
 
     def __post_init__(self) -> None:
         """Register the effect for `effects_by_address`."""
-        _living[id(self)] = self
+        _live_effects[id(self)] = self
 
 
-_living: WeakValueDictionary[int, Effect] = WeakValueDictionary()
+_live_effects: WeakValueDictionary[int, Effect] = WeakValueDictionary()
 """Effects by address; weak references, so that an unused effect is freed."""
 
 
@@ -187,8 +187,8 @@ def effects_by_address() -> dict[int, Effect]:
     Effects hold functions, which cannot be pickled for another process; a forked process has them at the same
     addresses, so that the address identifies them there.
     """
-    held = [reference() for reference in _living.valuerefs()]
-    return {id(effect): effect for effect in held if effect is not None}
+    effects = [reference() for reference in _live_effects.valuerefs()]
+    return {id(effect): effect for effect in effects if effect is not None}
 
 
 @dataclass(frozen=True, slots=True)

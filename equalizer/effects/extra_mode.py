@@ -24,7 +24,7 @@ LOWEST_HZ, STARTS = 2.0, 2
 """Lowest natural frequency (Hz) that is tried, and largest number of modes for which starting values are returned."""
 RATIOS = (0.01, 0.04, 0.12)
 """Damping ratios of the coarse search."""
-FINER, COARSER = np.linspace(0.96, 1.04, 9), np.geomspace(0.4, 2.5, 5)
+FINE_FREQUENCIES, FINE_DAMPING = np.linspace(0.96, 1.04, 9), np.geomspace(0.4, 2.5, 5)
 """Factors of the finer search: natural frequencies and damping ratios relative to the best of the coarse search."""
 TILTS = ("tilt_next", "tilt_after_next")
 """Parameter names: components of the oscillator's direction along the next two axes, relative to its own axis."""
@@ -33,36 +33,41 @@ TILTS = ("tilt_next", "tilt_after_next")
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
     """The model with the oscillator attached along the tilted direction, a unit vector in the coordinates."""
     axes, m = driven_axes(model), model.inputs
-    along = axes[:, axis].copy()
-    for place, tilt in enumerate(TILTS[: m - 1], start=1):
-        along += values.get(tilt, 0.0) * axes[:, (axis + place) % m]
-    along /= np.linalg.norm(along)
-    mass, natural = values["mass"], 2 * np.pi * values["frequency"]
-    return with_oscillator(model, along, mass, 2 * values["damping_ratio"] * mass * natural, mass * natural**2)
+    direction = axes[:, axis].copy()
+    for offset, tilt in enumerate(TILTS[: m - 1], start=1):
+        direction += values.get(tilt, 0.0) * axes[:, (axis + offset) % m]
+    direction /= np.linalg.norm(direction)
+    mass, natural_rad_s = values["mass"], 2 * np.pi * values["frequency"]
+    return with_oscillator(
+        model, direction, mass, 2 * values["damping_ratio"] * mass * natural_rad_s, mass * natural_rad_s**2
+    )
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Oscillators that explain most of the missing force, by a coarse and a fine grid search each."""
     missing, starts = missing_force_spectra(evidence, axis), []
-    natural = np.geomspace(LOWEST_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
+    natural_hz = np.geomspace(LOWEST_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
     for _ in range(STARTS):
-        coarse = likely_oscillators(missing, axis, natural, RATIOS)[:1]
-        for each in coarse:
-            near = likely_oscillators(
-                missing, axis, (each.natural_hz * FINER).tolist(), (each.damping_ratio * COARSER).tolist()
+        coarse = likely_oscillators(missing, axis, natural_hz, RATIOS)[:1]
+        for oscillator in coarse:
+            refined = likely_oscillators(
+                missing,
+                axis,
+                (oscillator.natural_hz * FINE_FREQUENCIES).tolist(),
+                (oscillator.damping_ratio * FINE_DAMPING).tolist(),
             )
-            starts.append(_mode_values(near[0], axis, evidence.model.inputs))
+            starts.append(_mode_values(refined[0], axis, evidence.model.inputs))
             # The next mode is searched for in the missing force without this mode.
-            missing = subtract_oscillator(missing, near[0])
+            missing = subtract_oscillator(missing, refined[0])
     return tuple(starts)
 
 
-def _mode_values(each: AttachedOscillator, axis: int, m: int) -> Values:
+def _mode_values(oscillator: AttachedOscillator, axis: int, m: int) -> Values:
     """Parameters of an oscillator that was fitted at an axis. m: number of driven axes."""
-    tilts = [float(np.clip(each.by_axis[(axis + place) % m], -1, 1)) if place < m else 0.0 for place in (1, 2)]
+    tilts = [float(np.clip(oscillator.by_axis[(axis + offset) % m], -1, 1)) if offset < m else 0.0 for offset in (1, 2)]
     # Along a direction (1, t1, t2) the own axis feels only mass / (1 + t1² + t2²), which is what was fitted.
-    mass = each.mass * (1 + tilts[0] ** 2 + tilts[1] ** 2)
-    values = {"frequency": each.natural_hz, "mass": mass, "damping_ratio": each.damping_ratio}
+    mass = oscillator.mass * (1 + tilts[0] ** 2 + tilts[1] ** 2)
+    values = {"frequency": oscillator.natural_hz, "mass": mass, "damping_ratio": oscillator.damping_ratio}
     return values | dict(zip(TILTS, tilts, strict=True))
 
 
@@ -79,6 +84,6 @@ EFFECT = Effect(
         Parameter("tilt_next", -1.0, 1.0, none=None, scale="linear", step=0.02),
         Parameter("tilt_after_next", -1.0, 1.0, none=None, scale="linear", step=0.02),
     ),
-    acts=Structure(_change),
+    action=Structure(_change),
     starts=_starts,
 )

@@ -23,15 +23,15 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Likeliest width without a jump (0) and with a full one (1), each by grid search."""
     peaks = grid_of_peaks(evidence, axis)
     grid = [peaks[0] / 30, peaks[0] / 10, peaks[0] / 3, *peaks] if peaks else []
-    found = []
+    starting_values = []
     for jump in (0.0, 1.0):
 
         def change(commands: FloatArray, step_s: float, width: float, jump: float = jump) -> FloatArray:
             return _apply_deadband(commands, step_s, {"width": width, "jump": jump})
 
         width = likeliest_value(evidence, axis, change, grid, True)
-        found += [] if width is None else [{"width": width, "jump": jump}]
-    return tuple(found)
+        starting_values += [] if width is None else [{"width": width, "jump": jump}]
+    return tuple(starting_values)
 
 
 def _without_jump(values: Values) -> tuple[Values, ...]:
@@ -51,8 +51,8 @@ EFFECT = Effect(
         Parameter("width", 1e-6, 1e4, none=0.0),
         Parameter("jump", 0.0, 1.0, none=None, scale="linear", step=0.05),
     ),
-    acts=OnCommand(_apply_deadband),
+    action=OnCommand(_apply_deadband),
     starts=_starts,
     sites=("one", "all"),
-    alike=_without_jump,
+    near_equivalents=_without_jump,
 )

@@ -25,8 +25,8 @@ def _bend_force(commands: FloatArray, step_s: float, values: Values) -> FloatArr
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    found = fit_square_law(evidence, axis)
-    return () if found is None else ({"square": found[0], "reference": found[1]},)
+    square_law = fit_square_law(evidence, axis)
+    return () if square_law is None else ({"square": square_law[0], "reference": square_law[1]},)
 
 
 EFFECT = Effect(
@@ -40,7 +40,7 @@ EFFECT = Effect(
         Parameter("square", -1.0, 1.0, none=0.0, scale="signed"),
         Parameter("reference", 1e-6, 1e6, none=None),
     ),
-    acts=OnCommand(_bend_force),
+    action=OnCommand(_bend_force),
     starts=_starts,
     sites=("one", "all"),
 )

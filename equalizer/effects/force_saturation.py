@@ -34,7 +34,7 @@ EFFECT = Effect(
     signature="force is missing only where more than the limit is commanded, and all that is above it; odd harmonics "
     "at the top level alone",
     parameters=(Parameter("limit", 1e-4, 1e4, none=math.inf),),
-    acts=OnCommand(_clip_force),
+    action=OnCommand(_clip_force),
     starts=_starts,
     sites=("one", "all"),
 )

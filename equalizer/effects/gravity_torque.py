@@ -9,7 +9,7 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
+from equalizer.effects.starts.starting_values import axis_motion, regress_out_linear_terms
 from equalizer.signals.signal import FloatArray
 
 LEAST_TRAVEL_RAD = 0.5
@@ -34,7 +34,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     motion = axis_motion(evidence, axis)
     if not evidence.model.rotational or not np.ptp(motion.position) > LEAST_TRAVEL_RAD:
         return ()
-    fit = regress_beside_linear(motion).fit(-np.sin(motion.position), -np.cos(motion.position))
+    fit = regress_out_linear_terms(motion).fit(-np.sin(motion.position), -np.cos(motion.position))
     sine, cosine = fit.strengths.tolist()
     torque = float(np.hypot(sine, cosine))
     return ({"torque": torque, "angle": float(np.arctan2(cosine, sine))},) if torque > 0 else ()
@@ -49,6 +49,6 @@ EFFECT = Effect(
         Parameter("torque", 1e-9, 1e6, none=0.0),
         Parameter("angle", -1e3, 1e3, none=None, scale="linear", step=0.02),
     ),
-    acts=AxisForce(_law, pack_values("torque", "angle")),
+    action=AxisForce(_law, pack_values("torque", "angle")),
     starts=_starts,
 )

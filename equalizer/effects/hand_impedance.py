@@ -11,18 +11,18 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, value_along
+from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, quadratic_form
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
-_GUESS = 0.1
+_INITIAL_SHARE = 0.1
 """Second starting values, as shares of the model's own mass, damping and stiffness. In the first, a tenth of them
 replaces each value that the regression finds negative or zero."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
-    along = driven_axes(model)[:, axis]
-    square = np.outer(along, along)
+    direction = driven_axes(model)[:, axis]
+    square = np.outer(direction, direction)
     return replace(
         model,
         mass=model.mass + values["mass"] * square,
@@ -34,13 +34,17 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Values by linear regression of the missing force, then shares of the model's own values."""
     motion = axis_motion(evidence, axis)
-    beside = PartialRegression(motion.force, np.ones((len(motion.force), 1)))
-    found = beside.fit(-motion.acceleration, -motion.velocity, -motion.position).strengths.tolist()
-    along, model = driven_axes(evidence.model)[:, axis], evidence.model
-    known = [_GUESS * value_along(matrix, along) for matrix in (model.mass, model.damping, model.stiffness)]
-    values = [each if each > 0 else 0.1 * other for each, other in zip(found, known, strict=True)]
+    regression = PartialRegression(motion.force, np.ones((len(motion.force), 1)))
+    estimates = regression.fit(-motion.acceleration, -motion.velocity, -motion.position).strengths.tolist()
+    direction, model = driven_axes(evidence.model)[:, axis], evidence.model
+    model_shares = [
+        _INITIAL_SHARE * quadratic_form(matrix, direction) for matrix in (model.mass, model.damping, model.stiffness)
+    ]
+    values = [
+        estimate if estimate > 0 else 0.1 * fallback for estimate, fallback in zip(estimates, model_shares, strict=True)
+    ]
     names = ("mass", "damping", "stiffness")
-    return tuple(dict(zip(names, numbers, strict=True)) for numbers in (values, known))
+    return tuple(dict(zip(names, numbers, strict=True)) for numbers in (values, model_shares))
 
 
 EFFECT = Effect(
@@ -55,7 +59,7 @@ EFFECT = Effect(
         Parameter("damping", 0.0, 1e6, none=0.0, scale="signed"),
         Parameter("stiffness", 0.0, 1e9, none=0.0, scale="signed"),
     ),
-    acts=Structure(_change),
+    action=Structure(_change),
     starts=_starts,
     sites=("each",),
     simpler=("added_mass",),

@@ -8,7 +8,7 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
+from equalizer.effects.starts.starting_values import axis_motion, regress_out_linear_terms
 from equalizer.signals.signal import FloatArray
 
 
@@ -34,7 +34,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """k3 by linear regression of the missing force on -x³ and the linear terms of the motion; empty where k3 is not
     positive, so that a search by simulation begins with hardening only."""
     motion = axis_motion(evidence, axis)
-    k3 = float(regress_beside_linear(motion).fit(-(motion.position**3)).strengths[0])
+    k3 = float(regress_out_linear_terms(motion).fit(-(motion.position**3)).strengths[0])
     return ({"k3": k3},) if k3 > 0 else ()
 
 
@@ -45,6 +45,6 @@ EFFECT = Effect(
     signature="the missing force is an odd function of the position; its odd harmonics grow with the level, and the "
     "lowest resonance moves up with it",
     parameters=(Parameter("k3", -1e15, 1e15, none=0.0, scale="signed"),),
-    acts=AxisForce(_law, pack_values("k3")),
+    action=AxisForce(_law, pack_values("k3")),
     starts=_starts,
 )

@@ -21,7 +21,7 @@ from equalizer.effects.discovered_law import (
 )
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
+from equalizer.effects.starts.starting_values import axis_motion, regress_out_linear_terms
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law, roles
 from equalizer.laws.tree import Apply, Node, Variable, format_formula
@@ -42,36 +42,38 @@ class LawEntry:
     """Features of the law in the data, as in `Effect.signature`."""
 
 
-def kept_effects(entries: Sequence[LawEntry], recording: Recording) -> tuple[Effect, ...]:
+def library_effects(entries: Sequence[LawEntry], recording: Recording) -> tuple[Effect, ...]:
     """Effects of all entries at all axes, bound to the channels of a recording. Raises LawError for a signal that the
     recording lacks."""
     channels = law_channels(recording)
-    return tuple(effect for entry in entries for effect in effects_of(entry, channels))
+    return tuple(effect for entry in entries for effect in effects_per_axis(entry, channels))
 
 
-def effects_of(entry: LawEntry, channels: Channels) -> tuple[Effect, ...]:
+def effects_per_axis(entry: LawEntry, channels: Channels) -> tuple[Effect, ...]:
     """One effect per axis, the formula moved to it by a cyclic permutation of the axis letters. Raises LawError where
     the recording lacks a signal."""
     letters = axis_names(channels.outputs if entry.law.acts_on == "response" else channels.inputs)
-    found = []
+    effects = []
     for site in range(len(letters)):
         law = _move_to_axis(entry.law, letters, site)
         effect = law_effect(law, channels)
-        found.append(
+        effects.append(
             replace(
                 effect, name=entry.name, source=entry.source, signature=entry.signature, starts=_make_starts(law, site)
             )
         )
-    return tuple(found)
+    return tuple(effects)
 
 
 def _move_to_axis(law: Law, letters: tuple[str, ...], site: int) -> Law:
     """The law at axis `site`: letters in its formula are shifted cyclically so that its own axis becomes that axis."""
-    own = law.axis[-1:]
-    first = letters.index(own) if own in letters else 0
-    turn = {letter: letters[(number + site - first) % len(letters)] for number, letter in enumerate(letters)}
-    turn[own] = letters[site]
-    names = {prefix + letter: prefix + to for letter, to in turn.items() for prefix in (*DERIVATIVES, COMMAND)}
+    law_letter = law.axis[-1:]
+    first = letters.index(law_letter) if law_letter in letters else 0
+    permutation = {letter: letters[(index + site - first) % len(letters)] for index, letter in enumerate(letters)}
+    permutation[law_letter] = letters[site]
+    names = {
+        prefix + letter: prefix + target for letter, target in permutation.items() for prefix in (*DERIVATIVES, COMMAND)
+    }
     tree = _rename_signals(law.tree, names)
     return replace(law, expression=format_formula(tree, None, None), axis=letters[site])
 
@@ -89,7 +91,7 @@ def _rename_signals(node: Node, names: Mapping[str, str]) -> Node:
 def _make_starts(law: Law, site: int) -> Callable[[Evidence, int], tuple[Values, ...]]:
     """Function for starting values at axis `site`; empty at other axes. For a force: the law's factors by linear
     regression of the missing force, the other parameters as in the library. Otherwise all as in the library."""
-    factors = [place for place, role in roles(law.tree).items() if role == "factor"]
+    factors = [index for index, role in roles(law.tree).items() if role == "factor"]
 
     def starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         if axis != site:
@@ -103,17 +105,17 @@ def _make_starts(law: Law, site: int) -> Callable[[Evidence, int], tuple[Values,
         ]
         if not np.isfinite(shapes).all():
             return (law_values(law),)
-        strengths = regress_beside_linear(axis_motion(evidence, axis)).fit(*shapes).strengths.tolist()
-        found = {f"p{place}": strength for place, strength in zip(factors, strengths, strict=True)}
-        return ({**law_values(law), **found},) if np.any(strengths) else ()
+        strengths = regress_out_linear_terms(axis_motion(evidence, axis)).fit(*shapes).strengths.tolist()
+        fitted_factors = {f"p{index}": strength for index, strength in zip(factors, strengths, strict=True)}
+        return ({**law_values(law), **fitted_factors},) if np.any(strengths) else ()
 
     return starts
 
 
-def _with_single_factor(law: Law, factors: Sequence[int], each: int) -> Law:
-    """The law with the factor p<each> set to 1 and the other factors to 0: the regressor of that factor."""
+def _with_single_factor(law: Law, factors: Sequence[int], selected: int) -> Law:
+    """The law with the factor p<selected> set to 1 and the other factors to 0: the regressor of that factor."""
     return law.with_numbers(
-        [float(place == each) if place in factors else number for place, number in enumerate(law.numbers)]
+        [float(index == selected) if index in factors else value for index, value in enumerate(law.numbers)]
     )
 
 
@@ -122,7 +124,7 @@ def _signal_columns(evidence: Evidence) -> dict[str, FloatArray]:
     acceleration = np.gradient(evidence.axis_velocity, 1 / evidence.sample_rate_hz, axis=0)
     motion = evidence.axis_position, evidence.axis_velocity, acceleration, evidence.command
     return {
-        prefix + letter: column[:, number]
-        for number, letter in enumerate(LETTERS[: evidence.command.shape[1]])
+        prefix + letter: column[:, axis]
+        for axis, letter in enumerate(LETTERS[: evidence.command.shape[1]])
         for prefix, column in zip((*DERIVATIVES, COMMAND), motion, strict=True)
     }

@@ -7,7 +7,7 @@ samples, which attenuates high frequencies.
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.simulation.interpolated_response import read_other_times
+from equalizer.effects.simulation.interpolated_response import resample_response
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
@@ -21,7 +21,7 @@ LEAST_SAMPLES = 1e-3
 def _read_shifted(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
     """The response (n, c), delayed by `offset` seconds. `interpolated`: share (0 to 1) of linear interpolation between
     samples; the rest is band-limited (windowed sinc). `channels` is not used: all are delayed alike."""
-    return read_other_times(response, 1.0, -values["offset"] * sample_rate_hz, values.get("interpolated", 0.0))
+    return resample_response(response, 1.0, -values["offset"] * sample_rate_hz, values.get("interpolated", 0.0))
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
@@ -31,11 +31,13 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
         return ()
     weight = evidence.used[:, None] / evidence.noise
     longest = min(int(LONGEST_S * evidence.sample_rate_hz), len(weight) // 2)
-    late = lateness(evidence.response * weight, evidence.predicted * weight, longest)
-    if abs(late) <= LEAST_SAMPLES:
+    lag_samples = lateness(evidence.response * weight, evidence.predicted * weight, longest)
+    if abs(lag_samples) <= LEAST_SAMPLES:
         return ()
     # Linear interpolation between samples attenuates high frequencies, band-limited interpolation does not.
-    starts = [{"offset": late / evidence.sample_rate_hz, "interpolated": straight} for straight in (0.0, 1.0)]
+    starts = [
+        {"offset": lag_samples / evidence.sample_rate_hz, "interpolated": linear_share} for linear_share in (0.0, 1.0)
+    ]
     return tuple(sorted(starts, key=lambda values: _misfit(evidence, values)))
 
 
@@ -54,7 +56,7 @@ EFFECT = Effect(
         Parameter("offset", -LONGEST_S, LONGEST_S, none=0.0, scale="linear", step=1e-5),
         Parameter("interpolated", 0.0, 1.0, none=None, scale="linear", step=0.05),
     ),
-    acts=OnResponse(_read_shifted, stage=4),
+    action=OnResponse(_read_shifted, stage=4),
     starts=_starts,
     sites=("all",),
 )

@@ -16,28 +16,28 @@ from itertools import product
 import numpy as np
 
 from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values, pack_values
-from equalizer.effects.simulation.bodies import bodies_of, simulate_bodies
+from equalizer.effects.simulation.bodies import build_bodies, simulate_bodies
 from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.instant import F_END, V_FREE, V_PER_N, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.simulation.sensor_path import low_pass
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import value_along
+from equalizer.effects.starts.starting_values import quadratic_form
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 STEPS = 8
 """Integration steps per sample."""
-GAPS, STIFFNESSES, SLIPS = (0.2, 0.5, 1.2, 3.0, 8.0), (0.05, 0.2, 0.6), (0.01, 0.1, 0.4)
+RELATIVE_GAPS, RELATIVE_STIFFNESSES, RELATIVE_SLIPS = (0.2, 0.5, 1.2, 3.0, 8.0), (0.05, 0.2, 0.6), (0.01, 0.1, 0.4)
 """Starting values that are tried: gaps relative to the joint's rms travel in the model; stiffnesses relative to the
 model's stiffness along the joint; slip forces relative to that stiffness times that travel."""
-TRIED_S = 2.0
+EXCERPT_S = 2.0
 """Length of the excerpt that is simulated (s)."""
 SETTLING = 4
 """The first 1/SETTLING of the excerpt is not compared: the simulation starts at rest, the recording did not."""
-FINER = 4
+REFINED_PAIRS = 4
 """Number of the best pairs of gap and stiffness that are tried with every slip force."""
 _NO_FORCE: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
 """Values without a force: the motion of the model alone, from which the joint's travel is computed."""
@@ -52,11 +52,11 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
         start, free_end = max(side * at[X] - half_gap, 0.0), side * at[X_FREE] - half_gap
         if start > 0 or free_end > 0:
             ratio = stiffness * at[X_PER_N]
-            theta = (0.5 + ratio) / (1 + ratio)
-            push = stiffness * ((1 - theta) * start + theta * free_end) / (1 + theta * ratio)
-            if free_end - at[X_PER_N] * push < 0:  # contact is lost within the step: no force at its end
-                push = stiffness * (1 - theta) * start
-            spring = -side * max(push, 0.0)
+            end_weight = (0.5 + ratio) / (1 + ratio)
+            contact_force = stiffness * ((1 - end_weight) * start + end_weight * free_end) / (1 + end_weight * ratio)
+            if free_end - at[X_PER_N] * contact_force < 0:  # contact is lost within the step: no force at its end
+                contact_force = stiffness * (1 - end_weight) * start
+            spring = -side * max(contact_force, 0.0)
             spring_at_end = -side * stiffness * max(free_end + side * at[X_PER_N] * spring, 0.0)
             break
     at[V_FREE] += at[V_PER_N] * spring
@@ -72,17 +72,19 @@ def joint_direction(model: MechanicalModel, axis: int) -> FloatArray:
     quasi-statically (mass times squared static displacement per displacement of the axis). Where no undriven body with
     a spring is coupled to the axis, the joint connects the axis to the ground.
     """
-    along, axes = driven_axes(model)[:, axis], driven_axes(model)
+    direction, axes = driven_axes(model)[:, axis], driven_axes(model)
     undriven = np.linalg.norm(axes, axis=1) < 1e-9
     if not undriven.any():
-        return along
+        return direction
     own_stiffness = np.diagonal(model.stiffness)
-    is_held = undriven & (own_stiffness > 0)
-    static_ratio = np.where(is_held, model.stiffness @ along / np.where(own_stiffness > 0, own_stiffness, 1.0), 0.0)
+    is_sprung = undriven & (own_stiffness > 0)
+    static_ratio = np.where(
+        is_sprung, model.stiffness @ direction / np.where(own_stiffness > 0, own_stiffness, 1.0), 0.0
+    )
     energy = np.diagonal(model.mass) * static_ratio**2
     body = int(np.argmax(energy))
     if energy[body] == 0:
-        return along
+        return direction
     # Travel of the joint: static position of the body for the driven coordinates, minus its actual position.
     relative = np.where(undriven, 0.0, -model.stiffness[body] / own_stiffness[body])
     relative[body] = -1.0
@@ -97,13 +99,13 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[Mechanic
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """The two best values of a coarse grid by the mean square error of a simulated excerpt: first all gaps and
     stiffnesses with a medium slip force, then the best of these with the other slip forces."""
-    part, joint = _strongest_part(evidence, axis), joint_direction(evidence.model, axis)
-    travel = float(np.std(_simulate_part(evidence, axis, _NO_FORCE, part)[1]))
-    model_stiffness = max(abs(value_along(evidence.model.stiffness, joint)) / float(joint @ joint) ** 2, 1e-6)
-    measured = evidence.response[part]
+    excerpt, joint = _strongest_excerpt(evidence, axis), joint_direction(evidence.model, axis)
+    travel = float(np.std(_simulate_excerpt(evidence, axis, _NO_FORCE, excerpt)[1]))
+    model_stiffness = max(abs(quadratic_form(evidence.model.stiffness, joint)) / float(joint @ joint) ** 2, 1e-6)
+    measured = evidence.response[excerpt]
 
     def mean_square(values: Values) -> float:
-        error = (_simulate_part(evidence, axis, values, part)[0] - measured) / evidence.noise
+        error = (_simulate_excerpt(evidence, axis, values, excerpt)[0] - measured) / evidence.noise
         return float(np.mean(error[len(error) // SETTLING :] ** 2))
 
     def scaled(gap: float, stiffness: float, slip: float) -> Values:
@@ -113,28 +115,28 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
             "slip": slip * model_stiffness * travel,
         }
 
-    medium = SLIPS[len(SLIPS) // 2]
-    errors = {pair: mean_square(scaled(*pair, medium)) for pair in product(GAPS, STIFFNESSES)}
-    best = sorted(errors, key=errors.__getitem__)[:FINER]
-    found = [(errors[pair], scaled(*pair, medium)) for pair in best]
-    others = [scaled(*pair, slip) for pair in best for slip in SLIPS if slip != medium]
-    found += [(mean_square(values), values) for values in others]
-    return tuple(values for _, values in sorted(found, key=lambda item: item[0])[:2])
+    medium = RELATIVE_SLIPS[len(RELATIVE_SLIPS) // 2]
+    errors = {pair: mean_square(scaled(*pair, medium)) for pair in product(RELATIVE_GAPS, RELATIVE_STIFFNESSES)}
+    best = sorted(errors, key=errors.__getitem__)[:REFINED_PAIRS]
+    candidates = [(errors[pair], scaled(*pair, medium)) for pair in best]
+    other_slips = [scaled(*pair, slip) for pair in best for slip in RELATIVE_SLIPS if slip != medium]
+    candidates += [(mean_square(values), values) for values in other_slips]
+    return tuple(values for _, values in sorted(candidates, key=lambda item: item[0])[:2])
 
 
-def _strongest_part(evidence: Evidence, axis: int) -> slice:
-    """The excerpt of at most `TRIED_S` in which the acceleration of the axis has the largest mean square."""
-    length = min(int(TRIED_S * evidence.sample_rate_hz), len(evidence.command))
+def _strongest_excerpt(evidence: Evidence, axis: int) -> slice:
+    """The excerpt of at most `EXCERPT_S` in which the acceleration of the axis has the largest mean square."""
+    length = min(int(EXCERPT_S * evidence.sample_rate_hz), len(evidence.command))
     acceleration = np.gradient(evidence.axis_velocity[:, axis])
     power = np.cumsum(np.append(0.0, acceleration**2 * evidence.used))
     first = int(np.argmax(power[length:] - power[:-length]))
     return slice(first, first + length)
 
 
-def _simulate_part(evidence: Evidence, axis: int, values: Values, part: slice) -> tuple[FloatArray, FloatArray]:
+def _simulate_excerpt(evidence: Evidence, axis: int, values: Values, excerpt: slice) -> tuple[FloatArray, FloatArray]:
     """Simulated response (n, p) of an excerpt, and travel (n,) of the joint in m, from rest."""
-    bodies = bodies_of(evidence.model, (PlacedEffect(EFFECT, (axis,), values),))
-    commands, rate_hz = evidence.command[part], evidence.sample_rate_hz
+    bodies = build_bodies(evidence.model, (PlacedEffect(EFFECT, (axis,), values),))
+    commands, rate_hz = evidence.command[excerpt], evidence.sample_rate_hz
     outputs, _ = simulate_bodies(bodies, ActuatorForce(commands, commands), (len(commands), STEPS), 1 / rate_hz / STEPS)
     # Columns: positions, velocities, accelerations of the ports (axes, then the joint), response, its positions.
     ports = bodies.ports.shape[1]
@@ -154,6 +156,6 @@ EFFECT = Effect(
         Parameter("stiffness", 1e-6, 1e12, none=0.0),
         Parameter("slip", 1e-9, 1e6, none=0.0),
     ),
-    acts=JointForce(_change, _law, pack_values("gap", "stiffness", "slip"), memory=1, steps=STEPS),
+    action=JointForce(_change, _law, pack_values("gap", "stiffness", "slip"), memory=1, steps=STEPS),
     starts=_starts,
 )

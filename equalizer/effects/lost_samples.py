@@ -16,7 +16,7 @@ from equalizer.effects.simulation.reading_kernel import Flags, repeat_as_measure
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
-CLEAR = 4.0
+DISTINGUISHABLE = 4.0
 """Difference of two successive samples, over the noise, from which a repeated sample is distinguishable."""
 LEAST_EVENTS = 8
 """Fewest repeated readings that count as lost samples."""
@@ -34,9 +34,9 @@ def _lose_at_random(
 ) -> FloatArray:
     # Seeded with the length, so that the same samples are lost in every simulation of a recording.
     lost = np.random.default_rng(len(response)).random(len(response)) < values["fraction"]
-    read, held = response.copy(), np.empty((len(response), len(channels)))
-    repeat_where(np.ascontiguousarray(response[:, channels]), lost, held)
-    read[:, channels] = held
+    read, repeated = response.copy(), np.empty((len(response), len(channels)))
+    repeat_where(np.ascontiguousarray(response[:, channels]), lost, repeated)
+    read[:, channels] = repeated
     return read
 
 
@@ -46,8 +46,10 @@ def _lose_as_measured(
     """The response (n, p) with lost samples decided by the measurement; unchanged for a fraction of 0 or 1."""
     if not 0 < values["fraction"] < 1:
         return response
-    which, read = list(channels), response.copy()
-    read[:, which] = _repeat_by_likelihood(response[:, which], measured[:, which], noise[which], values["fraction"])[0]
+    columns, read = list(channels), response.copy()
+    read[:, columns] = _repeat_by_likelihood(
+        response[:, columns], measured[:, columns], noise[columns], values["fraction"]
+    )[0]
     return read
 
 
@@ -69,25 +71,25 @@ def _repeat_by_likelihood(
 
 
 def _lose_positions_as_measured(
-    before: FloatArray, after: FloatArray, position: FloatArray, measured: FloatArray
+    response_before: FloatArray, response_after: FloatArray, position: FloatArray, measured: FloatArray
 ) -> FloatArray:
     """Repeat positions (n, p) where samples of the response are lost, provided that this brings them closer to the
     measured position, i.e. the same logger recorded both. Then also repeat those where only the position shows a loss,
     because the response hardly changed between the two samples."""
-    lost = np.any(after != before, axis=1)
+    lost = np.any(response_after != response_before, axis=1)
     if not lost.any():
         return position
-    held = _repeat_rows(position, lost)
-    if not np.nansum((measured - held)[lost] ** 2) < np.nansum((measured - position)[lost] ** 2):
+    repeated = _repeat_rows(position, lost)
+    if not np.nansum((measured - repeated)[lost] ** 2) < np.nansum((measured - position)[lost] ** 2):
         return position
     return _repeat_rows(position, lost | _is_clearly_repeated(position, measured))
 
 
 def _repeat_rows(position: FloatArray, lost: Flags) -> FloatArray:
     """Positions (n, p) with each lost row replaced by the last row that was not lost."""
-    held = np.empty(position.shape)
-    repeat_where(np.ascontiguousarray(position), lost, held)
-    return held
+    repeated = np.empty(position.shape)
+    repeat_where(np.ascontiguousarray(position), lost, repeated)
+    return repeated
 
 
 def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> Flags:
@@ -99,36 +101,38 @@ def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> Flags:
     with np.errstate(divide="ignore", invalid="ignore"):
         # Squared distance to the preceding position minus squared distance to the sample's own position.
         nearer = np.nansum((2 * error * step + step**2) / noise**2, axis=1)
-    return np.asarray(nearer < -(CLEAR**2) / 2)
+    return np.asarray(nearer < -(DISTINGUISHABLE**2) / 2)
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """The fraction of lost samples; empty where they are too few or the negative control has as many."""
-    which = [channel]
-    found = _estimate_fraction(evidence, which, 1)
+    columns = [channel]
+    fraction = _estimate_fraction(evidence, columns, 1)
     return (
-        ({"fraction": found},)
-        if found is not None and found > CONTROL * (_estimate_fraction(evidence, which, -1) or 0)
+        ({"fraction": fraction},)
+        if fraction is not None and fraction > CONTROL * (_estimate_fraction(evidence, columns, -1) or 0)
         else ()
     )
 
 
-def _estimate_fraction(evidence: Evidence, which: list[int], forwards: int) -> float | None:
+def _estimate_fraction(evidence: Evidence, columns: list[int], direction: int) -> float | None:
     """Fraction of lost samples among those where a loss is distinguishable; None for fewer than `LEAST_EVENTS`.
-    forwards: 1, or -1 for the negative control, in reversed time (samples that equal the next)."""
-    samples, measured = evidence.predicted[::forwards, which], evidence.response[::forwards, which]
-    noise, used = evidence.noise[which], evidence.used[::forwards] > 0
-    apart = np.sum((np.diff(samples, axis=0, prepend=samples[:1]) / noise) ** 2, axis=1) > CLEAR**2
-    clear = apart & used
-    if not clear.any():
+    direction: 1, or -1 for the negative control, in reversed time (samples that equal the next)."""
+    samples, measured = evidence.predicted[::direction, columns], evidence.response[::direction, columns]
+    noise, used = evidence.noise[columns], evidence.used[::direction] > 0
+    is_distinguishable = (
+        np.sum((np.diff(samples, axis=0, prepend=samples[:1]) / noise) ** 2, axis=1) > DISTINGUISHABLE**2
+    )
+    is_countable = is_distinguishable & used
+    if not is_countable.any():
         return None
     fraction = 0.01
     for _ in range(ROUNDS):
         lost = _repeat_by_likelihood(samples, measured, noise, fraction)[1]
-        events = int(np.count_nonzero(lost & clear))
+        events = int(np.count_nonzero(lost & is_countable))
         if events < LEAST_EVENTS:
             return None
-        fraction = min(events / int(np.count_nonzero(clear)), LARGEST)
+        fraction = min(events / int(np.count_nonzero(is_countable)), LARGEST)
     return fraction
 
 
@@ -139,7 +143,9 @@ EFFECT = Effect(
     signature="single samples repeat the one before, scattered at random, in the response and in nothing "
     "that another logger read",
     parameters=(Parameter("fraction", 1e-6, LARGEST, none=0.0, fixed=True),),
-    acts=OnResponse(_lose_at_random, stage=5, given=_lose_as_measured, given_position=_lose_positions_as_measured),
+    action=OnResponse(
+        _lose_at_random, stage=5, conditioned=_lose_as_measured, conditioned_position=_lose_positions_as_measured
+    ),
     starts=_starts,
     of_time=True,
     sites=("all", "one"),

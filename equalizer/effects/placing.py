@@ -16,7 +16,7 @@ from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME, L
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, suggest_word
 from equalizer.signals.recording import Recording
 
-SHORT = 2
+SHORT_NAME_LENGTH = 2
 """Length of the longest channel name that consists of a quantity and an axis letter, such as `fx`."""
 
 
@@ -35,19 +35,21 @@ def place_effects(model: MechanicalModel, channels: Channels) -> tuple[PlacedEff
     An axis is named by its channel ('fx', 'ax') or by its letter ('x'). A parameter that a file leaves out takes its
     default. Raises PlacingError for an unknown effect or axis, or a value that must not be negative.
     """
-    named = replace(channels, quantity=model.quantity)
-    return tuple(_place_effect(effect, named) for effect in model.effects)
+    model_channels = replace(channels, quantity=model.quantity)
+    return tuple(_place_effect(effect, model_channels) for effect in model.effects)
 
 
 def model_effects(
-    placed: tuple[PlacedEffect, ...], input_channels: tuple[str, ...], output_channels: tuple[str, ...]
+    placed_effects: tuple[PlacedEffect, ...], input_channels: tuple[str, ...], output_channels: tuple[str, ...]
 ) -> tuple[ModelEffect, ...]:
     """The inverse of `place_effects`: an entry per site, or a single entry without an axis where an effect acts on all
     sites with the same values. Raises PlacingError for a site beyond the channels."""
     return tuple(
-        _model_effect(each, axis)
-        for each in placed
-        for axis in _axis_names(each, output_channels if place_of_effect(each.effect) == "sensor" else input_channels)
+        _model_effect(placed_effect, axis)
+        for placed_effect in placed_effects
+        for axis in _axis_names(
+            placed_effect, output_channels if place_of_effect(placed_effect.effect) == "sensor" else input_channels
+        )
     )
 
 
@@ -68,9 +70,15 @@ def _model_effect(placed: PlacedEffect, axis: str | None) -> ModelEffect:
 def axis_letter(channel: str, channels: tuple[str, ...]) -> str:
     """Last letter of a channel name ('x' of 'fx'), provided that all channels end in different letters and each name is
     short or ends in x, y or z; otherwise the whole name."""
-    ends = [name[-1:] for name in channels]
-    short = all(len(name) <= SHORT or name[-1:] in "xyz" for name in channels)
-    return channel[-1:] if short and len(set(ends)) == len(ends) and all(end.isalpha() for end in ends) else channel
+    last_letters = [name[-1:] for name in channels]
+    has_axis_suffixes = all(len(name) <= SHORT_NAME_LENGTH or name[-1:] in "xyz" for name in channels)
+    return (
+        channel[-1:]
+        if has_axis_suffixes
+        and len(set(last_letters)) == len(last_letters)
+        and all(letter.isalpha() for letter in last_letters)
+        else channel
+    )
 
 
 def _axis_names(placed: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:
@@ -118,9 +126,9 @@ def find_sites(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str,
     channels = outputs if place == "sensor" else inputs
     if effect.axis is None:
         return tuple(range(len(channels)))
-    exact = tuple(number for number, channel in enumerate(channels) if channel == effect.axis)
-    named = exact or tuple(number for number, channel in enumerate(channels) if channel[-1:] == effect.axis)
-    if len(named) != 1:
-        found = "is on several of" if named else "is none of"
-        raise PlacingError(f"{effect.kind}: the axis '{effect.axis}' {found} {', '.join(channels)}")
-    return named
+    exact_matches = tuple(index for index, channel in enumerate(channels) if channel == effect.axis)
+    matches = exact_matches or tuple(index for index, channel in enumerate(channels) if channel[-1:] == effect.axis)
+    if len(matches) != 1:
+        problem = "is on several of" if matches else "is none of"
+        raise PlacingError(f"{effect.kind}: the axis '{effect.axis}' {problem} {', '.join(channels)}")
+    return matches

@@ -9,7 +9,7 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import STEP_S, V_FREE, V_PER_N, X_FREE, V, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear, value_along
+from equalizer.effects.starts.starting_values import axis_motion, quadratic_form, regress_out_linear_terms
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -23,14 +23,17 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Force (N) at mid-step. The mean acceleration depends on the force itself: an implicit step, linear in the force.
     parameters: per_m M, speed_share."""
     middle, speed = 0.5 * (at[X] + at[X_FREE]), 0.5 * (at[V] + at[V_FREE])
-    more = parameters[0] * middle
-    free, per_newton = (at[V_FREE] - at[V]) / at[STEP_S], at[V_PER_N] / at[STEP_S]
-    return float(-(more * free + parameters[0] * parameters[1] * speed * speed) / max(1 + more * per_newton, 0.1))
+    added_mass = parameters[0] * middle
+    free_acceleration, per_newton = (at[V_FREE] - at[V]) / at[STEP_S], at[V_PER_N] / at[STEP_S]
+    return float(
+        -(added_mass * free_acceleration + parameters[0] * parameters[1] * speed * speed)
+        / max(1 + added_mass * per_newton, 0.1)
+    )
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
     """(2,): per_m times the mass along the axis, and speed_share."""
-    mass = value_along(model.mass, driven_axes(model)[:, axis])
+    mass = quadratic_form(model.mass, driven_axes(model)[:, axis])
     return np.array([values["per_m"] * mass, values.get("speed_share", LAGRANGE)])
 
 
@@ -38,13 +41,13 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """per_m by regression of the missing force: with both terms free where their ratio is plausible (below 1.5), and
     with the ratio of Lagrange's equation."""
     motion = axis_motion(evidence, axis)
-    mass = value_along(evidence.model.mass, driven_axes(evidence.model)[:, axis])
+    mass = quadratic_form(evidence.model.mass, driven_axes(evidence.model)[:, axis])
     by_place, by_speed = -mass * motion.position * motion.acceleration, -mass * motion.velocity**2
-    beside = regress_beside_linear(motion)
-    free, bound = beside.fit(by_place, by_speed), beside.fit(by_place + LAGRANGE * by_speed)
+    regression = regress_out_linear_terms(motion)
+    free, bound = regression.fit(by_place, by_speed), regression.fit(by_place + LAGRANGE * by_speed)
     per_m, momentum = free.strengths.tolist()
-    together = float(bound.strengths[0])
-    starts = [{"per_m": together, "speed_share": LAGRANGE}]
+    joint_fit = float(bound.strengths[0])
+    starts = [{"per_m": joint_fit, "speed_share": LAGRANGE}]
     if abs(momentum) < 1.5 * abs(per_m):
         starts.insert(0, {"per_m": per_m, "speed_share": max(momentum / per_m, 0.0)})
     return tuple(values for values in starts if values["per_m"] != 0)
@@ -60,6 +63,6 @@ EFFECT = Effect(
         Parameter("per_m", -1e6, 1e6, none=0.0, scale="signed"),
         Parameter("speed_share", -0.5, 1.5, none=None, scale="linear", step=0.02),
     ),
-    acts=AxisForce(_law, _pack),
+    action=AxisForce(_law, _pack),
     starts=_starts,
 )

@@ -12,15 +12,18 @@ from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.instant import X_FREE, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import regress_beside_linear, select_sliding_motion
+from equalizer.effects.starts.starting_values import regress_out_linear_terms, select_sliding_motion
 from equalizer.signals.signal import FloatArray
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Friction force (N) with the level at the mean of the step's start and (force-free) end position."""
-    mean = 0.5 * (at[X] + at[X_FREE])
-    level = max(parameters[0] * (1 + parameters[1] * mean + parameters[2] * mean * mean), 0.0)
+    """Friction force (N). Its level is taken at the mean of the step's start and (force-free) end position.
+    parameters: level (N), slope (1/m), bend (1/m²); memory: the bristle's deflection; at: motion, see `instant`."""
+    mean_position = 0.5 * (at[X] + at[X_FREE])
+    level = max(
+        parameters[0] * (1 + parameters[1] * mean_position + parameters[2] * mean_position * mean_position), 0.0
+    )
     return float(friction_force(level, level, memory[0], memory, at))
 
 
@@ -28,8 +31,8 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Values by linear regression of the missing force on -sgn(v), -x sgn(v), -x² sgn(v) where the axis slides."""
     motion = select_sliding_motion(evidence, axis)
     sign = -np.sign(motion.velocity)
-    found = regress_beside_linear(motion).fit(sign, sign * motion.position, sign * motion.position**2)
-    level, slope, bend = found.strengths.tolist()
+    fit = regress_out_linear_terms(motion).fit(sign, sign * motion.position, sign * motion.position**2)
+    level, slope, bend = fit.strengths.tolist()
     if level <= 0:
         return ()
     return ({"level": level, "slope_per_m": slope / level, "bend_per_m2": bend / level},)
@@ -45,7 +48,7 @@ EFFECT = Effect(
         Parameter("slope_per_m", -1e6, 1e6, none=None, scale="signed"),
         Parameter("bend_per_m2", -1e9, 1e9, none=None, scale="signed"),
     ),
-    acts=AxisForce(_law, pack_values("level", "slope_per_m", "bend_per_m2"), memory=1),
+    action=AxisForce(_law, pack_values("level", "slope_per_m", "bend_per_m2"), memory=1),
     starts=_starts,
     simpler=("coulomb_friction",),
 )

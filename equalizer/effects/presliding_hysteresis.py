@@ -12,10 +12,10 @@ from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import axis_motion, best_trial, regress_beside_linear
+from equalizer.effects.starts.starting_values import axis_motion, best_trial, regress_out_linear_terms
 from equalizer.signals.signal import FloatArray
 
-BENDS = np.geomspace(3e-4, 1.0, 15)
+RELATIVE_DEFLECTIONS = np.geomspace(3e-4, 1.0, 15)
 """Deflections level / k that are tried for starting values, relative to the rms position."""
 
 
@@ -30,25 +30,25 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
         return 0.0
     stiffness, longest, start = parameters[1], parameters[0] / parameters[1], memory[0]
     slack = stiffness * at[X_PER_N]
-    late = (0.5 + slack) / (1 + slack)
-    allowed = at[X_FREE] - at[X]
-    travel = allowed / (1 + slack)
-    bend = start
+    end_weight = (0.5 + slack) / (1 + slack)
+    free_travel = at[X_FREE] - at[X]
+    travel = free_travel / (1 + slack)
+    deflection = start
     for _ in range(20):
         full = longest * np.sign(travel)
-        bend = full + (start - full) * np.exp(-abs(travel) / longest)
+        deflection = full + (start - full) * np.exp(-abs(travel) / longest)
         # Derivative of the deflection with respect to the travel.
-        rate = 1 - bend * np.sign(travel) / longest
-        off = travel - allowed + slack * ((1 - late) * start + late * bend)
-        step = off / (1 + slack * late * max(rate, 0.0))
+        rate = 1 - deflection * np.sign(travel) / longest
+        travel_error = travel - free_travel + slack * ((1 - end_weight) * start + end_weight * deflection)
+        step = travel_error / (1 + slack * end_weight * max(rate, 0.0))
         travel -= step
         if abs(step) < 1e-7 * longest:
             break
     full = longest * np.sign(travel)
-    bend = full + (start - full) * np.exp(-abs(travel) / longest)
-    memory[0] = bend
-    at[F_END] = -stiffness * bend
-    return float(-stiffness * ((1 - late) * start + late * bend))
+    deflection = full + (start - full) * np.exp(-abs(travel) / longest)
+    memory[0] = deflection
+    at[F_END] = -stiffness * deflection
+    return float(-stiffness * ((1 - end_weight) * start + end_weight * deflection))
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
@@ -58,11 +58,13 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     rms = float(np.sqrt(np.mean(motion.position**2)))
     if rms == 0:
         return ()
-    longest, found = best_trial(
-        regress_beside_linear(motion), (BENDS * rms).tolist(), lambda slip: (-bristle_bend(path, slip)[used],)
+    deflection, fit = best_trial(
+        regress_out_linear_terms(motion),
+        (RELATIVE_DEFLECTIONS * rms).tolist(),
+        lambda slip: (-bristle_bend(path, slip)[used],),
     )
-    level = float(found.strengths[0])
-    return ({"level": level, "stiffness": level / longest},) if level > 0 else ()
+    level = float(fit.strengths[0])
+    return ({"level": level, "stiffness": level / deflection},) if level > 0 else ()
 
 
 EFFECT = Effect(
@@ -73,7 +75,7 @@ EFFECT = Effect(
     signature="the missing force flips its sign with the velocity only after some travel: a loop over the position "
     "near each reversal",
     parameters=(Parameter("level", 1e-9, 1e6, none=0.0), Parameter("stiffness", 1e-3, 1e9, none=None, step=0.03)),
-    acts=AxisForce(_law, pack_values("level", "stiffness"), memory=1),
+    action=AxisForce(_law, pack_values("level", "stiffness"), memory=1),
     starts=_starts,
     simpler=("coulomb_friction",),
 )

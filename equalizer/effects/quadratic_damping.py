@@ -11,7 +11,7 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_
 from equalizer.effects.simulation.instant import F_END, V_FREE, V_PER_N, V
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
+from equalizer.effects.starts.starting_values import axis_motion, regress_out_linear_terms
 from equalizer.signals.signal import FloatArray
 
 
@@ -29,7 +29,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Coefficient by linear regression of the missing force on -v |v|; empty unless positive."""
     motion = axis_motion(evidence, axis)
-    coefficient = float(regress_beside_linear(motion).fit(-motion.velocity * np.abs(motion.velocity)).strengths[0])
+    coefficient = float(regress_out_linear_terms(motion).fit(-motion.velocity * np.abs(motion.velocity)).strengths[0])
     return ({"coefficient": coefficient},) if coefficient > 0 else ()
 
 
@@ -39,6 +39,6 @@ EFFECT = Effect(
     source="Newton's drag at high Reynolds numbers",
     signature="the missing force is a parabola over the velocity, odd; its odd harmonics rise with the level",
     parameters=(Parameter("coefficient", 1e-9, 1e9, none=0.0),),
-    acts=AxisForce(_law, pack_values("coefficient")),
+    action=AxisForce(_law, pack_values("coefficient")),
     starts=_starts,
 )

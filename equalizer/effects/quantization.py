@@ -14,10 +14,10 @@ from scipy.special import ndtr, ndtri
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.lattice import lattice_offset, lattice_step, staircase_step
-from equalizer.effects.starts.response_starts import channels_of
+from equalizer.effects.starts.response_starts import site_channels
 from equalizer.signals.signal import FloatArray
 
-FAR = 1e-12
+LEAST_TAIL = 1e-12
 """Least tail probability for which a quantile is computed; below it too few significant digits remain."""
 
 
@@ -52,18 +52,18 @@ def _quantile_response(response: FloatArray, measured: FloatArray, noise: float,
     low, high = ndtr((side * missing - step / 2) / noise), ndtr((side * missing + step / 2) / noise)
     # Seeded with the length, so that a fit sees the same residual for the same prediction.
     chance = np.random.default_rng(len(response)).random(len(response))
-    residual = side * noise * ndtri(np.clip(low + chance * (high - low), FAR, 1 - FAR))
+    residual = side * noise * ndtri(np.clip(low + chance * (high - low), LEAST_TAIL, 1 - LEAST_TAIL))
     # Too improbable for a quantile: the distance to the nearest end of the rounding interval.
-    far = high < FAR
-    residual[far] = (missing - np.sign(missing) * step / 2)[far]
+    is_extreme = high < LEAST_TAIL
+    residual[is_extreme] = (missing - np.sign(missing) * step / 2)[is_extreme]
     return np.asarray(measured - residual)
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """The step of the lattice of measured values, or the step under added noise; empty where neither is found."""
     used = evidence.used > 0
-    for each in channels_of(evidence, channel):
-        measured, noise = evidence.response[used, each], float(evidence.noise[each])
+    for column in site_channels(evidence, channel):
+        measured, noise = evidence.response[used, column], float(evidence.noise[column])
         step = lattice_step(measured) or staircase_step(measured, noise)
         if step is not None:
             return ({"step": step},)
@@ -77,7 +77,7 @@ EFFECT = Effect(
     signature="the response takes whole multiples of one step, with as much error at every level, while the position "
     "agrees",
     parameters=(Parameter("step", 1e-12, 1e9, none=0.0, fixed=True),),
-    acts=OnResponse(_round_response, stage=3, given=_round_as_measured),
+    action=OnResponse(_round_response, stage=3, conditioned=_round_as_measured),
     starts=_starts,
     sites=("all", "one"),
 )

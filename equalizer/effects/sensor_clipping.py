@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import channels_of, likeliest_reading
+from equalizer.effects.starts.response_starts import likeliest_reading, site_channels
 from equalizer.signals.signal import FloatArray
 
 
@@ -27,7 +27,7 @@ def _clip_response(
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """The limit, below the predicted peak, that brings the predicted response closest to the measured one; empty where
     no limit does better than none."""
-    peak = float(np.abs(evidence.predicted[:, list(channels_of(evidence, channel))]).max())
+    peak = float(np.abs(evidence.predicted[:, list(site_channels(evidence, channel))]).max())
     if peak == 0:
         return ()
     limit = likeliest_reading(
@@ -46,7 +46,7 @@ EFFECT = Effect(
     signature="the peaks of the response are cut off flat at one height, at the top level alone, while the position "
     "agrees",
     parameters=(Parameter("limit", 1e-9, 1e9, none=math.inf),),
-    acts=OnResponse(_clip_response, stage=1),
+    action=OnResponse(_clip_response, stage=1),
     starts=_starts,
     sites=("one", "all"),
 )

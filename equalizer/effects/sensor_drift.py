@@ -12,7 +12,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import shares_of
+from equalizer.effects.starts.response_starts import regression_coefficients
 from equalizer.signals.signal import FloatArray
 
 LEAST_SIGMA = 5.0
@@ -40,16 +40,16 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     linear drift is not significant."""
     residual, n = (evidence.response - evidence.predicted)[:, channel], len(evidence.response)
     basis = np.column_stack([_drift_shape(n, 0.0), _drift_shape(n, 1.0) - _drift_shape(n, 0.0), np.ones(n)])
-    total, middle, first = shares_of(residual, basis, evidence.used).tolist()
-    straight, zero = shares_of(residual, basis[:, [0, 2]], evidence.used).tolist()
-    size = float(np.sqrt(np.mean((residual - straight * basis[:, 0] - zero)[evidence.used > 0] ** 2)))
+    total, middle, first = regression_coefficients(residual, basis, evidence.used).tolist()
+    slope, zero = regression_coefficients(residual, basis[:, [0, 2]], evidence.used).tolist()
+    size = float(np.sqrt(np.mean((residual - slope * basis[:, 0] - zero)[evidence.used > 0] ** 2)))
     # With white residuals, the standard error of a slope that is fitted together with an offset, over s from 0 to 1, is
     # sqrt(12 / n) times the residual's rms: the variance of s is 1/12.
-    if abs(straight) * np.sqrt(evidence.used.sum() / 12) < LEAST_SIGMA * size:
+    if abs(slope) * np.sqrt(evidence.used.sum() / 12) < LEAST_SIGMA * size:
         return ()
     return (
         {"total": total, "bend": _share(middle, total), "start": _share(first, total)},
-        {"total": straight, "bend": 0.0, "start": _share(zero, straight)},
+        {"total": slope, "bend": 0.0, "start": _share(zero, slope)},
     )
 
 
@@ -69,7 +69,7 @@ EFFECT = Effect(
         Parameter("bend", -STEEPEST, STEEPEST, none=None, scale="linear", step=0.02),
         Parameter("start", -STEEPEST, STEEPEST, none=None, scale="linear", step=0.02),
     ),
-    acts=OnResponse(_add_drift, stage=2, of_whole=True),
+    action=OnResponse(_add_drift, stage=2, needs_full_length=True),
     starts=_starts,
     of_time=True,
     sites=("one", "each"),

@@ -9,10 +9,10 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import channels_of
+from equalizer.effects.starts.response_starts import site_channels
 from equalizer.signals.signal import FloatArray
 
-LEAST = 1e-4
+LEAST_DEVIATION = 1e-4
 """Least deviation of a gain from 1 that is tried."""
 
 
@@ -25,13 +25,13 @@ def _scale_response(
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Gain by least squares of the measured on the predicted response; empty where it is 1 within `LEAST`."""
-    channels, used = list(channels_of(evidence, channel)), evidence.used > 0
+    """Gain by least squares of the measured on the predicted response; empty where it is 1 within `LEAST_DEVIATION`."""
+    channels, used = list(site_channels(evidence, channel)), evidence.used > 0
     measured = (evidence.response[:, channels] / evidence.noise[channels])[used]
     predicted = (evidence.predicted[:, channels] / evidence.noise[channels])[used]
     size = float(np.sum(predicted**2))
     gain = float(np.sum(measured * predicted)) / size if size > 0 else 1.0
-    return ({"gain": gain},) if gain > 0 and abs(gain - 1) > LEAST else ()
+    return ({"gain": gain},) if gain > 0 and abs(gain - 1) > LEAST_DEVIATION else ()
 
 
 EFFECT = Effect(
@@ -40,7 +40,7 @@ EFFECT = Effect(
     source="Analog Devices ADXL335 data sheet: sensitivity 270 to 330 mV/g, in proportion to the supply",
     signature="the response is wrong by one factor at every frequency and level, while the position agrees",
     parameters=(Parameter("gain", 0.01, 100.0, none=1.0),),
-    acts=OnResponse(_scale_response),
+    action=OnResponse(_scale_response),
     starts=_starts,
     sites=("one", "all"),
 )

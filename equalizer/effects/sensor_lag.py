@@ -50,7 +50,7 @@ EFFECT = Effect(
     source="Analog Devices ADXL335 data sheet: bandwidth set by an RC filter of 32 kOhm +-15 %",
     signature="the response falls short and late at high frequencies, at every level alike, while the position agrees",
     parameters=(Parameter("bandwidth", 1e-2, 1e5, none=math.inf),),
-    acts=OnResponse(_keep_response, bandwidth_hz=_bandwidth_hz),
+    action=OnResponse(_keep_response, bandwidth_hz=_bandwidth_hz),
     starts=_starts,
     sites=("all", "one"),
 )

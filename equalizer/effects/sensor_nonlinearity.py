@@ -9,7 +9,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import channels_of, shares_of
+from equalizer.effects.starts.response_starts import regression_coefficients, site_channels
 from equalizer.signals.signal import FloatArray
 
 
@@ -21,13 +21,13 @@ def _add_cubic(response: FloatArray, sample_rate_hz: float, channels: tuple[int,
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """The cubic coefficient by linear regression of the residual, weighted by the noise."""
-    channels = list(channels_of(evidence, channel))
+    channels = list(site_channels(evidence, channel))
     weight = 1 / evidence.noise[channels]
     predicted = evidence.predicted[:, channels]
     residual = ((evidence.response[:, channels] - predicted) * weight).ravel()
     basis = np.column_stack([(predicted**3 * weight).ravel(), (predicted * weight).ravel()])
     # The response itself is a second regressor, because re-tuned parameters can absorb a change of gain.
-    cubic = float(shares_of(residual, basis, np.repeat(evidence.used, len(channels)))[0])
+    cubic = float(regression_coefficients(residual, basis, np.repeat(evidence.used, len(channels)))[0])
     return ({"cubic": cubic},) if cubic != 0 and np.isfinite(cubic) else ()
 
 
@@ -38,7 +38,7 @@ EFFECT = Effect(
     signature="the error of the response grows with the cube of the response at every frequency, with odd harmonics "
     "that rise with the level, while the position agrees",
     parameters=(Parameter("cubic", -1e12, 1e12, none=0.0, scale="signed"),),
-    acts=OnResponse(_add_cubic),
+    action=OnResponse(_add_cubic),
     starts=_starts,
     sites=("one", "all"),
 )

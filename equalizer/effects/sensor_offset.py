@@ -35,7 +35,7 @@ EFFECT = Effect(
     source="IEEE Std 1293, single-axis accelerometers: bias",
     signature="the response is off by the same amount all the time, at rest as in motion, while the position agrees",
     parameters=(Parameter("offset", -1e12, 1e12, none=0.0, scale="signed"),),
-    acts=OnResponse(_add_offset, stage=2),
+    action=OnResponse(_add_offset, stage=2),
     starts=_starts,
     sites=("one", "each"),
 )

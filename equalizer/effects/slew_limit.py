@@ -14,9 +14,9 @@ from equalizer.effects.starts.command_starts import likeliest_value
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
-SELDOM = (0.3, 0.5, 0.75)
+RATE_SHARES = (0.3, 0.5, 0.75)
 """Starting values for a limit that is rarely reached, as shares of the command's largest rate of change."""
-ERRS = 1.05
+MISFIT_RATIO = 1.05
 """Rms residual of a channel, over its noise, above which these starting values are tried."""
 
 
@@ -32,8 +32,8 @@ def limit_rate(commands: FloatArray, reach: float, mean: FloatArray, end: FloatA
         missing = commands[k] - force
         if abs(missing) <= reach:
             # Share of the step after which the ramp reaches the command; the mean of the step includes the ramp.
-            on_way = abs(missing) / reach
-            mean[k] = commands[k] - missing * on_way / 2
+            ramp_share = abs(missing) / reach
+            mean[k] = commands[k] - missing * ramp_share / 2
             force = commands[k]
         else:
             change = reach if missing > 0 else -reach
@@ -62,9 +62,9 @@ def _mean_and_end(commands: FloatArray, step_s: float, rate: float) -> FloatArra
     """(2, n): mean force over each step, and force at its end; the command itself for an infinite rate."""
     if math.isinf(rate):
         return np.array([commands, commands])
-    found = np.empty((2, len(commands)))
-    limit_rate(np.asarray(commands, dtype=np.float64), rate * step_s, found[0], found[1])
-    return found
+    forces = np.empty((2, len(commands)))
+    limit_rate(np.asarray(commands, dtype=np.float64), rate * step_s, forces[0], forces[1])
+    return forces
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
@@ -85,13 +85,15 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     if not _has_unexplained_error(evidence):
         return likeliest
     # Re-tuning may have absorbed a limit that is rarely reached, so that the missing force does not show it.
-    return likeliest + tuple({"rate": share * fastest} for share in (SELDOM if axis == ALL_SITES else SELDOM[1:2]))
+    return likeliest + tuple(
+        {"rate": share * fastest} for share in (RATE_SHARES if axis == ALL_SITES else RATE_SHARES[1:2])
+    )
 
 
 def _has_unexplained_error(evidence: Evidence) -> bool:
-    """Whether the rms residual of any channel exceeds `ERRS` times its noise."""
+    """Whether the rms residual of any channel exceeds `MISFIT_RATIO` times its noise."""
     residual = (evidence.response - evidence.predicted)[evidence.used > 0]
-    return bool((np.sqrt(np.nanmean(residual**2, axis=0)) > ERRS * evidence.noise).any())
+    return bool((np.sqrt(np.nanmean(residual**2, axis=0)) > MISFIT_RATIO * evidence.noise).any())
 
 
 EFFECT = Effect(
@@ -100,7 +102,7 @@ EFFECT = Effect(
     source="Isermann, Mechatronic Systems, Springer 2005, ch. 10: limits of actuators",
     signature="force is missing where the command changes fast, more at high frequencies and high levels",
     parameters=(Parameter("rate", 1e-2, 1e7, none=math.inf),),
-    acts=OnCommand(_limit_rate, fine=True, at_end=_limit_rate_at_end),
+    action=OnCommand(_limit_rate, fine=True, at_end=_limit_rate_at_end),
     starts=_starts,
     sites=("one", "all"),
 )

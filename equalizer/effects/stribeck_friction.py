@@ -10,13 +10,13 @@ from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.instant import V_FREE, V_PER_N, V
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import best_trial, regress_beside_linear, select_sliding_motion
+from equalizer.effects.starts.starting_values import best_trial, regress_out_linear_terms, select_sliding_motion
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 SPEEDS = np.geomspace(0.03, 1.5, 12)
 """Stribeck velocities that are tried as starting values, relative to the rms velocity."""
-_MORE = 1.2
+_INITIAL_STATIC_RATIO = 1.2
 """Starting ratio of static to Coulomb friction where the data show no higher friction at low speed."""
 
 
@@ -45,16 +45,16 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     level is positive."""
     motion = select_sliding_motion(evidence, axis)
     sign, rms = np.sign(motion.velocity), float(np.sqrt(np.mean(motion.velocity**2)))
-    speed, found = best_trial(
-        regress_beside_linear(motion),
+    speed, fit = best_trial(
+        regress_out_linear_terms(motion),
         (SPEEDS * rms).tolist(),
-        lambda slow: (-sign, -sign * np.exp(-((motion.velocity / slow) ** 2))),
+        lambda trial_speed: (-sign, -sign * np.exp(-((motion.velocity / trial_speed) ** 2))),
     )
-    coulomb, more = found.strengths.tolist()
-    if coulomb <= 0 and coulomb + more <= 0:
+    coulomb, static_excess = fit.strengths.tolist()
+    if coulomb <= 0 and coulomb + static_excess <= 0:
         return ()
-    coulomb = max(coulomb, 0.05 * more)
-    static = coulomb + more if more > 0.02 * coulomb else _MORE * coulomb
+    coulomb = max(coulomb, 0.05 * static_excess)
+    static = coulomb + static_excess if static_excess > 0.02 * coulomb else _INITIAL_STATIC_RATIO * coulomb
     return ({"coulomb": coulomb, "static": static, "speed": speed},)
 
 
@@ -69,7 +69,7 @@ EFFECT = Effect(
         Parameter("static", 1e-9, 1e6, none=0.0),
         Parameter("speed", 1e-6, 1e3, none=None, step=0.03),
     ),
-    acts=AxisForce(_law, _pack, memory=1),
+    action=AxisForce(_law, _pack, memory=1),
     starts=_starts,
     simpler=("coulomb_friction",),
 )

@@ -14,7 +14,7 @@ from equalizer.effects.effect import ALL_SITES, AxisForce, Effect, Parameter, Va
 from equalizer.effects.simulation.instant import STEP_S, TIME_S, V_FREE, V_PER_N, X_FREE, X_PER_N, V, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, regress_beside_linear
+from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, regress_out_linear_terms
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
@@ -42,13 +42,13 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 def value_to_ground(matrix: FloatArray, axes: FloatArray, axis: int) -> float:
     """Damping (N s/m) or stiffness (N/m) between a driven axis and the ground; coordinates on which no command acts are
     eliminated by static condensation (Guyan 1965). matrix: (n, n), axes: (n, m)."""
-    carried = np.linalg.norm(axes, axis=1) < 1e-9
-    rest = matrix[np.ix_(~carried, ~carried)]
-    if carried.any():
-        between = matrix[np.ix_(~carried, carried)]
-        rest = rest - between @ np.linalg.pinv(matrix[np.ix_(carried, carried)]) @ between.T
-    along = axes[~carried, axis]
-    return float(along @ rest @ along)
+    is_undriven = np.linalg.norm(axes, axis=1) < 1e-9
+    condensed = matrix[np.ix_(~is_undriven, ~is_undriven)]
+    if is_undriven.any():
+        coupling = matrix[np.ix_(~is_undriven, is_undriven)]
+        condensed = condensed - coupling @ np.linalg.pinv(matrix[np.ix_(is_undriven, is_undriven)]) @ coupling.T
+    direction = axes[~is_undriven, axis]
+    return float(direction @ condensed @ direction)
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
@@ -67,7 +67,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     spring_force = np.zeros((n, len(sites)))
     axes, used = driven_axes(evidence.model), evidence.used > 0
     for column, site in enumerate(sites):
-        force[used, column] = regress_beside_linear(axis_motion(evidence, site)).force
+        force[used, column] = regress_out_linear_terms(axis_motion(evidence, site)).force
         damping_force[used, column] = (
             -value_to_ground(evidence.model.damping, axes, site) * evidence.axis_velocity[used, site]
         )
@@ -76,15 +76,15 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         )
     if not damping_force.any():
         return ()
-    found = []
+    candidates = []
     for rate_hz in _likely_rates(force, damping_force, rate):
         angle = 2 * np.pi * rate_hz * np.arange(n)[:, None] / rate
         shapes = [part * wave for part in (damping_force, spring_force) for wave in (np.sin(angle), np.cos(angle))]
         fit = PartialRegression(force.ravel(), np.column_stack([damping_force.ravel(), spring_force.ravel()])).fit(
-            *(s.ravel() for s in shapes)
+            *(shape.ravel() for shape in shapes)
         )
-        found.append((fit.explained, _grip_values(rate_hz, fit.strengths)))
-    return tuple(values for _, values in sorted(found, key=lambda item: -item[0]))
+        candidates.append((fit.explained_share, _grip_values(rate_hz, fit.strengths)))
+    return tuple(values for _, values in sorted(candidates, key=lambda item: -item[0]))
 
 
 def _grip_values(rate_hz: float, strengths: FloatArray) -> Values:
@@ -104,10 +104,10 @@ def _slow_lines(samples: FloatArray, size: int, count: int) -> ComplexArray:
     # Bluestein's chirp transform (Rabiner, Schafer and Rader 1969, Bell Syst. Tech. J. 48:1249).
     n, last = len(samples), max(len(samples), count)
     chirp = np.exp(-1j * np.pi / size * np.arange(last) ** 2)
-    around = np.concatenate([chirp[n - 1 : 0 : -1], chirp[:count]]).conj()
-    room = next_fast_len(n + count - 1)
-    mixed = ifft(fft(samples * chirp[:n], room) * fft(around, room))
-    return np.asarray(mixed[n - 1 : n - 1 + count] * chirp[:count])
+    kernel = np.concatenate([chirp[n - 1 : 0 : -1], chirp[:count]]).conj()
+    padded_length = next_fast_len(n + count - 1)
+    convolved = ifft(fft(samples * chirp[:n], padded_length) * fft(kernel, padded_length))
+    return np.asarray(convolved[n - 1 : n - 1 + count] * chirp[:count])
 
 
 def _likely_rates(force: FloatArray, damping_force: FloatArray, rate: float) -> list[float]:
@@ -117,18 +117,21 @@ def _likely_rates(force: FloatArray, damping_force: FloatArray, rate: float) -> 
     size = _POINTS_PER_LINE * n
     # The products of sine and cosine contain twice the frequency, which must stay below half of the sample rate.
     last = min(int(FASTEST_HZ / rate * size), size // 4)
-    against = np.conj(_slow_lines(np.sum(force * damping_force, axis=1), size, last + 1))
-    square = np.conj(_slow_lines(np.sum(damping_force**2, axis=1), size, 2 * last + 1))
-    twice, whole = square[: 2 * last + 1 : 2], float(square[0].real)
+    cross_spectrum = np.conj(_slow_lines(np.sum(force * damping_force, axis=1), size, last + 1))
+    power_spectrum = np.conj(_slow_lines(np.sum(damping_force**2, axis=1), size, 2 * last + 1))
+    double_frequency, total_power = power_spectrum[: 2 * last + 1 : 2], float(power_spectrum[0].real)
     normal = np.empty((last + 1, 3, 3))
-    normal[:, 0, 0] = whole
-    normal[:, 0, 1] = normal[:, 1, 0] = square[: last + 1].imag
-    normal[:, 0, 2] = normal[:, 2, 0] = square[: last + 1].real
-    normal[:, 1, 1], normal[:, 2, 2] = (whole - twice.real) / 2, (whole + twice.real) / 2
-    normal[:, 1, 2] = normal[:, 2, 1] = twice.imag / 2
-    columns = np.stack([np.full(last + 1, against[0].real), against.imag, against.real], axis=1)
+    normal[:, 0, 0] = total_power
+    normal[:, 0, 1] = normal[:, 1, 0] = power_spectrum[: last + 1].imag
+    normal[:, 0, 2] = normal[:, 2, 0] = power_spectrum[: last + 1].real
+    normal[:, 1, 1], normal[:, 2, 2] = (
+        (total_power - double_frequency.real) / 2,
+        (total_power + double_frequency.real) / 2,
+    )
+    normal[:, 1, 2] = normal[:, 2, 1] = double_frequency.imag / 2
+    columns = np.stack([np.full(last + 1, cross_spectrum[0].real), cross_spectrum.imag, cross_spectrum.real], axis=1)
     # Ridge: near zero frequency the cosine equals the constant.
-    normal += 1e-6 * whole * np.eye(3)
+    normal += 1e-6 * total_power * np.eye(3)
     power = np.sum(columns * np.linalg.solve(normal, columns[:, :, None])[:, :, 0], axis=1)
     # Less than one cycle per recording is not distinguishable from a constant grip.
     power[:_POINTS_PER_LINE] = -np.inf
@@ -151,7 +154,7 @@ EFFECT = Effect(
         Parameter("phase", -1e3, 1e3, none=None, scale="linear", step=0.02),
         Parameter("stiffness_share", -0.5, 2.0, none=None, scale="linear", step=0.02),
     ),
-    acts=AxisForce(_law, _pack),
+    action=AxisForce(_law, _pack),
     starts=_starts,
     of_time=True,
     sites=("all", "one"),

@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray
 
 SHORTEST_S, LONGEST_S = 2e-5, 0.05
 """Range of delays (s) among which starting values are searched."""
-BEYOND = 0.15
+JUMP_MARGIN = 0.15
 """Distance of the second starting value from the nearest whole number of hold times, in hold times; heuristic. An
 acceleration follows a force without delay, so that the misfit jumps where the delay passes a whole number of hold
 times, and a gradient search does not cross that jump."""
@@ -31,17 +31,17 @@ def _delay_force_at_end(commands: FloatArray, step_s: float, values: Values) -> 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Delays (s) from the response's time shift and from the missing force, and the first of these across the jump of
-    the misfit (see `BEYOND`)."""
-    fitting = likeliest_value(evidence, axis, delay_mean, list(np.geomspace(SHORTEST_S, LONGEST_S, 24)), False)
-    starts = starts_for_lateness(evidence, axis, fitting, LONGEST_S)
-    beside = tuple(_across_nearest_step(late, 1 / evidence.sample_rate_hz) for late in starts[:1])
-    return tuple({"delay": late} for late in (*starts, *beside))
+    the misfit (see `JUMP_MARGIN`)."""
+    force_delay = likeliest_value(evidence, axis, delay_mean, list(np.geomspace(SHORTEST_S, LONGEST_S, 24)), False)
+    starts = starts_for_lateness(evidence, axis, force_delay, LONGEST_S)
+    across_jump = tuple(_across_nearest_step(delay_s, 1 / evidence.sample_rate_hz) for delay_s in starts[:1])
+    return tuple({"delay": delay_s} for delay_s in (*starts, *across_jump))
 
 
-def _across_nearest_step(late_s: float, held_s: float) -> float:
+def _across_nearest_step(delay_s: float, held_s: float) -> float:
     """A delay (s) on the other side of the nearest whole number, at least 1, of hold times. held_s: sample period."""
-    whole = max(round(late_s / held_s), 1)
-    return (whole + (BEYOND if late_s < whole * held_s else -BEYOND)) * held_s
+    hold_times = max(round(delay_s / held_s), 1)
+    return (hold_times + (JUMP_MARGIN if delay_s < hold_times * held_s else -JUMP_MARGIN)) * held_s
 
 
 EFFECT = Effect(
@@ -50,7 +50,7 @@ EFFECT = Effect(
     source="Diolaiti et al., IEEE Trans. Robot. 22 (2006) 256: delay in a haptic loop",
     signature="the phase falls in proportion to frequency while the gain stays, in position and response alike",
     parameters=(Parameter("delay", 1e-6, 1.0, none=0.0),),
-    acts=OnCommand(_delay_force, fine=True, at_end=_delay_force_at_end),
+    action=OnCommand(_delay_force, fine=True, at_end=_delay_force_at_end),
     starts=_starts,
     sites=("all", "one"),
 )

@@ -11,30 +11,31 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, value_along
+from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, quadratic_form
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
-_GUESS = 0.3
+_INITIAL_DAMPING_SHARE = 0.3
 """Second starting value, relative to the model's own damping along the axis, for a missing damping that re-tuning has
 absorbed. Heuristic."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
     """The model with the damping matrix D + damping d d', d the unit vector of the driven axis."""
-    along = driven_axes(model)[:, axis]
-    return replace(model, damping=model.damping + values["damping"] * np.outer(along, along))
+    direction = driven_axes(model)[:, axis]
+    return replace(model, damping=model.damping + values["damping"] * np.outer(direction, direction))
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Positive ones of two values: regression of the missing force on -v, and `_GUESS` of the model's damping."""
+    """Positive ones of two values: regression of the missing force on -v, and `_INITIAL_DAMPING_SHARE` of the model's
+    damping."""
     motion = axis_motion(evidence, axis)
     nuisances = np.column_stack([motion.position, motion.acceleration, np.ones_like(motion.position)])
     fit = PartialRegression(motion.force, nuisances).fit(-motion.velocity)
-    damping = float(fit.strengths[0])
-    known = value_along(evidence.model.damping, driven_axes(evidence.model)[:, axis])
-    guesses = (damping, _GUESS * known)
-    return tuple({"damping": guess} for guess in guesses if guess > 0)
+    regressed_damping = float(fit.strengths[0])
+    model_damping = quadratic_form(evidence.model.damping, driven_axes(evidence.model)[:, axis])
+    candidates = (regressed_damping, _INITIAL_DAMPING_SHARE * model_damping)
+    return tuple({"damping": damping} for damping in candidates if damping > 0)
 
 
 EFFECT = Effect(
@@ -43,6 +44,6 @@ EFFECT = Effect(
     source="Rayleigh's dissipation; eddy currents and back-EMF act alike",
     signature="the missing force is a straight line over the velocity, at every level; nothing appears at silent lines",
     parameters=(Parameter("damping", 1e-9, 1e6, none=0.0),),
-    acts=Structure(_change),
+    action=Structure(_change),
     starts=_starts,
 )

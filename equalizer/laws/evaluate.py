@@ -11,7 +11,7 @@ import numpy as np
 from equalizer.laws.kernel import FROM_ZERO, run_along, run_along_held
 from equalizer.laws.law import Law
 from equalizer.laws.parse import LawError
-from equalizer.laws.program import Program, program_of
+from equalizer.laws.program import Program, compile_program
 from equalizer.signals.signal import FloatArray
 
 
@@ -48,9 +48,11 @@ def _bind_signals(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: f
         raise LawError(f"the signals have different lengths: {', '.join(str(length) for length in sorted(lengths))}")
     length = lengths.pop()
     used = law.variables
-    known = {"t": np.arange(length) / sample_rate_hz, **columns} if "t" in used else columns
-    program = program_of(law.tree, {name: number for number, name in enumerate(used) if name in known})
+    available = {"t": np.arange(length) / sample_rate_hz, **columns} if "t" in used else columns
+    program = compile_program(
+        law.tree, {name: column_index for column_index, name in enumerate(used) if name in available}
+    )
     signals = np.empty((length, len(used)))
-    for number, name in enumerate(used):
-        signals[:, number] = known[name]
+    for column_index, name in enumerate(used):
+        signals[:, column_index] = available[name]
     return program, signals

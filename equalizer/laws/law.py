@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from equalizer.laws.parse import LawError, parse_formula
-from equalizer.laws.tree import Apply, Free, Node, Variable, format_formula, nodes
+from equalizer.laws.tree import Apply, Free, Node, Variable, format_formula, iterate_nodes
 
 ActsOn = Literal["force", "command", "response"]
 KINDS: tuple[ActsOn, ...] = get_args(ActsOn)
@@ -34,7 +34,7 @@ class Law:
             raise LawError(f"a law acts on {', '.join(KINDS)}; not on '{self.acts_on}'")
         if not self.axis:
             raise LawError("the law does not state the axis on which it acts; state its axis")
-        used = {node.place for node in nodes(self.tree) if isinstance(node, Free)}
+        used = {node.index for node in iterate_nodes(self.tree) if isinstance(node, Free)}
         if used != set(range(len(self.numbers))):
             names = ", ".join(f"p{place}" for place in sorted(used)) or "none"
             raise LawError(f"the law names the free numbers {names}, but {len(self.numbers)} are given")
@@ -59,7 +59,7 @@ class Law:
     @property
     def variables(self) -> tuple[str, ...]:
         """Signals in the formula, sorted."""
-        return tuple(sorted({node.name for node in nodes(self.tree) if isinstance(node, Variable)} - {"pi"}))
+        return tuple(sorted({node.name for node in iterate_nodes(self.tree) if isinstance(node, Variable)} - {"pi"}))
 
     def with_numbers(self, numbers: Sequence[float]) -> "Law":
         """The law with other values of p0, p1, … in SI units. Raises LawError for another number of them."""
@@ -87,24 +87,24 @@ _SECOND_ARGUMENT: dict[str, Role] = {
 
 def roles(tree: Node) -> dict[int, Role]:
     """Role of each free parameter, by its place; where one occurs several times, by its first occurrence."""
-    found: dict[int, Role] = {}
-    _collect_roles(tree, "factor", found)
-    return found
+    role_by_place: dict[int, Role] = {}
+    _collect_roles(tree, "factor", role_by_place)
+    return role_by_place
 
 
-def _collect_roles(node: Node, role: Role, found: dict[int, Role]) -> None:
+def _collect_roles(node: Node, role: Role, role_by_place: dict[int, Role]) -> None:
     if isinstance(node, Free):
-        found.setdefault(node.place, role)
+        role_by_place.setdefault(node.index, role)
         return
     if not isinstance(node, Apply):
         return
-    for place, part in enumerate(node.parts):
+    for place, part in enumerate(node.arguments):
         _collect_roles(
             part,
             _SECOND_ARGUMENT.get(node.name, _first_part_role(node.name, role))
             if place
             else _first_part_role(node.name, role),
-            found,
+            role_by_place,
         )
 
 

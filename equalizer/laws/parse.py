@@ -90,12 +90,12 @@ class _Reader:
 
     def _call(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
         if name not in FUNCTIONS:
-            close = get_close_matches(name[:60], FUNCTIONS, n=1)
-            hint = f" (did you mean '{close[0]}'?)" if close else ""
+            matches = get_close_matches(name[:60], FUNCTIONS, n=1)
+            hint = f" (did you mean '{matches[0]}'?)" if matches else ""
             raise LawError(f"{self._position_text(node)}: there is no function '{name}'{hint}; {ALLOWED}")
         if len(arguments) != FUNCTIONS[name]:
-            wanted = f"{FUNCTIONS[name]} argument{'s' if FUNCTIONS[name] > 1 else ''}"
-            raise LawError(f"{self._position_text(node)}: {name} takes {wanted}, not {len(arguments)}")
+            expected = f"{FUNCTIONS[name]} argument{'s' if FUNCTIONS[name] > 1 else ''}"
+            raise LawError(f"{self._position_text(node)}: {name} takes {expected}, not {len(arguments)}")
         parts = tuple(self.read(argument) for argument in arguments)
         if name in MEMORY[:3] and any(isinstance(leaf, Variable) and leaf.name != "pi" for leaf in _leaves(parts[1])):
             raise LawError(f"{self._position_text(arguments[1])}: the second argument of {name} must be a constant")
@@ -103,8 +103,8 @@ class _Reader:
 
     def _position_text(self, node: ast.expr) -> str:
         part = ast.get_source_segment(self.text, node) or self.text
-        shown = part if len(part) <= 40 else f"{part[:40]}…"
-        return f"'{shown}' at character {_column(self.text, node) + 1}"
+        excerpt = part if len(part) <= 40 else f"{part[:40]}…"
+        return f"'{excerpt}' at character {_column(self.text, node) + 1}"
 
 
 @lru_cache(maxsize=4096)
@@ -128,19 +128,19 @@ def parse_formula(text: str, template: bool = False) -> tuple[Node, tuple[float,
 
 
 def _not_python(text: str, error: BaseException) -> str:
-    shown = text if len(text) <= 40 else f"{text[:40]}…"
+    excerpt = text if len(text) <= 40 else f"{text[:40]}…"
     if isinstance(error, SyntaxError) and error.offset:
-        return f"'{shown}' cannot be read at character {error.offset}: {error.msg}; {ALLOWED}"
-    return f"'{shown}' cannot be read; {ALLOWED}"
+        return f"'{excerpt}' cannot be read at character {error.offset}: {error.msg}; {ALLOWED}"
+    return f"'{excerpt}' cannot be read; {ALLOWED}"
 
 
 def _column(text: str, node: ast.expr) -> int:
     """Position of a node in the text in characters, from 0; Python's syntax tree counts lines, and bytes of UTF-8 in
     each line."""
     lines = text.splitlines(keepends=True)
-    before = sum(len(line) for line in lines[: node.lineno - 1])
-    return before + len(lines[node.lineno - 1].encode()[: node.col_offset].decode(errors="replace"))
+    characters = sum(len(line) for line in lines[: node.lineno - 1])
+    return characters + len(lines[node.lineno - 1].encode()[: node.col_offset].decode(errors="replace"))
 
 
 def _leaves(tree: Node) -> list[Node]:
-    return [leaf for part in tree.parts for leaf in _leaves(part)] if isinstance(tree, Apply) else [tree]
+    return [leaf for part in tree.arguments for leaf in _leaves(part)] if isinstance(tree, Apply) else [tree]

@@ -23,15 +23,15 @@ operators with memory."""
 CODE: Mapping[str, int] = {name: number for number, name in enumerate(CODES)}
 CELLS = 256
 """Resolution of a delay: every second instant in its ring buffer is at least delay / CELLS later."""
-KEPT: Mapping[str, int] = {"lag": 4, "play": 2, "delay": 4 + 2 * (2 * CELLS + 8), "integral": 4}
+MEMORY_SIZE: Mapping[str, int] = {"lag": 4, "play": 2, "delay": 4 + 2 * (2 * CELLS + 8), "integral": 4}
 """Numbers in the memory of each operator; its layout is described at the operators in `kernel`."""
-DEEPEST = 32
+STACK_SIZE = 32
 """Largest number of values on the stack."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
-    """Formula in postfix notation for the stack machine; result of `program_of`."""
+    """Formula in postfix notation for the stack machine; result of `compile_program`."""
 
     codes: FloatArray
     """(k, 2): operation, and its operand: a number, the column of a signal, or the index of its memory."""
@@ -48,32 +48,34 @@ class Program:
         return codes.ravel()
 
 
-def program_of(tree: Node, signals: Mapping[str, int]) -> Program:
+def compile_program(tree: Node, signals: Mapping[str, int]) -> Program:
     """Compile a formula's tree for the stack machine. signals: column of each signal. Raises LawError for an unknown
-    signal, and for a formula that needs more than `DEEPEST` values on the stack."""
+    signal, and for a formula that needs more than `STACK_SIZE` values on the stack."""
     program = _append_formula(tree, Program(np.empty((0, 2)), (), 1), signals)
     _check_depth(program.codes[:, 0])
     return program
 
 
-def _append_formula(tree: Node, to: Program, signals: Mapping[str, int]) -> Program:
+def _append_formula(tree: Node, program: Program, signals: Mapping[str, int]) -> Program:
     """The program with the code of a tree appended, arguments first."""
     match tree:
         case Number(value):
-            return _append_row(to, "number", value)
+            return _append_row(program, "number", value)
         case Free(place):
-            return replace(_append_row(to, "number", np.nan), free=(*to.free, (len(to.codes), place)))
+            return replace(_append_row(program, "number", np.nan), free=(*program.free, (len(program.codes), place)))
         case Variable("pi"):
-            return _append_row(to, "number", np.pi)
+            return _append_row(program, "number", np.pi)
         case Variable(name):
             if name not in signals:
                 raise LawError(f"the law needs the signal '{name}'; there are {', '.join(signals) or 'none'}")
-            return _append_row(to, "variable", signals[name])
+            return _append_row(program, "variable", signals[name])
         case Apply(name, parts):
             for part in parts:
-                to = _append_formula(part, to, signals)
-            kept = KEPT.get(name, 0)
-            return replace(_append_row(to, name, to.memory if kept else 0), memory=to.memory + kept)
+                program = _append_formula(part, program, signals)
+            memory_size = MEMORY_SIZE.get(name, 0)
+            return replace(
+                _append_row(program, name, program.memory if memory_size else 0), memory=program.memory + memory_size
+            )
 
 
 def _append_row(program: Program, name: str, operand: float) -> Program:
@@ -82,9 +84,9 @@ def _append_row(program: Program, name: str, operand: float) -> Program:
 
 def _check_depth(codes: FloatArray) -> None:
     """Raises LawError where the stack overflows. Each code changes the stack's height by 1, 0 or -1."""
-    taken = np.ones(len(codes))
-    taken[(codes >= CODE["+"]) & (codes <= CODE["maximum"])] = -1
-    taken[codes >= CODE["neg"]] = 0
-    taken[(codes >= CODE["lag"]) & (codes <= CODE["delay"])] = -1
-    if np.cumsum(taken).max() > DEEPEST:
-        raise LawError(f"the law keeps more than {DEEPEST} numbers at once; write it less nested")
+    growth = np.ones(len(codes))
+    growth[(codes >= CODE["+"]) & (codes <= CODE["maximum"])] = -1
+    growth[codes >= CODE["neg"]] = 0
+    growth[(codes >= CODE["lag"]) & (codes <= CODE["delay"])] = -1
+    if np.cumsum(growth).max() > STACK_SIZE:
+        raise LawError(f"the law keeps more than {STACK_SIZE} numbers at once; write it less nested")

@@ -1,5 +1,7 @@
-"""Expression tree of a formula, and its formatting as text in Python's syntax, with parentheses where operator
+"""Expression tree of a force law's formula, and its formatting in Python's syntax, with parentheses where operator
 precedence needs them.
+
+`parse` builds the tree, `program` compiles it, `law.Law` holds it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,9 +22,9 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Free:
-    """A free parameter `p0`, `p1`, …, whose value a fit may change. place: its index."""
+    """A free parameter `p0`, `p1`, …, whose value a fit may change. index: 0, 1, …."""
 
-    place: int
+    index: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,23 +39,23 @@ class Apply:
     """An operator or a function applied to its arguments."""
 
     name: str
-    """Name of an operator (+ - * / **, `neg`) or a function; `parts` are its arguments."""
-    parts: tuple["Node", ...]
+    """Name of an operator (+ - * / **, `neg`) or a function; `arguments` are its arguments."""
+    arguments: tuple["Node", ...]
 
 
 Node = Number | Free | Variable | Apply
 
 
-def nodes(tree: Node) -> Iterator[Node]:
-    """All nodes of a tree, each before its arguments (preorder)."""
+def iterate_nodes(tree: Node) -> Iterator[Node]:
+    """Iterate over all nodes of a tree, each before its arguments (preorder)."""
     yield tree
-    for part in tree.parts if isinstance(tree, Apply) else ():
-        yield from nodes(part)
+    for argument in tree.arguments if isinstance(tree, Apply) else ():
+        yield from iterate_nodes(argument)
 
 
 def format_formula(tree: Node, numbers: Sequence[float] | None = None, digits: int | None = DIGITS) -> str:
-    """The formula in Python's syntax. numbers: values of `p0`, `p1`, …; without them these names are written. digits:
-    significant digits of the values; None = as many as are needed to read the same values back."""
+    """Format the formula in Python's syntax. numbers: values of `p0`, `p1`, …; without them these names are written.
+    digits: significant digits of the values; None = as many as are needed to read the same values back."""
     return _format_node(tree, numbers, digits)[0]
 
 
@@ -62,18 +64,18 @@ def _format_node(tree: Node, numbers: Sequence[float] | None, digits: int | None
     match tree:
         case Number(value):
             return _format_signed(repr(float(value)).removesuffix(".0"))
-        case Free(place):
+        case Free(index):
             return (
-                (f"p{place}", _ATOM) if numbers is None else _format_signed(_format_free_number(numbers[place], digits))
+                (f"p{index}", _ATOM) if numbers is None else _format_signed(_format_free_number(numbers[index], digits))
             )
         case Variable(name):
             return name, _ATOM
-        case Apply("neg", (inner,)):
-            return _format_negated(*_format_node(inner, numbers, digits))
+        case Apply("neg", (operand,)):
+            return _format_negated(*_format_node(operand, numbers, digits))
         case Apply(name, (left, right)) if name in _OPERATORS:
             return _format_operation(name, _format_node(left, numbers, digits), _format_node(right, numbers, digits))
-    inside = ", ".join(_format_node(part, numbers, digits)[0] for part in tree.parts)
-    return f"{tree.name}({inside})", _ATOM
+    arguments = ", ".join(_format_node(argument, numbers, digits)[0] for argument in tree.arguments)
+    return f"{tree.name}({arguments})", _ATOM
 
 
 def _format_free_number(value: float, digits: int | None) -> str:
@@ -85,27 +87,27 @@ def _format_signed(text: str) -> tuple[str, int]:
     return text, _SIGN if text.startswith("-") else _ATOM
 
 
-def _format_negated(text: str, strength: int) -> tuple[str, int]:
-    if strength < _PRODUCT:
+def _format_negated(text: str, precedence: int) -> tuple[str, int]:
+    if precedence < _PRODUCT:
         return f"-({text})", _SIGN
-    return (text[1:], min(strength, _SIGN)) if text.startswith("-") else (f"-{text}", min(strength, _SIGN))
+    return (text[1:], min(precedence, _SIGN)) if text.startswith("-") else (f"-{text}", min(precedence, _SIGN))
 
 
 _OPERATORS = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT, "**": _POWER}
 
 
 def _format_operation(name: str, left: tuple[str, int], right: tuple[str, int]) -> tuple[str, int]:
-    own = _OPERATORS[name]
+    precedence = _OPERATORS[name]
     if name == "**":
-        return f"{_parenthesise(left, _ATOM)}**{_parenthesise(right, _SIGN)}", own
-    first, second = _parenthesise(left, own), _parenthesise(right, own + 1)
-    if own == _PRODUCT:
-        return f"{first}{name}{f'({second})' if second.startswith('-') else second}", own
+        return f"{_parenthesise(left, _ATOM)}**{_parenthesise(right, _SIGN)}", precedence
+    first, second = _parenthesise(left, precedence), _parenthesise(right, precedence + 1)
+    if precedence == _PRODUCT:
+        return f"{first}{name}{f'({second})' if second.startswith('-') else second}", precedence
     if second.startswith("-"):
-        return f"{first} {'+' if name == '-' else '-'} {second[1:]}", own
-    return f"{first} {name} {second}", own
+        return f"{first} {'+' if name == '-' else '-'} {second[1:]}", precedence
+    return f"{first} {name} {second}", precedence
 
 
-def _parenthesise(part: tuple[str, int], least: int) -> str:
-    text, strength = part
-    return text if strength >= least else f"({text})"
+def _parenthesise(formatted: tuple[str, int], min_precedence: int) -> str:
+    text, precedence = formatted
+    return text if precedence >= min_precedence else f"({text})"

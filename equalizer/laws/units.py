@@ -12,7 +12,7 @@ from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 Dimension = tuple[float, float, float]
 """Exponents of force, of length (or angle) and of time."""
-NONE: Dimension = (0.0, 0.0, 0.0)
+DIMENSIONLESS: Dimension = (0.0, 0.0, 0.0)
 """Dimensionless."""
 FORCE: Dimension = (1.0, 0.0, 0.0)
 SECOND: Dimension = (0.0, 0.0, 1.0)
@@ -27,17 +27,17 @@ def units_of(
     tree: Node,
     numbers: Sequence[float],
     signals: Mapping[str, Dimension],
-    wanted: Dimension,
+    dimension: Dimension,
     system: UnitSystem = LINEAR,
 ) -> tuple[str, ...]:
     """Units of p0, p1, …; `?` where the formula does not determine the unit, as of two parameters that are factors of
-    each other. numbers: values of the parameters; wanted: dimension of the law's value."""
-    reader = _Reader(numbers, signals)
+    each other. numbers: values of the parameters; dimension: dimension of the law's value."""
+    solver = _DimensionSolver(numbers, signals)
     for _ in range(2):  # Two passes: a parameter found on the right of an operator may determine another on the left.
-        reader.assign(tree, wanted)
+        solver.assign(tree, dimension)
     symbols = (system.force, system.length, system.time)
     return tuple(
-        _format_dimension(reader.found[place], symbols) if place in reader.found else "?"
+        _format_dimension(solver.dimensions[place], symbols) if place in solver.dimensions else "?"
         for place in range(len(numbers))
     )
 
@@ -49,9 +49,9 @@ def _format_dimension(dimension: Dimension, symbols: tuple[str, str, str]) -> st
     below = [
         _format_power(name, -power) for name, power in zip(symbols, dimension, strict=True) if power < 0 and name != "1"
     ]
-    over = " ".join(above) or "1"
-    under = " ".join(below)
-    return f"{over}/{f'({under})' if len(below) > 1 else under}" if below else over
+    numerator = " ".join(above) or "1"
+    denominator = " ".join(below)
+    return f"{numerator}/{f'({denominator})' if len(below) > 1 else denominator}" if below else numerator
 
 
 def _format_power(name: str, power: float) -> str:
@@ -74,26 +74,28 @@ def _scale_dimension(dimension: Dimension | None, factor: float | None) -> Dimen
     )
 
 
-class _Reader:
+class _DimensionSolver:
     """Dimensions of a formula's parameters, collected in `found` by index; the first dimension found counts."""
 
     def __init__(self, numbers: Sequence[float], signals: Mapping[str, Dimension]) -> None:
         self.numbers = numbers
         self.signals = signals
-        self.found: dict[int, Dimension] = {}
+        self.dimensions: dict[int, Dimension] = {}
 
-    def dimension_of(self, node: Node, literal: Dimension | None = NONE) -> Dimension | None:
+    def dimension_of(self, node: Node, literal: Dimension | None = DIMENSIONLESS) -> Dimension | None:
         """Dimension of an expression; None where it is not known. literal: dimension of the numbers that are part of
         the formula; None = not known, because such a number may have a unit."""
         match node:
             case Number() | Variable("pi"):
                 return literal
             case Free(place):
-                return self.found.get(place)
+                return self.dimensions.get(place)
             case Variable(name):
                 return self.signals.get(name)
             case Apply("+" | "-" | "minimum" | "maximum" | "neg" | "abs", parts):
-                return next((known for part in parts if (known := self.dimension_of(part, literal)) is not None), None)
+                return next(
+                    (dimension for part in parts if (dimension := self.dimension_of(part, literal)) is not None), None
+                )
             case Apply("lag" | "play" | "delay", (signal, _)):
                 return self.dimension_of(signal, literal)
             case Apply("*" | "/" as name, (left, right)):
@@ -106,7 +108,7 @@ class _Reader:
                 return _scale_dimension(self.dimension_of(inner, literal), 0.5)
             case Apply("integral", (inner,)):
                 return _add_dimensions(self.dimension_of(inner, literal), SECOND)
-        return NONE
+        return DIMENSIONLESS
 
     def _value(self, node: Node) -> float | None:
         """Value of an exponent that is a number or a parameter, with or without sign; None for any other expression."""
@@ -120,47 +122,47 @@ class _Reader:
                 return None if positive is None else -positive
         return None
 
-    def assign(self, node: Node, wanted: Dimension | None) -> None:
+    def assign(self, node: Node, dimension: Dimension | None) -> None:
         """Pass the dimension that an expression must have (None: not known) down to its parameters."""
         match node:
             case Free(place):
-                if wanted is not None:
-                    self.found.setdefault(place, wanted)
+                if dimension is not None:
+                    self.dimensions.setdefault(place, dimension)
             case Apply("+" | "-" | "minimum" | "maximum" | "neg" | "abs", parts):
                 for part in parts:
-                    self.assign(part, self.dimension_of(node) if wanted is None else wanted)
+                    self.assign(part, self.dimension_of(node) if dimension is None else dimension)
             case Apply("*" | "/" as name, (left, right)):
                 sign = 1.0 if name == "*" else -1.0
-                of_left = _add_dimensions(wanted, self.dimension_of(right), -sign)
-                of_right = _scale_dimension(_add_dimensions(wanted, self.dimension_of(left), -1.0), sign)
-                self.assign(left, None if self._tells_more(left, right) else of_left)
-                self.assign(right, None if self._tells_more(right, left) else of_right)
+                left_dimension = _add_dimensions(dimension, self.dimension_of(right), -sign)
+                right_dimension = _scale_dimension(_add_dimensions(dimension, self.dimension_of(left), -1.0), sign)
+                self.assign(left, None if self._determines_itself(left, right) else left_dimension)
+                self.assign(right, None if self._determines_itself(right, left) else right_dimension)
             case Apply("**", (base, exponent)):
                 power = self._value(exponent)
-                self.assign(exponent, NONE)
-                self.assign(base, _scale_dimension(wanted, 1 / power if power else None))
+                self.assign(exponent, DIMENSIONLESS)
+                self.assign(base, _scale_dimension(dimension, 1 / power if power else None))
             case Apply(name, parts):
-                self._assign_arguments(name, parts, wanted)
+                self._assign_arguments(name, parts, dimension)
 
-    def _tells_more(self, part: Node, factor: Node) -> bool:
+    def _determines_itself(self, part: Node, factor: Node) -> bool:
         """Whether the signals in a sum (or power) determine its dimension better than the dimension wanted of the
         product: the other factor is a number that is part of the form, and may have a unit."""
         is_sum = isinstance(part, Apply) and part.name in ("+", "-", "minimum", "maximum", "**")
-        stated = self.dimension_of(factor, None) is None and self.dimension_of(factor) is not None
-        return is_sum and stated and self.dimension_of(part, None) is not None
+        has_unknown_unit = self.dimension_of(factor, None) is None and self.dimension_of(factor) is not None
+        return is_sum and has_unknown_unit and self.dimension_of(part, None) is not None
 
-    def _assign_arguments(self, name: str, parts: tuple[Node, ...], wanted: Dimension | None) -> None:
+    def _assign_arguments(self, name: str, parts: tuple[Node, ...], dimension: Dimension | None) -> None:
         """Pass dimensions to a function's arguments; those of functions such as sin and exp are dimensionless."""
         first = parts[0]
         match name:
             case "lag" | "delay" | "play":
-                self.assign(first, wanted)
+                self.assign(first, dimension)
                 self.assign(parts[1], self.dimension_of(first) if name == "play" else SECOND)
             case "integral":
-                self.assign(first, _add_dimensions(wanted, SECOND, -1.0))
+                self.assign(first, _add_dimensions(dimension, SECOND, -1.0))
             case "sqrt":
-                self.assign(first, _scale_dimension(wanted, 2.0))
+                self.assign(first, _scale_dimension(dimension, 2.0))
             case "sign":
                 self.assign(first, None)
             case _:
-                self.assign(first, NONE)
+                self.assign(first, DIMENSIONLESS)

@@ -33,7 +33,7 @@ SPARE = 2
 NEAR_SHARE = 0.3
 """Standard deviation of the Gaussian weight around a position, relative to the calibration's reach. Without a weight,
 far positions change the slope at the centre of the simulated omega.3 by 20 %; with it, by 2 %."""
-MOST_TOLD = 10
+MOST_LISTED = 10
 """Largest number of problems at positions that are listed one by one; further ones are only counted."""
 
 
@@ -106,11 +106,11 @@ def calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
             LinkageReading(*(getattr(calibration, name)[number] for name in shapes)), gravity_known=not filled
         )
     ]
-    yield from at_places[:MOST_TOLD]
-    if len(at_places) > MOST_TOLD:
-        yield f"and {len(at_places) - MOST_TOLD} more of this kind at other positions"
-    told_once = calibration.line_deg, calibration.asymmetry, np.atleast_1d(calibration.difference)
-    if any(each.shape not in ((3,), (1,)) or not np.isfinite(each).all() for each in told_once):
+    yield from at_places[:MOST_LISTED]
+    if len(at_places) > MOST_LISTED:
+        yield f"and {len(at_places) - MOST_LISTED} more of this kind at other positions"
+    shared_values = calibration.line_deg, calibration.asymmetry, np.atleast_1d(calibration.difference)
+    if any(values.shape not in ((3,), (1,)) or not np.isfinite(values).all() for values in shared_values):
         yield "mirror lines, asymmetries or differences are not finite numbers"
     else:
         yield from difference_problems(calibration.difference)
@@ -128,27 +128,27 @@ def difference_problems(difference: float) -> Iterator[str]:
 def check_reading(reading: LinkageReading, gravity_known: bool = True) -> Iterator[str]:
     """Problems of a reading, a sentence for each: values that are not finite, a singular Jacobian, an inertia that is
     not symmetric, not positive definite or not plausible. gravity_known: whether the gravity force must be a number."""
-    where = "(" + ", ".join(f"{1000 * each:.0f}" for each in reading.position_m) + ") mm"
+    place = "(" + ", ".join(f"{1000 * coordinate:.0f}" for coordinate in reading.position_m) + ") mm"
     jacobian, inertia = reading.jacobian, reading.inertia_kg
     vectors = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
     for name, values in (vectors | {"Jacobian": jacobian, "inertia": inertia}).items():
         if not np.isfinite(values).all():
-            yield f"at {where} the {name} contains a value that is not a number"
+            yield f"at {place} the {name} contains a value that is not a number"
     if not (np.isfinite(jacobian).all() and np.isfinite(inertia).all()):
         return
     if np.isinf(reading.gravity_n).any() or (gravity_known and np.isnan(reading.gravity_n).any()):
-        yield f"at {where} the gravity force is not a number"
+        yield f"at {place} the gravity force is not a number"
     condition = float(np.linalg.cond(jacobian))
     if not condition <= MOST_CONDITION:
-        yield f"at {where} the Jacobian is singular, or nearly so (condition {condition:.3g})"
+        yield f"at {place} the Jacobian is singular, or nearly so (condition {condition:.3g})"
     if np.abs(inertia - inertia.T).max() > MOST_SKEW * np.abs(inertia).max():
-        yield f"at {where} the inertia is not symmetric"
+        yield f"at {place} the inertia is not symmetric"
         return
     masses = np.linalg.eigvalsh(0.5 * (inertia + inertia.T))
     if masses[0] <= 0:
-        yield f"at {where} the inertia is not positive definite: {masses[0]:.3g} kg along a direction"
+        yield f"at {place} the inertia is not positive definite: {masses[0]:.3g} kg along a direction"
     elif not MASSES_KG[0] <= masses[0] <= masses[-1] <= MASSES_KG[1]:
-        yield f"at {where} the inertia is {masses[0]:.3g} to {masses[-1]:.3g} kg, which is not plausible for a handle"
+        yield f"at {place} the inertia is {masses[0]:.3g} to {masses[-1]:.3g} kg, which is not plausible for a handle"
 
 
 def inertia_about(calibration: LinkageCalibration, place_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -159,15 +159,15 @@ def inertia_about(calibration: LinkageCalibration, place_m: FloatArray) -> tuple
     Raises ValueError for fewer than eight positions, or for positions in a plane.
     """
     reach_m = float(np.linalg.norm(calibration.position_m, axis=1).max())
-    away = (calibration.position_m - place_m) / (reach_m or 1.0)
-    weights = np.exp(-0.5 * np.sum((away / NEAR_SHARE) ** 2, axis=1))[:, None]
+    offsets = (calibration.position_m - place_m) / (reach_m or 1.0)
+    weights = np.exp(-0.5 * np.sum((offsets / NEAR_SHARE) ** 2, axis=1))[:, None]
     for degree in DEGREES:
         powers = [p for p in itertools.product(range(degree + 1), repeat=3) if sum(p) <= degree]
-        terms = weights * np.stack([np.prod(away ** np.array(power), axis=1) for power in powers], axis=1)
-        if len(away) >= SPARE * len(powers) and np.linalg.matrix_rank(terms) == len(powers):
-            found = np.linalg.lstsq(terms, weights * calibration.inertia_kg.reshape(-1, 9), rcond=None)[0]
+        terms = weights * np.stack([np.prod(offsets ** np.array(power), axis=1) for power in powers], axis=1)
+        if len(offsets) >= SPARE * len(powers) and np.linalg.matrix_rank(terms) == len(powers):
+            coefficients = np.linalg.lstsq(terms, weights * calibration.inertia_kg.reshape(-1, 9), rcond=None)[0]
             linear = [powers.index((axis == 0, axis == 1, axis == 2)) for axis in range(3)]
-            return found[powers.index((0, 0, 0))].reshape(3, 3), found[linear].reshape(3, 3, 3) / reach_m
+            return coefficients[powers.index((0, 0, 0))].reshape(3, 3), coefficients[linear].reshape(3, 3, 3) / reach_m
     raise ValueError(
-        f"{len(away)} positions do not determine how the inertia changes: read at least eight, not in one plane"
+        f"{len(offsets)} positions do not determine how the inertia changes: read at least eight, not in one plane"
     )

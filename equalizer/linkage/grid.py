@@ -30,12 +30,12 @@ def arm_azimuths(jacobian: FloatArray) -> FloatArray:
     rows = np.linalg.inv(jacobian)
     rows = rows * np.sign(rows[:, :1])
     outwards = np.arctan2(-rows[:, 2], -rows[:, 1])
-    turned = np.angle(np.exp(3j * outwards).mean()) / 3
-    thirds = np.round((outwards - turned) / (2 * math.pi / 3))
-    ideal = turned + thirds * 2 * math.pi / 3
-    off_deg = np.degrees(np.abs(outwards - ideal)).max()
-    if len(set(thirds.astype(int) % 3)) < 3 or off_deg > MOST_OFF_DEG:
-        text = ", ".join(f"{each:.0f}" for each in np.degrees(outwards))
+    rotation = np.angle(np.exp(3j * outwards).mean()) / 3
+    thirds = np.round((outwards - rotation) / (2 * math.pi / 3))
+    ideal = rotation + thirds * 2 * math.pi / 3
+    deviation_deg = np.degrees(np.abs(outwards - ideal)).max()
+    if len(set(thirds.astype(int) % 3)) < 3 or deviation_deg > MOST_OFF_DEG:
+        text = ", ".join(f"{azimuth:.0f}" for azimuth in np.degrees(outwards))
         raise CalibrationError((f"the arms lie at {text} degrees; those of a delta device are 120 degrees apart",))
     azimuths: FloatArray = np.angle(np.exp(1j * ideal))
     return azimuths
@@ -59,7 +59,7 @@ def symmetric_grid(azimuths: FloatArray, radius_m: float, depth_m: float) -> Flo
     return np.array(points)
 
 
-def beside(position_m: FloatArray) -> FloatArray:
+def difference_positions(position_m: FloatArray) -> FloatArray:
     """Positions (6, 3), m: a step `STEP_M` forwards along x, y and z, then a step backwards; for `difference_error`."""
     steps: FloatArray = STEP_M * np.vstack([np.eye(3), -np.eye(3)])
     return position_m + steps
@@ -67,7 +67,7 @@ def beside(position_m: FloatArray) -> FloatArray:
 
 def difference_error(jacobian: FloatArray, positions_m: FloatArray, angles_rad: FloatArray) -> float:
     """Largest difference between an entry of J (3, 3) and that of d position / d angle by central differences, relative
-    to the largest entry of the latter. positions_m, angles_rad: (6, 3), at the positions of `beside`."""
-    moved, turned = positions_m[:3] - positions_m[3:], angles_rad[:3] - angles_rad[3:]
-    by_differences = np.linalg.lstsq(turned, moved, rcond=None)[0].T
+    to the largest entry of the latter. positions_m, angles_rad: (6, 3), at the positions of `difference_positions`."""
+    position_steps, angle_steps = positions_m[:3] - positions_m[3:], angles_rad[:3] - angles_rad[3:]
+    by_differences = np.linalg.lstsq(angle_steps, position_steps, rcond=None)[0].T
     return float(np.abs(jacobian - by_differences).max() / np.abs(by_differences).max())

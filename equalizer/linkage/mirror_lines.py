@@ -26,60 +26,63 @@ UPRIGHT = 1e-3
 
 def reflection(azimuth_rad: float) -> FloatArray:
     """(3, 3): reflection about the plane that contains the axis x and has this azimuth, from y towards z."""
-    across = np.array([0.0, -np.sin(azimuth_rad), np.cos(azimuth_rad)])
-    mirror: FloatArray = np.eye(3) - 2 * np.outer(across, across)
+    normal = np.array([0.0, -np.sin(azimuth_rad), np.cos(azimuth_rad)])
+    mirror: FloatArray = np.eye(3) - 2 * np.outer(normal, normal)
     return mirror
 
 
 def line_asymmetry(readings: list[LinkageReading], azimuths: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Asymmetry of the inertia about each line, (3,): largest |M(R p) - R M(p) R| / |M(p)| (spectral norms) over the
     readings whose mirrored position was read too, 0 without any; and the positions (3, 3), m, where it is largest."""
-    worst, where = np.zeros(3), np.zeros((3, 3))
+    worst, worst_positions = np.zeros(3), np.zeros((3, 3))
     positions = np.array([reading.position_m for reading in readings])
     for line, azimuth in enumerate(azimuths):
         mirror = reflection(float(azimuth))
         for reading in readings:
-            other = _nearest(positions, mirror @ reading.position_m)
-            if other is None:
+            mirrored = _nearest(positions, mirror @ reading.position_m)
+            if mirrored is None:
                 continue
-            left = readings[other].inertia_kg - mirror @ reading.inertia_kg @ mirror
-            share = float(np.linalg.norm(left, 2) / np.linalg.norm(reading.inertia_kg, 2))
+            difference = readings[mirrored].inertia_kg - mirror @ reading.inertia_kg @ mirror
+            share = float(np.linalg.norm(difference, 2) / np.linalg.norm(reading.inertia_kg, 2))
             if share > worst[line]:
-                worst[line], where[line] = share, reading.position_m
-    return worst, where
+                worst[line], worst_positions[line] = share, reading.position_m
+    return worst, worst_positions
 
 
-def fill_in(
+def complete_by_symmetry(
     readings: list[LinkageReading], azimuths: FloatArray, unread: FloatArray
 ) -> tuple[list[LinkageReading], FloatArray]:
     """Complete readings by symmetry: readings at those positions of unread (k, 3), m, that one reflection, or two in
     succession, map to a position that was read; and the remaining positions (r, 3). Gravity is reflected about an
     upright line only, and NaN otherwise."""
-    filled, left = [], []
+    completed, remaining = [], []
     positions = np.array([reading.position_m for reading in readings])
-    once = [(line,) for line in range(3)]
+    single_reflections = [(line,) for line in range(3)]
     for position in unread:
-        for lines in (*once, *((first, second) for first in range(3) for second in range(3) if first != second)):
-            wanted = position
+        for lines in (
+            *single_reflections,
+            *((first, second) for first in range(3) for second in range(3) if first != second),
+        ):
+            image_position = position
             for line in lines:
-                wanted = reflection(float(azimuths[line])) @ wanted
-            found = _nearest(positions, wanted)
-            if found is not None:
-                image = readings[found]
+                image_position = reflection(float(azimuths[line])) @ image_position
+            source = _nearest(positions, image_position)
+            if source is not None:
+                image = readings[source]
                 for line in reversed(lines):
                     image = _mirror_reading(image, line, float(azimuths[line]))
-                filled.append(image)
+                completed.append(image)
                 break
         else:
-            left.append(position)
-    return filled, np.array(left).reshape(-1, 3)
+            remaining.append(position)
+    return completed, np.array(remaining).reshape(-1, 3)
 
 
 def asymmetry_words(asymmetry: FloatArray, where_m: FloatArray, line_deg: FloatArray) -> tuple[str, ...]:
     """Warnings for lines whose asymmetry exceeds `WARN_FROM`; empty if there are none."""
     warnings = [
         f"Mirrored about the line at {line_deg[line]:.0f} degrees the inertia differs by up to {asymmetry[line]:.1%}, "
-        f"most at ({', '.join(f'{1000 * each:.0f}' for each in where_m[line])}) mm; up to {WARN_FROM:.0%} is rounding "
+        f"most at ({', '.join(f'{1000 * x:.0f}' for x in where_m[line])}) mm; up to {WARN_FROM:.0%} is rounding "
         "and assembly."
         for line in range(3)
         if asymmetry[line] > WARN_FROM
@@ -94,9 +97,9 @@ def asymmetry_words(asymmetry: FloatArray, where_m: FloatArray, line_deg: FloatA
     return tuple(warnings)
 
 
-def _nearest(positions: FloatArray, wanted: FloatArray) -> int | None:
-    """Index of the position that equals `wanted` within `NEAR_M`; None without one."""
-    distances = np.linalg.norm(positions - wanted, axis=1)
+def _nearest(positions: FloatArray, target: FloatArray) -> int | None:
+    """Index of the position that equals `target` within `NEAR_M`; None without one."""
+    distances = np.linalg.norm(positions - target, axis=1)
     nearest = int(np.argmin(distances))
     return nearest if distances[nearest] < NEAR_M else None
 
@@ -104,12 +107,12 @@ def _nearest(positions: FloatArray, wanted: FloatArray) -> int | None:
 def _mirror_reading(reading: LinkageReading, line: int, azimuth_rad: float) -> LinkageReading:
     """The reading at the position mirrored about this line."""
     mirror = reflection(azimuth_rad)
-    swapped = [line if joint == line else 3 - line - joint for joint in range(3)]
+    joint_order = [line if joint == line else 3 - line - joint for joint in range(3)]
     upright = abs(np.cos(azimuth_rad)) < UPRIGHT
     return LinkageReading(
         position_m=mirror @ reading.position_m,
-        joint_angle_rad=reading.joint_angle_rad[swapped],
-        jacobian=(mirror @ reading.jacobian)[:, swapped],
+        joint_angle_rad=reading.joint_angle_rad[joint_order],
+        jacobian=(mirror @ reading.jacobian)[:, joint_order],
         inertia_kg=mirror @ reading.inertia_kg @ mirror,
         gravity_n=mirror @ reading.gravity_n if upright else np.full(3, np.nan),
     )

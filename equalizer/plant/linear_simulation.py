@@ -48,61 +48,61 @@ def driven_axes(model: MechanicalModel) -> FloatArray:
     return np.asarray(model.input / np.where(length > 0, length, 1.0))
 
 
-def linear_steps(model: MechanicalModel, step_s: float, ports: FloatArray | None = None) -> LinearSteps:
+def discretise_model(model: MechanicalModel, step_s: float, ports: FloatArray | None = None) -> LinearSteps:
     """Discretise the structure without actuator, sensor and effects, with a step in s. ports: (n, r), the directions in
     the coordinates along which forces act and motion is output; None = the driven axes."""
     n, m = model.coordinates, model.inputs
     axes = driven_axes(model) if ports is None else ports
-    inputs = np.asarray(np.linalg.solve(model.mass, np.hstack([model.input, axes])), dtype=np.float64)
-    held = np.hstack([model.stiffness, model.damping])
-    from_state = -np.asarray(np.linalg.solve(model.mass, held), dtype=np.float64)
-    size, inward = 2 * n, m + axes.shape[1]
-    continuous = np.zeros((size + inward, size + inward))
-    continuous[:n, n:size] = np.eye(n)
-    continuous[n:size, :size] = from_state
-    continuous[n:size, size:] = inputs
-    exact = expm(continuous * step_s)
-    rate = DERIVATIVE_OF_QUANTITY[model.quantity]
-    looked, directly = _output_rows(model.output, rate, from_state, inputs)
-    motion = [_output_rows(axes.T, order, from_state, inputs) for order in range(3)]
+    input_matrix = np.asarray(np.linalg.solve(model.mass, np.hstack([model.input, axes])), dtype=np.float64)
+    restoring = np.hstack([model.stiffness, model.damping])
+    from_state = -np.asarray(np.linalg.solve(model.mass, restoring), dtype=np.float64)
+    state_count, input_count = 2 * n, m + axes.shape[1]
+    generator_matrix = np.zeros((state_count + input_count, state_count + input_count))
+    generator_matrix[:n, n:state_count] = np.eye(n)
+    generator_matrix[n:state_count, :state_count] = from_state
+    generator_matrix[n:state_count, state_count:] = input_matrix
+    step_matrices = expm(generator_matrix * step_s)
+    derivative_order = DERIVATIVE_OF_QUANTITY[model.quantity]
+    response, response_by_input = _output_rows(model.output, derivative_order, from_state, input_matrix)
+    motion = [_output_rows(axes.T, derivative, from_state, input_matrix) for derivative in range(3)]
     return LinearSteps(
         step_s=step_s,
-        advance=exact[:size, :size],
-        by_command=exact[:size, size : size + m],
-        by_axis_force=exact[:size, size + m :],
+        advance=step_matrices[:state_count, :state_count],
+        by_command=step_matrices[:state_count, state_count : state_count + m],
+        by_axis_force=step_matrices[:state_count, state_count + m :],
         motion=np.vstack([rows for rows, _ in motion]),
         motion_by_command=np.vstack([direct[:, :m] for _, direct in motion]),
         motion_by_axis_force=np.vstack([direct[:, m:] for _, direct in motion]),
-        response=looked,
-        response_by_command=directly[:, :m],
-        response_by_axis_force=directly[:, m:],
-        position=_output_rows(model.output, 0, from_state, inputs)[0],
+        response=response,
+        response_by_command=response_by_input[:, :m],
+        response_by_axis_force=response_by_input[:, m:],
+        position=_output_rows(model.output, 0, from_state, input_matrix)[0],
     )
 
 
 def _output_rows(
-    output: FloatArray, order: int, from_state: FloatArray, inputs: FloatArray
+    output: FloatArray, derivative_order: int, from_state: FloatArray, input_matrix: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Rows of the `order`-th time derivative (0 to 2) of the outputs (p, n) of the coordinates: for the state,
+    """Rows of the time derivative of an order (0 to 2) of the outputs (p, n) of the coordinates: for the state,
     (p, 2n), and for the inputs, (p, m + r). Only the acceleration depends on the inputs directly."""
-    nothing, directly = np.zeros_like(output), np.zeros((len(output), inputs.shape[1]))
-    if order == 0:
-        return np.hstack([output, nothing]), directly
-    if order == 1:
-        return np.hstack([nothing, output]), directly
-    return output @ from_state, output @ inputs
+    zeros, direct = np.zeros_like(output), np.zeros((len(output), input_matrix.shape[1]))
+    if derivative_order == 0:
+        return np.hstack([output, zeros]), direct
+    if derivative_order == 1:
+        return np.hstack([zeros, output]), direct
+    return output @ from_state, output @ input_matrix
 
 
 def free_motion_rates(model: MechanicalModel) -> ComplexArray:
     """(2n,): eigenvalues of the continuous-time state matrix (poles), 1/s; complex ones come in conjugate pairs."""
     n = model.coordinates
-    motion = np.block(
+    state_matrix = np.block(
         [
             [np.zeros((n, n)), np.eye(n)],
             [-np.linalg.solve(model.mass, model.stiffness), -np.linalg.solve(model.mass, model.damping)],
         ]
     )
-    return np.asarray(np.linalg.eigvals(motion), dtype=np.complex128)
+    return np.asarray(np.linalg.eigvals(state_matrix), dtype=np.complex128)
 
 
 def growth_rate(model: MechanicalModel) -> float:

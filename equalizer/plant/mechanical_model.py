@@ -151,18 +151,18 @@ def with_units_of(
 ) -> MechanicalModel:
     """The model with the unit system of its recordings, where that is not SI and the input and output matrices (entries
     of magnitude 0 or 1) do not convert units. commands, responses: units of the recordings' channels."""
-    plain = all(np.isin(np.abs(matrix), (0.0, 1.0)).all() for matrix in (model.input, model.output))
-    found = system_of(commands, responses, time)
-    if model.units is not None or not plain or found.rotational is not None:
+    is_unit_free = all(np.isin(np.abs(matrix), (0.0, 1.0)).all() for matrix in (model.input, model.output))
+    system = system_of(commands, responses, time)
+    if model.units is not None or not is_unit_free or system.rotational is not None:
         return model
-    return replace(model, units=found)
+    return replace(model, units=system)
 
 
 def suggest_word(word: str, allowed: tuple[str, ...]) -> str:
     """Text that suggests the most similar of the allowed words, to be appended to a message; empty if none is
     similar."""
-    close = get_close_matches(word[:60], allowed, n=1)  # the comparison of longer words takes minutes
-    return f" (did you mean '{close[0]}'?)" if close else ""
+    matches = get_close_matches(word[:60], allowed, n=1)  # the comparison of longer words takes minutes
+    return f" (did you mean '{matches[0]}'?)" if matches else ""
 
 
 def _problems(model: MechanicalModel) -> Iterator[str]:
@@ -189,8 +189,8 @@ def _matrix_problems(model: MechanicalModel) -> Iterator[str]:
     for name, shape in shapes.items():
         matrix: FloatArray = getattr(model, name)
         if matrix.ndim != 2 or matrix.shape != shape or 0 in matrix.shape:
-            wanted = {"input": f"({n}, inputs)", "output": f"(outputs, {n})"}.get(name, f"({n}, {n})")
-            yield f"model.{name} has shape {matrix.shape}, but must have {wanted}: mass is {n} rows high"
+            expected = {"input": f"({n}, inputs)", "output": f"(outputs, {n})"}.get(name, f"({n}, {n})")
+            yield f"model.{name} has shape {matrix.shape}, but must have {expected}: mass is {n} rows high"
             valid = False
         elif not np.isfinite(matrix).all():
             yield f"model.{name} holds values that are not finite numbers"
@@ -214,12 +214,12 @@ def effect_problems(effect: ModelEffect) -> Iterator[str]:
     if effect.kind == DISCOVERED_LAW:
         yield from _law_problems(effect)
         return
-    known = EFFECTS_BY_NAME.get(effect.kind)
-    if known is None:
+    entry = EFFECTS_BY_NAME.get(effect.kind)
+    if entry is None:
         names = (*EFFECTS_BY_NAME, DISCOVERED_LAW)
         yield f"unknown kind '{effect.kind}'{suggest_word(effect.kind, names)}; allowed are {', '.join(names)}"
         return
-    names = tuple(parameter.name for parameter in known.parameters)
+    names = tuple(parameter.name for parameter in entry.parameters)
     for name, value in effect.parameters.items():
         if name not in names:
             yield f"{effect.kind} has no parameter '{name}'{suggest_word(name, names)}; allowed are {', '.join(names)}"
@@ -227,7 +227,7 @@ def effect_problems(effect: ModelEffect) -> Iterator[str]:
             yield f"{effect.kind}.{name} is {value}; it must be a finite number"
     missing = [
         f"{part.name} ({part.unit})"
-        for part in known.parameters
+        for part in entry.parameters
         if not (part.optional or part.name in effect.parameters)
     ]
     if missing:

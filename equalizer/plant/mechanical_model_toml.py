@@ -170,11 +170,11 @@ def _read_numbers(document: Mapping[str, Any], name: str, kind: type[Numbers], p
     table = _read_table(document, name, problems)
     allowed = tuple(part.name for part in fields(kind))
     problems += _find_unknown_keys(table, allowed, f"{name}.")
-    known = {key: value for key, value in table.items() if key in allowed}
-    for key, value in known.items():
+    values = {key: value for key, value in table.items() if key in allowed}
+    for key, value in values.items():
         if not _is_number(value):
             problems.append(f"{name}.{key} is {_quote_value(value)}; it must be a number")
-    return kind(**{key: float(value) for key, value in known.items() if _is_number(value)})
+    return kind(**{key: float(value) for key, value in values.items() if _is_number(value)})
 
 
 def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
@@ -182,7 +182,7 @@ def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
     if not (isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)):
         problems.append("effects are written as tables: [[effect]]")
         return ()
-    found = []
+    effects = []
     for number, entry in enumerate(entries, start=1):
         law = _read_law(entry, number, problems) if entry.get("kind") == DISCOVERED_LAW else None
         words = ("kind", "axis") if law is None else ("kind", "axis", *_LAW_KEYS)
@@ -198,8 +198,8 @@ def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
             problems.append(
                 f"effect {number}: axis is {_quote_value(entry['axis'])}; it must be a text, or left out for all axes"
             )
-        found.append(ModelEffect(kind, entry.get("axis") or None, numbers, law))
-    return () if problems else tuple(_with_float_parameters(effect) for effect in found)
+        effects.append(ModelEffect(kind, entry.get("axis") or None, numbers, law))
+    return () if problems else tuple(_with_float_parameters(effect) for effect in effects)
 
 
 _LAW_KEYS = ("acts_on", "expression")

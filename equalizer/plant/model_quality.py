@@ -48,9 +48,9 @@ def model_quality(
     """The quality of a model. The expected error is the root of the summed squares of misfit and scatter, and at least
     the held-out error. held_out: error, noise, and length of the record (s). most_misfit: misfit that the noise of the
     fitted lines may hide; used in place of a smaller misfit_error."""
-    own = float(np.hypot(max(misfit_error, most_misfit), scatter_error or 0.0))
+    model_error = float(np.hypot(max(misfit_error, most_misfit), scatter_error or 0.0))
     error, noise, seconds = held_out or (None, None, None)
-    return ModelQuality(max(own, error or 0.0), misfit_error, scatter_error, error, noise, seconds, remarks)
+    return ModelQuality(max(model_error, error or 0.0), misfit_error, scatter_error, error, noise, seconds, remarks)
 
 
 def quality_sentence(quality: ModelQuality | None) -> str:
@@ -84,7 +84,7 @@ def quality_brief(quality: ModelQuality | None) -> str:
     return f"held-out error {100 * quality.held_out_error:.2g} %"
 
 
-def worst_quality(found: tuple[ModelQuality | None, ...]) -> ModelQuality | None:
+def worst_quality(qualities: tuple[ModelQuality | None, ...]) -> ModelQuality | None:
     """The quality with the largest expected error of several models; None if there are none or a quality is unknown."""
-    known = [quality for quality in found if quality is not None]
-    return max(known, key=lambda quality: quality.expected_error) if len(known) == len(found) and known else None
+    stored = [quality for quality in qualities if quality is not None]
+    return max(stored, key=lambda quality: quality.expected_error) if len(stored) == len(qualities) and stored else None

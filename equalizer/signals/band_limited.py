@@ -34,12 +34,12 @@ def filter_by_gain(
     beyond both ends, so that neither steps nor kinks arise there. The line is not added again; where it is wanted, the
     caller adds it.
     """
-    whole = odd_extension(samples - end_to_end_line(samples))
-    spectrum, lines = rfft(whole, axis=0), rfftfreq(len(whole), 1 / sample_rate_hz)
+    extended = odd_extension(samples - end_to_end_line(samples))
+    spectrum, lines = rfft(extended, axis=0), rfftfreq(len(extended), 1 / sample_rate_hz)
     # In blocks: the matrices of all lines at once would take a gigabyte for some minutes of samples at 1 kHz.
-    pieces = [slice(first, first + LINES) for first in range(0, len(lines), LINES)]
-    passed = np.concatenate([np.einsum("lrk,lk->lr", gain(lines[piece]), spectrum[piece]) for piece in pieces])
-    return np.asarray(irfft(passed, len(whole), axis=0)[: len(samples)])
+    line_blocks = [slice(first, first + LINES) for first in range(0, len(lines), LINES)]
+    filtered = np.concatenate([np.einsum("lrk,lk->lr", gain(lines[block]), spectrum[block]) for block in line_blocks])
+    return np.asarray(irfft(filtered, len(extended), axis=0)[: len(samples)])
 
 
 def odd_extension(samples: FloatArray) -> FloatArray:
@@ -54,8 +54,8 @@ def odd_extension(samples: FloatArray) -> FloatArray:
 
 def end_to_end_line(samples: FloatArray) -> FloatArray:
     """(n, k): the straight line from the first to the last sample of each channel. samples: (n, k)."""
-    along = np.linspace(0.0, 1.0, len(samples))[:, None]
-    return np.asarray((1 - along) * samples[0] + along * samples[-1])
+    position = np.linspace(0.0, 1.0, len(samples))[:, None]
+    return np.asarray((1 - position) * samples[0] + position * samples[-1])
 
 
 def filter_low_pass(samples: FloatArray, sample_rate_hz: float, band_hz: float, late_s: float = 0.0) -> FloatArray:

@@ -101,8 +101,8 @@ def _correlate_normalised(first: FloatArray, second: FloatArray) -> FloatArray:
 def _has_enough_overlap(lags: IntArray, first: int, second: int) -> BoolArray:
     """Mask of the lags at which signals of these lengths overlap by at least `LEAST_OVERLAP`."""
     overlap = np.minimum(first, lags + second) - np.maximum(0, lags)
-    enough: BoolArray = overlap >= LEAST_OVERLAP * min(first, second)
-    return enough
+    has_overlap: BoolArray = overlap >= LEAST_OVERLAP * min(first, second)
+    return has_overlap
 
 
 def _refuse_rivals(offsets_s: FloatArray, height: FloatArray, peak: int) -> None:
@@ -110,7 +110,9 @@ def _refuse_rivals(offsets_s: FloatArray, height: FloatArray, peak: int) -> None
     from scipy import signal as sg
 
     peaks, _ = sg.find_peaks(height)
-    rivals = [place for place in peaks if abs(place - peak) > 2 and height[place] > AMBIGUOUS * height[peak]]
+    rivals = [
+        candidate for candidate in peaks if abs(candidate - peak) > 2 and height[candidate] > AMBIGUOUS * height[peak]
+    ]
     if rivals:
         raise NoOffsetError(
             f"offsets of {offsets_s[peak]:g} s and {offsets_s[rivals[0]]:g} s agree equally well, as happens with "
@@ -122,9 +124,9 @@ def _interpolate_peak(offsets_s: FloatArray, correlation: FloatArray, peak: int)
     """The maximum of |r| within a lag of the index `peak`, on a spline of fifth order."""
     from scipy.interpolate import make_interp_spline
 
-    around = slice(max(0, peak - 8), peak + 9)
+    neighbours = slice(max(0, peak - 8), peak + 9)
     spline = make_interp_spline(
-        offsets_s[around] - offsets_s[peak], correlation[around], k=min(5, len(correlation) - 1)
+        offsets_s[neighbours] - offsets_s[peak], correlation[neighbours], k=min(5, len(correlation) - 1)
     )
     step = offsets_s[1] - offsets_s[0]
     fine = np.linspace(-step, step, 4001)

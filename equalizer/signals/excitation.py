@@ -30,10 +30,10 @@ def log_sweep(from_hz: float, to_hz: float, amplitude: float, n: int, sample_rat
     duration_s = n / sample_rate_hz
     log_ratio = np.log(to_hz / from_hz)
     cycles = from_hz * duration_s / log_ratio * (np.exp(log_ratio * np.arange(n) / n) - 1.0)
-    whole = from_hz * duration_s / log_ratio * (np.exp(log_ratio) - 1.0)
-    if whole < 1.0:
+    total_cycles = from_hz * duration_s / log_ratio * (np.exp(log_ratio) - 1.0)
+    if total_cycles < 1.0:
         raise ValueError(f"a sweep of {duration_s:g} s from {from_hz:g} to {to_hz:g} Hz holds less than a cycle")
-    wave: FloatArray = amplitude * np.sin(2 * np.pi * cycles * np.floor(whole) / whole)
+    wave: FloatArray = amplitude * np.sin(2 * np.pi * cycles * np.floor(total_cycles) / total_cycles)
     return wave
 
 

@@ -56,14 +56,14 @@ def signals_left_out(parts: Sequence[Recording]) -> tuple[str, ...]:
     return tuple(sorted(set().union(*names) - names[0].intersection(*names))) if names else ()
 
 
-def _shift_segment(segment: Segment, by: int) -> Segment:
-    return replace(segment, start=segment.start + by, stop=segment.stop + by)
+def _shift_segment(segment: Segment, offset: int) -> Segment:
+    return replace(segment, start=segment.start + offset, stop=segment.stop + offset)
 
 
 def concatenate_if_all(signals: Sequence[Signal | None]) -> Signal | None:
     """The signals end to end; None where one of them is missing."""
-    present = [signal for signal in signals if signal is not None]
-    return concatenate(present) if len(present) == len(signals) else None
+    recorded = [signal for signal in signals if signal is not None]
+    return concatenate(recorded) if len(recorded) == len(signals) else None
 
 
 def concatenate(signals: Sequence[Signal]) -> Signal:

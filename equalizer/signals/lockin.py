@@ -18,14 +18,14 @@ def phasors(samples: FloatArray, sample_rate_hz: float, frequency_hz: float, har
     (missed ticks) are left out. Raises ValueError where the other rows cover less than one period, or a harmonic lies
     at or above half the sample rate.
     """
-    whole = np.isfinite(samples).all(axis=1)
-    if not covers_a_period(int(whole.sum()), sample_rate_hz, frequency_hz):
+    is_complete = np.isfinite(samples).all(axis=1)
+    if not covers_a_period(int(is_complete.sum()), sample_rate_hz, frequency_hz):
         raise ValueError(
-            f"{int(whole.sum())} samples are less than one period of {frequency_hz} Hz at {sample_rate_hz} Hz"
+            f"{int(is_complete.sum())} samples are less than one period of {frequency_hz} Hz at {sample_rate_hz} Hz"
         )
     if harmonics * frequency_hz >= sample_rate_hz / 2:
         raise ValueError(f"harmonic {harmonics} of {frequency_hz} Hz is not below half of {sample_rate_hz} Hz")
-    samples, ticks = samples[whole], np.flatnonzero(whole)
+    samples, ticks = samples[is_complete], np.flatnonzero(is_complete)
     n = len(ticks)
     t = ticks / sample_rate_hz
     drift = ticks / ticks[-1] - 0.5

@@ -38,8 +38,8 @@ def lines_between(from_hz: float, to_hz: float, n: int, sample_rate_hz: float, *
         )
     spacing_hz = sample_rate_hz / n
     lowest, highest = np.ceil(from_hz / spacing_hz - 1e-9), np.floor(to_hz / spacing_hz + 1e-9)
-    between: IntArray = np.arange(lowest, highest + 1).astype(np.int64)
-    lines: IntArray = between[(2 * between < n) & ((between % 2 == 1) | (not odd_only))]
+    candidates: IntArray = np.arange(lowest, highest + 1).astype(np.int64)
+    lines: IntArray = candidates[(2 * candidates < n) & ((candidates % 2 == 1) | (not odd_only))]
     if len(lines) == 0:
         raise ValueError(
             f"a period of {n / sample_rate_hz:g} s has no {'odd ' if odd_only else ''}line from {from_hz:g} to "

@@ -44,11 +44,11 @@ def quantity_in(name: str) -> str:
     """The quantity, by the last word that names one: a load angle is an angle. Empty where no word does, or another
     word makes it ambiguous."""
     words = words_in(name)
-    last = max((place for place, word in enumerate(words) if word in _QUANTITY), default=None)
+    last = max((index for index, word in enumerate(words) if word in _QUANTITY), default=None)
     if last is None:
         return ""
-    found = _QUANTITY[words[last]]
-    if found == "angle" and words[last + 1 : last + 2] == [_DERIVATIVE]:
-        found = "velocity"
+    quantity = _QUANTITY[words[last]]
+    if quantity == "angle" and words[last + 1 : last + 2] == [_DERIVATIVE]:
+        quantity = "velocity"
         del words[last + 1]
-    return "" if _AMBIGUOUS & set(words) else found
+    return "" if _AMBIGUOUS & set(words) else quantity

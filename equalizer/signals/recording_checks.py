@@ -11,22 +11,22 @@ from equalizer.signals.signal import FloatArray, Signal
 def check_recording(recording: Recording) -> tuple[str, ...]:
     """Sentences, one for everything that contradicts the format. Empty = consistent. NaN counts as missing, not as
     wrong."""
-    found = [*_signal_problems(recording), *segment_problems(recording.segments, len(recording))]
+    problems = [*_signal_problems(recording), *segment_problems(recording.segments, len(recording))]
     if recording.time_s is not None:
-        found.extend(_time_problems(recording.time_s, len(recording)))
-    return tuple(found)
+        problems.extend(_time_problems(recording.time_s, len(recording)))
+    return tuple(problems)
 
 
 def signals_of(recording: Recording) -> dict[str, Signal]:
     """The signals that the recording has, by their names in the file format."""
-    every = {
+    signals = {
         "command": recording.command,
         "response": recording.response,
         "position": recording.position,
         "excitation": recording.excitation,
         "condition": recording.condition,
     }
-    return {name: signal for name, signal in every.items() if signal is not None}
+    return {name: signal for name, signal in signals.items() if signal is not None}
 
 
 def channels_text(signal: Signal) -> str:
@@ -52,13 +52,13 @@ def segment_problems(segments: Sequence[Segment], samples: int) -> Iterator[str]
     for number, segment in enumerate(segments, start=1):
         for problem in _problems_of_segment(segment, samples):
             yield f"segment {number} {problem}"
-    ordered = sorted(enumerate(segments, start=1), key=lambda numbered: numbered[1].start)
+    ordered = sorted(enumerate(segments, start=1), key=lambda item: item[1].start)
     last = ordered[:1]  # of the earlier segments, the one that stops last, with its number
     for number, segment in ordered[1:]:
-        first, earlier = last[0]
+        earlier_number, earlier = last[0]
         if segment.start < earlier.stop:
             yield (
-                f"segments {first} and {number} overlap (one stops at {earlier.stop}, the other starts at "
+                f"segments {earlier_number} and {number} overlap (one stops at {earlier.stop}, the other starts at "
                 f"{segment.start})"
             )
         if segment.stop > earlier.stop:

@@ -71,15 +71,15 @@ class Signal:
         """The signal from sample `start` (included) to `stop` (excluded)."""
         return replace(self, samples=self.samples[start:stop])
 
-    def select_channels(self, places: Sequence[int]) -> Self:
+    def select_channels(self, columns: Sequence[int]) -> Self:
         """The signal with only the channels of these indices, in this order."""
-        kept = list(places)
+        indices = list(columns)
         return replace(
             self,
-            samples=self.samples[:, kept],
-            quantity=tuple(self.quantities[k] for k in kept),
-            unit=tuple(self.units[k] for k in kept),
-            channels=tuple(self.channels[k] for k in kept),
+            samples=self.samples[:, indices],
+            quantity=tuple(self.quantities[k] for k in indices),
+            unit=tuple(self.units[k] for k in indices),
+            channels=tuple(self.channels[k] for k in indices),
         )
 
 

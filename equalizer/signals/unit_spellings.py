@@ -80,30 +80,32 @@ _PEAK = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.IGNOR
 """Volts and amperes with how they were measured, which is no unit."""
 
 
-def respell(text: str, known: Collection[str]) -> str:
-    """Spell a unit as this project does; `known` are its symbols, which stay as they are."""
-    plain = text.strip()
-    if match := _PEAK.fullmatch(plain):
+def respell(text: str, known_symbols: Collection[str]) -> str:
+    """Spell a unit as this project does; `known_symbols` are its symbols, which stay as they are."""
+    spelling = text.strip()
+    if match := _PEAK.fullmatch(spelling):
         return match["unit"]
-    plain = _in_ascii(unicodedata.normalize("NFKC", _in_ascii(plain.replace("**", "^").replace("⁻", "-"))))
-    plain = re.sub(r"\s*/\s*", "/", plain.strip().rstrip("."))
-    plain = re.sub(r"(?<=[A-Za-z])(-[1-9]|[2-9])(?![A-Za-z0-9])", r"^\1", plain)
-    plain = _RATE.sub(lambda rate: f"{rate[1]}/s" + ("^2" if rate[2] == "2" else ""), plain)
-    plain = _WHOLE_UNITS.get(plain.replace("lbs", "lb"), plain)
-    plain = re.sub(r"(?<=[A-Za-z0-9])[.-](?=[A-Za-z])", " ", plain)
-    plain = re.sub(r"[A-Za-z]+", lambda word: _respell_symbol(word[0], known), plain)
-    return _TORQUES.get(plain, plain)
+    spelling = _in_ascii(unicodedata.normalize("NFKC", _in_ascii(spelling.replace("**", "^").replace("⁻", "-"))))
+    spelling = re.sub(r"\s*/\s*", "/", spelling.strip().rstrip("."))
+    spelling = re.sub(r"(?<=[A-Za-z])(-[1-9]|[2-9])(?![A-Za-z0-9])", r"^\1", spelling)
+    spelling = _RATE.sub(lambda rate: f"{rate[1]}/s" + ("^2" if rate[2] == "2" else ""), spelling)
+    spelling = _WHOLE_UNITS.get(spelling.replace("lbs", "lb"), spelling)
+    spelling = re.sub(r"(?<=[A-Za-z0-9])[.-](?=[A-Za-z])", " ", spelling)
+    spelling = re.sub(r"[A-Za-z]+", lambda word: _respell_symbol(word[0], known_symbols), spelling)
+    return _TORQUES.get(spelling, spelling)
 
 
-def nearest_unit(text: str, known: Collection[str]) -> str:
+def nearest_unit(text: str, known_symbols: Collection[str]) -> str:
     """The unit with each unknown symbol replaced by the nearest known one, and without a minus behind a slash; empty
     where a symbol has none."""
-    plain = re.sub(
-        r"(/[A-Za-z]+)\^-([1-9])", lambda under: under[1] + f"^{under[2]}".removesuffix("^1"), respell(text, known)
+    spelling = re.sub(
+        r"(/[A-Za-z]+)\^-([1-9])",
+        lambda under: under[1] + f"^{under[2]}".removesuffix("^1"),
+        respell(text, known_symbols),
     )
-    words = re.findall(r"[A-Za-z%]+", plain)
-    near = {word: _nearest(word, known, len(words) == 1) for word in words}
-    return re.sub(r"[A-Za-z%]+", lambda word: near[word[0]], plain) if all(near.values()) else ""
+    words = re.findall(r"[A-Za-z%]+", spelling)
+    replacements = {word: _nearest(word, known_symbols, len(words) == 1) for word in words}
+    return re.sub(r"[A-Za-z%]+", lambda word: replacements[word[0]], spelling) if all(replacements.values()) else ""
 
 
 def _in_ascii(text: str) -> str:
@@ -111,24 +113,24 @@ def _in_ascii(text: str) -> str:
     return "".join(_LETTERS.get(letter, letter) for letter in text)
 
 
-def _respell_symbol(word: str, known: Collection[str]) -> str:
+def _respell_symbol(word: str, known_symbols: Collection[str]) -> str:
     """Spell a unit's symbol as it is known. In words of two letters the case is kept, because it tells units apart
     (`mS`, `MM`)."""
-    return word if word in known else _SPELLED.get(word.lower() if len(word) > 2 else word, word)
+    return word if word in known_symbols else _SPELLED.get(word.lower() if len(word) > 2 else word, word)
 
 
-def _nearest(word: str, known: Collection[str], alone: bool) -> str:
-    """The known symbol with the most similar spelling; empty where none is similar. alone: whether the word is the
-    whole unit."""
-    if word in known:
+def _nearest(word: str, known_symbols: Collection[str], is_whole_unit: bool) -> str:
+    """The known symbol with the most similar spelling; empty where none is similar. is_whole_unit: whether the word is
+    the whole unit."""
+    if word in known_symbols:
         return word
     if len(word) == 1 and word.isupper():
-        return _SUGGESTED_ALONE.get(word.lower(), "") if alone else ""
-    by_size = sorted(known, key=lambda symbol: (len(symbol), symbol.islower(), symbol[0] == word[0], symbol))
+        return _SUGGESTED_ALONE.get(word.lower(), "") if is_whole_unit else ""
+    by_size = sorted(known_symbols, key=lambda symbol: (len(symbol), symbol.islower(), symbol[0] == word[0], symbol))
     # The last of a spelling counts: `mm` for `MM`, not `Mm`; `MPa` for `Mpa`.
     spelled = {**_SPELLED, **{symbol.lower(): symbol for symbol in by_size}, **_SUGGESTED}
-    spelled |= _SUGGESTED_ALONE if alone else {}
-    close = get_close_matches(
-        word.lower(), spelled, n=1, cutoff=_LEAST_SIMILARITY if alone else _LEAST_SIMILARITY_IN_PRODUCT
+    spelled |= _SUGGESTED_ALONE if is_whole_unit else {}
+    matches = get_close_matches(
+        word.lower(), spelled, n=1, cutoff=_LEAST_SIMILARITY if is_whole_unit else _LEAST_SIMILARITY_IN_PRODUCT
     )
-    return spelled[close[0]] if close else ""
+    return spelled[matches[0]] if matches else ""

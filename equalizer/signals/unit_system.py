@@ -33,30 +33,30 @@ class UnitSystem:
         "kg"; a unit that is not made of force, length and time is returned unchanged."""
         if unit == "Hz":
             return unit if self.time == "s" else f"1/{self.time}"
-        over, _, under = unit.partition("/")
+        numerator, _, denominator = unit.partition("/")
         powers = {"N": 0, "m": 0, "s": 0}
-        for part, sign in ((over, 1), (under, -1)):
+        for part, sign in ((numerator, 1), (denominator, -1)):
             for factor in part.split():
-                found = _FACTOR.match(factor)
-                if found is None and factor != "1":
+                match = _FACTOR.match(factor)
+                if match is None and factor != "1":
                     return unit
-                for name, power in _base_powers(found[1]) if found else ():
-                    assert found is not None
-                    powers[name] += sign * power * int(found[2] or 1)
+                for name, power in _base_powers(match[1]) if match else ():
+                    assert match is not None
+                    powers[name] += sign * power * int(match[2] or 1)
         return self._format_unit(powers["N"], powers["m"], powers["s"])
 
     def _format_unit(self, force: int, length: int, seconds: int) -> str:
         """The product of force, length and time to these powers, such as "A s^2/m"."""
-        named = [(self.force, force), (self.length, length), (self.time, seconds)]
-        known = [(f"({name})" if "/" in name else name, power) for name, power in named if name != "1"]
-        over = [
+        bases = [(self.force, force), (self.length, length), (self.time, seconds)]
+        units = [(f"({name})" if "/" in name else name, power) for name, power in bases if name != "1"]
+        numerator = [
             _format_power(name, power)
-            for name, power in sorted(known, key=lambda each: each[0] == self.length)
+            for name, power in sorted(units, key=lambda item: item[0] == self.length)
             if power > 0
         ]
-        under = [_format_power(name, -power) for name, power in known if power < 0]
-        below = f"/({' '.join(under)})" if len(under) > 1 else f"/{under[0]}" if under else ""
-        return f"{' '.join(over) or '1'}{below}"
+        denominator = [_format_power(name, -power) for name, power in units if power < 0]
+        below = f"/({' '.join(denominator)})" if len(denominator) > 1 else f"/{denominator[0]}" if denominator else ""
+        return f"{' '.join(numerator) or '1'}{below}"
 
     @property
     def known(self) -> bool:

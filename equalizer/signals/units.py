@@ -20,10 +20,12 @@ class _NotAUnitError(UnknownUnitError):
     """Arguments: the text and the reason. The suggestion takes long, so that it is computed only for display."""
 
     def __str__(self) -> str:
-        text, why = self.args
-        near = suggest_unit(text)
+        text, reason = self.args
+        suggestion = suggest_unit(text)
         return (
-            f"'{text}' is not a unit known here{why}" + (f" (did you mean '{near}'?)" if near else "") + f"; {ALLOWED}"
+            f"'{text}' is not a unit known here{reason}"
+            + (f" (did you mean '{suggestion}'?)" if suggestion else "")
+            + f"; {ALLOWED}"
         )
 
 
@@ -149,7 +151,9 @@ def parse_unit(text: str) -> Unit:
     for symbol, power in _parse_factors(text):
         unit = _parse_symbol(symbol, text)
         factor *= unit.factor**power
-        dimension = tuple(have + power * more for have, more in zip(dimension, unit.dimension, strict=True))
+        dimension = tuple(
+            exponent_sum + power * added for exponent_sum, added in zip(dimension, unit.dimension, strict=True)
+        )
         for part, exponent in _parse_factors(unit.si):
             symbols[part] = symbols.get(part, 0) + power * exponent
     return Unit(_PREFERRED.get(dimension) or _format_symbols(symbols), factor, dimension)
@@ -191,16 +195,16 @@ _QUANTITY_OF = {
 def _parse_factors(text: str) -> list[tuple[str, int]]:
     """Symbols with their exponents; a symbol after a slash has a negative exponent. Raises UnknownUnitError."""
     numerator, *denominators = text.replace("*", " ").split("/")
-    found = [_parse_power(factor, 1, text) for factor in numerator.split()]
+    factors = [_parse_power(factor, 1, text) for factor in numerator.split()]
     for part in denominators:
         if len(part.split()) != 1:
             raise _NotAUnitError(text, " (each slash must be followed by exactly one symbol, as in N m s/rad or m/s/V)")
         if "-" in part:
             raise _NotAUnitError(text, " (an exponent after a slash must not be negative, as in m/s^2)")
-        found.append(_parse_power(part.strip(), -1, text))
+        factors.append(_parse_power(part.strip(), -1, text))
     if not numerator.strip():
         raise _NotAUnitError(text, "")
-    return found
+    return factors
 
 
 def _parse_power(factor: str, sign: int, text: str) -> tuple[str, int]:
@@ -237,13 +241,13 @@ def _format_power(symbol: str, power: int) -> str:
 
 def suggest_unit(text: str) -> str:
     """The accepted unit nearest to an unknown text; empty where none is near."""
-    plain = plain_unit(text)
-    if plain != text:
-        return plain
+    rewritten = plain_unit(text)
+    if rewritten != text:
+        return rewritten
     from equalizer.signals.unit_spellings import nearest_unit
 
-    near = nearest_unit(text, _SYMBOLS) if len(text) <= LONGEST_UNIT else text
-    return near if near != text and _is_known(near) else ""
+    nearest = nearest_unit(text, _SYMBOLS) if len(text) <= LONGEST_UNIT else text
+    return nearest if nearest != text and _is_accepted(nearest) else ""
 
 
 def plain_unit(text: str) -> str:
@@ -254,11 +258,11 @@ def plain_unit(text: str) -> str:
     # Imported here, because only files of other origin need it.
     from equalizer.signals.unit_spellings import respell
 
-    plain = respell(text, _SYMBOLS)
-    return plain if plain != text and _is_known(plain) else text
+    rewritten = respell(text, _SYMBOLS)
+    return rewritten if rewritten != text and _is_accepted(rewritten) else text
 
 
-def _is_known(text: str) -> bool:
+def _is_accepted(text: str) -> bool:
     """Whether `parse_unit` accepts the text."""
     try:
         parse_unit(text)

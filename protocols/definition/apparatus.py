@@ -17,10 +17,10 @@ Plane = Literal["xy", "yz", "zx"]
 
 @dataclass(frozen=True, config=STRICT)
 class TestDirections:
-    """Two orthogonal directions in a plane, mirrored about the linkage's line of symmetry in that plane.
+    """Two orthogonal directions in a plane, symmetric about the linkage's line of symmetry in that plane.
 
-    Direction 1 lies 45° counter-clockwise of the line, direction 2 as far clockwise: orthogonal, because that is
-    the easiest pair to tell apart and so the most conservative limit.
+    Direction 1 lies 45° counter-clockwise of the line, direction 2 lies 45° clockwise. Orthogonal directions are the
+    easiest pair to distinguish, and therefore give the most conservative limit.
     """
 
     __test__ = False  # a test direction is not a test
@@ -28,8 +28,8 @@ class TestDirections:
     plane: Annotated[
         Plane,
         Field(
-            description="The plane of both directions. Default 'yz', the frontal plane, because the picture on "
-            "the screen lies in it too."
+            description="Plane of both directions. Default 'yz', the frontal plane, in which the picture on the "
+            "screen lies too."
         ),
     ] = "yz"
     symmetry_deg: Annotated[
@@ -37,15 +37,15 @@ class TestDirections:
         Field(
             ge=-180,
             le=180,
-            description="Angle of the linkage's line of symmetry in the plane, from its first axis. Default 90, "
-            "because with one leg upright the linkage mirrors left and right about the vertical.",
+            description="Angle of the linkage's line of symmetry in the plane, from its first axis. Default 90: with "
+            "one leg upright the linkage is symmetric about the vertical.",
         ),
     ] = 90.0
 
 
 @dataclass(frozen=True, config=STRICT)
 class SpringSettings:
-    """A weak virtual spring about the centre, which keeps the handle where the linkage is symmetric."""
+    """A weak virtual spring towards the centre, which keeps the handle where the linkage is symmetric."""
 
     natural_frequency_hz: Annotated[
         float,
@@ -53,7 +53,8 @@ class SpringSettings:
             ge=0,
             le=10,
             description="Natural frequency with the device's own mass at the handle; 0 = no spring. Default 3.5, as "
-            "published for identification: weak, below every frequency tested, and it keeps the handle central.",
+            "published for identification: weak, below every tested frequency, and sufficient to keep the handle "
+            "central.",
         ),
     ] = 3.5
     damping_n_s_per_m: Annotated[
@@ -61,23 +62,23 @@ class SpringSettings:
         Field(
             ge=0,
             le=20,
-            description="Virtual damping in addition to the spring. Default 0, because the device's own friction is "
-            "enough and differentiated encoders are noisy.",
+            description="Virtual damping in addition to the spring. Default 0, because the device's own friction "
+            "suffices and speeds differentiated from encoder readings are noisy.",
         ),
     ] = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
 class SafetySettings:
-    """Limits that the safety layer keeps at every tick, independent of the rest of the program."""
+    """Limits that the safety layer enforces at every tick, independent of the rest of the program."""
 
     stimulus_cap_n: Annotated[
         float,
         Field(
             gt=0,
             le=3.0,
-            description="Norm of the stimulus force, spring and damper not counted; 3 N at the most in any "
-            "protocol. Together with them the command may be larger: see total_cap_n.",
+            description="Upper limit of the norm of the stimulus force, without spring and damper; at most 3 N in "
+            "any protocol. With spring and damper the command may be larger: see total_cap_n.",
         ),
     ]
     total_cap_n: Annotated[
@@ -85,8 +86,9 @@ class SafetySettings:
         Field(
             gt=0,
             le=6.0,
-            description="Norm of the whole command: stimulus, spring and damper. This is what a hand may feel; 6 N "
-            "at the most in any protocol. At the cap the direction of the force is kept.",
+            description="Upper limit of the norm of the whole command (stimulus, spring and damper), the largest "
+            "force on a hand; at most 6 N in any protocol. A command above the cap is scaled down; its direction is "
+            "kept.",
         ),
     ]
     feedback_cap_n: Annotated[
@@ -94,9 +96,9 @@ class SafetySettings:
         Field(
             gt=0,
             le=6.0,
-            description="Norm of the spring's force, of the damper's, and of both together; never above "
-            "total_cap_n. Default 1.5: the room that the shipped protocols leave between stimulus and total, so "
-            "that leaning on the spring never reduces a stimulus, and the pull at a wrong position that is not "
+            description="Upper limit of the norm of the spring's force, of the damper's, and of both together; never "
+            "above total_cap_n. Default 1.5, the difference between total and stimulus cap in the shipped protocols. "
+            "Leaning on the spring then never reduces a stimulus, and the pull at a wrong position that is not "
             "detected is limited to it. Measured: 1.35 N.",
         ),
     ] = 1.5
@@ -105,8 +107,8 @@ class SafetySettings:
         Field(
             gt=0,
             le=600,
-            description="A stimulus is released after this time, answered or not; such a trial is void. Default 120, "
-            "because a task without a time limit must still not hold a force after the participant has left.",
+            description="A stimulus ends after this time, answered or not; such a trial is void. Default 120: even a "
+            "task without a time limit must not hold a force after the participant has left.",
         ),
     ] = 120.0
     watchdog_s: Annotated[
@@ -114,13 +116,13 @@ class SafetySettings:
         Field(
             ge=0.3,
             le=5,
-            description="The force fades to zero when the program gives no sign of life for this time. Default 0.5: "
-            "longer than any pause of a busy computer, and short enough not to frighten.",
+            description="The force fades to zero when the program sends no sign of life for this time. Default 0.5: "
+            "longer than any pause of a busy computer, and short enough not to startle.",
         ),
     ] = 0.5
     release_s: Annotated[
         float,
-        Field(gt=0, le=1, description="Duration of a fade for safety. Default 0.05: short, but without a jerk."),
+        Field(gt=0, le=1, description="Duration of a safety fade. Default 0.05: short, but without a jerk."),
     ] = 0.05
     plausibility: PlausibilitySettings = Field(default_factory=PlausibilitySettings)
 

@@ -10,15 +10,16 @@ from protocols.definition.staircase_rule import STRICT
 
 @dataclass(frozen=True, config=STRICT)
 class AnalysisSettings:
-    """Declared before the data. Fixed, with all else, by `hapteq protocol lock`."""
+    """Analysis declared before the data are collected. `hapteq protocol lock` fixes it with the rest of the
+    protocol."""
 
     primary: Annotated[
         Literal["undeclared", "hierarchical", "published"],
         Field(
-            description="Which analysis decides, and with it how the interval of the contrast is computed. "
-            "'hierarchical': one psychometric model of all answers, 95 % interval over people's differences in dB (t); "
-            "'published': one-way analysis of reversal means with Tukey's 95 % intervals. Default: undeclared, and the "
-            "report says so."
+            description="The primary analysis, which decides. It determines how the interval of the contrast is "
+            "computed. 'hierarchical': one psychometric model of all answers, 95 % interval over people's "
+            "differences in dB (t); 'published': one-way analysis of reversal means with Tukey's 95 % intervals. "
+            "Default: undeclared, which the report states."
         ),
     ] = "undeclared"
     contrast_hz: Annotated[
@@ -33,15 +34,15 @@ class AnalysisSettings:
     ] = 0
     exclusions: Annotated[
         tuple[str, ...],
-        Field(max_length=20, description="Whose data are excluded, and why, in sentences. Default: none declared."),
+        Field(max_length=20, description="Which data are excluded, and why, in sentences. Default: none declared."),
     ] = ()
     interval: Annotated[
         Literal["undeclared", "paired_t", "tukey"],
         Field(
-            description="How the 95 % interval of the primary contrast is computed, declared by name. 'paired_t': "
-            "over people's differences in dB (t), the interval of 'hierarchical'; 'tukey': Tukey's of means of "
-            "runs in newtons, the interval of 'published'. Default: undeclared; the interval is then the one "
-            "that belongs to primary."
+            description="Method of the 95 % interval of the primary contrast, declared by name. 'paired_t': over "
+            "people's differences in dB (t), the interval of 'hierarchical'; 'tukey': Tukey's interval of means of "
+            "runs in newtons, the interval of 'published'. Default: undeclared; the interval is then that of the "
+            "primary analysis."
         ),
     ] = "undeclared"
 

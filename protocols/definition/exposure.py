@@ -12,23 +12,28 @@ from protocols.definition.staircase_rule import STRICT
 
 @dataclass(frozen=True, config=STRICT)
 class DetectionSettings:
-    """Is the vibration felt at all? One of two intervals holds a stimulus; which one is asked.
+    """Detection of the vibration: one of two intervals contains a stimulus, and the participant states which.
 
-    The same up-down rule as the study's, from a level of its own.
+    The same up-down rule as in the study, with a start level of its own.
     """
 
     frequencies_hz: Annotated[
         tuple[StimulusFrequency, ...],
-        Field(max_length=20, description="One detection run each, after the test runs, in this order. Default: none."),
+        Field(
+            max_length=20,
+            description="One detection run for each frequency, after the test runs, in this order. Default: none.",
+        ),
     ] = ()
     start_n: Annotated[
         float, Field(ge=0.001, le=3.0, description="Level of the first trial. Default 0.5: felt by most hands.")
     ] = 0.5
     interval_s: Annotated[
         float,
-        Field(ge=0.3, le=10, description="Length of each interval, fades included. Default 1.5: fades, and a second."),
+        Field(
+            ge=0.3, le=10, description="Length of each interval, fades included. Default 1.5: the fades and one second."
+        ),
     ] = 1.5
-    gap_s: Annotated[float, Field(ge=0.1, le=10, description="Stillness between the two. Default 0.5.")] = 0.5
+    gap_s: Annotated[float, Field(ge=0.1, le=10, description="Pause between the two intervals. Default 0.5.")] = 0.5
     trial_limit: Annotated[
         int,
         Field(
@@ -41,7 +46,8 @@ class DetectionSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class CatchSettings:
-    """Trials at full level (the cap), mixed into the test runs. They steer nothing; errors in them are lapses."""
+    """Trials at full level (the cap), mixed into the test runs. They do not move the staircase; wrong answers are
+    lapses."""
 
     one_in: Annotated[
         int,
@@ -49,7 +55,7 @@ class CatchSettings:
             ge=0,
             le=100,
             description="One in this many trials is a catch trial, at a random position. Default 0: none, as "
-            "published. 20 costs 5 % more trials.",
+            "published. A value of 20 adds 5 % more trials.",
         ),
     ] = 0
 
@@ -62,23 +68,34 @@ class CatchSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class GateSettings:
-    """A trial starts only with the handle near its place."""
+    """Start condition of a trial: the handle must be near its place."""
 
     radius_mm: Annotated[
         float,
-        Field(ge=0, le=50, description="Farthest the handle may be from its place at the start. Default 0: no gate."),
+        Field(
+            ge=0,
+            le=50,
+            description="Largest distance of the handle from its place at the start of a trial. Default 0: no gate.",
+        ),
     ] = 0.0
     still_s: Annotated[
-        float, Field(ge=0, le=5, description="How long it must have been there. Default 0.3: not just passing.")
+        float,
+        Field(
+            ge=0,
+            le=5,
+            description="Time for which the handle must have been within the radius. Default 0.3: a handle that only "
+            "passes through does not start a trial.",
+        ),
     ] = 0.3
 
 
 @dataclass(frozen=True, config=STRICT)
 class SittingLimits:
-    """Hard limits of one sitting of a person. Where one is reached, it ends between two trials; another day goes on."""
+    """Hard limits of one sitting of a person. At a limit the sitting ends between two trials; it continues on another
+    day."""
 
     longest_min: Annotated[
-        float, Field(gt=0, le=480, description="From the first trial or demonstration. Default 120 minutes.")
+        float, Field(gt=0, le=480, description="Time from the first trial or demonstration. Default 120 minutes.")
     ] = 120.0
     dose_a8_mps2: Annotated[
         float,

@@ -18,13 +18,13 @@ Name = Annotated[
     str,
     Field(
         pattern=r"^[a-z][a-z0-9_]{0,63}$",
-        description="Names the protocol in files and logs: lower-case letters, digits and underscores.",
+        description="Name of the protocol in files and logs: lower-case letters, digits and underscores.",
     ),
 ]
-Title = Annotated[str, Field(min_length=1, max_length=200, description="What reports and lists call it.")]
+Title = Annotated[str, Field(min_length=1, max_length=200, description="Title of the protocol in reports and lists.")]
 Source = Annotated[
     str,
-    Field(max_length=1000, description="Where the numbers come from. Default: empty, for numbers of your own choice."),
+    Field(max_length=1000, description="Source of the numbers. Default: empty, for numbers of your own choice."),
 ]
 Frequency = Annotated[float, Field(ge=0.5, le=500.0)]
 StimulusFrequency = Annotated[float, Field(ge=0.5, le=250.0), AfterValidator(_whole_tenths)]

@@ -10,15 +10,15 @@ from protocols.definition.staircase_rule import STRICT
 
 @dataclass(frozen=True, config=STRICT)
 class MeasurementSettings:
-    """What is kept of every trial, and when a trial is void because of the device."""
+    """Recording of every trial, and the conditions under which a trial is void because of the device."""
 
     keep_s: Annotated[
         float,
         Field(
             gt=0,
             le=60,
-            description="The last whole periods of the steady part, this long at the most, are kept as a recording. "
-            "Default 1: five periods at 5 Hz.",
+            description="Length of the recording that is kept of each trial: the last whole periods of the steady "
+            "part, at most this long. Default 1: five periods at 5 Hz.",
         ),
     ] = 1.0
     missed_ticks_limit: Annotated[
@@ -26,8 +26,8 @@ class MeasurementSettings:
         Field(
             ge=0,
             le=1,
-            description="A trial with a larger share of missed 1 kHz ticks is void and is presented again. Default "
-            "0.02: fewer cannot be felt.",
+            description="Largest share of missed 1 kHz ticks; above it a trial is void and is presented again. "
+            "Default 0.02: smaller shares cannot be felt.",
         ),
     ] = 0.02
     late_ticks_limit: Annotated[
@@ -35,9 +35,9 @@ class MeasurementSettings:
         Field(
             ge=0,
             le=1,
-            description="A trial in which, until the answer, a larger share of ticks was late (their work ended "
-            "after the next was due) or missed is void and is presented again: 0.02, say. Default 1: no limit. "
-            "Devices that wait for the computer are never late.",
+            description="Largest share of late or missed ticks until the answer, such as 0.02; above it a trial is "
+            "void and is presented again. A tick is late if its work ended after the next tick was due. Default 1: "
+            "no limit. Devices that wait for the computer are never late.",
         ),
     ] = 1.0
     longest_late_ms: Annotated[
@@ -45,9 +45,10 @@ class MeasurementSettings:
         Field(
             gt=0,
             le=1000,
-            description="A trial is void and is presented again where, until the answer, a tick's work ended later "
-            "than this after it was due, so that the device held its last force: 10, say, a quarter of a period "
-            "at 25 Hz. Default 1000: no limit, for a loop that makes no step for 100 ms is lost.",
+            description="Largest lateness of a tick until the answer, such as 10, a quarter of a period at 25 Hz. If "
+            "a tick's work ended later than this after it was due, the device held its last force meanwhile; the "
+            "trial is void and is presented again. Default 1000: no limit, because a loop without a step for 100 ms "
+            "counts as lost.",
         ),
     ] = 1000.0
     lost_packets_limit: Annotated[
@@ -55,15 +56,15 @@ class MeasurementSettings:
         Field(
             ge=0,
             le=1,
-            description="A trial that lacks a larger share of the accelerometer's packets, or of the recorded "
-            "ticks, has no trustworthy acceleration, and no delivered amplitude is reported for it. Default "
-            "0.05: gaps of this size change an amplitude by less than a percent.",
+            description="Largest share of missing packets of the accelerometer, or of missing recorded ticks. Above "
+            "it a trial has no trustworthy acceleration, and no delivered amplitude is reported for it. Default "
+            "0.05: gaps of this size change an amplitude by less than 1 %.",
         ),
     ] = 0.05
     accelerometer_needed: Annotated[
         bool,
         Field(
-            description="Whether a trial without a trustworthy acceleration is void and is presented again, and no "
-            "session begins on a device without an accelerometer. Default: no, its answer counts."
+            description="Whether a trial without a trustworthy acceleration is void and is presented again, and "
+            "whether no session begins on a device without an accelerometer. Default: no, such an answer counts."
         ),
     ] = False

@@ -17,22 +17,22 @@ LONGEST_SCALE = 11
 
 @dataclass(frozen=True, config=STRICT)
 class TextSettings:
-    """What the participant's screens say. It counts in the hash: other words are another protocol."""
+    """Texts of the participant's screens. They are part of the hash: a protocol with other texts has another hash."""
 
     language: Annotated[
         str,
         Field(
             min_length=1,
             max_length=200,
-            description="'de' (German) or 'es' (Spanish), or the path of a TOML file with every text, from the folder "
-            "of the protocol; `hapteq protocol texts` prints one to translate. Default 'en', English.",
+            description="'de' (German), 'es' (Spanish), or the path of a TOML file with all texts, relative to the "
+            "folder of the protocol; `hapteq protocol texts` prints a table to translate. Default 'en', English.",
         ),
     ] = "en"
     words: Annotated[
         dict[str, str],
         Field(
-            description="Your own wording of single texts, by the keys that `hapteq protocol texts` lists. Where a "
-            "language is named, all its texts are filled in here as the protocol is read. Default: none."
+            description="Replacements of single texts, by the keys that `hapteq protocol texts` lists. If a language "
+            "is named, all its texts are filled in here when the protocol is read. Default: none."
         ),
     ] = field(default_factory=dict, hash=False)
 
@@ -46,24 +46,25 @@ class TextSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class Question:
-    """Asked before the trials or after the last run. Each may stay without an answer. Free text, where neither
-    choices nor number nor scale is given."""
+    """A question before the trials or after the last run. An answer is optional. Without choices, number and scale the
+    answer is free text."""
 
-    key: Annotated[Key, Field(description="Names the answer in the log.")]
-    question: Annotated[Sentence, Field(description="What is asked.")]
+    key: Annotated[Key, Field(description="Name of the answer in the log.")]
+    question: Annotated[Sentence, Field(description="Text of the question.")]
     choices: Annotated[
-        tuple[Sentence, ...], Field(max_length=9, description="One of these. Default: none, see number and scale.")
+        tuple[Sentence, ...],
+        Field(max_length=9, description="Answers to choose from. Default: none, see number and scale."),
     ] = ()
     codes: Annotated[
         tuple[Annotated[str, Field(min_length=1, max_length=80)], ...],
         Field(
             max_length=9,
-            description="What is logged for each choice, the same in every language. Default: the choices as written.",
+            description="Logged value of each choice, the same in every language. Default: the choices as written.",
         ),
     ] = ()
     number: Annotated[
         tuple[float, ...],
-        Field(max_length=2, description="Lowest and highest number that is accepted, such as [18, 99]. Default: none."),
+        Field(max_length=2, description="Lowest and highest accepted number, such as [18, 99]. Default: none."),
     ] = ()
     unit: Annotated[str, Field(max_length=20, description="Unit of the number, for tables. Default: none.")] = ""
     scale: Annotated[
@@ -72,7 +73,7 @@ class Question:
     ] = ()
     ends: Annotated[
         tuple[Annotated[str, Field(min_length=1, max_length=80)], ...],
-        Field(max_length=2, description="What the two ends of the scale mean. Default: not stated."),
+        Field(max_length=2, description="Meaning of the two ends of the scale. Default: not stated."),
     ] = ()
 
     @property
@@ -86,29 +87,29 @@ class Question:
 
     @model_validator(mode="after")
     def _of_one_kind(self) -> Self:
-        refuse(list(_problems(self)))
+        refuse(list(_find_problems(self)))
         return self
 
 
-def _problems(question: Question) -> tuple[Problem, ...]:
-    found = []
+def _find_problems(question: Question) -> tuple[Problem, ...]:
+    problems = []
     if sum(map(bool, (question.choices, question.number, question.scale))) > 1:
-        found.append(
+        problems.append(
             Problem("choices", "is given together with number or scale", "only one of choices, number and scale")
         )
     if question.codes and len(question.codes) != len(question.choices):
         wrong = f"has {len(question.codes)} entries for {len(question.choices)} choices"
-        found.append(Problem("codes", wrong, "one for each of the choices, or none"))
-    if any(len(set(each)) < len(each) for each in (question.codes, question.choices)):
-        found.append(Problem("choices", "or its codes have an entry twice", "different entries"))
+        problems.append(Problem("codes", wrong, "one for each of the choices, or none"))
+    if any(len(set(entries)) < len(entries) for entries in (question.codes, question.choices)):
+        problems.append(Problem("choices", "or its codes have an entry twice", "different entries"))
     if question.number and not (len(question.number) == 2 and question.number[0] < question.number[1]):
-        found.append(Problem("number", f"is {list(question.number)}", "the lowest and then the highest number"))
+        problems.append(Problem("number", f"is {list(question.number)}", "the lowest and then the highest number"))
     scale = question.scale
     if scale and not (len(scale) == 2 and 0 <= scale[0] < scale[1] < scale[0] + LONGEST_SCALE):
         allowed = f"the first and the last of 2 to {LONGEST_SCALE} steps, none below 0"
-        found.append(Problem("scale", f"is {list(scale)}", allowed))
+        problems.append(Problem("scale", f"is {list(scale)}", allowed))
     if question.ends and not (scale and len(question.ends) == 2):
-        found.append(Problem("ends", "does not match the scale", "two texts, together with a scale"))
+        problems.append(Problem("ends", "does not match the scale", "two texts, together with a scale"))
     if question.unit and not question.number:
-        found.append(Problem("unit", "is given without a number", "empty, or together with number"))
-    return tuple(found)
+        problems.append(Problem("unit", "is given without a number", "empty, or together with number"))
+    return tuple(problems)

@@ -15,8 +15,8 @@ from protocols.definition.staircase_rule import STRICT
 
 @dataclass(frozen=True, config=STRICT)
 class PlausibilitySettings:
-    """Bounds of the position's readings. Each default is several times what a hand and the shipped forces do; the
-    maximum measured on the simulated omega.3 over all shipped protocols, with and without a hand, stands beside it."""
+    """Bounds of the position's readings. Each default is several times what a hand and the shipped forces cause. A
+    stated measurement is the maximum on the simulated omega.3 over all shipped protocols, with and without a hand."""
 
     workspace_m: Annotated[
         float,
@@ -32,8 +32,9 @@ class PlausibilitySettings:
         Field(
             gt=0,
             le=20,
-            description="Fastest motion from one reading to the next. Default 3: 6 N, the highest cap, throw a bare "
-            "0.25 kg to 2.7 m/s over the whole workspace, friction aside; fingers reach some 1 m/s. Measured: 0.3.",
+            description="Largest speed from one reading to the next. Default 3: without friction, 6 N (the highest "
+            "cap) accelerates 0.25 kg to 2.7 m/s over the whole workspace; fingers reach about 1 m/s. Largest "
+            "measured: 0.3.",
         ),
     ] = 3.0
     longest_jump_m: Annotated[
@@ -41,9 +42,8 @@ class PlausibilitySettings:
         Field(
             gt=0,
             le=0.5,
-            description="Largest distance between one reading and the next, however late that comes. Default 0.05: "
-            "half a metre per second over 0.1 s, the longest gap that a loop survives. Measured: 0.0003 per "
-            "tick.",
+            description="Largest distance between two successive readings, however late the second is. Default 0.05: "
+            "0.5 m/s over 0.1 s, the longest gap after which a loop continues. Largest measured: 0.0003 per tick.",
         ),
     ] = 0.05
     acceleration_mps2: Annotated[
@@ -51,8 +51,9 @@ class PlausibilitySettings:
         Field(
             gt=0,
             le=10000,
-            description="Largest acceleration of the readings, averaged over 20 ms so that a bump against a stop is "
-            "none. Default 500: twice what 50 N of a hand give to 0.2 kg. Measured: 60, of encoders' steps too.",
+            description="Largest acceleration of the readings, averaged over 20 ms so that an impact on a stop stays "
+            "below it. Default 500: twice the acceleration of 0.2 kg by 50 N from a hand. Largest measured: 60, "
+            "steps of the encoders included.",
         ),
     ] = 500.0
     resolution_m: Annotated[
@@ -61,7 +62,7 @@ class PlausibilitySettings:
             ge=1e-7,
             le=0.001,
             description="Resolution of the encoders at the handle; a difference below half of it counts as no "
-            "change. Default 0.00001, as the omega.3's data sheet says.",
+            "change. Default 0.00001, from the omega.3's data sheet.",
         ),
     ] = 1e-5
     friction_n: Annotated[
@@ -69,8 +70,8 @@ class PlausibilitySettings:
         Field(
             ge=0,
             le=3,
-            description="Forces that change by less than twice this need not move the handle. Default 0.5: more than "
-            "twice the friction of the simulated omega.3, and more than that of such devices.",
+            description="Changes of force below twice this value need not move the handle. Default 0.5: more than "
+            "twice the friction of the simulated omega.3, and more than the friction of such devices.",
         ),
     ] = 0.5
     stale_s: Annotated[
@@ -78,9 +79,9 @@ class PlausibilitySettings:
         Field(
             gt=0,
             le=5,
-            description="A position is stale that has not changed for this time although the force must have moved "
-            "even a handle that is gripped hard (1 kg, 60 N s/m, 3000 N/m) by twice the resolution. Default 0.1: a "
-            "handle that sticks at its turning points does so for less, from 2 Hz on.",
+            description="Time after which an unchanged position is stale, although the force must have moved even a "
+            "firmly gripped handle (1 kg, 60 N s/m, 3000 N/m) by twice the resolution. Default 0.1: from 2 Hz on, a "
+            "handle that sticks at its turning points rests for less than this.",
         ),
     ] = 0.1
     still_s: Annotated[
@@ -88,9 +89,9 @@ class PlausibilitySettings:
         Field(
             gt=0,
             le=60,
-            description="Longest time for which the spring pulls with more than friction_n at a position that does "
-            "not change. After half of it, the pull is faded out over the other half: a hand that rested on the spring "
-            "moves then, and a position that has still not changed is stale. Default 1.",
+            description="Longest time for which the spring may pull with more than friction_n at a position that "
+            "does not change. In the second half of this time the pull is faded out. A hand that rested on the "
+            "spring then moves; a position that has still not changed is stale. Default 1.",
         ),
     ] = 1.0
 

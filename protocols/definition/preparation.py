@@ -15,17 +15,17 @@ RoveDb = Annotated[
     Field(
         ge=0,
         le=20,
-        description="Width of the range, level_n in its middle, from which each amplitude is drawn evenly in dB, "
-        "for all directions alike. At one fixed level, labels and feedback teach how strong each direction "
-        "feels. With a range of r dB, a difference of d dB between the directions allows at most 50 + 50 d / r "
-        "% right answers by strength alone. Default 0: one fixed level, as in older protocols.",
+        description="Width of the range from which each amplitude is drawn, uniformly in dB and for all "
+        "directions alike; level_n is its middle. At one fixed level, labels and feedback teach how strong each "
+        "direction feels. With a range of r dB, a difference of d dB between the directions allows at most 50 + "
+        "50 d / r % right answers by strength alone. Default 0: one fixed level, as in older protocols.",
     ),
 ]
 
 
 @dataclass(frozen=True, config=STRICT)
 class ConsentSettings:
-    """What a participant agrees to, and what keeps a person from taking part."""
+    """Consent of the participant, and criteria that exclude a person from taking part."""
 
     version: Annotated[
         str,
@@ -40,14 +40,18 @@ class ConsentSettings:
     ] = ""
     statements: Annotated[
         tuple[Sentence, ...],
-        Field(max_length=12, description="Each must be agreed to. Default: none, and no consent is asked for."),
+        Field(
+            max_length=12,
+            description="Statements, each of which the participant must agree to. Default: none, and consent is not "
+            "asked for.",
+        ),
     ] = ()
     exclusions: Annotated[
         tuple[Sentence, ...],
         Field(
             max_length=12,
-            description="Questions; one yes ends the sitting before anything is played. Only the outcome is kept, "
-            "because the answers are about health. Default: none are asked.",
+            description="Questions; one answer 'yes' ends the sitting before any stimulus is played. Only the "
+            "outcome is stored, because the answers concern health. Default: none.",
         ),
     ] = ()
 
@@ -60,13 +64,13 @@ class ConsentSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class SetupSettings:
-    """How a participant sits at the device, asked for and logged at the start of every sitting, and in which state that
-    must be."""
+    """Posture of the participant at the device, asked for and logged at the start of every sitting, and the required
+    values."""
 
     ask: Annotated[bool, Field(description="Whether the questions on the set-up are asked. Default: no.")] = False
     hearing_masked: Annotated[
         bool,
-        Field(description="Ear protection or masking noise is wanted. Default: yes, because a device can be heard."),
+        Field(description="Ear protection or masking noise is required. Default: yes, because a device can be heard."),
     ] = True
     hand_hidden: Annotated[
         bool, Field(description="The hand should be out of sight. Default: yes, because a handle can be seen moving.")
@@ -76,28 +80,28 @@ class SetupSettings:
     ] = True
     grip: Annotated[
         str,
-        Field(max_length=80, description="The grip that the participant should use. Default: as published, constant."),
+        Field(max_length=80, description="Grip that the participant should use. Default: as published, constant."),
     ] = "constant and comfortable"
     daily_check_needed: Annotated[
         bool,
         Field(
             description="Whether a session on a real device begins only if that device has passed `hapteq doctor "
-            "--daily` on the same day. Default: no, a warning is shown where it has not."
+            "--daily` on the same day. Default: no; if it has not passed, a warning is shown."
         ),
     ] = False
 
 
 @dataclass(frozen=True, config=STRICT)
 class MaskingSettings:
-    """Noise that the program plays from its own sound output, so that the device is not heard: pink, as that of
-    `hapteq noise`."""
+    """Masking noise that the program plays from its own sound output, so that the device is not heard. It is pink, like
+    that of `hapteq noise`."""
 
     play: Annotated[
         bool,
         Field(
-            description="Whether the program plays the noise, from before the demonstration to the end except in "
-            "pauses, and begins no session of a person where it cannot. Default: no, the lab plays the file of "
-            "`hapteq noise`."
+            description="Whether the program plays the noise, from before the demonstration to the end, except in "
+            "pauses. Without a working sound output no session of a person begins then. Default: no, the lab plays "
+            "the file of `hapteq noise`."
         ),
     ] = False
     level_db: Annotated[
@@ -105,13 +109,19 @@ class MaskingSettings:
         Field(
             ge=-60,
             le=0,
-            description="Level, re the file of `hapteq noise`; its highest sample lies 3 dB below full scale. What a "
-            "participant hears depends on the output: measure it there. Default -20.",
+            description="Level in dB re the file of `hapteq noise`, whose highest sample lies 3 dB below full scale. "
+            "The level at the participant's ear depends on the output: measure it there. Default -20.",
         ),
     ] = -20.0
-    low_hz: Annotated[float, Field(ge=1, le=20_000, description="Lower corner. Default 40.")] = 40.0
-    high_hz: Annotated[float, Field(ge=1, le=20_000, description="Upper corner. Default 8000.")] = 8000.0
-    seed: Annotated[int, Field(ge=0, le=2**32 - 1, description="Another seed gives other noise. Default 1.")] = 1
+    low_hz: Annotated[float, Field(ge=1, le=20_000, description="Lower corner frequency of the band. Default 40.")] = (
+        40.0
+    )
+    high_hz: Annotated[
+        float, Field(ge=1, le=20_000, description="Upper corner frequency of the band. Default 8000.")
+    ] = 8000.0
+    seed: Annotated[
+        int, Field(ge=0, le=2**32 - 1, description="Seed of the noise; another seed gives other noise. Default 1.")
+    ] = 1
 
     @model_validator(mode="after")
     def _has_band(self) -> Self:
@@ -123,24 +133,28 @@ class MaskingSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class DemoSettings:
-    """Both directions at every frequency, labelled, before anything is asked."""
+    """Labelled demonstration of both directions at every frequency, before the first question."""
 
     level_n: Annotated[
         float, Field(ge=0, le=3.0, description="Amplitude, in newtons. Default 0: no demonstration.")
     ] = 0.0
     rove_db: RoveDb = 0.0
-    seconds: Annotated[float, Field(ge=0.5, le=20, description="Duration of each. Default 2: ten periods at 5 Hz.")] = (
-        2.0
-    )
+    seconds: Annotated[
+        float, Field(ge=0.5, le=20, description="Duration of each stimulus. Default 2: ten periods at 5 Hz.")
+    ] = 2.0
 
 
 @dataclass(frozen=True, config=STRICT)
 class PracticeSettings:
-    """A short run around one level for each frequency, passed by right answers. It enters no result."""
+    """A short run around one level for each frequency, passed by right answers. Its trials are not part of any
+    result."""
 
     frequencies_hz: Annotated[
         tuple[StimulusFrequency, ...],
-        Field(max_length=20, description="One practice run each, in this order, after the training. Default: none."),
+        Field(
+            max_length=20,
+            description="One practice run for each frequency, in this order, after the training. Default: none.",
+        ),
     ] = ()
     level_n: Annotated[
         float,
@@ -153,24 +167,35 @@ class PracticeSettings:
     rove_db: RoveDb = 0.0
     right_needed: Annotated[
         int,
-        Field(ge=1, le=50, description="Passed with this number of right answers among the last `of_last`. Default 4."),
+        Field(
+            ge=1,
+            le=50,
+            description="Number of right answers among the last `of_last` that passes the practice. Default 4.",
+        ),
     ] = 4
     of_last: Annotated[
-        int, Field(ge=1, le=50, description="See `right_needed`. Default 5: by guessing, 4 of 5 has a chance of 19 %.")
+        int,
+        Field(
+            ge=1,
+            le=50,
+            description="Number of last answers that are counted, see `right_needed`. Default 5: guessing gives 4 of "
+            "5 with a probability of 19 %.",
+        ),
     ] = 5
     trial_limit: Annotated[
         int,
         Field(
             ge=1,
             le=200,
-            description="A practice run ends after this number of trials, passed or not. Default 10. Not passing "
-            "excludes no participant: at high frequencies it is a finding.",
+            description="Number of trials after which a practice run ends, passed or not. Default 10. A participant "
+            "who does not pass is not excluded: at high frequencies this is a result.",
         ),
     ] = 10
     feedback: Annotated[
         Literal["none", "after_answer"],
         Field(
-            description="As trial.feedback, for practice alone. Default: after each answer, so that it can be learnt."
+            description="Like trial.feedback, for the practice alone. Default: after each answer, so that the task "
+            "can be learnt."
         ),
     ] = "after_answer"
 

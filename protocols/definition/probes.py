@@ -28,15 +28,15 @@ LevelN = Annotated[float, Field(gt=0, le=1.5)]
 
 @dataclass(frozen=True, config=STRICT)
 class ProbeSettings:
-    """Odd multisines on all three axes at once. The only forces of a session that no trial asks about."""
+    """Odd multisines on all three axes at once, between trials. No trial asks about these forces."""
 
     levels_n: Annotated[
         tuple[LevelN, ...],
         Field(
             max_length=6,
-            description="Peaks of the force of the probes with a hand on the handle, in newtons, in turn: friction is "
-            "distinguished from damping by how the answer depends on the level. Three levels, such as [0.2, 0.4, 0.8]. "
-            "Default: none, and nothing is played between trials.",
+            description="Peak forces of the probes with a hand on the handle, in newtons, played in turn. Three "
+            "levels, such as [0.2, 0.4, 0.8], distinguish friction from damping by the level dependence of the "
+            "response. Default: none, and no probe is played between trials.",
         ),
     ] = ()
     probe_cap_n: Annotated[
@@ -44,7 +44,7 @@ class ProbeSettings:
         Field(
             gt=0,
             le=1.5,
-            description="No probe with a hand on the handle is stronger; below staircase.cap_n. Default 1.",
+            description="Upper limit of the probes with a hand on the handle; below staircase.cap_n. Default 1.",
         ),
     ] = 1.0
     interval_s: Annotated[
@@ -52,23 +52,28 @@ class ProbeSettings:
         Field(ge=15, le=3600, description="Shortest time from one probe to the next. Default 60: once a minute."),
     ] = 60.0
     to_hz: Annotated[
-        float, Field(ge=20, le=150, description="No line lies above; with a reference at least 45. Default 60.")
+        float,
+        Field(
+            ge=20,
+            le=150,
+            description="Upper limit of the frequencies of the lines; at least 45 with a reference. Default 60.",
+        ),
     ] = 60.0
     reference_s: Annotated[
         float,
         Field(
             ge=0,
             le=120,
-            description="Length of the reference, played while no hand is on the handle, at the start of a sitting and "
-            "after long pauses. 20 is enough. Default 0: no reference.",
+            description="Length of the reference, a probe without a hand on the handle. It is played at the start of "
+            "a sitting and after long pauses. 20 suffices. Default 0: no reference.",
         ),
     ] = 0.0
     reference_n: Annotated[
-        float, Field(gt=0, le=1.5, description="Its peak; not above staircase.cap_n. Default 1.")
+        float, Field(gt=0, le=1.5, description="Peak force of the reference; not above staircase.cap_n. Default 1.")
     ] = 1.0
     reference_after_pause_s: Annotated[
         float,
-        Field(ge=0, le=36000, description="A pause of this length or longer is followed by another. Default 120."),
+        Field(ge=0, le=36000, description="Length of a pause from which on another reference follows. Default 120."),
     ] = 120.0
 
     @model_validator(mode="after")
@@ -92,7 +97,7 @@ class ProbeSettings:
         return bool(self.levels_n)
 
 
-def probe_contradictions(protocol: StudyProtocol) -> list[Problem]:
+def find_probe_contradictions(protocol: StudyProtocol) -> list[Problem]:
     """Problems of the probes beside the rest of the protocol: strength, steepness, and what is kept of them."""
     probes, cap_n = protocol.probes, protocol.staircase.cap_n
     if not probes.played:

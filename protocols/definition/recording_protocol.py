@@ -14,10 +14,12 @@ from protocols.definition.staircase_rule import STRICT
 
 @dataclass(frozen=True, config=STRICT)
 class RecordingProtocol:
-    """Excitations that `hapteq record` plays one after another into one recording."""
+    """Excitations that `hapteq record` plays in sequence into one recording."""
 
     name: Name
-    kind: Annotated[Literal["recording"], Field(description="Played by `hapteq record`.")]
+    kind: Annotated[
+        Literal["recording"], Field(description="Kind of the protocol: a recording, played by `hapteq record`.")
+    ]
     title: Title
     segments: Annotated[
         tuple[Segment, ...], Field(min_length=1, max_length=200, description="Excitations, played in this order.")
@@ -29,8 +31,8 @@ class RecordingProtocol:
     hand: Annotated[
         Literal["none", "held"],
         Field(
-            description="Whether a person holds the handle. Default 'none', because a spring repeats and a grip does "
-            "not; only a protocol that says 'held' is ever played into a hand."
+            description="Whether a person holds the handle. Default 'none', because a spring is reproducible and a "
+            "grip is not. Only a protocol with 'held' is played into a hand."
         ),
     ] = "none"
     rest_s: Annotated[
@@ -38,8 +40,8 @@ class RecordingProtocol:
         Field(
             ge=0.1,
             le=60,
-            description="Rest before, between and after the excitations. Default 1: vibrations have decayed by "
-            "then, and the sensor's noise is recorded.",
+            description="Rest before, between and after the excitations. Default 1: vibrations have decayed by then. "
+            "The rest also records the sensor's noise.",
         ),
     ] = 1.0
     repeats: Annotated[
@@ -47,19 +49,20 @@ class RecordingProtocol:
         Field(
             ge=1,
             le=100,
-            description="How often the whole list is played. Default 1; with more, noise can be distinguished from "
-            "the device's response.",
+            description="Number of times that the whole list is played. Default 1; with more, noise can be "
+            "distinguished from the device's response.",
         ),
     ] = 1
     fade_s: Annotated[
         float,
-        Field(gt=0, le=5, description="Every excitation rises and falls over this time. Default 0.1: no click."),
+        Field(gt=0, le=5, description="Time over which every excitation rises and falls. Default 0.1: no click."),
     ] = 0.1
     lower_on_clip: Annotated[
         bool,
         Field(
             description="Whether an excitation at which the accelerometer or the total force reaches its limit is "
-            "played again with less. Default true: clipped samples contain no information about the device."
+            "played again with a lower amplitude. Default true: clipped samples contain no information about the "
+            "device."
         ),
     ] = True
     least_amplitude_n: Annotated[
@@ -67,8 +70,8 @@ class RecordingProtocol:
         Field(
             gt=0,
             le=3.0,
-            description="No excitation is lowered below this. Default 0.2: about the friction of such a device, below "
-            "which it hardly moves.",
+            description="Lowest amplitude to which an excitation is reduced. Default 0.2: about the friction of such "
+            "a device, below which it hardly moves.",
         ),
     ] = 0.2
 

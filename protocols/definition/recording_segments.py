@@ -11,7 +11,7 @@ from protocols.definition.problem import Problem, refuse
 from protocols.definition.staircase_rule import STRICT
 
 Amplitude = Annotated[float, Field(gt=0, le=3.0, description="Peak of the force, in newtons.")]
-Along = Annotated[
+AxisName = Annotated[
     Literal["x", "y", "z", "direction_1", "direction_2"],
     Field(description="A device axis, or one of the two test directions."),
 ]
@@ -21,33 +21,37 @@ Periods = Annotated[
     Field(
         ge=1,
         le=100,
-        description="Periods played, the transient's included. Default 2: one for the transient, one to be evaluated.",
+        description="Number of periods, the transient's included. Default 2: one for the transient, one for "
+        "evaluation.",
     ),
 ]
 Role = Annotated[
     Literal["fit", "test", ""],
     Field(
-        description="What the excitation is for: 'fit' a model, or 'test' it on what it has not seen. Default: empty, "
-        "decided when the recording is used."
+        description="Use of the excitation: 'fit' a model, or 'test' it on data that the fit has not used. "
+        "Default: empty, decided when the recording is used."
     ),
 ]
 
 
 @dataclass(frozen=True, config=STRICT)
 class SineSegment:
-    """Sinusoids one after another, each long enough to be steady before it counts."""
+    """Sinusoids in sequence, each played long enough to be steady before its evaluated part."""
 
     kind: Annotated[Literal["sine"], Field(description="Sinusoids, one after another.")]
     frequencies_hz: Annotated[
-        tuple[Frequency, ...], Field(min_length=1, max_length=100, description="Played in this order.")
+        tuple[Frequency, ...], Field(min_length=1, max_length=100, description="Frequencies, played in this order.")
     ]
     amplitude_n: Amplitude
-    along: Along
-    duration_s: Annotated[float, Field(gt=0, le=600, description="Evaluated part of every sinusoid, whole periods.")]
+    along: AxisName
+    duration_s: Annotated[float, Field(gt=0, le=600, description="Evaluated part of every sinusoid; whole periods.")]
     settle_s: Annotated[
         float,
         Field(
-            ge=0, le=60, description="Played before it and not evaluated. Default 1: resonances have decayed by then."
+            ge=0,
+            le=60,
+            description="Time that each sinusoid is played before the evaluated part. Default 1: resonances have "
+            "decayed by then.",
         ),
     ] = 1.0
     role: Role = ""
@@ -55,13 +59,13 @@ class SineSegment:
 
 @dataclass(frozen=True, config=STRICT)
 class SweepSegment:
-    """A periodic logarithmic swept sine; the first period is there to let the transient die."""
+    """A periodic logarithmic swept sine. During the first period the transient decays."""
 
     kind: Annotated[Literal["sweep"], Field(description="A logarithmic swept sine.")]
     from_hz: Annotated[Frequency, Field(description="Lowest frequency, where every period begins.")]
     to_hz: Annotated[Frequency, Field(description="Highest frequency, where every period ends.")]
     amplitude_n: Amplitude
-    along: Along
+    along: AxisName
     duration_s: Period
     periods: Periods = 2
     role: Role = ""
@@ -70,9 +74,9 @@ class SweepSegment:
     def _require_rising_cycle(self) -> Self:
         _refuse_downwards(self.from_hz, self.to_hz)
         least_s = math.log(self.to_hz / self.from_hz) / (self.to_hz - self.from_hz)
-        said = f"is {self.duration_s} s, less than a cycle of the sweep"
+        problem_text = f"is {self.duration_s} s, less than a cycle of the sweep"
         allowed = f"{math.ceil(1e6 * least_s) / 1e6:g} s or more"
-        refuse([] if self.duration_s >= least_s else [Problem("duration_s", said, allowed)])
+        refuse([] if self.duration_s >= least_s else [Problem("duration_s", problem_text, allowed)])
         return self
 
 
@@ -80,22 +84,22 @@ class SweepSegment:
 class MultisineSegment:
     """A periodic sum of sinusoids of equal size and random phases: all frequencies at once, on whole lines.
 
-    Odd lines leave the even ones empty: what the device answers there is noise and even distortion, not the signal.
-    Periods tell noise, because they differ in nothing else; realisations tell odd distortion, because only that
-    changes with the phases.
+    With odd lines only, the even lines of the response contain noise and even distortion, not the signal. Periods
+    differ in noise only. Realisations differ in their phases, and therefore in odd distortion.
     """
 
     kind: Annotated[Literal["multisine"], Field(description="A sum of sinusoids with random phases.")]
-    from_hz: Annotated[Frequency, Field(description="No line lies below.")]
-    to_hz: Annotated[Frequency, Field(description="No line lies above.")]
+    from_hz: Annotated[Frequency, Field(description="Lower limit of the lines' frequencies.")]
+    to_hz: Annotated[Frequency, Field(description="Upper limit of the lines' frequencies.")]
     amplitude_n: Annotated[
-        float, Field(gt=0, le=3.0, description="Peak of the force, in newtons; along all axes, peak of its norm.")
+        float,
+        Field(gt=0, le=3.0, description="Peak of the force, in newtons; along all axes, peak of the force's norm."),
     ]
     along: Annotated[
         Literal["x", "y", "z", "direction_1", "direction_2", "all"],
         Field(
-            description="A device axis, a test direction, or 'all' three axes at once, each with phases of its own; "
-            "three realisations along all axes are orthogonal, so that axes can be distinguished at every line."
+            description="A device axis, a test direction, or 'all' three axes at once, each with its own phases. "
+            "Three realisations along all axes are orthogonal, so that axes can be distinguished at every line."
         ),
     ]
     duration_s: Annotated[float, Field(gt=0, le=600, description="One period: lines lie 1 / duration_s apart.")]
@@ -103,7 +107,8 @@ class MultisineSegment:
     odd_only: Annotated[
         bool,
         Field(
-            description="Only odd multiples of 1 / duration_s. Default true: even distortion then falls between lines."
+            description="Whether only odd multiples of 1 / duration_s are excited. Default true: even distortion "
+            "then falls between the lines."
         ),
     ] = True
     seed: Annotated[
@@ -111,8 +116,7 @@ class MultisineSegment:
         Field(
             ge=0,
             le=2**53,
-            description="Seed of the phases. Default 1: any number will do, and the same one gives the same "
-            "excitation.",
+            description="Seed of the phases; the same seed gives the same excitation. Default 1.",
         ),
     ] = 1
     realisations: Annotated[
@@ -120,8 +124,8 @@ class MultisineSegment:
         Field(
             ge=1,
             le=50,
-            description="How many excitations with different phases are played. Default 1; with more, distortion "
-            "can be distinguished from the linear response.",
+            description="Number of excitations with different phases. Default 1; with more, distortion can be "
+            "distinguished from the linear response.",
         ),
     ] = 1
     role: Role = ""

@@ -19,9 +19,9 @@ STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 class StepChange(Enum):
-    """When the next step size takes effect.
+    """Trial at which the next step size takes effect.
 
-    Published staircases of "4 dB, then 1 dB" differ here, and their thresholds with them by 0.7 to 1.1 dB.
+    Published staircases of "4 dB, then 1 dB" differ in this, and their thresholds differ by 0.7 to 1.1 dB as a result.
     """
 
     AFTER_REVERSAL = "after_reversal"
@@ -50,8 +50,8 @@ class BayesianPlacement:
         Field(
             ge=0,
             le=500,
-            description="Trials of a run whose levels are chosen by Psi, from the cap downwards in steps of 1 dB; 0: "
-            "by the up-down rule. The first trial is at start_n in either case. Default: 0, as published.",
+            description="Number of trials of a run at levels chosen by Psi, from the cap downwards in steps of 1 dB; "
+            "0: the up-down rule. The first trial is at start_n in either case. Default: 0, as published.",
         ),
     ] = 0
     spread_db: Annotated[
@@ -59,8 +59,8 @@ class BayesianPlacement:
         Field(
             ge=0,
             le=20,
-            description="End a run earlier, once the standard deviation of its threshold's posterior is this small, in "
-            "dB. Default: 0, never.",
+            description="Standard deviation of the threshold's posterior, in dB, at which a run ends earlier. "
+            "Default: 0, never.",
         ),
     ] = 0.0
 
@@ -72,7 +72,7 @@ class StaircaseRule:
     start_n: Annotated[float, Field(ge=0.001, le=3.0, description="Level of the first trial of every run, in newtons.")]
     cap_n: Annotated[
         float,
-        Field(gt=0, le=3.0, description="Highest level, in newtons; 3 N at the most. Only roving exceeds it."),
+        Field(gt=0, le=3.0, description="Highest level, in newtons; at most 3 N. Only roving exceeds it."),
     ]
     up_after_wrong: Annotated[
         int, Field(ge=1, le=10, description="Number of wrong answers in a row that raise the level.")
@@ -80,48 +80,49 @@ class StaircaseRule:
     down_after_right: Annotated[
         int, Field(ge=1, le=10, description="Number of right answers in a row that lower the level.")
     ]
-    steps: Annotated[tuple[StepPhase, ...], Field(min_length=1, description="Step sizes, phase by phase.")]
+    steps: Annotated[tuple[StepPhase, ...], Field(min_length=1, description="Step sizes, one entry for each phase.")]
     reversals: Annotated[
-        int, Field(ge=2, le=100, description="Number of reversals of a run, which ends with the last of them.")
+        int, Field(ge=2, le=100, description="Number of reversals of a run; the run ends with the last of them.")
     ]
     averaged_reversals: Annotated[
-        int, Field(ge=1, le=100, description="The threshold is the mean of this many last peaks and valleys.")
+        int, Field(ge=1, le=100, description="Number of last peaks and valleys whose mean is the threshold.")
     ]
     step_change: Annotated[
         StepChange,
         Field(
-            description="Step used at the reversal that completes a phase. Default: the old one, because "
-            "a phase of three reversals 'at 4 dB' means that its third reversal moves by 4 dB too."
+            description="Step size at the reversal that completes a phase. Default: the old one, because a phase of "
+            "three reversals 'at 4 dB' means that the movement at its third reversal is 4 dB too."
         ),
     ] = StepChange.AFTER_REVERSAL
     initial_one_up_one_down: Annotated[
         bool,
         Field(
-            description="Move after every answer until the first reversal. Default: no, because the rule is stated "
-            "for the whole run, and the shortcut raises the spread of the threshold by 30 to 55 %."
+            description="Whether the level moves after every answer until the first reversal. Default: no, because "
+            "the rule is stated for the whole run, and this shortcut raises the spread of the threshold by 30 to 55 "
+            "%."
         ),
     ] = False
     reversal: Annotated[
         Literal["level_direction"],
         Field(
-            description="What a reversal is. Default, and the only one offered: a change of the level's direction; "
-            "the first movement is no reversal, because alternating answers alone make no peaks and valleys to "
-            "average."
+            description="Definition of a reversal. Default, and the only value: a change of the level's direction. "
+            "The first movement is not a reversal, because answers that merely alternate produce no peaks and "
+            "valleys to average."
         ),
     ] = "level_direction"
     at_cap: Annotated[
         Literal["clamp"],
         Field(
-            description="What happens at the cap. Default, and the only one offered: a movement beyond the cap ends at "
-            "the cap, and the next one starts there. An upward movement at the cap changes nothing and is no reversal, "
-            "because the level does not change its direction. Both are counted."
+            description="Behaviour at the cap. Default, and the only value: a movement beyond the cap ends at the "
+            "cap, and the next one starts there. An upward movement at the cap changes nothing and is not a "
+            "reversal, because the level does not change its direction. Both are counted."
         ),
     ] = "clamp"
     mean: Annotated[
         Literal["newton"],
         Field(
-            description="How the peaks and valleys are averaged. Default, and the only one offered: arithmetic mean in "
-            "newtons, the unit of the published figure; the mean in dB is always written in addition."
+            description="Mean of the peaks and valleys. Default, and the only value: arithmetic mean in newtons, the "
+            "unit of the published figure. The mean in dB is written in addition."
         ),
     ] = "newton"
     trial_limit: Annotated[
@@ -129,17 +130,17 @@ class StaircaseRule:
         Field(
             ge=0,
             le=10_000,
-            description="End a run after this many trials even without its reversals; 0 = never. Default: "
-            "never, as published; a pure guesser needs about 110 trials.",
+            description="Number of trials after which a run ends even without its reversals; 0 = never. Default: "
+            "never, as published. A participant who only guesses needs about 110 trials.",
         ),
     ] = 0
 
     bayesian: Annotated[
         BayesianPlacement,
         Field(
-            description="Psi method in place of the up-down rule: each level is the one whose answer is expected to "
-            "leave the least entropy of threshold and slope (Kontsevich and Tyler 1999). Steps and reversals "
-            "above are then not used, and the threshold is the posterior mean. Default: off, as published."
+            description="Psi method (Kontsevich and Tyler 1999) in place of the up-down rule: each level is the one "
+            "whose answer is expected to leave the lowest entropy of threshold and slope. Steps and reversals above "
+            "are then not used, and the threshold is the posterior mean. Default: off, as published."
         ),
     ] = BayesianPlacement()
 
@@ -170,11 +171,11 @@ class StaircaseRule:
                     "phases whose reversals add up to the number in reversals",
                 )
             )
-        refuse([*problems, *_placement_problems(self)])
+        refuse([*problems, *_find_placement_problems(self)])
         return self
 
 
-def _placement_problems(rule: StaircaseRule) -> list[Problem]:
+def _find_placement_problems(rule: StaircaseRule) -> list[Problem]:
     """Contradictions between the keys of the up-down rule and those of the Psi method."""
     bayesian, problems = rule.bayesian, []
     if bayesian.spread_db and not rule.is_bayesian:

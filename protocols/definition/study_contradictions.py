@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from protocols.definition.declared_analysis import INTERVALS
-from protocols.definition.probes import probe_contradictions
+from protocols.definition.probes import find_probe_contradictions
 from protocols.definition.problem import Problem
 
 if TYPE_CHECKING:
@@ -16,16 +16,16 @@ ROUNDING_N = 1e-9
 """Tolerance for rounding when forces are compared (N)."""
 
 
-def contradictions(protocol: StudyProtocol) -> list[Problem]:
+def find_contradictions(protocol: StudyProtocol) -> list[Problem]:
     """All contradictions between tables of the protocol; empty if it is consistent."""
     return [
-        *_caps(protocol),
-        *_placement(protocol),
-        *_levels(protocol),
-        *_times(protocol),
-        *_names(protocol),
-        *_declared(protocol),
-        *probe_contradictions(protocol),
+        *_check_caps(protocol),
+        *_check_placement(protocol),
+        *_check_levels(protocol),
+        *_check_times(protocol),
+        *_check_names(protocol),
+        *_check_declared(protocol),
+        *find_probe_contradictions(protocol),
     ]
 
 
@@ -34,7 +34,7 @@ def highest_roved_n(level_n: float, rove_db: float) -> float:
     return level_n * float(10.0 ** (rove_db / 2 / 20))
 
 
-def _caps(protocol: StudyProtocol) -> list[Problem]:
+def _check_caps(protocol: StudyProtocol) -> list[Problem]:
     """The staircase's cap, roved, against the safety layer's."""
     cap_n, safety_cap_n, rove_db = protocol.staircase.cap_n, protocol.safety.stimulus_cap_n, protocol.stimulus.rove_db
     if safety_cap_n < cap_n:
@@ -50,7 +50,7 @@ def _caps(protocol: StudyProtocol) -> list[Problem]:
     return [Problem("staircase.cap_n", wrong, allowed)]
 
 
-def _placement(protocol: StudyProtocol) -> list[Problem]:
+def _check_placement(protocol: StudyProtocol) -> list[Problem]:
     """What the Bayesian placement of levels (Psi) needs: levels as planned, and room for all its trials."""
     problems, trials = [], protocol.staircase.bayesian.trials
     if protocol.stimulus.rove_db and protocol.staircase.is_bayesian:
@@ -68,7 +68,7 @@ def _placement(protocol: StudyProtocol) -> list[Problem]:
     return problems
 
 
-def _levels(protocol: StudyProtocol) -> list[Problem]:
+def _check_levels(protocol: StudyProtocol) -> list[Problem]:
     """Levels outside the staircases on directions, against the staircase's cap."""
     cap_n, practice, detection = protocol.staircase.cap_n, protocol.practice, protocol.detection
     highest_n = {
@@ -85,7 +85,7 @@ def _levels(protocol: StudyProtocol) -> list[Problem]:
     return problems
 
 
-def _times(protocol: StudyProtocol) -> list[Problem]:
+def _check_times(protocol: StudyProtocol) -> list[Problem]:
     problems, limit_s = [], protocol.trial.time_limit_s
     if limit_s >= protocol.safety.longest_trial_s:
         wrong = f"is {limit_s} s, not below safety.longest_trial_s, which releases the device"
@@ -108,7 +108,7 @@ def _times(protocol: StudyProtocol) -> list[Problem]:
     return problems
 
 
-def _names(protocol: StudyProtocol) -> list[Problem]:
+def _check_names(protocol: StudyProtocol) -> list[Problem]:
     problems, buttons = [], protocol.trial.device_buttons
     if len(set(buttons)) not in (0, 2):
         problems.append(Problem("trial.device_buttons", f"is {list(buttons)}", "two different button numbers, or none"))
@@ -118,10 +118,10 @@ def _names(protocol: StudyProtocol) -> list[Problem]:
     return problems
 
 
-def _declared(protocol: StudyProtocol) -> list[Problem]:
+def _check_declared(protocol: StudyProtocol) -> list[Problem]:
     problems, declared = [], protocol.analysis
-    contrast, played = declared.contrast_hz, protocol.stimulus.frequencies_hz
-    if contrast and (len(set(contrast)) != 2 or not set(contrast) <= set(played)):
+    contrast, frequencies_hz = declared.contrast_hz, protocol.stimulus.frequencies_hz
+    if contrast and (len(set(contrast)) != 2 or not set(contrast) <= set(frequencies_hz)):
         allowed = "two different ones of stimulus.frequencies_hz, or none"
         problems.append(Problem("analysis.contrast_hz", f"is {list(contrast)}", allowed))
     fitting = INTERVALS.get(declared.primary)

@@ -1,4 +1,6 @@
-"""A study as data: every number that a session needs, each with its unit, bounds and reason."""
+"""Schema of a study protocol (pydantic): all settings of a session, each with unit, bounds, default and its reason.
+
+Read from TOML by `study.store.formats.protocol_files`; contradictions between settings are refused."""
 
 from typing import Annotated, Literal, Self
 
@@ -21,7 +23,7 @@ from protocols.definition.preparation import (
 from protocols.definition.probes import ProbeSettings
 from protocols.definition.problem import Problem, refuse
 from protocols.definition.staircase_rule import STRICT, StaircaseRule
-from protocols.definition.study_contradictions import contradictions
+from protocols.definition.study_contradictions import find_contradictions
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -30,12 +32,15 @@ class StimulusSettings:
 
     frequencies_hz: Annotated[
         tuple[StimulusFrequency, ...],
-        Field(max_length=20, description="One staircase each, in hertz. Empty for a session of training alone."),
+        Field(
+            max_length=20,
+            description="Frequencies in hertz, one staircase each. Empty for a session that consists of training only.",
+        ),
     ]
     quantity: Annotated[
         Literal["commanded_force", "delivered_acceleration"],
         Field(
-            description="What the staircase moves. Default: the commanded force, as published. "
+            description="Quantity that the staircase changes. Default: the commanded force, as published. "
             "'delivered_acceleration' needs an equalizer model and is refused without one."
         ),
     ] = "commanded_force"
@@ -44,7 +49,7 @@ class StimulusSettings:
         Field(
             gt=0,
             le=5,
-            description="The amplitude rises over this time. Default 0.5: two and a half periods at 5 Hz, so that "
+            description="Time over which the amplitude rises. Default 0.5: two and a half periods at 5 Hz, so that "
             "no onset reveals the direction.",
         ),
     ] = 0.5
@@ -53,12 +58,15 @@ class StimulusSettings:
         Field(
             gt=0,
             le=5,
-            description="The amplitude falls over this time after the answer. Default 0.25: no jerk, no waiting.",
+            description="Time over which the amplitude falls after the answer. Default 0.25: no jerk, no waiting.",
         ),
     ] = 0.25
     fade_shape: Annotated[
         Literal["raised_cosine", "linear"],
-        Field(description="Default: raised cosine, because it has no corner at either end, hence no click."),
+        Field(
+            description="Shape of the fades. Default: raised cosine. It has no corner at either end, and therefore "
+            "no click."
+        ),
     ] = "raised_cosine"
     onset_polarity: Annotated[
         Literal["random", "positive"],
@@ -72,17 +80,17 @@ class StimulusSettings:
         Field(
             ge=0,
             le=20,
-            description="Width of the range, the staircase's level in its middle, from which the amplitude of every "
-            "trial of a staircase on directions is drawn evenly in dB, for both directions alike: the control "
-            "that directions are not distinguished by strength. A difference of d dB between the directions "
-            "then allows at most 50 + 50 d / r % right answers by strength alone. Half of the range lies above "
-            "the level, so staircase.cap_n must leave room below safety.stimulus_cap_n. Default 0: each trial "
-            "at the staircase's level, as published.",
+            description="Width of the range from which the amplitude of each trial is drawn, uniformly in dB and for "
+            "both directions alike; the staircase's level is its middle. Applies to staircases on directions, as a "
+            "control that directions are not distinguished by strength. With a range of r dB, a difference of d dB "
+            "between the directions allows at most 50 + 50 d / r % right answers by strength alone. Half of the "
+            "range lies above the level, so that staircase.cap_n must leave room below safety.stimulus_cap_n. "
+            "Default 0: each trial at the staircase's level, as published.",
         ),
     ] = 0.0
 
     @model_validator(mode="after")
-    def _distinct(self) -> Self:
+    def _check_distinct(self) -> Self:
         if len(set(self.frequencies_hz)) != len(self.frequencies_hz):
             refuse([Problem("frequencies_hz", "names a frequency twice", "every frequency once")])
         return self
@@ -90,7 +98,7 @@ class StimulusSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class ScheduleSettings:
-    """In which order things come, and what is drawn by lot."""
+    """Order of presentation, and randomisation."""
 
     order: Annotated[
         Literal["random", "williams", "as_listed"],
@@ -102,15 +110,15 @@ class ScheduleSettings:
     directions: Annotated[
         Literal["independent", "balanced"],
         Field(
-            description="How directions are drawn. Default: independently, because then no run of equal directions "
-            "predicts the next one. 'balanced' shows both equally often within every eight trials."
+            description="Randomisation of the directions. Default: independent, so that a run of equal directions "
+            "does not predict the next one. 'balanced' shows both equally often within every eight trials."
         ),
     ] = "independent"
     labels: Annotated[
         Literal["fixed", "swapped_for_half"],
         Field(
-            description="Whether the numbers 1 and 2 change places for every second participant. Default: "
-            "fixed, as published; swapping separates a bias towards a key from one towards a direction."
+            description="Whether the numbers 1 and 2 are exchanged for every second participant. Default: fixed, as "
+            "published. Exchanged numbers separate a bias towards a key from a bias towards a direction."
         ),
     ] = "fixed"
 
@@ -130,8 +138,8 @@ class TrialSettings:
     feedback: Annotated[
         Literal["none", "after_answer"],
         Field(
-            description="Whether the participant learns if the answer was right. Default: none, because none is "
-            "published and it would teach cues other than direction."
+            description="Whether the participant is told if the answer was right. Default: none, because none is "
+            "published, and because feedback would teach cues other than direction."
         ),
     ] = "none"
     repeats_per_run: Annotated[
@@ -139,51 +147,53 @@ class TrialSettings:
         Field(
             ge=0,
             le=100,
-            description="How often in a run the participant may ask for the same stimulus again. Default 3: for a "
-            "cough or a noise in some 60 trials. 0: never.",
+            description="Number of times in a run that the participant may ask for the same stimulus again; 0: "
+            "never. Default 3: for a cough or a noise in some 60 trials.",
         ),
     ] = 3
     time_limit_s: Annotated[
         float,
-        Field(ge=0, le=600, description="Longest time to answer. Default 0: as long as wanted, as published."),
+        Field(ge=0, le=600, description="Longest time to answer. Default 0: no limit, as published."),
     ] = 0.0
     pause_between_s: Annotated[
         float,
         Field(
             ge=0,
             le=60,
-            description="Still time between an answer and the next stimulus. Default 0.5: the hand feels the next "
-            "onset as new.",
+            description="Time without a stimulus between an answer and the next stimulus. Default 0.5: the next "
+            "onset is felt as new.",
         ),
     ] = 0.5
 
 
 @dataclass(frozen=True, config=STRICT)
 class TrainingSettings:
-    """Runs before the study proper. They follow the same rule and enter no result."""
+    """Runs before the study proper. They follow the same rule, and their trials are not part of any result."""
 
     frequencies_hz: Annotated[
         tuple[StimulusFrequency, ...],
-        Field(max_length=20, description="One training run each, in this order. Default: no training."),
+        Field(max_length=20, description="One training run for each frequency, in this order. Default: no training."),
     ] = ()
     trial_limit: Annotated[
         int,
         Field(
             ge=0,
             le=1000,
-            description="A training run ends after this many trials at the latest. Default 0: a whole staircase, "
-            "so that no participant starts untrained.",
+            description="Number of trials after which a training run ends at the latest. Default 0: a whole "
+            "staircase, so that no participant starts untrained.",
         ),
     ] = 0
     feedback: Annotated[
         Literal["none", "after_answer"],
-        Field(description="As trial.feedback, for the training alone. Default: none, like the trials it prepares."),
+        Field(
+            description="Like trial.feedback, for the training alone. Default: none, like the trials that it prepares."
+        ),
     ] = "none"
 
 
 @dataclass(frozen=True, config=STRICT)
 class RestSettings:
-    """Enforced pauses: vibration numbs the hand."""
+    """Enforced pauses, because vibration numbs the hand."""
 
     after_run_s: Annotated[
         float,
@@ -194,12 +204,13 @@ class RestSettings:
         Field(
             ge=0,
             le=1000,
-            description="A rest within a run after this many trials. Default 0: none, because a run takes minutes.",
+            description="Number of trials after which a rest within a run follows. Default 0: no rest, because a run "
+            "takes minutes.",
         ),
     ] = 0
     within_run_s: Annotated[
         float,
-        Field(ge=0, le=3600, description="Shortest rest within a run. Default 30; idle while after_trials is 0."),
+        Field(ge=0, le=3600, description="Shortest rest within a run. Default 30; not used while after_trials is 0."),
     ] = 30.0
 
 
@@ -208,7 +219,7 @@ class StudyProtocol:
     """A forced-choice staircase study on two directions."""
 
     name: Name
-    kind: Annotated[Literal["study"], Field(description="Taken by a participant with `hapteq study`.")]
+    kind: Annotated[Literal["study"], Field(description="Kind of the protocol: a study, run with `hapteq study`.")]
     title: Title
     stimulus: StimulusSettings
     staircase: StaircaseRule
@@ -235,19 +246,19 @@ class StudyProtocol:
     text: TextSettings = Field(default_factory=TextSettings)
     before: Annotated[
         tuple[Question, ...],
-        Field(max_length=20, description="Asked before the first trial, such as age. Default: nothing."),
+        Field(max_length=20, description="Questions before the first trial, such as age. Default: none."),
     ] = ()
     debrief: Annotated[
-        tuple[Question, ...], Field(max_length=20, description="Asked after the last run. Default: nothing.")
+        tuple[Question, ...], Field(max_length=20, description="Questions after the last run. Default: none.")
     ] = ()
 
     @property
     def all_frequencies_hz(self) -> tuple[float, ...]:
-        """Everything that may be played, each once, ascending."""
+        """All frequencies (Hz) that may be played, each once, ascending."""
         parts = (self.stimulus, self.training, self.practice, self.detection)
         return tuple(sorted({frequency_hz for part in parts for frequency_hz in part.frequencies_hz}))
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        refuse(contradictions(self))
+    def _check_consistency(self) -> Self:
+        refuse(find_contradictions(self))
         return self

@@ -19,20 +19,22 @@ def protocol_values(protocol: StudyProtocol | RecordingProtocol) -> dict[str, An
 
 def dump_protocol(protocol: StudyProtocol | RecordingProtocol) -> str:
     """TOML text with all defaults; `loading.load_protocol` reads an equal protocol from it."""
-    return _table("", protocol_values(protocol)).lstrip("\n")
+    return _format_table("", protocol_values(protocol)).lstrip("\n")
 
 
-def _table(path: str, values: dict[str, Any], header: str = "") -> str:
+def _format_table(path: str, values: dict[str, Any], header: str = "") -> str:
     """TOML text of a table: its header, its plain keys, then its sub-tables, because TOML assigns each key to the
     header above it. path: dotted name of the table, empty for the document."""
-    plain = {key: value for key, value in values.items() if not _holds_tables(value)}
-    text = (f"\n{header}\n" if header else "") + "".join(f"{key} = {_value(value)}\n" for key, value in plain.items())
+    scalar_values = {key: value for key, value in values.items() if not _holds_tables(value)}
+    text = (f"\n{header}\n" if header else "") + "".join(
+        f"{key} = {_format_value(value)}\n" for key, value in scalar_values.items()
+    )
     for key, value in values.items():
-        inner = f"{path}.{key}" if path else key
+        table_path = f"{path}.{key}" if path else key
         if isinstance(value, dict):
-            text += _table(inner, value, f"[{inner}]")
+            text += _format_table(table_path, value, f"[{table_path}]")
         elif _holds_tables(value):
-            text += "".join(_table(inner, entry, f"[[{inner}]]") for entry in value)
+            text += "".join(_format_table(table_path, entry, f"[[{table_path}]]") for entry in value)
     return text
 
 
@@ -41,7 +43,7 @@ def _holds_tables(value: Any) -> bool:
     return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(entry, dict) for entry in value))
 
 
-def _value(value: Any) -> str:
+def _format_value(value: Any) -> str:
     """A value other than a table as TOML text."""
     match value:
         case bool():
@@ -50,6 +52,6 @@ def _value(value: Any) -> str:
             # TOML's basic strings are JSON's, except that TOML forbids a bare delete character and escaped surrogates.
             return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
         case list():
-            return f"[{', '.join(_value(entry) for entry in value)}]"
+            return f"[{', '.join(_format_value(entry) for entry in value)}]"
         case _:
             return repr(value)

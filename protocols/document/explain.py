@@ -11,10 +11,10 @@ from typing import Any
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.dumping import protocol_values
-from protocols.document.schema import Node, Place, describe_allowed, node_at, protocol_schema, resolve_reference
-from protocols.document.validation_messages import key_path
+from protocols.document.schema import Node, Place, describe_allowed, find_node, protocol_schema, resolve_reference
+from protocols.document.validation_messages import format_key_path
 
-Plain = str | int | float | bool | list[Any] | dict[str, str]
+TomlValue = str | int | float | bool | list[Any] | dict[str, str]
 """Value of a field as TOML has it. A table of texts (key to text) counts as a single value."""
 
 
@@ -24,8 +24,8 @@ class ExplainedField:
 
     key: str
     """Dotted path; entries of lists of tables count from 1: `staircase.steps[2].step_db`."""
-    value: Plain
-    default: Plain | None
+    value: TomlValue
+    default: TomlValue | None
     """None where every protocol must state the value itself."""
     description: str
     """Meaning of the field, and the reason for its default."""
@@ -36,23 +36,23 @@ class ExplainedField:
 def explain(protocol: StudyProtocol | RecordingProtocol) -> tuple[ExplainedField, ...]:
     """All fields of a protocol, in the order of its values, with nested tables flattened to dotted keys."""
     root = protocol_schema(protocol.kind)
-    return tuple(_fields(root, protocol_values(protocol), ()))
+    return tuple(_explain_fields(root, protocol_values(protocol), ()))
 
 
-def _fields(root: Node, value: Any, place: Place) -> Iterator[ExplainedField]:
+def _explain_fields(root: Node, value: Any, place: Place) -> Iterator[ExplainedField]:
     """Fields of a value at its place: of a table key by key, of a list of tables entry by entry, else the value."""
-    node = resolve_reference(root, node_at(root, place) or {})
+    node = resolve_reference(root, find_node(root, place) or {})
     if isinstance(value, dict) and ("properties" in node or "oneOf" in node):
         # An entry of a mixed list: its kind picks the schema.
         tag = (value[node["discriminator"]["propertyName"]],) if "oneOf" in node else ()
-        for key, inner in value.items():
-            yield from _fields(root, inner, (*place, *tag, key))
+        for key, item in value.items():
+            yield from _explain_fields(root, item, (*place, *tag, key))
     elif isinstance(value, list) and value and isinstance(value[0], dict):
-        for index, inner in enumerate(value):
-            yield from _fields(root, inner, (*place, index))
+        for index, item in enumerate(value):
+            yield from _explain_fields(root, item, (*place, index))
     else:
         yield ExplainedField(
-            key=key_path(root, place),
+            key=format_key_path(root, place),
             value=value,
             default=node.get("default"),
             description=node.get("description", ""),

@@ -24,8 +24,8 @@ from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.dumping import protocol_values
 
-Untouched = str | float | bool | list[Any] | dict[str, Any]
-"""A default value as JSON has it."""
+DefaultValue = str | float | bool | list[Any] | dict[str, Any]
+"""Default value of a field, as in JSON."""
 
 TABLES_SINCE = {
     "consent": ConsentSettings(),
@@ -46,25 +46,25 @@ TABLES_SINCE = {
 """Tables added after the first locks and sessions, with their default values. A table at its defaults is left out of
 the hash, so that old hashes stay valid."""
 
-SAFETY_SINCE: dict[str, Untouched] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": UNTOUCHED}
+SAFETY_SINCE: dict[str, DefaultValue] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": UNTOUCHED}
 """Safety settings added later, in study and recording protocols, by path, with their defaults. Force in N."""
 
-ROVE_SINCE: dict[str, Untouched] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0, "stimulus.rove_db": 0.0}
+ROVE_SINCE: dict[str, DefaultValue] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0, "stimulus.rove_db": 0.0}
 """Roving of the level (dB, random variation) in demonstration, practice and test, added later."""
 
-TIMING_SINCE: dict[str, Untouched] = {"measurement.late_ticks_limit": 1.0, "measurement.longest_late_ms": 1000.0}
+TIMING_SINCE: dict[str, DefaultValue] = {"measurement.late_ticks_limit": 1.0, "measurement.longest_late_ms": 1000.0}
 """Limits on late ticks of the control loop added later."""
 
-SENSOR_SINCE: dict[str, Untouched] = {
+SENSOR_SINCE: dict[str, DefaultValue] = {
     "measurement.lost_packets_limit": 0.05,
     "measurement.accelerometer_needed": False,
 }
 """Requirements on the accelerometer added later."""
 
-SETUP_SINCE: dict[str, Untouched] = {"setup.daily_check_needed": False}
+SETUP_SINCE: dict[str, DefaultValue] = {"setup.daily_check_needed": False}
 """Requirement of a daily device check, added later."""
 
-QUESTIONS_SINCE: dict[str, Untouched] = {
+QUESTIONS_SINCE: dict[str, DefaultValue] = {
     "debrief.codes": [],
     "debrief.number": [],
     "debrief.unit": "",
@@ -72,13 +72,13 @@ QUESTIONS_SINCE: dict[str, Untouched] = {
     "debrief.ends": [],
 }
 """Kinds of answers to the questions of the debriefing added later; each path stands for all questions."""
-DECLARED_SINCE: dict[str, Untouched] = {"analysis.interval": "undeclared"}
+DECLARED_SINCE: dict[str, DefaultValue] = {"analysis.interval": "undeclared"}
 """Declaration of the confidence interval, added later."""
 
-PLACEMENT_SINCE: dict[str, Untouched] = {"staircase.bayesian": {"trials": 0, "spread_db": 0.0}}
+PLACEMENT_SINCE: dict[str, DefaultValue] = {"staircase.bayesian": {"trials": 0, "spread_db": 0.0}}
 """Bayesian placement of levels, added later; off by default."""
 
-FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
+FIELDS_SINCE: dict[str, dict[str, DefaultValue]] = {
     "study": {
         "trial.device_buttons": [],
         "trial.repeats_per_run": 3,
@@ -106,26 +106,26 @@ def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
     """
     values = protocol_values(protocol)
     if isinstance(protocol, StudyProtocol):
-        for name, untouched in TABLES_SINCE.items():
-            if getattr(protocol, name) == untouched:
+        for name, default in TABLES_SINCE.items():
+            if getattr(protocol, name) == default:
                 del values[name]
-    for path, untouched in FIELDS_SINCE[protocol.kind].items():
-        _leave_out(values, path.split("."), untouched)
+    for path, default in FIELDS_SINCE[protocol.kind].items():
+        _delete_default(values, path.split("."), default)
     # JSON writes 0.0 and -0.0 differently, though the values are equal; adding 0.0 turns -0.0 into 0.0.
     text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    plain = json.loads(text, parse_float=lambda digits: float(digits) + 0.0)
-    canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    normalised = json.loads(text, parse_float=lambda digits: float(digits) + 0.0)
+    canonical = json.dumps(normalised, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode()).hexdigest()
 
 
-def _leave_out(values: Any, path: list[str], untouched: Untouched) -> None:
+def _delete_default(values: Any, path: list[str], default: DefaultValue) -> None:
     """Delete the field at a path from nested values, in place, where it has its default value; in each entry of a
     list."""
     if isinstance(values, list):
         for entry in values:
-            _leave_out(entry, path, untouched)
+            _delete_default(entry, path, default)
     elif len(path) > 1:
         if path[0] in values:
-            _leave_out(values[path[0]], path[1:], untouched)
-    elif values.get(path[0]) == untouched:
+            _delete_default(values[path[0]], path[1:], default)
+    elif values.get(path[0]) == default:
         del values[path[0]]

@@ -11,7 +11,7 @@ from protocols.definition.problem import Problem
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.schema import ADAPTERS, protocol_schema
-from protocols.document.validation_messages import problems_in, shown
+from protocols.document.validation_messages import collect_problems, describe_value
 
 Protocol = StudyProtocol | RecordingProtocol
 
@@ -52,33 +52,37 @@ def load_protocol(text: str, source: str) -> Protocol:
 def protocol_from_values(values: dict[str, Any], source: str) -> Protocol:
     """Check plain values from TOML or JSON and make the protocol. Numbers must be numbers, not text or booleans.
     Raises ProtocolError."""
-    if unsupported := tuple(_no_protocol_values(values, "")):
+    if unsupported := tuple(_find_unsupported_values(values, "")):
         raise ProtocolError(source, unsupported)
     kind = values.get("kind")
     if not isinstance(kind, str) or kind not in ADAPTERS:
-        wrong = "is missing" if kind is None else f'is "{kind}"' if isinstance(kind, str) else f"is {shown(kind)}"
+        wrong = (
+            "is missing" if kind is None else f'is "{kind}"' if isinstance(kind, str) else f"is {describe_value(kind)}"
+        )
         raise ProtocolError(source, (Problem("kind", wrong, _KINDS),))
     try:
         # By way of JSON, because strict checking then takes a list for a tuple and a whole number for a real one,
         # but still no text and no truth value for a number.
         protocol: Protocol = ADAPTERS[kind].validate_json(json.dumps(values), strict=True)
     except ValidationError as error:
-        raise ProtocolError(source, problems_in(protocol_schema(kind), error.errors())) from error
+        raise ProtocolError(source, collect_problems(protocol_schema(kind), error.errors())) from error
     return protocol
 
 
-def _no_protocol_values(value: Any, path: str) -> list[Problem]:
+def _find_unsupported_values(value: Any, path: str) -> list[Problem]:
     """Values that TOML allows and protocols do not: dates, and integers of unlimited length."""
     match value:
         case dict():
             return [
-                found
-                for key, inner in value.items()
-                for found in _no_protocol_values(inner, f"{path}.{key}" if path else key)
+                problem
+                for key, item in value.items()
+                for problem in _find_unsupported_values(item, f"{path}.{key}" if path else key)
             ]
         case list():
             return [
-                found for i, inner in enumerate(value, start=1) for found in _no_protocol_values(inner, f"{path}[{i}]")
+                problem
+                for i, item in enumerate(value, start=1)
+                for problem in _find_unsupported_values(item, f"{path}[{i}]")
             ]
         case datetime.date() | datetime.time():
             return [Problem(path, f"is {value}, a date or time", "text in quotes or a number")]

@@ -34,7 +34,7 @@ class ProtocolLock:
     """Version of hapteq that locked it."""
 
 
-def lock_of(protocol: StudyProtocol | RecordingProtocol, locked_utc: str, hapteq: str) -> ProtocolLock:
+def make_lock(protocol: StudyProtocol | RecordingProtocol, locked_utc: str, hapteq: str) -> ProtocolLock:
     """The lock of a protocol. locked_utc: ISO 8601; hapteq: version of the program."""
     return ProtocolLock(protocol.name, protocol_hash(protocol), locked_utc, hapteq)
 
@@ -48,11 +48,11 @@ def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, 
         raise LockError(
             f"the lock is that of protocol {lock.name}, not of {protocol.name}; give the lock of this protocol"
         )
-    now = protocol_hash(protocol)
-    if now != lock.hash:
+    current_hash = protocol_hash(protocol)
+    if current_hash != lock.hash:
         raise LockError(
             f"protocol {lock.name} was locked on {locked} and has changed since: "
-            f"its fingerprint is {now[:12]}…, the locked one {lock.hash[:12]}…"
+            f"its fingerprint is {current_hash[:12]}…, the locked one {lock.hash[:12]}…"
         )
 
 

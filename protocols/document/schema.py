@@ -43,7 +43,7 @@ def protocol_schema(kind: str) -> Node:
     return ADAPTERS[kind].json_schema()
 
 
-def node_at(root: Node, place: Place) -> Node | None:
+def find_node(root: Node, place: Place) -> Node | None:
     """Schema of the value at this place; None where the schema has no such place."""
     node: Node | None = root
     for part in place:
@@ -51,7 +51,7 @@ def node_at(root: Node, place: Place) -> Node | None:
     return node
 
 
-def keys_of(root: Node, node: Node) -> tuple[str, ...]:
+def list_keys(root: Node, node: Node) -> tuple[str, ...]:
     """The keys of a table in the order of the dataclass's fields; empty for another value than a table."""
     return tuple(resolve_reference(root, node).get("properties", {}))
 
@@ -68,25 +68,28 @@ def describe_allowed(root: Node, node: Node, key: str = "") -> str:
     """Allowed values in words. key: name of the value, whose suffix determines the unit (`UNITS`)."""
     node = resolve_reference(root, node)
     if "oneOf" in node:
-        return f"a table whose {node['discriminator']['propertyName']} is {_choices(node['discriminator']['mapping'])}"
+        return (
+            f"a table whose {node['discriminator']['propertyName']} is "
+            f"{_describe_choices(node['discriminator']['mapping'])}"
+        )
     if "enum" in node or "const" in node:
-        return _choices(node.get("enum", [node.get("const")]))
+        return _describe_choices(node.get("enum", [node.get("const")]))
     match node.get("type"):
         case "number" | "integer":
-            return _number(node) + unit_of(key)
+            return _describe_number(node) + find_unit(key)
         case "boolean":
             return "true or false"
         case "string":
-            return _text(node)
+            return _describe_text(node)
         case "array":
-            return _list(root, node, key)
+            return _describe_list(root, node, key)
         case "object" if "properties" not in node:
             return "a table of texts in quotes"
         case _:
-            return f"a table with the keys {', '.join(keys_of(root, node))}"
+            return f"a table with the keys {', '.join(list_keys(root, node))}"
 
 
-def unit_of(key: str) -> str:
+def find_unit(key: str) -> str:
     """Unit of a key in words, such as ", in newtons" for `start_n`; empty for a key without a unit."""
     for suffix, unit in sorted(UNITS.items(), key=lambda item: -len(item[0])):
         if key.endswith(f"_{suffix}"):
@@ -104,17 +107,17 @@ def _child_node(root: Node, node: Node, part: str | int) -> Node | None:
         reference = node["discriminator"]["mapping"].get(part)
         return {"$ref": reference} if reference else None
     child: Node | None = node.get("properties", {}).get(part)
-    if child is None and isinstance(others := node.get("additionalProperties"), dict):
-        return others
+    if child is None and isinstance(additional := node.get("additionalProperties"), dict):
+        return additional
     return child
 
 
-def _choices(values: Any) -> str:
+def _describe_choices(values: Any) -> str:
     names = [f'"{value}"' for value in values]
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
-def _number(node: Node) -> str:
+def _describe_number(node: Node) -> str:
     kind = "a whole number" if node["type"] == "integer" else "a number"
     bounds = [
         f"{word} {node[bound]:g}"
@@ -124,14 +127,14 @@ def _number(node: Node) -> str:
     return " ".join([kind, *bounds])
 
 
-def _text(node: Node) -> str:
+def _describe_text(node: Node) -> str:
     if "pattern" in node:
         return "text in quotes: a lower-case letter, then up to 63 lower-case letters, digits and underscores"
     shortest, longest = node.get("minLength", 0), node.get("maxLength")
     return f"text in quotes, {shortest} to {longest} characters long" if longest else "text in quotes"
 
 
-def _list(root: Node, node: Node, key: str) -> str:
-    fewest, most = node.get("minItems", 0), node.get("maxItems")
-    count = f"{fewest} to {most}" if most else f"{fewest} or more"
+def _describe_list(root: Node, node: Node, key: str) -> str:
+    smallest_count, largest_count = node.get("minItems", 0), node.get("maxItems")
+    count = f"{smallest_count} to {largest_count}" if largest_count else f"{smallest_count} or more"
     return f"a list of {count} entries, each {describe_allowed(root, node['items'], key)}"

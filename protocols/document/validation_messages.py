@@ -9,33 +9,35 @@ from difflib import get_close_matches
 from typing import Any
 
 from protocols.definition.problem import InconsistentError, Problem
-from protocols.document.schema import UNITS, Node, Place, describe_allowed, keys_of, node_at, resolve_reference
+from protocols.document.schema import UNITS, Node, Place, describe_allowed, find_node, list_keys, resolve_reference
 
 _LONGEST_WORD = 60
 """Longest word (characters) that is compared with known keys: comparing longer ones would take minutes."""
 
 
-def problems_in(root: Node, errors: Sequence[Any]) -> tuple[Problem, ...]:
+def collect_problems(root: Node, errors: Sequence[Any]) -> tuple[Problem, ...]:
     """Problems of a protocol, each once. root: schema of the protocol's kind; errors: from pydantic's
     ValidationError."""
     unknown = [error["loc"] for error in errors if error["type"] == "unexpected_keyword_argument"]
-    meant = {(*place[:-1], nearest_key(str(place[-1]), _keys_beside(root, place))) for place in unknown}
-    found: list[Problem] = []
+    intended_keys = {
+        (*place[:-1], find_nearest_key(str(place[-1]), _list_sibling_keys(root, place))) for place in unknown
+    }
+    problems: list[Problem] = []
     for error in errors:
         # Pydantic reports a misspelt required key twice (as unknown and as missing), and a list with invalid entries
         # also as too short: the second report is dropped.
-        wrong_name = error["type"] == "missing" and error["loc"] in meant
+        wrong_name = error["type"] == "missing" and error["loc"] in intended_keys
         wrong_entries = error["type"] == "too_short" and len(error["input"]) > 0
         if not wrong_name and not wrong_entries:
-            found.extend(_translate_error(root, error))
-    return tuple(found)
+            problems.extend(_translate_error(root, error))
+    return tuple(problems)
 
 
-def key_path(root: Node, place: Place) -> str:
+def format_key_path(root: Node, place: Place) -> str:
     """`staircase.steps[2].step_db` from ("staircase", "steps", 1, "step_db"); list entries count from 1."""
     path = ""
     for depth, part in enumerate(place):
-        node = node_at(root, place[:depth])
+        node = find_node(root, place[:depth])
         if isinstance(part, int):
             path += f"[{part + 1}]"
         elif node is None or "oneOf" not in resolve_reference(root, node):
@@ -43,18 +45,18 @@ def key_path(root: Node, place: Place) -> str:
     return path
 
 
-def nearest_key(key: str, known: Sequence[str]) -> str | None:
+def find_nearest_key(key: str, known_keys: Sequence[str]) -> str | None:
     """The known key that was probably meant: first the same quantity with another unit, then a similar spelling;
     None if there is none."""
     suffixes = tuple(f"_{unit}" for unit in UNITS)
-    for candidate in known:
+    for candidate in known_keys:
         if candidate.endswith(suffixes) and candidate.rsplit("_", 1)[0] in (key, key.rsplit("_", 1)[0]):
             return candidate
-    close = get_close_matches(key[:_LONGEST_WORD].lower(), known, n=1)
-    return close[0] if close else None
+    candidates = get_close_matches(key[:_LONGEST_WORD].lower(), known_keys, n=1)
+    return candidates[0] if candidates else None
 
 
-def shown(value: Any) -> str:
+def describe_value(value: Any) -> str:
     """A value for a message: numbers and texts as in the file, other types by name."""
     match value:
         case bool():
@@ -74,19 +76,19 @@ def _translate_error(root: Node, error: Any) -> tuple[Problem, ...]:
     place: Place = error["loc"]
     if error["type"] == "json_invalid":  # nested too deeply
         return (Problem("The text", f"cannot be read: {error['msg']}", "numbers and nesting of ordinary size"),)
-    key = key_path(root, place)
+    key = format_key_path(root, place)
     if error["type"] == "unexpected_keyword_argument":
         return (_report_unknown_key(root, place),)
     if error["type"] == "value_error" and isinstance(error["ctx"]["error"], InconsistentError):
         return tuple(problem.below(key) for problem in error["ctx"]["error"].problems)
     if error["type"] in ("union_tag_not_found", "union_tag_invalid"):
-        return (_wrong_kind_of_entry(root, place, error),)
-    node = node_at(root, place)
+        return (_report_wrong_entry_kind(root, place, error),)
+    node = find_node(root, place)
     name = str(place[-1]) if isinstance(place[-1], str) else str(place[-2])
-    return (Problem(key, _problem_text(error), describe_allowed(root, node, name) if node else "something else"),)
+    return (Problem(key, _describe_problem(error), describe_allowed(root, node, name) if node else "something else"),)
 
 
-def _problem_text(error: Any) -> str:
+def _describe_problem(error: Any) -> str:
     """What is wrong with the value, as the predicate of a sentence whose subject is the key."""
     value = error["input"]
     match error["type"]:
@@ -105,42 +107,42 @@ def _problem_text(error: Any) -> str:
         case "too_short" | "too_long":
             return f"has {len(value)} entries"
         case _:
-            return f"is {shown(value)}"
+            return f"is {describe_value(value)}"
 
 
 def _report_unknown_key(root: Node, place: Place) -> Problem:
     """Problem for an unknown key, with the table in which it belongs or the known key that was probably meant."""
-    key, known = str(place[-1]), _keys_beside(root, place)
-    table = key_path(root, place[:-1])
+    key, known_keys = str(place[-1]), _list_sibling_keys(root, place)
+    table = format_key_path(root, place[:-1])
     problem = f"is no key of {f'[{table}]' if table else 'a protocol'}"
-    homes = _homes_of(root, key)
+    homes = _find_sections(root, key)
     if table and key in root["properties"]:
         problem += "; it belongs at the top of the file, before the first [table]"
     elif homes:
         problem += f"; it belongs in [{homes[0]}]"
-    elif meant := nearest_key(key, known):
-        problem += f"; did you mean {meant}"
-    return Problem(key_path(root, place), problem, ", ".join(known))
+    elif suggestion := find_nearest_key(key, known_keys):
+        problem += f"; did you mean {suggestion}"
+    return Problem(format_key_path(root, place), problem, ", ".join(known_keys))
 
 
-def _wrong_kind_of_entry(root: Node, place: Place, error: Any) -> Problem:
+def _report_wrong_entry_kind(root: Node, place: Place, error: Any) -> Problem:
     """Problem for an entry of a mixed list whose kind is missing or unknown."""
-    node = resolve_reference(root, node_at(root, place) or {})
+    node = resolve_reference(root, find_node(root, place) or {})
     tag, choices = node["discriminator"]["propertyName"], node["discriminator"]["mapping"]
-    given = error["input"].get(tag)
-    problem = "is missing" if given is None else f'is "{given}"'
-    if isinstance(given, str) and (close := get_close_matches(given[:_LONGEST_WORD], choices, n=1)):
-        problem += f'; did you mean "{close[0]}"'
-    return Problem(f"{key_path(root, place)}.{tag}", problem, " or ".join(f'"{choice}"' for choice in choices))
+    given_kind = error["input"].get(tag)
+    problem = "is missing" if given_kind is None else f'is "{given_kind}"'
+    if isinstance(given_kind, str) and (suggestions := get_close_matches(given_kind[:_LONGEST_WORD], choices, n=1)):
+        problem += f'; did you mean "{suggestions[0]}"'
+    return Problem(f"{format_key_path(root, place)}.{tag}", problem, " or ".join(f'"{choice}"' for choice in choices))
 
 
-def _keys_beside(root: Node, place: Place) -> tuple[str, ...]:
+def _list_sibling_keys(root: Node, place: Place) -> tuple[str, ...]:
     """Keys that the schema allows in the table that contains this place."""
-    table = node_at(root, place[:-1])
-    return keys_of(root, table) if table else ()
+    table = find_node(root, place[:-1])
+    return list_keys(root, table) if table else ()
 
 
-def _homes_of(root: Node, key: str) -> list[str]:
+def _find_sections(root: Node, key: str) -> list[str]:
     """Top-level tables that have this key."""
     sections = {name: resolve_reference(root, node) for name, node in root["properties"].items()}
     return [name for name, section in sections.items() if key in section.get("properties", {})]

@@ -22,16 +22,16 @@ def add_answer(state: PracticeState, correct: bool) -> PracticeState:
     return PracticeState((*state.correct, correct))
 
 
-def right_of_last(settings: PracticeSettings, state: PracticeState) -> int:
+def count_right_of_last(settings: PracticeSettings, state: PracticeState) -> int:
     """Number of correct answers among the last `of_last`."""
     return sum(state.correct[-settings.of_last :])
 
 
-def practice_passed(settings: PracticeSettings, state: PracticeState) -> bool:
+def is_practice_passed(settings: PracticeSettings, state: PracticeState) -> bool:
     """Whether at least `right_needed` of the last `of_last` answers are correct."""
-    return right_of_last(settings, state) >= settings.right_needed
+    return count_right_of_last(settings, state) >= settings.right_needed
 
 
-def practice_over(settings: PracticeSettings, state: PracticeState) -> bool:
+def is_practice_over(settings: PracticeSettings, state: PracticeState) -> bool:
     """Whether the practice has ended: it is passed, or its trial limit is reached."""
-    return practice_passed(settings, state) or len(state.correct) >= settings.trial_limit
+    return is_practice_passed(settings, state) or len(state.correct) >= settings.trial_limit

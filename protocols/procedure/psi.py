@@ -29,7 +29,7 @@ BEYOND_DB = 12.0
 """Thresholds of the grid end this far (dB) above the cap and below the lowest level."""
 SLOPES = tuple(float(slope) for slope in np.geomspace(0.8, 5.0, 7))
 """Slopes of the Weibull curve over newtons, equally probable a priori, spaced geometrically about 2. By hand."""
-LAPSE = 0.02
+LAPSE_RATE = 0.02
 """Share of inattentive answers, half of them wrong: P(right) ends at 0.99, a lapse rate of 0.01 in the words of
 `analysis.psychophysics.hierarchy.curve`. By hand: without it a single lapse at a high level could never be undone."""
 TARGET = 0.5 ** (1 / 3)
@@ -74,16 +74,16 @@ def share_right(level_db: FloatArray, cap_db: float) -> FloatArray:
     """
     t0 = math.log(-math.log(2.0 - 2.0 * TARGET))
     above = np.asarray(level_db)[..., None, None] - thresholds_db(cap_db)[:, None]
-    rest = 0.5 * np.exp(-np.exp(t0 + np.array(SLOPES) * (math.log(10.0) / 20.0) * above))
-    return LAPSE / 2 + (1.0 - LAPSE) * (1.0 - rest)
+    failure_share = 0.5 * np.exp(-np.exp(t0 + np.array(SLOPES) * (math.log(10.0) / 20.0) * above))
+    return LAPSE_RATE / 2 + (1.0 - LAPSE_RATE) * (1.0 - failure_share)
 
 
-def posterior(answered: tuple[Answered, ...], cap_db: float) -> FloatArray:
+def compute_posterior(answered: tuple[Answered, ...], cap_db: float) -> FloatArray:
     """Posterior probability of every threshold and slope (thresholds, slopes), from a flat prior."""
     log_p = np.zeros((len(thresholds_db(cap_db)), len(SLOPES)))
-    for level_db, right in answered:
+    for level_db, is_right in answered:
         p = share_right(np.array(level_db), cap_db)
-        log_p += np.log(p if right else 1.0 - p)
+        log_p += np.log(p if is_right else 1.0 - p)
     weight = np.exp(log_p - log_p.max())
     share: FloatArray = weight / weight.sum()
     return share
@@ -91,20 +91,20 @@ def posterior(answered: tuple[Answered, ...], cap_db: float) -> FloatArray:
 
 def next_level_db(probability: FloatArray, cap_db: float) -> float:
     """The level (dB re 1 N) after which the least entropy of threshold and slope is expected; never above the cap.
-    probability: (thresholds, slopes), as `posterior` gives it."""
-    levels, right = levels_db(cap_db), _table(cap_db)
-    left = np.zeros(len(levels))
-    for table in (right, 1.0 - right):
+    probability: (thresholds, slopes), as `compute_posterior` gives it."""
+    levels, right_share = levels_db(cap_db), _tabulate_share_right(cap_db)
+    expected_entropy = np.zeros(len(levels))
+    for table in (right_share, 1.0 - right_share):
         joint = table * probability
         chance = joint.sum(axis=(1, 2))
         # Entropy of the posterior times its chance: -sum of joint log(joint / chance).
-        left -= (joint * np.log(np.maximum(joint, 1e-300))).sum(axis=(1, 2)) - chance * np.log(chance)
-    return float(levels[int(np.flatnonzero(left <= left.min() + SAME_BITS)[0])])
+        expected_entropy -= (joint * np.log(np.maximum(joint, 1e-300))).sum(axis=(1, 2)) - chance * np.log(chance)
+    return float(levels[int(np.flatnonzero(expected_entropy <= expected_entropy.min() + SAME_BITS)[0])])
 
 
-def estimate(probability: FloatArray, cap_db: float) -> Estimate:
+def estimate_threshold(probability: FloatArray, cap_db: float) -> Estimate:
     """Mean and standard deviation of the threshold's marginal posterior, and its probability above the cap.
-    probability: (thresholds, slopes), as `posterior` gives it."""
+    probability: (thresholds, slopes), as `compute_posterior` gives it."""
     thresholds, by_threshold = thresholds_db(cap_db), probability.sum(axis=1)
     mean = float((by_threshold * thresholds).sum())
     variance = float((by_threshold * (thresholds - mean) ** 2).sum())
@@ -112,5 +112,5 @@ def estimate(probability: FloatArray, cap_db: float) -> Estimate:
 
 
 @cache
-def _table(cap_db: float) -> FloatArray:
+def _tabulate_share_right(cap_db: float) -> FloatArray:
     return share_right(levels_db(cap_db), cap_db)

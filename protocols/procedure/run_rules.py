@@ -7,7 +7,7 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Phase
 
 
-def staircase_rule(protocol: StudyProtocol, phase: Phase) -> StaircaseRule:
+def make_staircase_rule(protocol: StudyProtocol, phase: Phase) -> StaircaseRule:
     """The rule of a staircase run. Practice runs, at a fixed level, have none: see `protocols.procedure.practice`.
 
     Raises ValueError for CATCH: catch trials lie within test runs and follow no staircase.

@@ -16,7 +16,7 @@ from protocols.procedure.staircase import to_db, to_newton
 from protocols.trial import Phase
 
 
-def williams_rows(conditions: int) -> tuple[tuple[int, ...], ...]:
+def make_williams_rows(conditions: int) -> tuple[tuple[int, ...], ...]:
     """Williams design (Latin square balanced for first-order carry-over): orders of conditions 0 … conditions - 1.
 
     One row per participant. Over all rows each condition occurs in each position equally often, and follows each other
@@ -60,15 +60,15 @@ class Draw:
     """Random choices for one presentation of a stimulus: its direction and its polarity."""
 
     direction: int
-    """1 or 2, in the order of the protocol; `label_of` gives the number on the screen."""
+    """1 or 2, in the order of the protocol; `label_direction` gives the number on the screen."""
     polarity: int
     """Sign of the first half-wave, 1 or -1."""
 
 
-def runs(protocol: StudyProtocol, seed: int, participant_number: int) -> tuple[Run, ...]:
+def schedule_runs(protocol: StudyProtocol, seed: int, participant_number: int) -> tuple[Run, ...]:
     """All runs of a session: training and practice as listed, the test runs in the order of the schedule, then
     detection."""
-    order = frequency_order(protocol.schedule, protocol.stimulus.frequencies_hz, seed, participant_number)
+    order = order_frequencies(protocol.schedule, protocol.stimulus.frequencies_hz, seed, participant_number)
     planned = [
         *((Phase.TRAINING, frequency_hz, False) for frequency_hz in protocol.training.frequencies_hz),
         *((Phase.TRAINING, frequency_hz, True) for frequency_hz in protocol.practice.frequencies_hz),
@@ -78,7 +78,7 @@ def runs(protocol: StudyProtocol, seed: int, participant_number: int) -> tuple[R
     return tuple(Run(index, *run) for index, run in enumerate(planned))
 
 
-def frequency_order(
+def order_frequencies(
     settings: ScheduleSettings, frequencies_hz: tuple[float, ...], seed: int, participant_number: int
 ) -> tuple[float, ...]:
     """Order of the test frequencies. participant_number counts from 0; only the Williams design uses it."""
@@ -90,7 +90,7 @@ def frequency_order(
         case "williams":
             if not frequencies_hz:
                 return ()
-            rows = williams_rows(len(frequencies_hz))
+            rows = make_williams_rows(len(frequencies_hz))
             return tuple(frequencies_hz[place] for place in rows[participant_number % len(rows)])
 
 
@@ -112,27 +112,27 @@ def is_catch_trial(settings: CatchSettings, seed: int, run: int, trial: int) -> 
     if not settings.one_in:
         return False
     block, place = divmod(trial, settings.one_in)
-    return draw_words(seed, (run, block, _CATCH, 0), 1)[0] % settings.one_in == place
+    return draw_words(seed, (run, block, _CATCH_KEY, 0), 1)[0] % settings.one_in == place
 
 
 def detection_direction(seed: int, run: int, trial: int, attempt: int) -> int:
     """Direction, 1 or 2, of a detection trial's stimulus. The interval that contains it is drawn separately."""
-    return 1 + (draw_words(seed, (run, trial, attempt, _DETECTION), 1)[0] >> 63)
+    return 1 + (draw_words(seed, (run, trial, attempt, _DETECTION_KEY), 1)[0] >> 63)
 
 
 def practice_level_n(settings: PracticeSettings, seed: int, run: int, trial: int, attempt: int) -> float:
     """Amplitude (N) of a practice trial, drawn independently of the direction."""
-    return _draw_level_n(settings.level_n, settings.rove_db, seed, (run, trial, attempt, _ROVE))
+    return _draw_level_n(settings.level_n, settings.rove_db, seed, (run, trial, attempt, _ROVE_KEY))
 
 
 def rove_level_n(nominal_n: float, rove_db: float, seed: int, run: int, trial: int, attempt: int) -> float:
     """Amplitude (N) of a staircase trial around the level of its staircase, drawn independently of the direction."""
-    return _draw_level_n(nominal_n, rove_db, seed, (run, trial, attempt, _ROVE))
+    return _draw_level_n(nominal_n, rove_db, seed, (run, trial, attempt, _ROVE_KEY))
 
 
-def demo_level_n(settings: DemoSettings, seed: int, played: int) -> float:
-    """Amplitude (N) of a demonstration. played: number of earlier ones in the session."""
-    return _draw_level_n(settings.level_n, settings.rove_db, seed, (played,))
+def demo_level_n(settings: DemoSettings, seed: int, earlier_demos: int) -> float:
+    """Amplitude (N) of a demonstration. earlier_demos: number of earlier ones in the session."""
+    return _draw_level_n(settings.level_n, settings.rove_db, seed, (earlier_demos,))
 
 
 def _draw_level_n(level_n: float, rove_db: float, seed: int, key: tuple[int, ...]) -> float:
@@ -144,12 +144,12 @@ def _draw_level_n(level_n: float, rove_db: float, seed: int, key: tuple[int, ...
     return to_newton(to_db(level_n) + rove_db * (share - 0.5))
 
 
-_CATCH, _DETECTION, _ROVE = 0, 1, 2
+_CATCH_KEY, _DETECTION_KEY, _ROVE_KEY = 0, 1, 2
 """Last element of the keys of four elements, by purpose: catch trial, direction in detection, roving. A key of four
 elements never gives the same words as a trial's key of three."""
 
 
-def labels_swapped(settings: ScheduleSettings, frequencies: int, participant_number: int) -> bool:
+def are_labels_swapped(settings: ScheduleSettings, frequencies: int, participant_number: int) -> bool:
     """Whether the numbers 1 and 2 are exchanged for this participant.
 
     True for every second participant, and for the other half on the next pass through the Williams rows, so that each
@@ -159,14 +159,16 @@ def labels_swapped(settings: ScheduleSettings, frequencies: int, participant_num
     if settings.labels == "fixed":
         return False
     passes = (
-        participant_number // len(williams_rows(frequencies)) if settings.order == "williams" and frequencies else 0
+        participant_number // len(make_williams_rows(frequencies))
+        if settings.order == "williams" and frequencies
+        else 0
     )
     return (participant_number + passes) % 2 == 1
 
 
-def label_of(direction: int, swapped: bool) -> int:
+def label_direction(direction: int, is_swapped: bool) -> int:
     """Number on the screen, 1 or 2, for a direction; the mapping is its own inverse."""
-    return 3 - direction if swapped else direction
+    return 3 - direction if is_swapped else direction
 
 
 def draw_words(seed: int, key: tuple[int, ...], count: int) -> tuple[int, ...]:

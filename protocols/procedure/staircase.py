@@ -1,8 +1,9 @@
 """Transformed up-down staircase: the next level, and the end of a run.
 
 Read `step` first: it is the complete rule, except for runs whose levels the Psi method chooses
-(`protocols.procedure.psi`). The state is a value: `begin` makes it, `step` returns the next one. Levels are in dB re
-1 N and not restricted to a grid of steps, because a level that was limited to the cap need not be on that grid.
+(`protocols.procedure.psi`). The state is a value: `begin_staircase` makes it, `step` returns the next one. Levels are
+in dB re 1 N and not restricted to a grid of steps, because a level that was limited to the cap need not be on that
+grid.
 
 Source: H. Levitt, Transformed up-down methods in psychoacoustics, J. Acoust. Soc. Am. 49 (1971), 467-477.
 """
@@ -12,7 +13,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from protocols.definition.staircase_rule import StaircaseRule, StepChange
-from protocols.procedure.psi import Answered, estimate, next_level_db, posterior
+from protocols.procedure.psi import Answered, compute_posterior, estimate_threshold, next_level_db
 
 
 class Heading(Enum):
@@ -53,7 +54,7 @@ class StaircaseState:
         return len(self.reversal_levels_db)
 
 
-def begin(rule: StaircaseRule) -> StaircaseState:
+def begin_staircase(rule: StaircaseRule) -> StaircaseState:
     """State before the first answer of a run, at the rule's start level."""
     return StaircaseState(level_db=to_db(rule.start_n))
 
@@ -67,14 +68,14 @@ def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Staircase
     """
     if is_finished(rule, state):
         raise ValueError("this run is finished: no answer can follow")
-    counted = _count(rule, state, correct)
+    updated = _count_answer(rule, state, correct)
     if rule.is_bayesian:
-        return _apply_psi(rule, counted, correct)
-    if counted.wrong_in_a_row >= _wrong_needed(rule, state):
-        return _move(rule, counted, Heading.UP)
-    if counted.right_in_a_row >= _right_needed(rule, state):
-        return _move(rule, counted, Heading.DOWN)
-    return counted
+        return _apply_psi(rule, updated, correct)
+    if updated.wrong_in_a_row >= _count_wrong_needed(rule, state):
+        return _move_level(rule, updated, Heading.UP)
+    if updated.right_in_a_row >= _count_right_needed(rule, state):
+        return _move_level(rule, updated, Heading.DOWN)
+    return updated
 
 
 def is_finished(rule: StaircaseRule, state: StaircaseState) -> bool:
@@ -106,75 +107,75 @@ def to_newton(level_db: float) -> float:
     return float(10.0 ** (level_db / 20.0))
 
 
-def _count(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
+def _count_answer(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
     """Count the answer: trials, trials at the cap, and consecutive right or wrong answers."""
     return replace(
         state,
         right_in_a_row=state.right_in_a_row + 1 if correct else 0,
         wrong_in_a_row=0 if correct else state.wrong_in_a_row + 1,
         trials=state.trials + 1,
-        trials_at_cap=state.trials_at_cap + _at_cap(rule, state.level_db),
+        trials_at_cap=state.trials_at_cap + _is_at_cap(rule, state.level_db),
     )
 
 
 def _apply_psi(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
     """State with the level that Psi chooses after this answer, at most the cap, and the new posterior's spread."""
     cap_db, answered = to_db(rule.cap_n), (*state.answered, (state.level_db, correct))
-    probability = posterior(answered, cap_db)
+    probability = compute_posterior(answered, cap_db)
     level_db = min(next_level_db(probability, cap_db), cap_db)
-    return replace(state, level_db=level_db, answered=answered, spread_db=estimate(probability, cap_db).sd_db)
+    return replace(state, level_db=level_db, answered=answered, spread_db=estimate_threshold(probability, cap_db).sd_db)
 
 
-def _move(rule: StaircaseRule, state: StaircaseState, heading: Heading) -> StaircaseState:
+def _move_level(rule: StaircaseRule, state: StaircaseState, heading: Heading) -> StaircaseState:
     """Move one step and reset the counters; at the cap an upward movement changes nothing and is no reversal."""
-    fresh = replace(state, right_in_a_row=0, wrong_in_a_row=0)
-    if heading is Heading.UP and _at_cap(rule, state.level_db):
-        return replace(fresh, pushes_against_cap=state.pushes_against_cap + 1)
-    turned = state.heading is not Heading.NONE and heading is not state.heading
-    size_db = _step_db(rule, state.reversals, turned)
-    wanted_db = state.level_db + (size_db if heading is Heading.UP else -size_db)
+    reset = replace(state, right_in_a_row=0, wrong_in_a_row=0)
+    if heading is Heading.UP and _is_at_cap(rule, state.level_db):
+        return replace(reset, pushes_against_cap=state.pushes_against_cap + 1)
+    is_reversal = state.heading is not Heading.NONE and heading is not state.heading
+    size_db = _find_step_db(rule, state.reversals, is_reversal)
+    unlimited_db = state.level_db + (size_db if heading is Heading.UP else -size_db)
     cap_db = to_db(rule.cap_n)
-    after = replace(
-        fresh,
-        level_db=min(wanted_db, cap_db),
+    next_state = replace(
+        reset,
+        level_db=min(unlimited_db, cap_db),
         heading=heading,
-        pushes_against_cap=state.pushes_against_cap + (wanted_db > cap_db + _SAME_DB),
+        pushes_against_cap=state.pushes_against_cap + (unlimited_db > cap_db + _LEVEL_TOLERANCE_DB),
     )
-    if not turned:
-        return after
+    if not is_reversal:
+        return next_state
     return replace(
-        after,
+        next_state,
         reversal_levels_db=(*state.reversal_levels_db, state.level_db),
         reversal_trials=(*state.reversal_trials, state.trials - 1),
-        reversals_at_cap=state.reversals_at_cap + _at_cap(rule, state.level_db),
+        reversals_at_cap=state.reversals_at_cap + _is_at_cap(rule, state.level_db),
     )
 
 
-def _step_db(rule: StaircaseRule, reversals_before: int, turned: bool) -> float:
+def _find_step_db(rule: StaircaseRule, reversals_before: int, is_reversal: bool) -> float:
     """Size of the next change of level (dB). The phase of `rule.steps` follows from the number of reversals so far;
     `rule.step_change` determines whether the present reversal counts already."""
-    reversals_now = reversals_before + turned
+    reversals_now = reversals_before + is_reversal
     match rule.step_change:
         case StepChange.AFTER_REVERSAL:
             # The movement at the reversal that completes a phase still has that phase's step.
-            counted = reversals_before
+            reversal_count = reversals_before
         case StepChange.AT_REVERSAL:
-            counted = reversals_now
+            reversal_count = reversals_now
         case StepChange.AT_NEXT_REVERSAL:
-            counted = reversals_now - 1
+            reversal_count = reversals_now - 1
     for phase in rule.steps:
-        if counted < phase.reversals:
+        if reversal_count < phase.reversals:
             return phase.step_db
-        counted -= phase.reversals
+        reversal_count -= phase.reversals
     return rule.steps[-1].step_db
 
 
-def _wrong_needed(rule: StaircaseRule, state: StaircaseState) -> int:
+def _count_wrong_needed(rule: StaircaseRule, state: StaircaseState) -> int:
     """Consecutive wrong answers that raise the level."""
     return 1 if _in_initial_phase(rule, state) else rule.up_after_wrong
 
 
-def _right_needed(rule: StaircaseRule, state: StaircaseState) -> int:
+def _count_right_needed(rule: StaircaseRule, state: StaircaseState) -> int:
     """Consecutive right answers that lower the level."""
     return 1 if _in_initial_phase(rule, state) else rule.down_after_right
 
@@ -184,10 +185,10 @@ def _in_initial_phase(rule: StaircaseRule, state: StaircaseState) -> bool:
     return rule.initial_one_up_one_down and state.reversals == 0
 
 
-_SAME_DB = 1e-9
+_LEVEL_TOLERANCE_DB = 1e-9
 """Tolerance (dB) within which two levels are equal; below any allowed step."""
 
 
-def _at_cap(rule: StaircaseRule, level_db: float) -> bool:
+def _is_at_cap(rule: StaircaseRule, level_db: float) -> bool:
     """Whether the level is the cap, within rounding."""
-    return level_db >= to_db(rule.cap_n) - _SAME_DB
+    return level_db >= to_db(rule.cap_n) - _LEVEL_TOLERANCE_DB

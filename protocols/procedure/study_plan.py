@@ -1,9 +1,9 @@
 """Progress of a study's participants, and the orders of the frequencies that a balanced sample still needs.
 
-The order of the frequencies is counterbalanced by a Williams design (`schedule.williams_rows`). A participant's number
-determines the row of the design and whether the labels 1 and 2 of the directions are swapped. Both repeat after a cycle
-of participants; each place of the cycle is a cell of the design. A sample of n participants fills the cells in turn. A
-cell whose participant withdrew or did not finish lacks a participant, because a number is never assigned again.
+The order of the frequencies is counterbalanced by a Williams design (`schedule.make_williams_rows`). A participant's
+number determines the row of the design and whether the labels 1 and 2 of the directions are swapped. Both repeat after
+a cycle of participants; each place of the cycle is a cell of the design. A sample of n participants fills the cells in
+turn. A cell whose participant withdrew or did not finish lacks a participant, because a number is never assigned again.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.procedure.schedule import frequency_order, labels_swapped, williams_rows
+from protocols.procedure.schedule import are_labels_swapped, make_williams_rows, order_frequencies
 
 Progress = Literal["done", "begun", "left out"]
 """Whether a participant finished, has begun, or does not count towards the sample."""
@@ -25,7 +25,7 @@ class Participant:
     number: int | None
     """Place in the balanced order, from 0; None where none was assigned."""
     progress: Progress
-    why: str = ""
+    reason: str = ""
     """Reason why a participant is left out, such as refused, excluded, withdrawn or unreadable; else empty."""
 
 
@@ -37,8 +37,8 @@ class Cell:
     """Frequencies in the order of their runs; empty where the order is drawn at random."""
     swapped: bool
     """Whether the labels 1 and 2 of the directions are swapped."""
-    wanted: int
-    """Participants that the whole sample requires in this cell."""
+    required: int
+    """Number of participants that the whole sample requires in this cell."""
     done: int
     """Participants who have finished."""
     begun: int
@@ -47,7 +47,7 @@ class Cell:
     @property
     def needed(self) -> int:
         """Number of participants who still have to begin."""
-        return max(0, self.wanted - self.done - self.begun)
+        return max(0, self.required - self.done - self.begun)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class StudyPlan:
 
     def count(self, progress: Progress) -> int:
         """Number of participants with this progress, including those without a place in the balanced order."""
-        return sum(each.progress == progress for each in self.participants)
+        return sum(participant.progress == progress for participant in self.participants)
 
     @property
     def next_cell(self) -> Cell | None:
@@ -78,39 +78,47 @@ class StudyPlan:
         return self.cells[self.next_number % len(self.cells)] if self.cells else None
 
     @property
-    def balanced_sizes(self) -> int:
+    def cycle_length(self) -> int:
         """Number of participants in a cycle: samples of a multiple of it fill all cells equally often; 1 where nothing
         is balanced."""
         return max(1, len(self.cells))
 
 
 def plan_study(protocol: StudyProtocol, participants: Sequence[Participant], next_number: int) -> StudyPlan:
-    """The plan of a study: its cells with the numbers of participants that they have and need. participants: those of
-    this protocol; next_number: number of the next participant. Where the protocol declares no sample size, the plan
+    """Make the plan of a study: its cells with the numbers of participants that they have and need. participants: those
+    of this protocol; next_number: number of the next participant. Where the protocol declares no sample size, the plan
     completes the present cycle."""
     planned = protocol.analysis.participants
-    cycle = _cycle(protocol)
+    cycle = _find_cycle_length(protocol)
     sample = planned or -(-max(next_number, 1) // cycle) * cycle
-    cells = tuple(_cell(protocol, place, cycle, sample, participants) for place in range(cycle)) if cycle > 1 else ()
+    cells = (
+        tuple(_make_cell(protocol, place, cycle, sample, participants) for place in range(cycle)) if cycle > 1 else ()
+    )
     return StudyPlan(protocol.name, planned, tuple(participants), cells, next_number)
 
 
-def _cycle(protocol: StudyProtocol) -> int:
+def _find_cycle_length(protocol: StudyProtocol) -> int:
     """Number of participants after which order and labelling repeat."""
     frequencies, settings = protocol.stimulus.frequencies_hz, protocol.schedule
-    orders = len(williams_rows(len(frequencies))) if settings.order == "williams" and frequencies else 1
+    orders = len(make_williams_rows(len(frequencies))) if settings.order == "williams" and frequencies else 1
     return orders * (1 if settings.labels == "fixed" else 2)
 
 
-def _cell(protocol: StudyProtocol, place: int, cycle: int, sample: int, participants: Sequence[Participant]) -> Cell:
-    """The cell at this place of the cycle, with the participants of a sample of this size."""
+def _make_cell(
+    protocol: StudyProtocol, cycle_index: int, cycle: int, sample: int, participants: Sequence[Participant]
+) -> Cell:
+    """Make the cell of this index in the cycle, with the participants of a sample of this size."""
     frequencies_hz = protocol.stimulus.frequencies_hz
-    drawn = protocol.schedule.order == "random"
-    here = [each for each in participants if each.number is not None and each.number % cycle == place]
+    is_random = protocol.schedule.order == "random"
+    cell_participants = [
+        participant
+        for participant in participants
+        if participant.number is not None and participant.number % cycle == cycle_index
+    ]
     return Cell(
-        () if drawn else frequency_order(protocol.schedule, frequencies_hz, 0, place),
-        labels_swapped(protocol.schedule, len(frequencies_hz), place),
-        len(range(place, sample, cycle)),
-        sum(each.progress == "done" for each in here),
-        sum(each.progress == "begun" for each in here),
+        () if is_random else order_frequencies(protocol.schedule, frequencies_hz, 0, cycle_index),
+        are_labels_swapped(protocol.schedule, len(frequencies_hz), cycle_index),
+        len(range(cycle_index, sample, cycle)),
+        sum(participant.progress == "done" for participant in cell_participants),
+        sum(participant.progress == "begun" for participant in cell_participants),
     )

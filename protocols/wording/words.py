@@ -16,7 +16,7 @@ KEYS = {text: key for key, text in SCREENS.items() if key.startswith("key_")}
 """Key of each word in the footer (what a keyboard key does), by its English text."""
 
 
-def _pattern(text: str) -> re.Pattern[str]:
+def _compile_pattern(text: str) -> re.Pattern[str]:
     """Regular expression for a fact whose placeholders are filled in; each placeholder becomes a named group."""
     parts = re.split(r"\{(\w+)\}", text)  # plain text and names of placeholders alternate
     groups = (f"(?P<{part}>.+?)" if place % 2 else re.escape(part) for place, part in enumerate(parts))
@@ -24,7 +24,7 @@ def _pattern(text: str) -> re.Pattern[str]:
 
 
 PATTERNS = {
-    key: _pattern(text) for key, text in sorted(FACTS.items(), key=lambda fact: ("{" in fact[1], -len(fact[1])))
+    key: _compile_pattern(text) for key, text in sorted(FACTS.items(), key=lambda fact: ("{" in fact[1], -len(fact[1])))
 }
 """Patterns of all facts in the order in which they are tried: exact sentences first, then the longest, so that a short
 pattern does not match a part of a longer sentence."""
@@ -46,7 +46,7 @@ class Words:
         fitting = placeholders(self[key]) == placeholders(ENGLISH[key])
         return (self[key] if fitting else ENGLISH[key]).format_map(values)
 
-    def counted(self, key: str, count: int) -> str:
+    def fill_count(self, key: str, count: int) -> str:
         """The text in the singular for a count of 1, else in the plural."""
         return self[f"{key}_1"] if count == 1 else self.fill(f"{key}_n", {"count": count})
 
@@ -58,15 +58,15 @@ class Words:
     def fact(self, english: str) -> str:
         """Translation of a sentence that a session composed in English; unchanged where it matches no pattern."""
         for key, pattern in PATTERNS.items():
-            found = pattern.fullmatch(english)
-            if found is not None:
-                return self.fill(key, {name: self._fill_part(part) for name, part in found.groupdict().items()})
+            match = pattern.fullmatch(english)
+            if match is not None:
+                return self.fill(key, {name: self._fill_part(part) for name, part in match.groupdict().items()})
         return english
 
     def _fill_part(self, part: str) -> str:
         """Translation of a value in a fact: itself a fact, a list of facts separated by commas, or unchanged (a
         number)."""
-        return ", ".join(self.fact(each) for each in part.split(", ")) if self.fact(part) == part else self.fact(part)
+        return ", ".join(self.fact(item) for item in part.split(", ")) if self.fact(part) == part else self.fact(part)
 
 
 ENGLISH_WORDS = Words()

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from study.cli.results import JsonOption, show
+from study.cli.results import JsonOption, print_results
 
 
 def analyze(
@@ -24,4 +24,4 @@ def analyze(
     from study.workflows.results.analyze_data import analyze_data
 
     out = out if out is not None else data / ANALYSIS_NAME
-    show(analyze_data(data, out, ellipsoid, protocol), as_json)
+    print_results(analyze_data(data, out, ellipsoid, protocol), as_json)

@@ -23,7 +23,7 @@ def calibrate(
     `hapteq twin --calibration CAL.h5` and `--device simulated:CAL.h5` use the result. (Another calibration, that of the
     encoders after each power-up, is `hapteq doctor --calibrate`.)
     """
-    from study.cli.progress import late_bar
+    from study.cli.progress import show_late_bar
     from study.workflows.recording.calibrate_linkage import (
         CalibrationPlan,
         calibrate_linkage,
@@ -32,9 +32,9 @@ def calibrate(
     )
 
     plan = CalibrationPlan(out, device, radius, depth)
-    with late_bar("Calibration (%)", total=100) as show:
-        written = calibrate_linkage(plan, lambda share: show(round(100 * share)))
-    summary = json.dumps(calibration_summary(written), indent=2)
-    typer.echo(summary if as_json else "\n".join((str(out), *calibration_lines(written))))
-    for warning in written.warnings:
+    with show_late_bar("Calibration (%)", total=100) as show:
+        calibration = calibrate_linkage(plan, lambda share: show(round(100 * share)))
+    summary = json.dumps(calibration_summary(calibration), indent=2)
+    typer.echo(summary if as_json else "\n".join((str(out), *calibration_lines(calibration))))
+    for warning in calibration.warnings:
         typer.echo(f"Note: {warning}", err=True)

@@ -116,4 +116,6 @@ class Subcommands(TyperGroup):
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the subcommands under one title, each with its whole short help."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, each.get_short_help_str(limit=200)) for name, each in self.commands.items()])
+            formatter.write_dl(
+                [(name, command.get_short_help_str(limit=200)) for name, command in self.commands.items()]
+            )

@@ -10,17 +10,17 @@ import typer
 
 from protocols.wording.words import Words
 from study.cli.motion_notice import announce
-from study.cli.progress import answer_count
-from study.cli.results import show
+from study.cli.progress import show_answer_count
+from study.cli.results import print_results
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.opening import REAL, needs_real_time
 from study.errors import WrongUseError
-from study.session.views.forms import words_of
+from study.session.views.forms import make_words
 from study.store.disk.privacy import data_folder_warning
 from study.store.sessions.archive import check_subject, find_session
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_mode.line_input import LineInput
-from study.tui.line_mode.plain import PlainDisplay
+from study.tui.line_mode.plain_display import PlainDisplay
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
 from study.workflows.session.end_sitting import end_sitting, finish_closed
@@ -42,7 +42,7 @@ class SittingOptions:
     """Whether the caller declares, without a terminal to confirm it, that no hand is on a real device's handle."""
 
 
-def begin(
+def run_new_session(
     sitter: SittingOptions,
     protocol_name: str,
     device: str,
@@ -58,9 +58,11 @@ def begin(
     _confirm_free_handle(sitter.observer, device, sitter.hands_off)
     in_real_time = sitter.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock()
-    with _participant(sitter.observer, plan.session.seed, sitter.keys, clock, words_of(plan.session.protocol)) as who:
-        end = conduct_new(plan.session, device, who)
-    show(end_sitting(end, RealClock().utc()), as_json)
+    with _participant(
+        sitter.observer, plan.session.seed, sitter.keys, clock, make_words(plan.session.protocol)
+    ) as participant:
+        end = conduct_new(plan.session, device, participant)
+    print_results(end_sitting(end, RealClock().utc()), as_json)
 
 
 def _confirm_free_handle(observer: str | None, device: str, hands_off: bool) -> None:
@@ -74,24 +76,24 @@ def _confirm_free_handle(observer: str | None, device: str, hands_off: bool) -> 
         )
 
 
-def go_on(
+def run_resumed_session(
     session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys = DIGITS, hands_off: bool = False
 ) -> None:
     """Resume a session in line mode or simulated, and print its results. Raises StudyError."""
     folder = find_session(session, data)
-    if still_open := data_folder_warning(folder.path.parent):
-        typer.echo(f"Note: {still_open}", err=True)
-    folded = fold_session(folder)
-    state, opened = folded.state, folded.state.opened
+    if warning := data_folder_warning(folder.path.parent):
+        typer.echo(f"Note: {warning}", err=True)
+    folded_session = fold_session(folder)
+    state, opened = folded_session.state, folded_session.state.opened
     if state.closed:
-        show(finish_closed(folder, folded), as_json)
+        print_results(finish_closed(folder, folded_session), as_json)
         return
     _confirm_free_handle(opened.observer, device, hands_off)
     in_real_time = opened.observer is None or needs_real_time(device)
-    clock: Clock = RealClock() if in_real_time else VirtualClock.not_before(state.sitting.last.utc)
-    with _participant(opened.observer, opened.seed, keys, clock, words_of(state.protocol)) as who:
-        end = conduct_resumed(folder, device, who)
-    show(end_sitting(end, RealClock().utc()), as_json)
+    clock: Clock = RealClock() if in_real_time else VirtualClock.resume_at(state.sitting.last.utc)
+    with _participant(opened.observer, opened.seed, keys, clock, make_words(state.protocol)) as participant:
+        end = conduct_resumed(folder, device, participant)
+    print_results(end_sitting(end, RealClock().utc()), as_json)
 
 
 @contextmanager
@@ -100,7 +102,7 @@ def _participant(
 ) -> Iterator[Participant]:
     """The participant of a sitting; a person is told to wait before, and whose the results are after it."""
     if observer is not None:
-        with answer_count(f"simulated participant '{observer}'") as show_question:
+        with show_answer_count(f"simulated participant '{observer}'") as show_question:
             yield make_simulated_participant(observer, seed, clock, on_question=show_question)
         return
     typer.echo(words["preparing_device"], err=True)

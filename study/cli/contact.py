@@ -35,10 +35,14 @@ def contact(
     """
     from functools import partial
 
-    from study.cli.progress import late_bar
-    from study.workflows.equalizer.play_contact import ContactPlan, contact_lines, contact_summary, play_contact
+    from study.cli.progress import show_late_bar
+    from study.workflows.equalizer.play_contact import ContactPlan, format_contact, play_contact, summarise_contact
 
     plan = ContactPlan(model, transient, normal, out, device, scale, weight, cap, seed)
-    with late_bar("Plays (%)", total=100) as show:
-        done = play_contact(plan, lambda share: show(round(100 * share)), partial(announce, hands_off=hands_off))
-    typer.echo(json.dumps(contact_summary(done), indent=2) if as_json else "\n".join((str(out), *contact_lines(done))))
+    with show_late_bar("Plays (%)", total=100) as show:
+        playback = play_contact(plan, lambda share: show(round(100 * share)), partial(announce, hands_off=hands_off))
+    typer.echo(
+        json.dumps(summarise_contact(playback), indent=2)
+        if as_json
+        else "\n".join((str(out), *format_contact(playback)))
+    )

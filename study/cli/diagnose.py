@@ -80,19 +80,19 @@ def diagnose(
 
     Writes diagnosis.json, improved.toml, report.html and figures.
     """
-    from study.cli.progress import steps
+    from study.cli.progress import show_steps
     from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, find_answer, write_answer
-    from study.workflows.diagnosis.diagnosed_summary import answer_lines, file_lines, new_remarks, summary
+    from study.workflows.diagnosis.diagnosed_summary import format_answer, format_paths, list_new_remarks, make_json
 
     plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare)
     plan = replace(plan, seconds=seconds, discovery=discovery, effect_files=tuple(effect_file or ()))
     plan = replace(plan, force_constants=tuple(force_constant or ()))
-    with steps("Diagnosing") as show:
+    with show_steps("Diagnosing") as show:
         answer = find_answer(plan, show)
-    found = answer.findings
+    findings = answer.findings
     # Printed before drawing, because the page takes a while.
-    typer.echo(json.dumps(summary(found), indent=2) if as_json else "\n".join(answer_lines(found)))
-    with steps("Diagnosing") as show:
+    typer.echo(json.dumps(make_json(findings), indent=2) if as_json else "\n".join(format_answer(findings)))
+    with show_steps("Diagnosing") as show:
         complete = write_answer(answer, show)
     if not as_json:
-        typer.echo("\n".join((*new_remarks(complete.findings, found), *file_lines(out))))
+        typer.echo("\n".join((*list_new_remarks(complete.findings, findings), *format_paths(out))))

@@ -72,7 +72,7 @@ def doctor(
     --daily requires it: then this is announced, and confirmed in a terminal or by --hands-off."""
     from contextlib import nullcontext
 
-    from study.cli.progress import bar
+    from study.cli.progress import show_bar
     from study.workflows.checks.check_installation import this_terminal
     from study.workflows.checks.examine_setup import examine_setup
 
@@ -80,10 +80,10 @@ def doctor(
         _calibrate_sensor(calibrate_sensor, baud, keep)
         return
     _prepare(device, calibrate, daily, daily or accept is not None, hands_off)
-    with bar("Timing the loop (s)", total=timing) if timing else nullcontext(lambda done: None) as show:
+    with show_bar("Timing the loop (s)", total=timing) if timing else nullcontext(lambda result: None) as show:
         examination = examine_setup(device, data, timing, this_terminal(), on_progress=show)
     if as_json:
-        typer.echo(json.dumps(_document(examination), indent=2))
+        typer.echo(json.dumps(_make_document(examination), indent=2))
     else:
         _print_findings(examination)
     if accept is not None:
@@ -111,8 +111,8 @@ def _prepare(device: str, calibrate: bool, daily: bool, moves: bool, hands_off: 
 def _accept(device: str, examination: "Examination", operator: str, hands_off: bool) -> None:
     from study.workflows.checks.examine_setup import accept
 
-    with _show_motion(hands_off) as moving:
-        sentence = accept(device, examination, operator, moving)
+    with _show_motion(hands_off) as motion_callbacks:
+        sentence = accept(device, examination, operator, motion_callbacks)
     typer.echo(sentence, err=True)
 
 
@@ -123,12 +123,12 @@ def _check_today(device: str, examination: "Examination", as_json: bool, hands_o
     from study.workflows.checks.examine_setup import require_sensor
 
     require_sensor(examination)
-    with _show_motion(hands_off) as moving:
-        checked = check_today(device, moving)
+    with _show_motion(hands_off) as motion_callbacks:
+        checked = check_today(device, motion_callbacks)
     if not as_json:
         typer.echo("Daily check")
         for finding in checked.findings:
-            _say_one(finding)
+            _print_finding(finding)
     typer.echo(str(checked.file), err=as_json)
     if not all(finding.fine for finding in checked.findings):
         raise typer.Exit(ExitCode.DEVICE)
@@ -138,23 +138,23 @@ def _check_today(device: str, examination: "Examination", as_json: bool, hands_o
 def _show_motion(hands_off: bool) -> "Iterator[MotionCallbacks]":
     from functools import partial
 
-    from study.cli.progress import late_bar
+    from study.cli.progress import show_late_bar
     from study.workflows.checks.daily_check import MotionCallbacks, seconds_of_play
 
-    with late_bar("The device moves (s)", total=round(seconds_of_play())) as show:
+    with show_late_bar("The device moves (s)", total=round(seconds_of_play())) as show:
         yield MotionCallbacks(partial(announce, hands_off=hands_off), show)
 
 
 def _calibrate(device: str) -> None:
     from study.devices.opening import calibrate_device
 
-    where = "Bring the handle into its calibration position, as the device's manual shows, and leave it there"
-    typer.echo(f"{where} (within {CALIBRATION_S:g} s).", err=True)
+    instruction = "Bring the handle into its calibration position, as the device's manual shows, and leave it there"
+    typer.echo(f"{instruction} (within {CALIBRATION_S:g} s).", err=True)
     calibrate_device(device, CALIBRATION_S)
 
 
 def _calibrate_sensor(port: str, baud: int, keep: bool) -> None:
-    from study.devices.opening import calibrate_accelerometer, keep_accelerometer
+    from study.devices.opening import calibrate_accelerometer, save_accelerometer_calibration
 
     def lay_down(position: str, heard: tuple[float, float, float] | None) -> None:
         if heard is not None:
@@ -165,7 +165,7 @@ def _calibrate_sensor(port: str, baud: int, keep: bool) -> None:
 
     table = calibrate_accelerometer(port, baud, lay_down)
     if keep:
-        typer.echo(f"Written into {keep_accelerometer(table)}:", err=True)
+        typer.echo(f"Written into {save_accelerometer_calibration(table)}:", err=True)
     else:
         typer.echo("Put this into the device's file (docs/hardware.md), or do it again with --keep:", err=True)
     typer.echo(table)
@@ -182,26 +182,26 @@ def _print_findings(examination: "Examination") -> None:
         if findings:
             typer.echo(title)
         for finding in findings:
-            _say_one(finding)
-    typer.echo(_summary(examination.findings))
+            _print_finding(finding)
+    typer.echo(_summarise(examination.findings))
 
 
-def _summary(findings: "tuple[DeviceFinding, ...]") -> str:
+def _summarise(findings: "tuple[DeviceFinding, ...]") -> str:
     not_fine, warnings = sum(not finding.fine for finding in findings), sum(finding.warning for finding in findings)
     if not not_fine:
         return f"All {len(findings)} checks are fine."
-    which = f" {warnings} of them {'is a warning' if warnings == 1 else 'are warnings'}." if warnings else ""
-    return f"{not_fine} of {len(findings)} checks are not fine.{which}"
+    warning_note = f" {warnings} of them {'is a warning' if warnings == 1 else 'are warnings'}." if warnings else ""
+    return f"{not_fine} of {len(findings)} checks are not fine.{warning_note}"
 
 
-def _say_one(finding: "DeviceFinding") -> None:
+def _print_finding(finding: "DeviceFinding") -> None:
     verdict = "fine" if finding.fine else "WRONG" if finding.wrong else "WARN"
     typer.echo(f"  {verdict:<5}  {finding.name:<{NAME_WIDTH}}  {finding.value}")
     if finding.advice:
         typer.echo(f"         {'':<{NAME_WIDTH}}  {finding.advice}")
 
 
-def _document(examination: "Examination") -> dict[str, Any]:
+def _make_document(examination: "Examination") -> dict[str, Any]:
     timing = examination.timing
     document = {
         "fine": all(finding.fine for finding in examination.findings),

@@ -7,7 +7,7 @@ import typer
 
 
 def effect(
-    found: Annotated[
+    law_source: Annotated[
         Path,
         typer.Argument(metavar="FOUND", help="A diagnosis (file or folder) or a mechanical model with a law."),
     ],
@@ -18,7 +18,7 @@ def effect(
     it in other recordings, at every axis."""
     from study.workflows.diagnosis.effect_file import write_entry
 
-    entry = write_entry(found, out, number)
+    entry = write_entry(law_source, out, number)
     typer.echo(str(out))
     typer.echo(f"{entry.name}: {entry.law.text}, acts on {entry.law.acts_on}, found at {entry.law.axis}.")
     typer.echo(f"To look for it: hapteq diagnose REC.h5 --out FOLDER --effect-file {out}")

@@ -57,12 +57,12 @@ def equalize(
     _check_arguments(files, repeat, device, earlier)
     *models, trajectory = files
     plan = EqualizePlan(tuple(models), trajectory, out, at, weight, cap, constrain, physics)
-    found, lines = (
+    summary, lines = (
         _equalize_once(plan)
         if repeat is None or device is None
         else _play_repeatedly(plan, RepeatOrder(repeat, device, earlier, seed), hands_off)
     )
-    typer.echo(json.dumps(found, indent=2) if as_json else "\n".join((str(out), *lines)))
+    typer.echo(json.dumps(summary, indent=2) if as_json else "\n".join((str(out), *lines)))
 
 
 def _check_arguments(files: list[Path], repeat: int | None, device: str | None, earlier: Path | None) -> None:
@@ -86,8 +86,8 @@ def _equalize_once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ..
     from study.workflows.equalizer.equalize_trajectory import equalize_trajectory
     from study.workflows.equalizer.equalized_summary import summary, summary_lines
 
-    done = equalize_trajectory(plan)
-    return summary(done), summary_lines(done)
+    equalized = equalize_trajectory(plan)
+    return summary(equalized), summary_lines(equalized)
 
 
 def _play_repeatedly(
@@ -95,7 +95,7 @@ def _play_repeatedly(
 ) -> "tuple[dict[str, Any], tuple[str, ...]]":
     from functools import partial
 
-    from study.cli.progress import late_bar
+    from study.cli.progress import show_late_bar
     from study.workflows.equalizer.repeat_trajectory import (
         repeat_lines,
         repeat_summary,
@@ -103,6 +103,6 @@ def _play_repeatedly(
     )
 
     ask = partial(announce, hands_off=hands_off)
-    with late_bar("Plays", total=order.repeats + 1) as show:
-        done = repeat_trajectory(plan, order, lambda number, share: show(number + share), ask)
-    return repeat_summary(done), repeat_lines(done)
+    with show_late_bar("Plays", total=order.repeats + 1) as show:
+        repeated = repeat_trajectory(plan, order, lambda number, share: show(number + share), ask)
+    return repeat_summary(repeated), repeat_lines(repeated)

@@ -36,10 +36,10 @@ def export(
     from study.workflows.results.collect_sessions import collect_sessions
     from study.workflows.results.export_study import export_study
 
-    done = export_study(collect_sessions(data, protocol), data, out, form, free_text)
+    exported = export_study(collect_sessions(data, protocol), data, out, form, free_text)
     if as_json:
-        typer.echo(json.dumps({"out": str(done.out), "files": done.files, "trials": done.trials}, indent=2))
+        typer.echo(json.dumps({"out": str(exported.out), "files": exported.files, "trials": exported.trials}, indent=2))
         return
-    for remark in done.left_out:
+    for remark in exported.left_out:
         typer.echo(f"Left out: {remark}", err=True)
-    typer.echo(f"{done.out}: {done.trials} trials in {len(done.files)} files")
+    typer.echo(f"{exported.out}: {exported.trials} trials in {len(exported.files)} files")

@@ -1,4 +1,4 @@
-"""`hapteq export-controller`: a model's controller as C sources for a loop of one's own."""
+"""`hapteq export-controller`: a model's controller as C sources for a user's own control loop."""
 
 import json
 from pathlib import Path
@@ -40,5 +40,5 @@ def export_controller(
     exported = export_controller(ControllerPlan(model, out, transient, settings))
     for warning in warn_of_export(exported):
         typer.echo(f"Note: {warning}", err=True)
-    found = summarise_export(exported)
-    typer.echo(json.dumps(found, indent=2) if as_json else "\n".join(describe_export(exported)))
+    summary = summarise_export(exported)
+    typer.echo(json.dumps(summary, indent=2) if as_json else "\n".join(describe_export(exported)))

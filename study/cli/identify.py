@@ -44,7 +44,7 @@ def identify(
     as_json: JsonOption = False,
 ) -> None:
     """Fit a stable model to the band, test it on held-out data, and write it."""
-    from study.cli.progress import bar
+    from study.cli.progress import show_bar
     from study.workflows.equalizer.identified_summary import summary, summary_lines
     from study.workflows.equalizer.identify_model import IdentifyPlan, check_free, identify_model
     from study.workflows.equalizer.report_identification import report_identification
@@ -52,13 +52,13 @@ def identify(
     chosen_hz = _band(band, limit_from)
     plan = IdentifyPlan(tuple(recordings), out, chosen_hz, order, smooth, with_spring, physics, longest_decay)
     check_free(out)
-    with bar("Identifying (%)", total=100) as show:
+    with show_bar("Identifying (%)", total=100) as show:
         device = identify_model(plan, lambda share: show(round(100 * share)))
     typer.echo(json.dumps(summary(device), indent=2) if as_json else "\n".join((str(out), *summary_lines(device))))
     for remark in device.remarks:
         typer.echo(f"Note: {remark}", err=True)
     if report is not None:
-        with bar("Report (%)", total=100) as show:
+        with show_bar("Report (%)", total=100) as show:
             page = report_identification(device, report, lambda share: show(round(100 * share)))
         typer.echo(f"Report: {page}", err=True)
 
@@ -69,6 +69,6 @@ def _band(band: tuple[float, float], limit_from: Path | None) -> tuple[float, fl
         return band
     from study.workflows.equalizer.direction_limit import band_of_study
 
-    found = band_of_study(limit_from, band[0])
-    typer.echo(f"Note: {found.origin}", err=True)
-    return found.band_hz
+    limited_band = band_of_study(limit_from, band[0])
+    typer.echo(f"Note: {limited_band.origin}", err=True)
+    return limited_band.band_hz

@@ -26,24 +26,25 @@ def import_recording(
     Without a map, tables and arrays whose names say units are understood (time [s], fx [N], x_mm, ...), so are files
     that a shipped map fits, and hapteq recordings; for other files a map to be completed is printed.
     """
-    from study.cli.progress import late_bar
+    from study.cli.progress import show_late_bar
     from study.importing.map_format.map_errors import MapNeededError
     from study.workflows.recording.import_recording import ImportPlan, check_free
     from study.workflows.recording.import_recording import import_recording as run
 
     check_free(out)
     try:
-        with late_bar("Importing (%)", total=100) as show:
+        with show_late_bar("Importing (%)", total=100) as show:
             imported = run(ImportPlan(tuple(files), by_map, out), lambda share: show(round(100 * share)))
     except MapNeededError as error:
         typer.echo(error.skeleton, nl=False)
         raise
-    found = imported.recording
+    recording = imported.recording
     if as_json:
         facts = {
-            "recording": str(out), "map": imported.map, "sample_rate_hz": found.sample_rate_hz, "samples": len(found),
-            "command": list(found.command.channels), "response": list(found.response.channels),
-            "segments": len(found.segments), "notes": list(imported.notes),
+            "recording": str(out), "map": imported.map, "sample_rate_hz": recording.sample_rate_hz,
+            "samples": len(recording), "command": list(recording.command.channels),
+            "response": list(recording.response.channels), "segments": len(recording.segments),
+            "notes": list(imported.notes),
         }  # fmt: skip
         typer.echo(json.dumps(facts, indent=2))
     else:

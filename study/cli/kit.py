@@ -35,7 +35,7 @@ def draw(
     typer.echo(f"{len(labels)} recordings, {labels[0].recording} to {labels[-1].recording}: {out}")
     for change in CHANGES:
         number = f" Write down the number, in {change.unit}, where you know it." if change.unit else ""
-        typer.echo(f"  {change.name}: {change.how}{number}")
+        typer.echo(f"  {change.name}: {change.instruction}{number}")
 
 
 @app.command("seal")

@@ -22,65 +22,65 @@ def look(
 ) -> None:
     """Signals, spectra, coherence, levels and repeats; and checks of units, clock, derivatives, lags, clipping and
     steps. Exit code 0 also where something is wrong: that is a result."""
-    from study.cli.progress import late_bar
-    from study.workflows.recording.look_at_recordings import look_at, look_document, write_look
+    from study.cli.progress import show_late_bar
+    from study.workflows.recording.look_at_recordings import inspect_recordings, make_look_document, write_look_page
 
-    with late_bar("Looking (%)", total=100) as show:
-        found = look_at(recordings, lambda share: show(round(100 * share)))
+    with show_late_bar("Looking (%)", total=100) as show:
+        overviews = inspect_recordings(recordings, lambda share: show(round(100 * share)))
     if as_json:
-        typer.echo(json.dumps(look_document(found), indent=2))
+        typer.echo(json.dumps(make_look_document(overviews), indent=2))
     else:
-        for each in found:
-            say(look_lines(each, everything))
+        for overview in overviews:
+            print_lines(look_lines(overview, everything))
     if out is not None:
-        typer.echo(f"Report: {write_look(found, out)}", err=True)
+        typer.echo(f"Report: {write_look_page(overviews, out)}", err=True)
 
 
-def look_lines(found: "Overview", everything: bool) -> Iterable[str]:
+def look_lines(overview: "Overview", everything: bool) -> Iterable[str]:
     """Checks and measurements of one recording as lines; everything: also passed checks."""
-    from analysis.reports.look_report import brief
+    from analysis.reports.look_report import summarise_overview
     from study.tui.text_rows import wrap_hanging
 
-    yield brief(found)
-    yield from draw_recording_lines(found)
+    yield summarise_overview(overview)
+    yield from draw_recording_lines(overview)
     yield ""
-    for check in found.checks:
+    for check in overview.checks:
         if everything or check.level != "fine":
             yield from wrap_hanging(f"{check.level:6s}  {check.name}: {check.seen} {check.do}".rstrip(), 8, columns())
-    fine = sum(check.level == "fine" for check in found.checks)
+    fine = sum(check.level == "fine" for check in overview.checks)
     if not everything and fine:
         yield f"fine    {fine} further checks (--all shows them)"
     yield ""
 
 
-def draw_recording_lines(found: "Overview") -> Iterable[str]:
+def draw_recording_lines(overview: "Overview") -> Iterable[str]:
     """Time series, spectra, and tables of channels and segments."""
     from study.tui.drawing.recording_drawing import spectrum_lines, time_series_lines
 
     yield ""
-    for channel in found.channels:
+    for channel in overview.channels:
         yield from time_series_lines(channel)
-    if found.spectra is not None:
+    if overview.spectra is not None:
         yield ""
-        yield from spectrum_lines(found)
-    yield from ("", *_tables(found))
+        yield from spectrum_lines(overview)
+    yield from ("", *_tables(overview))
 
 
-def _tables(found: "Overview") -> Iterable[str]:
+def _tables(overview: "Overview") -> Iterable[str]:
     from analysis.wording import typeset
     from study.tui.text_rows import align_rows
 
     rows: list[tuple[str, ...]] = [("channel", "quantity", "unit", "lowest", "highest", "mean", "rms", "missing")]
-    for summary in found.summaries:
+    for summary in overview.summaries:
         sizes = [typeset(f"{value:.4g}") for value in (summary.lowest, summary.highest, summary.mean, summary.rms)]
         rows.append((f"{summary.role} {summary.name}", summary.quantity, summary.unit, *sizes, str(summary.missing)))
     yield from align_rows(tuple(rows), columns())
-    segments = found.recording.segments
+    segments = overview.recording.segments
     if segments:
         yield ""
-        heads = [f"rms {channel.role} {channel.name}" for channel in found.channels]
+        heads = [f"rms {channel.role} {channel.name}" for channel in overview.channels]
         table: list[tuple[str, ...]] = [("segment", "role", "start s", "length s", "period", *heads)]
-        for level in found.levels[:MOST_SEGMENTS]:
+        for level in overview.levels[:MOST_SEGMENTS]:
             sizes = [f"{value:.4g}" for value in level.rms]
             times = (f"{level.start_s:.4g}", f"{level.duration_s:.4g}", str(level.period) if level.period else "")
             table.append((f"{level.number} {level.kind}", level.role, *times, *sizes))
@@ -93,7 +93,7 @@ MOST_SEGMENTS = 20
 """Segments printed in the terminal; the page lists all."""
 
 
-def say(lines: Iterable[str]) -> None:
+def print_lines(lines: Iterable[str]) -> None:
     """Print lines; control characters from a file are removed."""
     from study.session.views.printable import printable_text
 

@@ -42,8 +42,8 @@ INTERRUPTED = StudyError(
 """Said after Ctrl-C where a command says nothing better."""
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(is_requested: bool) -> None:
+    if is_requested:
         from importlib.metadata import version
 
         typer.echo(f"hapteq {version('hapteq')}")
@@ -68,18 +68,18 @@ def main(arguments: list[str] | None = None) -> int:
             raise KeyboardInterrupt
         return code if isinstance(code, int) else ExitCode.DONE
     except StudyError as error:
-        say(error)
+        print_error(error)
         return error.exit_code
     except WrongCommandLine as error:
         error.show()
         return ExitCode.WRONG_USE
     except (KeyboardInterrupt, typer.Abort):
-        say(INTERRUPTED)
+        print_error(INTERRUPTED)
         return ExitCode.INTERRUPTED
     except BrokenPipeError:
         return ExitCode.ERROR
     except OSError as problem:
-        say(_system_error(problem))
+        print_error(_system_error(problem))
         return ExitCode.ERROR
 
 
@@ -96,9 +96,9 @@ def _settle_in() -> None:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 
-def say(error: StudyError) -> None:
+def print_error(error: StudyError) -> None:
     """Print an error on stderr: title, what happened, what is saved, what to do."""
-    parts = [as_typed(part) for part in (error.happened, error.saved, error.do_now)]
+    parts = [spell_commands(part) for part in (error.happened, error.saved, error.do_now)]
     try:
         sys.stderr.write(f"{error.title}\n" + "".join(f"  {part}\n" for part in parts if part))
         sys.stderr.flush()
@@ -106,7 +106,7 @@ def say(error: StudyError) -> None:
         sys.stderr = io.StringIO()
 
 
-def as_typed(sentence: str) -> str:
+def spell_commands(sentence: str) -> str:
     """Command names as they can be typed here: after `make study`, hapteq is not on the path."""
     started_as = Path(sys.argv[0])
     if shutil.which("hapteq") or started_as.name != "hapteq":
@@ -116,10 +116,10 @@ def as_typed(sentence: str) -> str:
 
 def _system_error(problem: OSError) -> StudyError:
     """The error for operating-system errors without a named one: missing rights, a full disk, a closed terminal."""
-    where = f" ({problem.filename})" if problem.filename else ""
+    file_note = f" ({problem.filename})" if problem.filename else ""
     return StudyError(
         "The system refused",
-        f"{problem.strerror or problem}{where}.",
+        f"{problem.strerror or problem}{file_note}.",
         "Check the permissions and the room on the disk, then run the command again.",
         saved="Everything reported as written so far is on disk.",
     )

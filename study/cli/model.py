@@ -21,7 +21,7 @@ def model(
 
     `auto` compares structures by their error on held-out data, and states the reason for its choice.
     """
-    from study.cli.progress import late_bar
+    from study.cli.progress import show_late_bar
     from study.workflows.diagnosis.fit_first_model import (
         FirstModelPlan,
         first_model_lines,
@@ -30,8 +30,8 @@ def model(
     )
 
     plan = FirstModelPlan(tuple(recordings), out, structure, tuple(force_constant or ()))
-    with late_bar("Model (%)", total=100) as show:
-        done = fit_first_model(plan, lambda share: show(round(100 * share)))
-    typer.echo(json.dumps(first_model_summary(done), indent=2) if as_json else "\n".join(first_model_lines(done)))
-    for remark in done.remarks:
+    with show_late_bar("Model (%)", total=100) as show:
+        fitted = fit_first_model(plan, lambda share: show(round(100 * share)))
+    typer.echo(json.dumps(first_model_summary(fitted), indent=2) if as_json else "\n".join(first_model_lines(fitted)))
+    for remark in fitted.remarks:
         typer.echo(f"Note: {remark}", err=True)

@@ -31,6 +31,6 @@ def write_note(folder: "SessionFolder", text: str, adverse: bool) -> None:
     from study.session.watching.requests import NoteAsked
     from study.workflows.views.take_note import take_note
 
-    written = take_note(folder, NoteAsked("experimenter", text, adverse), RealClock())
+    is_written = take_note(folder, NoteAsked("experimenter", text, adverse), RealClock())
     waits = f"The session writes it into the log of {folder.name} as soon as it looks."
-    typer.echo(f"Noted in {folder.name}." if written else waits, err=True)
+    typer.echo(f"Noted in {folder.name}." if is_written else waits, err=True)

@@ -1,4 +1,4 @@
-"""`hapteq power`: how many participants a study needs, by whole simulated studies."""
+"""`hapteq power`: power analysis of a protocol by Monte-Carlo simulation of whole studies."""
 
 import json
 import re
@@ -79,32 +79,34 @@ def power(
     as_json: JsonOption = False,
 ) -> None:
     """Simulate whole studies and count how often each analysis finds the difference. Run again, it continues."""
-    from study.cli.progress import bar
+    from study.cli.progress import show_bar
     from study.store.formats.protocol_files import read_study_protocol
     from study.workflows.cluster import cluster_workers
     from study.workflows.planning.simulate_power import PowerPlan, simulate_power
     from study.workflows.worker_processes import worker_processes
 
-    chosen = read_study_protocol(protocol, Path()).protocol
-    crowd = _with_habits(_crowd(chosen, threshold_n, effect_db), people, curve, lapse, chosen.trial.repeats_per_run)
-    crowd = replace(crowd, delivery=_delivery(delivered, crowd.frequencies_hz), rove_db=chosen.stimulus.rove_db)
+    loaded = read_study_protocol(protocol, Path()).protocol
+    crowd = _make_crowd(loaded, threshold_n, effect_db)
+    crowd = _add_habits(crowd, people, curve, lapse, loaded.trial.repeats_per_run)
+    crowd = replace(crowd, delivery=_read_delivery(delivered, crowd.frequencies_hz), rove_db=loaded.stimulus.rove_db)
     if compare:
-        _compare(crowd, chosen.staircase, studies, seed, as_json)
+        _print_comparison(crowd, loaded.staircase, studies, seed, as_json)
         return
-    sizes = sample_sizes(subjects)
-    plan = PowerPlan(crowd, chosen.staircase, sizes, studies, seed, chosen.analysis.contrast_hz)
+    sizes = parse_sample_sizes(subjects)
+    plan = PowerPlan(crowd, loaded.staircase, sizes, studies, seed, loaded.analysis.contrast_hz)
     title = f"{studies} studies of each of {len(sizes)} sizes"
     executor = worker_processes(workers) if scheduler is None else cluster_workers(scheduler)
-    with executor as pool, bar(title, total=studies * len(sizes)) as advance:
+    with executor as pool, show_bar(title, total=studies * len(sizes)) as advance:
         points = simulate_power(plan, out, pool, advance)
     if as_json:
         typer.echo(json.dumps([asdict(point) for point in points], indent=2))
         return
-    typer.echo("\n".join((*_table(points, plan), f"Figure: {out / 'figures' / 'power.png'}")))
+    typer.echo("\n".join((*_format_table(points, plan), f"Figure: {out / 'figures' / 'power.png'}")))
 
 
-def _compare(crowd: "Crowd", rule: "StaircaseRule", people: int, seed: int, as_json: bool) -> None:
-    """Print what each rule makes of the same people. Their habits, and what they feel, are left out."""
+def _print_comparison(crowd: "Crowd", rule: "StaircaseRule", people: int, seed: int, as_json: bool) -> None:
+    """Print bias, standard deviation and error of each rule on the same simulated people, without habits or
+    delivery."""
     from analysis.psychophysics.power.compare_rules import compare_rules, list_compared_rules
 
     results = compare_rules(crowd, list_compared_rules(rule), people, seed)
@@ -127,8 +129,8 @@ def _compare(crowd: "Crowd", rule: "StaircaseRule", people: int, seed: int, as_j
         )
 
 
-def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "Crowd":
-    """People whose median threshold is the same at all frequencies but the first of the pair that is compared."""
+def _make_crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "Crowd":
+    """Make a population with the same median threshold at all frequencies but the first of the compared pair."""
     from analysis.psychophysics.power.power_curve import find_judged_pair
     from analysis.psychophysics.power.simulated_study import Crowd
 
@@ -139,27 +141,27 @@ def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "
             f"{protocol.name} plays fewer than two frequencies.",
             "Choose a protocol with two or more in stimulus.frequencies_hz.",
         )
-    raised_n = threshold_n * 10.0 ** (effect_db / 20.0)
-    raised_hz, _ = find_judged_pair(frequencies_hz, protocol.analysis.contrast_hz)
-    return Crowd(frequencies_hz, tuple(raised_n if f == raised_hz else threshold_n for f in frequencies_hz))
+    higher_n = threshold_n * 10.0 ** (effect_db / 20.0)
+    higher_hz, _ = find_judged_pair(frequencies_hz, protocol.analysis.contrast_hz)
+    return Crowd(frequencies_hz, tuple(higher_n if f == higher_hz else threshold_n for f in frequencies_hz))
 
 
-def _table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str]:
+def _format_table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str]:
     from analysis.threshold_words import threshold_words
     from study.workflows.planning.simulate_power import power_lines
 
     first_hz, second_hz = plan.pair_hz
-    which = (
+    contrast_text = (
         "the declared contrast" if plan.contrast_hz else "the highest frequency and the lowest; no contrast is declared"
     )
-    compared = f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {which}."
+    compared = f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {contrast_text}."
     roved = [f"Levels roved by {plan.crowd.rove_db:g} dB, as the protocol says."] if plan.crowd.rove_db else []
     return [*power_lines(points, threshold_words(plan.rule).means), "", compared, *roved]
 
 
-def _delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":
-    """Levels and answers of a pilot study. Raises StudyError where the data do not determine the threshold at a
-    frequency."""
+def _read_delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":
+    """Read the delivery of a device from the sessions of a pilot study. Raises StudyError where the data do not
+    determine the threshold at a frequency."""
     if data is None:
         return None
     from analysis.psychophysics.power.felt_delivery import felt_delivery
@@ -167,9 +169,9 @@ def _delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDeli
     from study.participants.psychometric_curve import threshold_at
     from study.workflows.results.collect_sessions import collect_sessions
 
-    flawless = [threshold_at(MPS2_PER_N, frequency_hz) for frequency_hz in frequencies_hz]
+    ideal_thresholds = [threshold_at(MPS2_PER_N, frequency_hz) for frequency_hz in frequencies_hz]
     try:
-        return felt_delivery(collect_sessions(data).trials, frequencies_hz, flawless)
+        return felt_delivery(collect_sessions(data).trials, frequencies_hz, ideal_thresholds)
     except ValueError as problem:
         raise WrongUseError(
             "It is not known what the device delivers",
@@ -178,8 +180,9 @@ def _delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDeli
         ) from problem
 
 
-def _with_habits(crowd: "Crowd", people: str, curve: str, lapse: float, repeats: int) -> "Crowd":
-    """Population from the options. Raises WrongUseError for an unknown curve or kind of people."""
+def _add_habits(crowd: "Crowd", people: str, curve: str, lapse: float, repeats: int) -> "Crowd":
+    """Add the habits and the curve of the options to the population. Raises WrongUseError for an unknown curve or kind
+    of people."""
     from analysis.psychophysics.hierarchy.curve import Family
 
     habits: dict[str, Crowd] = {
@@ -188,19 +191,19 @@ def _with_habits(crowd: "Crowd", people: str, curve: str, lapse: float, repeats:
         "repeating": replace(crowd, unsure=0.5, repeats=repeats),
         "criterion-drift": replace(crowd, criterion_drift_sd=0.3),
     }
-    for option, name, known in (
+    for option, name, choices in (
         ("--people", people, list(habits)),
-        ("--curve", curve, [each.value for each in Family]),
+        ("--curve", curve, [curve_family.value for curve_family in Family]),
     ):
-        if name not in known:
+        if name not in choices:
             raise WrongUseError(
-                "There are no such people", f"{option} is {name}.", f"Choose one of {', '.join(known)}."
+                "There are no such people", f"{option} is {name}.", f"Choose one of {', '.join(choices)}."
             )
     return replace(habits[people], family=Family(curve), lapse=lapse)
 
 
-def sample_sizes(text: str) -> tuple[int, ...]:
-    """Sample sizes of "5:40:5": 5, 10 ... 40. Raises WrongUseError."""
+def parse_sample_sizes(text: str) -> tuple[int, ...]:
+    """Parse sample sizes: "5:40:5" gives 5, 10 ... 40. Raises WrongUseError."""
     parts = [int(part) for part in text.split(":")] if re.fullmatch(r"\d{1,4}(:\d{1,4}){0,2}", text) else []
     low = parts[0] if parts else 0
     high = parts[1] if len(parts) > 1 else low

@@ -20,7 +20,7 @@ from study.session.views.views import Question
 
 
 @contextmanager
-def answer_count(title: str) -> Iterator[Callable[[Question], None]]:
+def show_answer_count(title: str) -> Iterator[Callable[[Question], None]]:
     """Callback with the current run and trial of a simulated participant; the length of a staircase is unknown
     beforehand."""
     columns = (TextColumn("{task.description}"), TextColumn("{task.fields[where]}"), TimeElapsedColumn())
@@ -35,40 +35,40 @@ def answer_count(title: str) -> Iterator[Callable[[Question], None]]:
 
 
 @contextmanager
-def bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
+def show_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
     """Progress bar; the yielded function takes how much is done."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(file=sys.stderr)) as progress:
         task = progress.add_task(title, total=total)
-        yield lambda done: progress.update(task, completed=done)
+        yield lambda completed: progress.update(task, completed=completed)
 
 
 @contextmanager
-def late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
+def show_late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
     """Progress bar that is drawn only at the first progress, because something may have to be read or asked first."""
     with ExitStack() as stack:
 
         @cache
         def start_bar() -> Callable[[float], None]:
-            return stack.enter_context(bar(title, total))
+            return stack.enter_context(show_bar(title, total))
 
-        yield lambda done: start_bar()(done)
+        yield lambda completed: start_bar()(completed)
 
 
 @contextmanager
-def steps(title: str) -> Iterator[Callable[[str, float], None]]:
+def show_steps(title: str) -> Iterator[Callable[[str, float], None]]:
     """The yielded function takes the current step and the share that is done. Silent without a terminal."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    quiet = not sys.stderr.isatty()
+    is_silent = not sys.stderr.isatty()
     with ExitStack() as stack:
 
         @cache
         def start_bar() -> tuple[Progress, TaskID]:
-            progress = stack.enter_context(Progress(*columns, console=Console(file=sys.stderr), disable=quiet))
+            progress = stack.enter_context(Progress(*columns, console=Console(file=sys.stderr), disable=is_silent))
             return progress, progress.add_task(title, total=1.0)
 
-        def show(what: str, share: float) -> None:
+        def show(step_name: str, share: float) -> None:
             progress, task = start_bar()
-            progress.update(task, description=f"{title}: {what}", completed=share)
+            progress.update(task, description=f"{title}: {step_name}", completed=share)
 
         yield show

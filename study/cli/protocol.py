@@ -39,7 +39,7 @@ def show(
     """Every key of a protocol with its value, its default and the reason for it."""
     from protocols.document.explain import explain
     from protocols.document.hashing import protocol_hash
-    from study.session.stimulus.limits import forces_in_words
+    from study.session.stimulus.limits import describe_forces
     from study.store.formats.protocol_files import read_protocol
 
     file = read_protocol(name)
@@ -52,7 +52,7 @@ def show(
         typer.echo(json.dumps({"hash": protocol_hash(file.protocol), "fields": rows}, indent=2, default=str))
         return
     typer.echo(f"{file.protocol.title} (hash {protocol_hash(file.protocol)[:12]})")
-    typer.echo(f"Force at the handle: {forces_in_words(file.protocol.safety)}.")
+    typer.echo(f"Force at the handle: {describe_forces(file.protocol.safety)}.")
     for field in fields:
         typer.echo(f"\n{field.key} = {field.value}")
         typer.echo(f"    {field.description}")
@@ -64,9 +64,9 @@ def texts(
     language: Annotated[str, typer.Argument(help="en, de, es, or a file, which is checked first.")] = "en",
 ) -> None:
     """All texts that a participant reads, as a TOML file to translate, for [text] language in a protocol."""
-    from study.store.formats.participant_texts import language_template
+    from study.store.formats.participant_texts import make_language_template
 
-    typer.echo(language_template(language), nl=False)
+    typer.echo(make_language_template(language), nl=False)
 
 
 @app.command("lock")

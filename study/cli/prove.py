@@ -1,4 +1,4 @@
-"""`hapteq prove`: how often the diagnosis is right about physics that was concealed from it."""
+"""`hapteq prove`: blind test of the diagnosis on simulated devices with concealed effects or laws."""
 
 import json
 from collections.abc import Callable
@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.scheduler import SchedulerOption, cluster_if
+from study.cli.scheduler import SchedulerOption, connect_cluster
 from study.cli.seed import check_seed
 
 if TYPE_CHECKING:
     from study.evaluation.bank.seal_cases import BankPlan
     from study.evaluation.bank.sealed_bank import BankOptions
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
 def prove(
@@ -41,7 +41,7 @@ def prove(
     Writes proof.json, proof.csv and report.html. Interrupted, the same command continues.
     """
     from study.evaluation.bank.proof_summary import blind_test_lines, summary
-    from study.evaluation.bank.prove import prove as proved
+    from study.evaluation.bank.prove import prove as run_blind_test
     from study.evaluation.bank.seal_cases import BankPlan
     from study.evaluation.bank.sealed_bank import BankOptions
     from study.evaluation.bank.write_proof import write_proof, write_table
@@ -49,32 +49,32 @@ def prove(
     if laws and controls:
         raise typer.BadParameter("The bank of laws has no controls: leave --controls or --laws out.")
     plan = BankPlan(seed, cases, brief)
-    with cluster_if(scheduler) as cluster:
+    with connect_cluster(scheduler) as cluster:
         options = BankOptions(workers, keep, controls, cluster)
         if laws:
             _prove_laws(out, plan, options, table, as_json)
             return
-        done = _with_steps(lambda on_step: proved(out, plan, options, on_step))
-    write_proof(done)
+        proof = _run_with_steps(lambda on_step: run_blind_test(out, plan, options, on_step))
+    write_proof(proof)
     if table is not None:
-        write_table(table, done)
-    typer.echo(json.dumps(summary(done), indent=2) if as_json else "\n".join(blind_test_lines(done)))
+        write_table(table, proof)
+    typer.echo(json.dumps(summary(proof), indent=2) if as_json else "\n".join(blind_test_lines(proof)))
 
 
 def _prove_laws(out: Path, plan: "BankPlan", options: "BankOptions", table: Path | None, as_json: bool) -> None:
     from study.evaluation.bank.laws.prove_laws import prove_laws
-    from study.evaluation.bank.laws.write_laws import law_lines, law_summary, write_law_table, write_laws
+    from study.evaluation.bank.laws.write_laws import format_law_lines, format_law_summary, write_law_table, write_laws
 
-    done = _with_steps(lambda on_step: prove_laws(out, plan, options, on_step))
-    write_laws(done)
+    law_proof = _run_with_steps(lambda on_step: prove_laws(out, plan, options, on_step))
+    write_laws(law_proof)
     if table is not None:
-        write_law_table(table, done)
-    typer.echo(law_summary(done) if as_json else "\n".join(law_lines(done)))
+        write_law_table(table, law_proof)
+    typer.echo(format_law_summary(law_proof) if as_json else "\n".join(format_law_lines(law_proof)))
 
 
-def _with_steps(run: Callable[[Callable[[str, int, int], None]], Found]) -> Found:
-    """Shows what is being done."""
-    from study.cli.progress import steps
+def _run_with_steps(run: Callable[[Callable[[str, int, int], None]], Result]) -> Result:
+    """Run the test with a progress display. run: called with a callback (name of the step, its number, total)."""
+    from study.cli.progress import show_steps
 
-    with steps("Proving") as show:
-        return run(lambda what, done, of: show(f"{what} {done} of {of}", done / max(of, 1)))
+    with show_steps("Proving") as show:
+        return run(lambda step_name, step, total: show(f"{step_name} {step} of {total}", step / max(total, 1)))

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.scheduler import SchedulerOption, cluster_if
+from study.cli.scheduler import SchedulerOption, connect_cluster
 from study.cli.seed import check_seed
 
 
@@ -43,13 +43,13 @@ def real(
     import json
 
     from analysis.diagnosis.real_answer.real_answer import real_answer_to_json
-    from study.cli.progress import steps
+    from study.cli.progress import show_steps
     from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
     from study.evaluation.real.real_summary import real_lines
 
-    with cluster_if(scheduler) as cluster, steps("Real recordings") as show:
-        done = diagnose_folder(RealPlan(folder, out, seconds, inject, seed), show, executor=cluster)
+    with connect_cluster(scheduler) as cluster, show_steps("Real recordings") as show:
+        diagnosed = diagnose_folder(RealPlan(folder, out, seconds, inject, seed), show, executor=cluster)
     if as_json:
-        typer.echo(json.dumps([real_answer_to_json(answer) for answer in done.results.answers], indent=2))
+        typer.echo(json.dumps([real_answer_to_json(answer) for answer in diagnosed.results.answers], indent=2))
     else:
-        typer.echo("\n".join(real_lines(done)))
+        typer.echo("\n".join(real_lines(diagnosed)))

@@ -10,6 +10,8 @@ from study.cli.seed import check_seed
 from study.cli.session_options import DeviceOption, HandsOffOption
 from study.errors import WrongUseError
 
+ORIGIN_M = (0.0, 0.0, 0.0)
+
 
 def record(
     protocol: Annotated[
@@ -21,11 +23,9 @@ def record(
     ],
     out: Annotated[Path, typer.Option(help="The recording to write, REC.h5.")],
     device: DeviceOption = "simulated",
-    place: Annotated[tuple[float, float, float], typer.Option(help="Place in the workspace, x y z in metres.")] = (
-        0.0,
-        0.0,
-        0.0,
-    ),
+    place: Annotated[
+        tuple[float, float, float], typer.Option(help="Place in the workspace, x y z in metres.")
+    ] = ORIGIN_M,
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
     hands_off: HandsOffOption = False,
 ) -> None:
@@ -36,13 +36,13 @@ def record(
     """
     from functools import partial
 
-    from study.cli.progress import late_bar
+    from study.cli.progress import show_late_bar
     from study.store.formats.protocol_files import read_recording_protocol
-    from study.workflows.recording.record_device import RecordingPlan, check_free, record_device
+    from study.workflows.recording.record_device import RecordingPlan, record_device, require_free_output
 
     source = read_recording_protocol(protocol)
-    held = source.protocol.hand == "held"
-    if held and hands_off:
+    hand_on_handle = source.protocol.hand == "held"
+    if hand_on_handle and hands_off:
         raise WrongUseError(
             "Is a hand on the handle?",
             f"{protocol!r} is played into a hand, and --hands-off says that there is none.",
@@ -50,9 +50,11 @@ def record(
             saved="Nothing moved.",
         )
     plan = RecordingPlan(source.protocol, device=device, place_m=place, seed=seed, out=out)
-    check_free(out)
-    with late_bar(f"{source.protocol.title} (s)", total=round(plan.total_s)) as show:
-        written = record_device(plan, on_progress=show, before_moving=partial(announce, hands_off=hands_off, held=held))
-    typer.echo(str(written.path))
-    for warning in written.warnings:
+    require_free_output(out)
+    with show_late_bar(f"{source.protocol.title} (s)", total=round(plan.total_s)) as show:
+        recording = record_device(
+            plan, on_progress=show, before_moving=partial(announce, hands_off=hands_off, hand_on_handle=hand_on_handle)
+        )
+    typer.echo(str(recording.path))
+    for warning in recording.warnings:
         typer.echo(f"Note: {warning}", err=True)

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from study.cli.results import JsonOption, show
-from study.cli.scheduler import SchedulerOption, cluster_if
+from study.cli.results import JsonOption, print_results
+from study.cli.scheduler import SchedulerOption, connect_cluster
 from study.cli.seed import check_seed
 from study.cli.session_options import ModelOption, ProtocolOption, protocol_or_default
 
@@ -30,7 +30,7 @@ def rehearse(
     as_json: JsonOption = False,
 ) -> None:
     """Let simulated participants take the whole study, with its report. Interrupted, the same command continues."""
-    from study.cli.progress import bar
+    from study.cli.progress import show_bar
     from study.store.formats.protocol_files import read_study_protocol
     from study.workflows.results.analysis_files import ANALYSIS_NAME
     from study.workflows.results.analyze_data import analyze_data
@@ -43,6 +43,9 @@ def rehearse(
         source.protocol, source.text, subjects, seed, data=out, model=model, observer=observer, locked=source.locked
     )
     make_rehearsed_observer(rehearsal, 0)
-    with cluster_if(scheduler) as cluster, bar(f"{subjects} simulated participants", total=subjects) as advance:
+    with (
+        connect_cluster(scheduler) as cluster,
+        show_bar(f"{subjects} simulated participants", total=subjects) as advance,
+    ):
         rehearse_study(rehearsal, cluster or workers, advance)
-    show(analyze_data(out, out / ANALYSIS_NAME), as_json)
+    print_results(analyze_data(out, out / ANALYSIS_NAME), as_json)

@@ -27,17 +27,17 @@ def reproduce(
     import json
 
     from analysis.evaluation.reproduction.document import reproduction_to_json
-    from study.cli.progress import bar
+    from study.cli.progress import show_bar
     from study.evaluation.reproduction.reproduce_paper import reproduce_paper
     from study.evaluation.reproduction.reproduction_plan import ReproductionPlan
 
     plan = ReproductionPlan(out, subjects=subjects, seed=seed, workers=workers)
-    with bar("Reproduction (%)", total=100) as show:
-        written = reproduce_paper(plan, lambda share: show(round(100 * share)))
+    with show_bar("Reproduction (%)", total=100) as show:
+        reproduction = reproduce_paper(plan, lambda share: show(round(100 * share)))
     if as_json:
-        document = {"report": str(written.report), **reproduction_to_json(written.reproduction)}
+        document = {"report": str(reproduction.report), **reproduction_to_json(reproduction.reproduction)}
         typer.echo(json.dumps(document, indent=2))
     else:
-        for line in written.lines:
+        for line in reproduction.lines:
             typer.echo(line)
-    typer.echo(f"Report: {written.report}", err=True)
+    typer.echo(f"Report: {reproduction.report}", err=True)

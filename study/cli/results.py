@@ -11,18 +11,18 @@ from study.workflows.results.written_analysis import WrittenAnalysis
 JsonOption = Annotated[bool, typer.Option("--json", help="Results as one JSON document on stdout.")]
 
 
-def show(written: WrittenAnalysis, as_json: bool) -> None:
+def print_results(analysis: WrittenAnalysis, as_json: bool) -> None:
     """Print the results of a session or analysis."""
     if as_json:
         document = {
-            "thresholds": [asdict(threshold) for threshold in written.thresholds],
-            "warnings": list(written.warnings),
-            "report": str(written.report),
+            "thresholds": [asdict(threshold) for threshold in analysis.thresholds],
+            "warnings": list(analysis.warnings),
+            "report": str(analysis.report),
         }
         typer.echo(json.dumps(document, indent=2))
         return
-    for line in written.table:
+    for line in analysis.table:
         typer.echo(line)
-    for warning in written.warnings:
+    for warning in analysis.warnings:
         typer.echo(f"Note: {warning}", err=True)
-    typer.echo(f"Report: {written.report}", err=True)
+    typer.echo(f"Report: {analysis.report}", err=True)

@@ -33,9 +33,9 @@ def resume(
 
         open_screen(AppStart(str(data), device, answer_keys, Resume(session, device, str(data))), as_json)
         return
-    from study.cli.conduct import go_on
+    from study.cli.conduct import run_resumed_session
 
-    go_on(session, device=device, data=data, as_json=as_json, keys=answer_keys, hands_off=hands_off)
+    run_resumed_session(session, device=device, data=data, as_json=as_json, keys=answer_keys, hands_off=hands_off)
 
 
 def _is_simulated(session: str, data: Path) -> bool:

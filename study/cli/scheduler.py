@@ -18,7 +18,7 @@ SchedulerOption = Annotated[
 
 
 @contextmanager
-def cluster_if(scheduler: str | None) -> Iterator[Executor | None]:
+def connect_cluster(scheduler: str | None) -> Iterator[Executor | None]:
     """Connect to the scheduler's cluster; None without a scheduler. Raises StudyError where the cluster cannot be
     used."""
     if scheduler is None:

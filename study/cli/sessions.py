@@ -22,7 +22,7 @@ def sessions(
     as_json: JsonOption = False,
 ) -> None:
     """List all sessions, latest first: their status and progress."""
-    from study.workflows.views.list_sessions import session_lines
+    from study.workflows.views.view_home import session_lines
 
     lines = session_lines(data)
     if as_json:
@@ -31,32 +31,32 @@ def sessions(
     if not lines:
         typer.echo(f"No sessions in {data}. hapteq study begins one, hapteq rehearse makes simulated ones.", err=True)
         return
-    for text in _table(lines, remarks, columns()):
+    for text in _format_table(lines, remarks, columns()):
         typer.echo(text)
 
 
-def _table(lines: "tuple[SessionLine, ...]", remarks: bool, width: int | None) -> Iterator[str]:
+def _format_table(lines: "tuple[SessionLine, ...]", remarks: bool, width: int | None) -> Iterator[str]:
     from study.local_clock import machine_zone
     from study.session.views.local_time import local_column
     from study.tui.session_status import status_text
-    from study.tui.text_rows import lines_of_rows
+    from study.tui.text_rows import align_row_lines
 
-    offset, begun = local_column([line.begun_utc for line in lines], machine_zone)
+    offset, begun_texts = local_column([line.begun_utc for line in lines], machine_zone)
     header = ("session", "standing", f"begun ({offset})" if offset else "begun", "runs", "answers", "protocol")
     rows = [
         (
             line.name,
             status_text(line.standing),
-            when,
+            begun_text,
             f"{line.runs_done}/{line.runs}" if line.runs else "",
             str(line.answers) if line.runs else "",
             f"{line.protocol}{f' ({line.observer})' if line.observer else ''}",
         )
-        for line, when in zip(lines, begun, strict=True)
+        for line, begun_text in zip(lines, begun_texts, strict=True)
     ]
-    titles, *shown = lines_of_rows((header, *rows), width)
+    titles, *row_lines = align_row_lines((header, *rows), width)
     yield from titles
-    for line, texts in zip(lines, shown, strict=True):
+    for line, texts in zip(lines, row_lines, strict=True):
         yield from texts
         if remarks and line.remark:
             yield f"    {line.remark}"

@@ -20,7 +20,7 @@ PLOT_COLUMNS, PLOT_ROWS = 78, 12
 
 
 def show(
-    what: Annotated[
+    target: Annotated[
         str,
         typer.Argument(
             help="A session (its folder or name), a diagnosis (its file or folder), or a recording.", metavar="WHAT"
@@ -36,12 +36,12 @@ def show(
     from study.importing.arrays.json_arrays import is_own_document
     from study.store.disk.hdf5_file import is_hdf5
 
-    path = Path(what)
+    path = Path(target)
     foreign = path.is_file() and path.suffix.lower() in FOREIGN and not is_own_document(path)
     if foreign or (path.is_file() and is_hdf5(path)):
-        _show_recording(Path(what), as_json)
+        _show_recording(Path(target), as_json)
         return
-    document = Path(what) / "diagnosis.json" if (Path(what) / "diagnosis.json").is_file() else Path(what)
+    document = Path(target) / "diagnosis.json" if (Path(target) / "diagnosis.json").is_file() else Path(target)
     if document.is_file():
         from study.workflows.views.view_diagnosis import diagnosis_view
 
@@ -52,28 +52,39 @@ def show(
     from study.session.views.local_time import in_utc
     from study.workflows.views.view_session import session_view
 
-    session = session_view(_folder(what, data), in_utc if as_json else machine_zone)
+    session = session_view(_folder(target, data), in_utc if as_json else machine_zone)
     _print_lines([json.dumps(asdict(session), indent=2)] if as_json else _session_lines(session, log))
 
 
 def _show_recording(path: Path, as_json: bool) -> None:
-    from study.cli.look import draw_recording_lines, say
-    from study.workflows.recording.look_at_recordings import list_recording_facts, look_at, look_document
+    from study.cli.look import draw_recording_lines, print_lines
+    from study.workflows.recording.look_at_recordings import (
+        inspect_recordings,
+        list_recording_facts,
+        make_look_document,
+    )
 
-    found = look_at([path])
+    overviews = inspect_recordings([path])
     if as_json:
-        _print_lines([json.dumps(look_document(found)[0], indent=2)])
+        _print_lines([json.dumps(make_look_document(overviews)[0], indent=2)])
         return
-    say([*list_recording_facts(found[0]), *draw_recording_lines(found[0]), "", f"Its checks: hapteq look {path}"])
+    print_lines(
+        [
+            *list_recording_facts(overviews[0]),
+            *draw_recording_lines(overviews[0]),
+            "",
+            f"Its checks: hapteq look {path}",
+        ]
+    )
 
 
-def _folder(what: str, data: Path) -> Path:
+def _folder(target: str, data: Path) -> Path:
     """Folder of a session, also of one that was withdrawn or cannot be read: these can be shown too."""
-    from study.store.sessions.archive import find_session, session_folders
+    from study.store.sessions.archive import find_session, list_session_folders
 
-    folder = Path(what) if Path(what).is_dir() else data / what
-    known = [known.path.resolve() for known in session_folders(folder.absolute().parent)]
-    return folder if folder.resolve() in known else find_session(what, data).path
+    folder = Path(target) if Path(target).is_dir() else data / target
+    session_paths = [session.path.resolve() for session in list_session_folders(folder.absolute().parent)]
+    return folder if folder.resolve() in session_paths else find_session(target, data).path
 
 
 def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
@@ -91,14 +102,14 @@ def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
     if view.staircases:
         yield f"\n{LEGEND}"
     for staircase in view.staircases:
-        yield from _plot(staircase)
+        yield from _draw_plot(staircase)
     if log:
         yield from ("", *view.events)
     if view.report:
         yield f"\nReport: {view.report}"
 
 
-def _plot(staircase: "Staircase") -> Iterable[str]:
+def _draw_plot(staircase: "Staircase") -> Iterable[str]:
     from study.tui.drawing.staircase_drawing import staircase_lines, summary
 
     yield f"\n{staircase.title}"
@@ -110,7 +121,7 @@ def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
     from study.tui.text_rows import align_rows
 
     width = columns()
-    inside = None if width is None else width - 2
+    inner_width = None if width is None else width - 2
     yield view.verdict
     sections = (
         ("Effects", view.sentences),
@@ -122,7 +133,7 @@ def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
             yield from ("", title, *(f"  {sentence}" for sentence in sentences))
     for title, rows in (("Fit", view.fit), ("Mismatch", view.mismatch), ("What remains", view.remainder)):
         if rows:
-            yield from ("", title, *(f"  {row}" for row in align_rows(rows, inside)))
+            yield from ("", title, *(f"  {row}" for row in align_rows(rows, inner_width)))
     yield ""
     yield from view.notes
     if view.next_experiment:

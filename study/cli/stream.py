@@ -35,5 +35,5 @@ def stream(
             inbox.send(NoteAsked("program", text))
 
     typer.echo(f"Streaming {folder.name}; Ctrl-C ends it, and not the session.", err=True)
-    sent = stream_session(folder.log, outlet, on_marker=typer.echo, beside=SideTasks(note, signals.push))
-    typer.echo(f"{sent} markers and {signals.sent} ticks; the session is finished.", err=True)
+    marker_count = stream_session(folder.log, outlet, on_marker=typer.echo, side_tasks=SideTasks(note, signals.push))
+    typer.echo(f"{marker_count} markers and {signals.sent} ticks; the session is finished.", err=True)

@@ -42,17 +42,17 @@ def study(
     answer_keys, protocol = parse_keys(keys), protocol_or_default(protocol, model)
     if observer is None and not plain and has_screen():
         from study.tui.app.app_start import AppStart
-        from study.tui.engine.to_engine import Begin, SessionOrder
+        from study.tui.engine.to_engine import BeginSession, SessionOrder
 
         equalizer = "" if model is None else str(model)
         order = None if subject is None else SessionOrder(protocol, device, subject, str(data), seed, equalizer)
-        first = None if order is None else Begin(order)
+        first = None if order is None else BeginSession(order)
         open_screen(AppStart(str(data), device, answer_keys, first, protocol, seed, equalizer), as_json)
         return
-    from study.cli.conduct import SittingOptions, begin
+    from study.cli.conduct import SittingOptions, run_new_session
 
     if observer is None and not plain and not has_keys():
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
     sitter = SittingOptions(observer=observer, subject=subject, keys=answer_keys, hands_off=hands_off)
-    begin(sitter, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json, model=model)
+    run_new_session(sitter, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json, model=model)

@@ -48,7 +48,7 @@ def _plan_lines(study: "PlannedStudy", width: int | None) -> Iterator[str]:
     if study.plan.cells:
         header = ("order", "frequencies", "wanted", "done", "begun", "needed")
         rows = [
-            (str(place), order_words(cell), *map(str, (cell.wanted, cell.done, cell.begun, cell.needed)))
+            (str(place), order_words(cell), *map(str, (cell.required, cell.done, cell.begun, cell.needed)))
             for place, cell in enumerate(study.plan.cells, start=1)
         ]
         yield from align_rows((header, *rows), width)

@@ -17,17 +17,18 @@ def validate(
     from study.workflows.files.validate_apart import validate_files
     from study.workflows.files.validate_together import check_together
 
-    found = check_together(list(validate_files(files)))
+    validations = check_together(list(validate_files(files)))
     if as_json:
         rows = [
-            {"file": str(v.path), "kind": v.kind, "problems": list(v.problems), "notes": list(v.notes)} for v in found
+            {"file": str(v.path), "kind": v.kind, "problems": list(v.problems), "notes": list(v.notes)}
+            for v in validations
         ]
         typer.echo(json.dumps(rows, indent=2))
-    for validation in [] if as_json else found:
+    for validation in [] if as_json else validations:
         typer.echo(f"{validation.path}: {validation.kind}: {'not valid' if validation.problems else 'valid'}")
         for problem in validation.problems:
             typer.echo(f"  {problem}")
         for note in validation.notes:
             typer.echo(f"  Note: {note}")
-    if any(v.problems for v in found):
+    if any(v.problems for v in validations):
         raise typer.Exit(ExitCode.ERROR)

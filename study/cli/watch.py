@@ -1,4 +1,4 @@
-"""`hapteq watch`: the experimenter's view of a running session, and what can be asked of it from beside."""
+"""`hapteq watch`: the experimenter's view of a running session, and requests to it (stop, pause, notes)."""
 
 import json
 import sys
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from study.store.sessions.archive import SessionFolder
 
 LOG_NAME = "events.jsonl"
-"""As `study.store.sessions.event_log.LOG_NAME`, which is too heavy to load before the first frame."""
+"""Same as `study.store.sessions.event_log.LOG_NAME`, whose import would delay the first frame."""
 PLAIN_EVERY_S = 0.2
-"""Interval between two views in plain lines (s)."""
+"""Interval between two updates in plain lines (s)."""
 
 
 def watch(
@@ -36,7 +36,7 @@ def watch(
     as_json: Annotated[bool, typer.Option("--json", help="With --once: one JSON document on stdout.")] = False,
 ) -> None:
     """Follow a running session from a second terminal, without changing it; stop it, pause it, note something."""
-    folder = _folder(session or _last_changed(data), data)
+    folder = _find_folder(session or _find_last_changed(data), data)
     if stop or pause or note or adverse:
         _send_requests(folder, stop, pause, ((note, False), (adverse, True)))
     elif once or as_json:
@@ -47,7 +47,8 @@ def watch(
         _show_screen(folder)
 
 
-def _folder(session: str, data: Path) -> Path:
+def _find_folder(session: str, data: Path) -> Path:
+    """Find the session's folder by its path or name. Raises StudyError."""
     for path in (Path(session), data / session):
         if (path / LOG_NAME).is_file():
             return path.resolve()
@@ -56,7 +57,8 @@ def _folder(session: str, data: Path) -> Path:
     return find_session(session, data).path
 
 
-def _last_changed(data: Path) -> str:
+def _find_last_changed(data: Path) -> str:
+    """Name of the session whose log changed last. Raises WrongUseError without a session."""
     logs = sorted(data.glob(f"*/{LOG_NAME}"), key=lambda log: log.stat().st_mtime)
     if not logs:
         from study.errors import WrongUseError
@@ -81,6 +83,7 @@ def _show_screen(folder: Path) -> None:
 
 
 def _print_once(folder: Path, as_json: bool) -> None:
+    """Print the present state, as lines or JSON. Raises StudyError where the log is empty."""
     from dataclasses import asdict
 
     from study.devices.clock import RealClock
@@ -101,23 +104,24 @@ def _print_once(folder: Path, as_json: bool) -> None:
 
 
 def _follow_in_lines(folder: Path) -> None:
-    """Loop until the sitting is over."""
+    """Print changes as lines until the sitting is over."""
     from study.devices.clock import RealClock
-    from study.session.watching.watch_view import ON
+    from study.session.watching.watch_view import RUNNING_STATUSES
     from study.tui.watch.watch_lines import changes
     from study.workflows.views.watch_session import follow
 
-    clock, follower, before = RealClock(), follow(folder), None
-    while before is None or before.standing in ON:
+    clock, follower, previous_view = RealClock(), follow(folder), None
+    while previous_view is None or previous_view.standing in RUNNING_STATUSES:
         view = follower.look(clock.utc())
         if view is not None:
-            for line in changes(before, view):
+            for line in changes(previous_view, view):
                 typer.echo(line)
-            before = view
+            previous_view = view
         clock.sleep(PLAIN_EVERY_S)
 
 
 def _send_requests(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], ...]) -> None:
+    """Send the requests to the session, a stop first. notes: text, and whether it is an adverse event."""
     from study.cli.note import write_note
     from study.session.watching.requests import PauseAsked, StopAsked
     from study.store.sessions.archive import SessionFolder
@@ -125,15 +129,15 @@ def _send_requests(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str
     session = SessionFolder(folder)
     if stop:
         sentence = f"The force is off and the sitting ends. Continue with: hapteq resume {folder}"
-        _ask_for(session, StopAsked("experimenter"), sentence)
+        _send_request(session, StopAsked("experimenter"), sentence)
     for text, adverse in notes:
         if text:
             write_note(session, text, adverse)
     if pause:
-        _ask_for(session, PauseAsked("experimenter"), "Paused. The participant continues at their own screen.")
+        _send_request(session, PauseAsked("experimenter"), "Paused. The participant continues at their own screen.")
 
 
-def _ask_for(session: "SessionFolder", request: "Request", text: str) -> None:
+def _send_request(session: "SessionFolder", request: "Request", text: str) -> None:
     from study.devices.clock import RealClock
     from study.workflows.views.send_request import send_request
 

@@ -25,18 +25,18 @@ def withdraw(
     folder = session_to_withdraw(session, data)
     place = folder.path.parent
     plan = plan_withdrawal(folder)
-    made = ", ".join(str(place / name) for name in plan.derived_roots)
-    analysis = f", and the analysis in {made}" if made else ""
+    derived_paths = ", ".join(str(place / name) for name in plan.derived_roots)
+    analysis = f", and the analysis in {derived_paths}" if derived_paths else ""
     typer.echo(f"To be erased for good: {', '.join(plan.sessions)}{analysis}", err=True)
     for sentence in plan.doubtful:
         typer.echo(f"Not to be erased: {sentence}", err=True)
     if not yes and not typer.confirm("Erase them?", err=True):
         typer.echo("Nothing was erased.", err=True)
         return
-    elsewhere = copies_elsewhere(place, plan)
+    copy_notes = copies_elsewhere(place, plan)
     erase(place, plan, RealClock().utc())
     typer.echo(f"Erased: {', '.join(plan.sessions)}")
-    if made:
-        typer.echo(f"Erased too, because it was made from them: {made}. Run hapteq analyze again.", err=True)
-    for sentence in elsewhere:
+    if derived_paths:
+        typer.echo(f"Erased too, because it was made from them: {derived_paths}. Run hapteq analyze again.", err=True)
+    for sentence in copy_notes:
         typer.echo(sentence, err=True)

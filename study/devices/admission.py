@@ -140,24 +140,24 @@ def _check_info(info: DeviceInfo) -> None:
         ("sample_rate_hz", info.sample_rate_hz, *RATES_HZ),
         ("effective_mass_kg", info.effective_mass_kg, 1e-3, HEAVIEST_KG),
     )
-    for name, value, least, most in ranges:
-        if not least <= value <= most:
+    for name, value, lowest, highest in ranges:
+        if not lowest <= value <= highest:
             raise DeviceError(
                 "The device was not opened: it reports implausible properties",
-                f"'{info.name}' reports that its {name} is {value:g}; it must lie between {least:g} and {most:g}.",
+                f"'{info.name}' reports that its {name} is {value:g}; it must lie between {lowest:g} and {highest:g}.",
                 "Correct the device's driver or its settings.",
             )
 
 
 def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
     """Require force caps within the device's maximum and, unless lifted without a hand, within those for a hand."""
-    limits, beyond = settings.limits, settings.beyond_hand_ceiling
-    if beyond and settings.hand_on_handle:
+    limits, exceeds_hand_ceiling = settings.limits, settings.beyond_hand_ceiling
+    if exceeds_hand_ceiling and settings.hand_on_handle:
         raise _settings_error("beyond_hand_ceiling is set while a hand is on the handle.")
-    ceiling_n = info.max_force_n if beyond else min(info.max_force_n, HAND_TOTAL_CAP_N)
-    stimulus_ceiling_n = ceiling_n if beyond else min(ceiling_n, HAND_STIMULUS_CAP_N)
+    ceiling_n = info.max_force_n if exceeds_hand_ceiling else min(info.max_force_n, HAND_TOTAL_CAP_N)
+    stimulus_ceiling_n = ceiling_n if exceeds_hand_ceiling else min(ceiling_n, HAND_STIMULUS_CAP_N)
     _check_within("total_cap_n", limits.total_cap_n, ceiling_n)
-    _check_within("feedback_cap_n", limits.feedback_cap_n, ceiling_n if beyond else HAND_TOTAL_CAP_N)
+    _check_within("feedback_cap_n", limits.feedback_cap_n, ceiling_n if exceeds_hand_ceiling else HAND_TOTAL_CAP_N)
     _check_within("stimulus_cap_n", limits.stimulus_cap_n, min(stimulus_ceiling_n, limits.total_cap_n))
 
 
@@ -168,19 +168,19 @@ def _check_within(name: str, value: float, highest: float, *, zero: bool = False
         raise _settings_error(f"{name} is {value:g}; it must be {allowed} and at most {highest:g}.")
 
 
-def _settings_error(happened: str) -> DeviceError:
-    """Error for settings that are refused. happened: a sentence."""
+def _settings_error(problem: str) -> DeviceError:
+    """Error for settings that are refused. problem: a sentence."""
     return DeviceError(
         "The device was not opened: its limits are not safe",
-        happened,
+        problem,
         "Correct the [safety] and [spring] sections of the protocol.",
     )
 
 
-def _refusal(why: str) -> DeviceError:
-    """Error for a stimulus or commands that are refused. why: a clause without a full stop."""
+def _refusal(reason: str) -> DeviceError:
+    """Error for a stimulus or commands that are refused. reason: a clause without a full stop."""
     return DeviceError(
         "The device did not play this: it is not within the limits",
-        f"Nothing has moved. The stimulus was refused because {why}.",
+        f"Nothing has moved. The stimulus was refused because {reason}.",
         "Correct the protocol or the equalizer's model, or widen the protocol's limits if they are meant to be wider.",
     )

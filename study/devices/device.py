@@ -123,7 +123,7 @@ class Health:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Played:
+class PlaybackResult:
     """Recording and counters of the device between `hold` and `release`, or during `play`."""
 
     recording: Recording | None
@@ -172,7 +172,7 @@ class Device(Protocol):
         ...
 
     def keep_alive(self) -> None:
-        """Sign of life of the program. Without one for `watchdog_s` the force fades to zero and the fault is STALLED.
+        """Restart the watchdog. Without a call for `watchdog_s` the force fades to zero and the fault is STALLED.
 
         Also checks that the control loop responds: if it hangs, the force is switched off and the fault is LOST.
         """
@@ -186,7 +186,7 @@ class Device(Protocol):
         """Counters of the safety layer since `hold`, up to now. Fast, like `fault`."""
         ...
 
-    def release(self) -> Played:
+    def release(self) -> PlaybackResult:
         """Fade out, wait until no force acts, and return recording and counters. To be called after a fault as well.
 
         Does not raise for a lost device, so that the trial can be logged as void; the next `hold` or `play` does.
@@ -194,9 +194,9 @@ class Device(Protocol):
         """
         ...
 
-    def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
-        """Play commands once, for identification and recordings. Returns when all are played; gives its own signs of
-        life. `on_progress(share)` is called repeatedly with the share played so far, 0 to 1; an exception from it, or
+    def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> PlaybackResult:
+        """Play commands once, for identification and recordings. Returns when all are played; restarts the watchdog
+        itself. `on_progress(share)` is called repeatedly with the share played so far, 0 to 1; an exception from it, or
         Ctrl-C, ends the playing with a fade. Raises `DeviceError` for commands that are not within the limits, before
         anything moves, and for a lost device.
         """

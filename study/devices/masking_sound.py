@@ -18,7 +18,7 @@ Samples = NDArray[np.int16]
 Fill = Callable[[Any, int, Any, Any], None]
 """fill(out, frames, time, status): write the next samples into out (frames, 1). Called by the library's thread."""
 
-DO_NOW = (
+REMEDY = (
     "Install the extra (pip install '.[audio]'; on Linux also the package libportaudio2), connect a sound output and "
     "choose it as the system's default. To play the noise otherwise, say play = false in [masking] of the protocol."
 )
@@ -51,14 +51,14 @@ class MaskingSound:
     constructor raises `DeviceError` where there is no output."""
 
     def __init__(self, samples: Samples, rate_hz: int, open_stream: Callable[[int, Fill], tuple[Stream, str]]) -> None:
-        self._samples, self._next = samples, 0
+        self._samples, self._next_sample = samples, 0
         self._playing = False
         with _as_device_error("cannot be played"):
             self._stream, self.output = open_stream(rate_hz, self._fill)
 
     def start(self) -> None:
         """Play from the beginning. Raises `DeviceError`."""
-        self._next = 0
+        self._next_sample = 0
         with _as_device_error("cannot be played"):
             self._stream.start()
             self._playing = True
@@ -73,11 +73,11 @@ class MaskingSound:
     def stop(self) -> bool:
         """Stop at once and drop the buffered samples. Returns whether the noise was started and not stopped before.
         Never raises."""
-        played, self._playing = self._playing, False
-        if played:
+        was_playing, self._playing = self._playing, False
+        if was_playing:
             with contextlib.suppress(Exception):
                 self._stream.abort()
-        return played
+        return was_playing
 
     def close(self) -> None:
         """Stop and release the output. Never raises."""
@@ -85,11 +85,11 @@ class MaskingSound:
         with contextlib.suppress(Exception):
             self._stream.close()
 
-    def _fill(self, out: Any, frames: int, time: Any, status: Any) -> None:
+    def _fill(self, buffer: Any, frames: int, time: Any, status: Any) -> None:
         """Write the next samples, continuing at the beginning after the last one."""
-        places = (self._next + np.arange(frames)) % len(self._samples)
-        out[:, 0] = self._samples[places]
-        self._next = (self._next + frames) % len(self._samples)
+        sample_indices = (self._next_sample + np.arange(frames)) % len(self._samples)
+        buffer[:, 0] = self._samples[sample_indices]
+        self._next_sample = (self._next_sample + frames) % len(self._samples)
 
 
 def open_stream(rate_hz: int, fill: Fill) -> tuple[Stream, str]:
@@ -102,10 +102,10 @@ def open_stream(rate_hz: int, fill: Fill) -> tuple[Stream, str]:
 
 
 @contextlib.contextmanager
-def _as_device_error(happened: str) -> Iterator[None]:
+def _as_device_error(symptom: str) -> Iterator[None]:
     """Context that converts any exception to a `DeviceError`, because the library's errors have no common class."""
     try:
         yield
     except Exception as error:
         reason = str(error) or type(error).__name__
-        raise DeviceError(f"The masking noise {happened}", f"{reason}.", DO_NOW) from error
+        raise DeviceError(f"The masking noise {symptom}", f"{reason}.", REMEDY) from error

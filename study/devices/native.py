@@ -32,101 +32,103 @@ _CLOCK_MONOTONIC, _TIMER_ABSTIME, _INTERRUPTED = 1, 1, 4
 """Constants of Linux (time.h, errno.h)."""
 
 
-def _caller(result: Any) -> Any:
+def _make_caller(result: Any) -> Any:
     """Make a numba function call(address, arguments) that calls the C function at an address. result: numba type of its
     return value; arguments: a tuple."""
 
     @_intrinsic
     def call(context: Any, address: Any, arguments: Any) -> Any:
-        def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            given = _cgutils.unpack_tuple(builder, values[1])
-            kind = ir.FunctionType(_context.get_value_type(result), [each.type for each in given])
-            return builder.call(builder.inttoptr(values[0], kind.as_pointer()), given)
+        def generate_code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            c_arguments = _cgutils.unpack_tuple(builder, values[1])
+            function_type = ir.FunctionType(
+                _context.get_value_type(result), [argument.type for argument in c_arguments]
+            )
+            return builder.call(builder.inttoptr(values[0], function_type.as_pointer()), c_arguments)
 
-        return result(types.int64, arguments), code
+        return result(types.int64, arguments), generate_code
 
     return call
 
 
-call_int = _caller(types.int32)
+call_int = _make_caller(types.int32)
 """call_int(address, arguments): call a C function that returns an int."""
-call_float = _caller(types.float64)
+call_float = _make_caller(types.float64)
 """call_float(address, arguments): call a C function that returns a double."""
 
 
-def _room(words: int) -> Any:
-    """Make a numba function that reserves this many words of 8 bytes on the stack and returns their address."""
+def _make_stack_allocator(words: int) -> Any:
+    """Make a numba function that allocates `words` words of 8 bytes on the stack and returns their address."""
 
     @_intrinsic
-    def room(context: Any) -> Any:
-        def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            place = _cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), words), zfill=True)
-            return builder.ptrtoint(place, ir.IntType(64))
+    def allocate(context: Any) -> Any:
+        def generate_code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            pointer = _cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), words), zfill=True)
+            return builder.ptrtoint(pointer, ir.IntType(64))
 
-        return types.int64(), code
+        return types.int64(), generate_code
 
-    return room
+    return allocate
 
 
-room_for_2, room_for_16 = _room(2), _room(16)
+allocate_2_words, allocate_16_words = _make_stack_allocator(2), _make_stack_allocator(16)
 """Return the address of 2 or 16 words of 8 bytes on the stack of the calling function: zero at the start of that
 function, and invalid after its end."""
 
 
 @_intrinsic
-def word(context: Any, address: Any, place: Any) -> Any:
-    """Read the 64-bit word with index `place` of an array at `address`."""
+def read_word(context: Any, address: Any, index: Any) -> Any:
+    """Read the 64-bit word with index `index` of an array at `address`."""
 
-    def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    def generate_code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
         start = builder.inttoptr(values[0], ir.IntType(64).as_pointer())
         return builder.load(builder.gep(start, [values[1]]))
 
-    return types.int64(types.int64, types.int64), code
+    return types.int64(types.int64, types.int64), generate_code
 
 
 @_intrinsic
-def set_word(context: Any, address: Any, place: Any, value: Any) -> Any:
-    """Write the 64-bit word with index `place` of an array at `address`."""
+def write_word(context: Any, address: Any, index: Any, value: Any) -> Any:
+    """Write the 64-bit word with index `index` of an array at `address`."""
 
-    def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    def generate_code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
         start = builder.inttoptr(values[0], ir.IntType(64).as_pointer())
         builder.store(values[2], builder.gep(start, [values[1]]))
         return _context.get_dummy_value()
 
-    return types.void(types.int64, types.int64, types.int64), code
+    return types.void(types.int64, types.int64, types.int64), generate_code
 
 
 @part
 def now_s(system: Addresses) -> float:
-    """Monotonic time (s), equal to that of `time.monotonic` to the last bit."""
+    """Monotonic time (s), bit for bit equal to `time.monotonic`."""
     if system[CLOCK] == 0:
         return float(call_float(system[MONOTONIC], ()))
-    time_now = room_for_2()
+    time_now = allocate_2_words()
     call_int(system[CLOCK], (np.int32(_CLOCK_MONOTONIC), time_now))
-    seconds, beyond_ns = word(time_now, 0), word(time_now, 1)
-    if beyond_ns == 0:
+    seconds, nanoseconds = read_word(time_now, 0), read_word(time_now, 1)
+    if nanoseconds == 0:
         return float(seconds)
-    return float(seconds * 1_000_000_000 + beyond_ns) / 1e9
+    return float(seconds * 1_000_000_000 + nanoseconds) / 1e9
 
 
 @part
 def sleep_until(system: Addresses, until_s: float) -> None:
     """Sleep until until_s (s, by `now_s`); resumed after interruptions by signals. To be called only where
     `system[SLEEP]` is not 0."""
-    until = room_for_2()
-    whole_s = int(until_s)
-    set_word(until, 0, whole_s)
-    set_word(until, 1, int((until_s - whole_s) * 1e9))
-    asked = (np.int32(_CLOCK_MONOTONIC), np.int32(_TIMER_ABSTIME), until, np.int64(0))
-    while call_int(system[SLEEP], asked) == _INTERRUPTED:
+    wake_time = allocate_2_words()
+    whole_seconds = int(until_s)
+    write_word(wake_time, 0, whole_seconds)
+    write_word(wake_time, 1, int((until_s - whole_seconds) * 1e9))
+    arguments = (np.int32(_CLOCK_MONOTONIC), np.int32(_TIMER_ABSTIME), wake_time, np.int64(0))
+    while call_int(system[SLEEP], arguments) == _INTERRUPTED:
         pass
 
 
 @part
 def acquire(system: Addresses, patience_s: float) -> bool:
     """Take the lock at `system[LOCK]`. Returns False where it was not free within patience_s (s)."""
-    asked = (system[LOCK], np.int64(patience_s * 1e6), np.int32(0))
-    return bool(call_int(system[ACQUIRE], asked) == 1)
+    arguments = (system[LOCK], np.int64(patience_s * 1e6), np.int32(0))
+    return bool(call_int(system[ACQUIRE], arguments) == 1)
 
 
 @part
@@ -144,9 +146,9 @@ class SharedLock:
         interpreter.PyThread_allocate_lock.restype = ctypes.c_void_p
         self.address = int(interpreter.PyThread_allocate_lock())
         # As CFUNCTYPE functions, which release the interpreter lock while they wait, unlike those of `pythonapi`.
-        take = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_longlong, ctypes.c_int)
-        self._acquire = take(address_of(interpreter.PyThread_acquire_lock_timed))
-        self._release = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address_of(interpreter.PyThread_release_lock))
+        acquire_type = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_longlong, ctypes.c_int)
+        self._acquire = acquire_type(find_address(interpreter.PyThread_acquire_lock_timed))
+        self._release = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(find_address(interpreter.PyThread_release_lock))
 
     def acquire(self, patience_s: float) -> bool:
         """Take the lock. Returns False where it was not free within patience_s (s)."""
@@ -167,7 +169,7 @@ _monotonic = ctypes.CFUNCTYPE(ctypes.c_double)(time.monotonic)
 """Clock for systems whose own is not used: `time.monotonic` as a C function, which takes the interpreter lock."""
 
 
-def address_of(function: Any) -> int:
+def find_address(function: Any) -> int:
     """Address of a function of a loaded library; 0 for a null pointer."""
     return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
 
@@ -176,11 +178,11 @@ def system_calls(lock: SharedLock) -> Addresses:
     """(SYSTEM_SIZE,): addresses of the functions for clock, sleep and lock, and of the lock itself, for compiled code.
     CLOCK and SLEEP are 0 except on Linux with its usual monotonic clock."""
     calls = np.zeros(SYSTEM_SIZE, dtype=np.int64)
-    calls[MONOTONIC] = address_of(_monotonic)
+    calls[MONOTONIC] = find_address(_monotonic)
     if sys.platform == "linux" and time.get_clock_info("monotonic").implementation == "clock_gettime(CLOCK_MONOTONIC)":
         system = ctypes.CDLL(None)
-        calls[CLOCK], calls[SLEEP] = address_of(system.clock_gettime), address_of(system.clock_nanosleep)
-    calls[ACQUIRE] = address_of(ctypes.pythonapi.PyThread_acquire_lock_timed)
-    calls[RELEASE] = address_of(ctypes.pythonapi.PyThread_release_lock)
+        calls[CLOCK], calls[SLEEP] = find_address(system.clock_gettime), find_address(system.clock_nanosleep)
+    calls[ACQUIRE] = find_address(ctypes.pythonapi.PyThread_acquire_lock_timed)
+    calls[RELEASE] = find_address(ctypes.pythonapi.PyThread_release_lock)
     calls[LOCK] = lock.address
     return calls

@@ -22,9 +22,9 @@ from protocols.definition.staircase_rule import STRICT
 from study.errors import DeviceError
 
 PATIENCE_S = 0.05
-"""Longest wait for a pulse (s); a working line takes well below a millisecond."""
+"""Timeout of a pulse (s); a working line needs well below a millisecond."""
 
-CLAIM, WRITE_DATA, RELEASE = 0x708B, 0x40017086, 0x708C
+CLAIM_PORT, WRITE_DATA, RELEASE_PORT = 0x708B, 0x40017086, 0x708C
 """Requests (ioctl) of Linux' parallel port driver: PPCLAIM, PPWDATA and PPRELEASE of linux/ppdev.h."""
 
 
@@ -74,8 +74,8 @@ class PulseSettings:
     @property
     def words(self) -> str:
         """Description of the line for the log."""
-        how = {"serial-byte": f"byte {self.code}", "serial-dtr": "DTR", "serial-rts": "RTS"}
-        return f"{how.get(self.kind, f'data lines {self.code}')} of {self.port}"
+        carriers = {"serial-byte": f"byte {self.code}", "serial-dtr": "DTR", "serial-rts": "RTS"}
+        return f"{carriers.get(self.kind, f'data lines {self.code}')} of {self.port}"
 
 
 class OnsetLine:
@@ -90,7 +90,7 @@ class OnsetLine:
         self._settings = settings
         self._open_line = open_line
         self._line = line
-        self._asked: SimpleQueue[SimpleQueue[Pulse] | None] = SimpleQueue()
+        self._requests: SimpleQueue[SimpleQueue[Pulse] | None] = SimpleQueue()
         self._busy = threading.Lock()
         self._thread = threading.Thread(target=self._run_thread, name="onset line", daemon=True)
         self._thread.start()
@@ -99,48 +99,48 @@ class OnsetLine:
         """Send a pulse, and wait at most `PATIENCE_S` until the driver has accepted it. A lost pulse states its
         reason."""
         if self._busy.locked():
-            return self._lost_pulse("the previous pulse has not been finished")
+            return self._make_lost_pulse("the previous pulse has not been finished")
         answer: SimpleQueue[Pulse] = SimpleQueue()
-        self._asked.put(answer)
+        self._requests.put(answer)
         try:
             return answer.get(timeout=PATIENCE_S)
         except Empty:
-            return self._lost_pulse(f"the line accepted none within {1000 * PATIENCE_S:g} ms")
+            return self._make_lost_pulse(f"the line accepted none within {1000 * PATIENCE_S:g} ms")
 
     def close(self) -> None:
         """Lower and close the line; waits at most 1 s for its thread. Never raises."""
-        self._asked.put(None)
+        self._requests.put(None)
         self._thread.join(1.0)
 
     def _run_thread(self) -> None:
-        while (answer := self._asked.get()) is not None:
+        while (answer := self._requests.get()) is not None:
             with self._busy:
-                self._hand_over(answer)
-        self._hang_up()
+                self._send_pulse(answer)
+        self._close_line()
 
-    def _hand_over(self, answer: SimpleQueue[Pulse]) -> None:
+    def _send_pulse(self, answer: SimpleQueue[Pulse]) -> None:
         """Raise the line, put the result into `answer`, and lower the line after `width_s`."""
         try:
             self._line = self._line or self._open_line(self._settings)
             self._line.raise_level()
         except Exception as problem:  # noqa: BLE001 - a trial goes on without its pulse for any error of a driver
-            answer.put(self._lost_pulse(str(problem) or type(problem).__name__))
-            self._hang_up()
+            answer.put(self._make_lost_pulse(str(problem) or type(problem).__name__))
+            self._close_line()
             return
         answer.put(Pulse(self._settings.words, time.monotonic()))
         time.sleep(self._settings.width_s)
         with contextlib.suppress(Exception):  # a failure shows at the next pulse
             self._line.lower_level()
 
-    def _hang_up(self) -> None:
+    def _close_line(self) -> None:
         """Lower and close the line, if it is open, and ignore errors."""
         line, self._line = self._line, None
         if line is not None:
-            for last in (line.lower_level, line.close):
+            for shut_down in (line.lower_level, line.close):
                 with contextlib.suppress(Exception):
-                    last()
+                    shut_down()
 
-    def _lost_pulse(self, trouble: str) -> Pulse:
+    def _make_lost_pulse(self, trouble: str) -> Pulse:
         return Pulse(self._settings.words, None, trouble)
 
 
@@ -222,7 +222,7 @@ class _Parallel:
         self._code = settings.code
         self._file = Path(settings.port).open("r+b", buffering=0)  # noqa: SIM115 - open as long as the line is
         try:
-            self._control(CLAIM, None)
+            self._control(CLAIM_PORT, None)
         except OSError:
             self._file.close()
             raise
@@ -235,7 +235,7 @@ class _Parallel:
 
     def close(self) -> None:
         with contextlib.suppress(OSError):
-            self._control(RELEASE, None)
+            self._control(RELEASE_PORT, None)
         self._file.close()
 
     def _control(self, request: int, value: int | None) -> None:

@@ -118,7 +118,7 @@ def _check_hand(name: str, info: DeviceInfo, settings: DeviceSettings) -> None:
 
 
 @contextlib.contextmanager
-def linkage_of(name: str) -> "Iterator[LinkageSource]":
+def open_linkage(name: str) -> "Iterator[LinkageSource]":
     """Context with the source of a device's linkage: joint angles, Jacobian and inertia by position. Nothing moves, and
     a real device stays braked. Raises `DeviceError`."""
     if name in REAL:
@@ -127,7 +127,7 @@ def linkage_of(name: str) -> "Iterator[LinkageSource]":
         with vendor_linkage(name) as linkage:
             yield linkage
     elif name == SIMULATED:
-        from study.devices.simulated.own_linkage import make_simulated_linkage
+        from study.devices.simulated.simulated_linkage import make_simulated_linkage
 
         yield make_simulated_linkage()
     else:
@@ -150,7 +150,7 @@ def _unknown_device(name: str) -> DeviceError:
     )
 
 
-def telemetry_of(path: str) -> "TelemetryReader":
+def open_telemetry(path: str) -> "TelemetryReader":
     """Reader of the telemetry ring of a running loop. path: of the ring. Raises `StudyError` where the loop has ended
     or its ring cannot be read."""
     from study.devices.telemetry import TelemetryReader
@@ -158,7 +158,7 @@ def telemetry_of(path: str) -> "TelemetryReader":
     return TelemetryReader(Path(path))
 
 
-def onset_line() -> "OnsetLine | None":
+def find_onset_line() -> "OnsetLine | None":
     """Open the line for onset pulses that the lab's file names; None where it names none. Raises `DeviceError`."""
     from study.devices.force_dimension.lab import read_lab
     from study.devices.onset_line import open_onset_line
@@ -167,7 +167,7 @@ def onset_line() -> "OnsetLine | None":
     return None if settings is None else open_onset_line(settings)
 
 
-def masking_sound(samples: "Samples", rate_hz: int) -> "MaskingSound":
+def make_masking_sound(samples: "Samples", rate_hz: int) -> "MaskingSound":
     """Masking noise: `samples`, repeated on the system's sound output, not yet started. Raises `DeviceError` where
     there is no sound output."""
     from study.devices.masking_sound import MaskingSound, open_stream
@@ -183,11 +183,11 @@ def raise_thread_priority() -> AbstractContextManager[object]:
     return real_time_class()
 
 
-def loop_priority() -> DeviceFinding:
+def check_loop_priority() -> DeviceFinding:
     """Finding on whether the system grants real-time priority to this account's loops."""
-    from study.devices.drive.real_time_class import real_time_finding
+    from study.devices.drive.real_time_class import check_real_time_rights
 
-    return real_time_finding()
+    return check_real_time_rights()
 
 
 def examine_device(name: str) -> tuple[DeviceFinding, ...]:
@@ -210,21 +210,21 @@ def calibrate_device(name: str, patience_s: float) -> None:
 
 
 def calibrate_accelerometer(
-    port: str, baud: int, before_each: Callable[[str, tuple[float, float, float] | None], None]
+    port: str, baud: int, await_position: Callable[[str, tuple[float, float, float] | None], None]
 ) -> str:
     """Calibrate an accelerometer by gravity in six positions (`six_positions.calibrate_on_table`). Returns the table
     for the lab's file, as TOML. Raises `DeviceError`."""
     from study.devices.accelerometer.six_positions import calibrate_on_table
 
-    return calibrate_on_table(port, baud, before_each)
+    return calibrate_on_table(port, baud, await_position)
 
 
-def keep_accelerometer(table: str) -> Path:
+def save_accelerometer_calibration(table: str) -> Path:
     """Write the table of an accelerometer's calibration into the lab's file. Raises `DeviceError`, and then leaves the
     file unchanged."""
-    from study.devices.force_dimension.lab import keep_sensor
+    from study.devices.force_dimension.lab import write_sensor_table
 
-    return keep_sensor(table)
+    return write_sensor_table(table)
 
 
 def lab_file_path() -> Path:
@@ -279,14 +279,15 @@ def accept_device(
         require_testable(rig)
         device = SafeDevice(rig, settings, clock)
         with contextlib.closing(device):
-            most_given_n = check_cap_holds(device, rig)
-            gone_after_s = check_force_vanishes(device, rig)
+            largest_force_n = check_cap_holds(device, rig)
+            force_off_after_s = check_force_vanishes(device, rig)
     finally:
         rig.close()
     today, info = clock.utc()[:10], device.info
-    tried = FORCE_N, gone_after_s, COMMANDED_TO_CAP * FORCE_N, most_given_n
-    path = write_acceptance(Acceptance(info.name, info.details, operator, today, *tried, *baseline))
+    test_results = FORCE_N, force_off_after_s, COMMANDED_TO_CAP * FORCE_N, largest_force_n
+    path = write_acceptance(Acceptance(info.name, info.details, operator, today, *test_results, *baseline))
     return (
         f"{info.name}: of {COMMANDED_TO_CAP * FORCE_N:g} N that were commanded with a cap of {FORCE_N:g} N it gave "
-        f"{most_given_n:.2g} N; a force of {FORCE_N:g} N was gone {1000 * gone_after_s:.0f} ms after the loop; {path}"
+        f"{largest_force_n:.2g} N; a force of {FORCE_N:g} N was gone {1000 * force_off_after_s:.0f} ms after the loop; "
+        f"{path}"
     )

@@ -112,16 +112,16 @@ class OwnClockSensor(Protocol):
         ...
 
 
-def no_buttons() -> frozenset[int]:
+def read_no_buttons() -> frozenset[int]:
     """Pressed buttons of a device without buttons: always empty."""
     return frozenset()
 
 
-def no_hand(on_handle: bool) -> None:
+def ignore_hand(on_handle: bool) -> None:
     """`CompiledRig.simulate_hand` of a device without a simulated hand: does nothing."""
 
 
-def not_prepared(rows: FloatArray, repeats: bool, wait: int) -> None:
+def skip_preparation(rows: FloatArray, repeats: bool, wait: int) -> None:
     """`CompiledRig.prepare` of a device that does not use the coming stimulus: does nothing."""
 
 
@@ -140,12 +140,12 @@ class CompiledRig:
     """sense(state, parameters, noise, reading): fills reading, shape (READING_SIZE,)."""
     advance: Callable[..., Any]
     """advance(state, parameters, force_n): moves by a tick under the constant force_n, shape (3,), N."""
-    buttons: Callable[[], frozenset[int]] = no_buttons
+    buttons: Callable[[], frozenset[int]] = read_no_buttons
     """Numbers of the pressed buttons."""
-    prepare: Callable[[FloatArray, bool, int], None] = not_prepared
+    prepare: Callable[[FloatArray, bool, int], None] = skip_preparation
     """prepare(rows, repeats, wait): called before a stimulus begins, for a replay, which does not respond to force.
     rows (n, 3), N: played once or, if `repeats`, repeatedly; the first row comes after `wait` ticks."""
-    simulate_hand: Callable[[bool], None] = no_hand
+    simulate_hand: Callable[[bool], None] = ignore_hand
     """simulate_hand(on_handle): True: the simulated hand takes the handle; False: it lets go."""
 
     def close(self) -> None:

@@ -12,8 +12,8 @@ from study.devices.force_dimension.models import MODELS
 from study.devices.force_dimension.rigs import force_dimension_rig
 from study.devices.rig import CompiledRig, Rig
 from study.devices.simulated.omega3 import build_omega3
-from study.devices.simulated.own_linkage import fit_linkage
 from study.devices.simulated.parameters import Omega3Parameters
+from study.devices.simulated.simulated_linkage import fit_linkage
 from study.errors import DeviceError
 from study.store.formats.calibration_file import read_calibration
 
@@ -23,7 +23,7 @@ def make_simulated_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
     return _build_simulated(settings, seed, friction=True)
 
 
-def frictionless_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
+def make_frictionless_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
     """The simulated omega.3 without dry friction in its drives. Raises as `make_simulated_rig`."""
     return _build_simulated(settings, seed, friction=False)
 
@@ -56,15 +56,15 @@ def _build_simulated(
         ) from error
 
 
-def _real_rig(name: str, settings: DeviceSettings, seed: int) -> Rig:
+def _make_real_rig(name: str, settings: DeviceSettings, seed: int) -> Rig:
     """The rig of a real device. `seed` is not used, because nothing in the driver is random."""
     return force_dimension_rig(name, settings)
 
 
 RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {
     "simulated": make_simulated_rig,
-    "simulated-frictionless": frictionless_rig,
-    **{name: partial(_real_rig, name) for name in MODELS},
+    "simulated-frictionless": make_frictionless_rig,
+    **{name: partial(_make_real_rig, name) for name in MODELS},
 }
 """Builder of a rig from settings and seed, by device name; the same names as in `study.devices.opening`."""
 
@@ -74,9 +74,9 @@ def find_rig(name: str, settings: DeviceSettings, seed: int) -> Rig | CompiledRi
     (`CALIBRATED` and a path). Raises `StudyError`."""
     if name.startswith(REPLAY):
         # Imported only here: the import loads compiled code, which other devices do not need.
-        from study.devices.replay.replay_rig import replay_rig
+        from study.devices.replay.replay_rig import make_replay_rig
 
-        return replay_rig(Path(name.removeprefix(REPLAY)))
+        return make_replay_rig(Path(name.removeprefix(REPLAY)))
     if name.startswith(CALIBRATED):
         return make_calibrated_rig(Path(name.removeprefix(CALIBRATED)), settings, seed)
     return RIGS_BY_NAME[name](settings, seed)

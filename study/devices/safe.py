@@ -14,33 +14,33 @@ from dataclasses import replace
 from equalizer.signals.signal import Signal
 from study.devices.admission import check_commands, check_hardware, check_settings, check_stimulus
 from study.devices.clock import Clock, RealClock, VirtualClock
-from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, Played
-from study.devices.drive.last_reading import look_of
+from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, PlaybackResult
+from study.devices.drive.last_reading import make_look
 from study.devices.drive.realtime_drive import RealtimeDrive
 from study.devices.drive.recorded_run import record_commands, record_held_stimulus
 from study.devices.drive.runner import CompiledRunner, Runner
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import VirtualDrive
 from study.devices.governor.governor import SETTLE_S, Governor
-from study.devices.rig import CompiledRig, OwnClockSensor, Rig, no_hand
+from study.devices.rig import CompiledRig, OwnClockSensor, Rig, ignore_hand
 from study.devices.telemetry import Ring
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 BLOCK_S = 0.05
-"""Longest block of a compiled rig's ticks in real time, and longest pause between signs of life in `play` (s)."""
+"""Longest block of a compiled rig's ticks in real time, and longest keep-alive interval in `play` (s)."""
 
 VIRTUAL_BLOCK_S = 5.0
 """Longest block of a compiled rig's ticks in virtual time (s)."""
 
-NOT_CLOSED = (
+CLOSING_UNCONFIRMED = (
     "the device did not say that it brakes when it was closed: it got zero force, and its brakes may be off; what was "
     "measured is saved; switch it off before a hand touches the handle, and on again before the next session"
 )
 """Written to stderr where the device did not confirm that it was closed."""
 
 PATIENCE_S = 1.0
-"""Time after the end of all fades until a device that still moves counts as lost (s)."""
+"""Timeout (s) after the end of all fades; a device that still moves then counts as lost."""
 
 
 class SafeDevice:
@@ -55,17 +55,17 @@ class SafeDevice:
         if not isinstance(rig, CompiledRig):
             check_hardware(rig.drops_force_after_s, rig.info, settings)
         self._info = rig.info
-        self._simulated_hand = rig.simulate_hand if isinstance(rig, CompiledRig) else no_hand
-        self._apart = rig if isinstance(rig, OwnClockSensor) else None
+        self._simulated_hand = rig.simulate_hand if isinstance(rig, CompiledRig) else ignore_hand
+        self._own_clock_sensor = rig if isinstance(rig, OwnClockSensor) else None
         self._limits = settings.limits
         self._hand_on_handle = settings.hand_on_handle
         self._clock = clock
         self._ring = ring
         rows = ring.rows(rig.info.sample_rate_hz) if ring is not None else None
         self._governor = Governor(rig.info, settings, rows)
-        self._runner = self._runner_of(rig)
-        self._drive = self._drive_of(clock)
-        self._held: HeldStimulus | None = None
+        self._runner = self._make_runner(rig)
+        self._drive = self._make_drive(clock)
+        self._held_stimulus: HeldStimulus | None = None
         self._closing = self._closed = False
         # Registered twice: a KeyboardInterrupt that is pending at exit ends the first call before its first line.
         atexit.register(self._close_at_exit)
@@ -80,19 +80,19 @@ class SafeDevice:
         return self._ring.path if self._ring is not None else ""
 
     def hold(self, stimulus: HeldStimulus) -> None:
-        self._must_be_idle()
+        self._require_idle()
         check_stimulus(stimulus, self._limits, self._info.sample_rate_hz)
         self._start(lambda: self._governor.begin_hold(stimulus))
-        self._held = stimulus
+        self._held_stimulus = stimulus
 
     def hold_unchecked(self, stimulus: HeldStimulus) -> None:
         """Hold a stimulus of valid shape that `hold` refuses, to test that the caps hold at each tick. Raises
         `DeviceError` with a hand on the handle."""
         if self._hand_on_handle:
-            raise _refusal("A hand is on the handle.", "Open it without.")
-        self._must_be_idle()
+            raise _usage_error("A hand is on the handle.", "Open it without.")
+        self._require_idle()
         self._start(lambda: self._governor.begin_hold(stimulus))
-        self._held = stimulus
+        self._held_stimulus = stimulus
 
     def keep_alive(self) -> None:
         self._governor.sign_of_life()
@@ -101,54 +101,54 @@ class SafeDevice:
     def fault(self) -> Fault:
         self._drive.check()
         fault = self._governor.fault
-        return Fault.STOPPED if self._governor.stop_asked and fault is not Fault.FORCE_LEFT else fault
+        return Fault.STOPPED if self._governor.stop_requested and fault is not Fault.FORCE_LEFT else fault
 
     def health(self) -> Health:
-        return self._with_missed_ticks(replace(self._governor.health(), fault=self.fault()))
+        return self._add_failure_reason(replace(self._governor.health(), fault=self.fault()))
 
-    def _with_missed_ticks(self, health: Health) -> Health:
+    def _add_failure_reason(self, health: Health) -> Health:
         """The counters with the reason of a lost device (`why`), if the rig has failed."""
         failure = self._runner.failure
         if failure is None:
             return health
         return replace(health, why=failure.happened.rstrip(".") if isinstance(failure, DeviceError) else str(failure))
 
-    def release(self) -> Played:
-        stimulus = self._held
+    def release(self) -> PlaybackResult:
+        stimulus = self._held_stimulus
         if stimulus is None:
-            raise _refusal("Nothing is held, so nothing can be released.", "Call hold first.")
-        self._governor.ask_release()
+            raise _usage_error("Nothing is held, so nothing can be released.", "Call hold first.")
+        self._governor.request_release()
         self._wait_until_still(stimulus.fade_out_s)
-        self._held = None
-        played = record_held_stimulus(self._governor, self._info, self._apart)
-        return replace(played, health=self._with_missed_ticks(played.health))
+        self._held_stimulus = None
+        result = record_held_stimulus(self._governor, self._info, self._own_clock_sensor)
+        return replace(result, health=self._add_failure_reason(result.health))
 
-    def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
-        self._must_be_idle()
+    def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> PlaybackResult:
+        self._require_idle()
         check_commands(commands, self._limits, self._info.sample_rate_hz)
         self._start(lambda: self._governor.begin_play(commands))
         try:
-            self._attend_play(SETTLE_S + commands.duration_s, on_progress)
+            self._wait_for_playback(SETTLE_S + commands.duration_s, on_progress)
         except BaseException:
-            self._let_go()
+            self._fade_out()
             raise
         self._wait_until_still(0.0)
-        self._must_be_there()
-        return record_commands(self._governor, self._info, self._apart)
+        self._require_connected()
+        return record_commands(self._governor, self._info, self._own_clock_sensor)
 
     def look(self) -> Look:
         """Wait for the loop's next reading, at most `realtime_drive.PATIENCE_S`."""
         self._drive.check()
-        fresh = not self._closing and self._drive.refresh()
-        missed_ticks = self._governor.missed if self._held is not None or self._runner.moving else 0
-        return look_of(self._runner.seen if fresh else None, missed_ticks)
+        has_reading = not self._closing and self._drive.refresh()
+        missed_ticks = self._governor.missed if self._held_stimulus is not None or self._runner.moving else 0
+        return make_look(self._runner.seen if has_reading else None, missed_ticks)
 
     def simulate_hand(self, on_handle: bool) -> None:
-        self._must_be_idle()
+        self._require_idle()
         self._simulated_hand(on_handle)
 
     def stop(self) -> None:
-        self._governor.ask_stop()
+        self._governor.request_stop()
         self._drive.stop()
 
     def close(self) -> None:
@@ -158,7 +158,7 @@ class SafeDevice:
             return
         self._closing = True
         try:
-            self._let_go()
+            self._fade_out()
         finally:
             try:
                 self._drive.close()
@@ -171,9 +171,9 @@ class SafeDevice:
         atexit.unregister(self._close_at_exit)
         if not (self._runner.force_off and self._runner.disconnected):
             # `close` never raises and may be the program's last action, so stderr must warn the person at the handle.
-            said = NOT_CLOSED if self._runner.force_off else Fault.FORCE_LEFT.value
+            warning = CLOSING_UNCONFIRMED if self._runner.force_off else Fault.FORCE_LEFT.value
             with contextlib.suppress(OSError):
-                sys.stderr.writelines([f"{said}\n"])
+                sys.stderr.writelines([f"{warning}\n"])
 
     def _close_at_exit(self) -> None:
         """Close when the program ends, and ignore Ctrl-C: the interpreter stops all threads next, including the thread
@@ -185,81 +185,84 @@ class SafeDevice:
             except KeyboardInterrupt:  # Ctrl-C came before the line above took effect
                 continue
 
-    def _attend_play(self, duration_s: float, on_progress: Callable[[float], None] | None) -> None:
-        """Wait until the commands are played, at most `PATIENCE_S` longer than duration_s; give signs of life."""
-        nap_s = min(BLOCK_S, self._limits.watchdog_s / 4)
+    def _wait_for_playback(self, duration_s: float, on_progress: Callable[[float], None] | None) -> None:
+        """Wait until the commands are played, at most `PATIENCE_S` longer than duration_s; send keep-alives."""
+        interval_s = min(BLOCK_S, self._limits.watchdog_s / 4)
         started_s = self._clock.now_s()
         while self._governor.playing and (elapsed_s := self._clock.now_s() - started_s) < duration_s + PATIENCE_S:
             if on_progress is not None:
                 on_progress(min(1.0, elapsed_s / duration_s))
             self.keep_alive()
-            self._clock.sleep(nap_s)
+            self._clock.sleep(interval_s)
         if on_progress is not None and not self._governor.playing:
             on_progress(1.0)
 
-    def _let_go(self) -> None:
+    def _fade_out(self) -> None:
         """Fade out within `release_s` and wait; if interrupted, stop without a fade."""
-        self._governor.ask_let_go()
+        self._governor.request_let_go()
         try:
             self._wait_until_still(0.0)
         except BaseException:  # interrupted
-            self._governor.ask_stop()
+            self._governor.request_stop()
             raise
 
     def _wait_until_still(self, fade_out_s: float) -> None:
         """Wait until no force is commanded; a device that takes too long counts as lost."""
-        patience_s = fade_out_s + self._limits.release_s + self._limits.watchdog_s + PATIENCE_S
-        until_s = self._clock.now_s() + patience_s
-        nap_s = 5 / self._info.sample_rate_hz
+        timeout_s = fade_out_s + self._limits.release_s + self._limits.watchdog_s + PATIENCE_S
+        deadline_s = self._clock.now_s() + timeout_s
+        interval_s = 5 / self._info.sample_rate_hz
         while self._runner.moving:
             self._drive.check()
-            if self._clock.now_s() > until_s:
-                self._runner.give_up(TimeoutError(f"no answer within {patience_s:g} s"))
+            if self._clock.now_s() > deadline_s:
+                self._runner.give_up(TimeoutError(f"no answer within {timeout_s:g} s"))
                 return
-            self._clock.sleep(nap_s)
+            self._clock.sleep(interval_s)
 
-    def _must_be_idle(self) -> None:
+    def _require_idle(self) -> None:
         """Raises `DeviceError` where the device is closed, lost, stopped or holds a stimulus."""
         if self._closing:
-            raise _refusal("The device is closed.", "Open it again.")
-        self._must_be_there()
-        if self._governor.stop_asked:
-            raise _refusal("The emergency stop was pressed.", "Make sure that all is well, then open the device again.")
-        if self._held is not None:
-            raise _still_playing()
+            raise _usage_error("The device is closed.", "Open it again.")
+        self._require_connected()
+        if self._governor.stop_requested:
+            raise _usage_error(
+                "The emergency stop was pressed.", "Make sure that all is well, then open the device again."
+            )
+        if self._held_stimulus is not None:
+            raise _playing_error()
 
-    def _start(self, begin: Callable[[], None]) -> None:
-        """Start the ticks of a stimulus that `begin` gives to the governor. Raises `DeviceError` for a lost device."""
+    def _start(self, begin_stimulus: Callable[[], None]) -> None:
+        """Start the ticks of a stimulus. begin_stimulus: passes it to the governor. Raises `DeviceError` for a lost
+        device, or one that still moves."""
 
-        def begin_both() -> None:
+        def begin_and_prepare() -> None:
             try:
-                begin()
+                begin_stimulus()
                 self._runner.prepare()
             except BaseException:  # the caller believes that nothing began, so none of its ticks may run
                 self._governor.abandon(Fault.NONE)
                 raise
 
-        started = self._drive.start(begin_both)
-        self._must_be_there()
+        started = self._drive.start(begin_and_prepare)
+        self._require_connected()
         if not started:
-            raise _still_playing()
+            raise _playing_error()
 
-    def _must_be_there(self) -> None:
+    def _require_connected(self) -> None:
         """Raises `DeviceError` for a lost device; the message says whether its force may still be on."""
         failure = self._runner.failure
         if failure is None:
             return
-        happened = f"It stopped answering ({type(failure).__name__}: {failure})."
-        mend = "heck its power and its cable, then open it again; a session is continued with `hapteq resume`."
+        problem = f"It stopped answering ({type(failure).__name__}: {failure})."
+        remedy = "heck its power and its cable, then open it again; a session is continued with `hapteq resume`."
         if self._runner.force_off:
-            raise DeviceError("The device was lost", f"{happened} Its force is off.", f"C{mend}") from failure
+            raise DeviceError("The device was lost", f"{problem} Its force is off.", f"C{remedy}") from failure
         raise DeviceError(
             "The device was lost",
-            f"{happened} It took no zero force: its force may still be on.",
-            f"Let go of the handle and switch the device off. Then c{mend}",
+            f"{problem} It took no zero force: its force may still be on.",
+            f"Let go of the handle and switch the device off. Then c{remedy}",
         ) from failure
 
-    def _runner_of(self, rig: Rig | CompiledRig) -> Runner:
+    def _make_runner(self, rig: Rig | CompiledRig) -> Runner:
         virtual = self._clock.virtual
         if isinstance(rig, CompiledRig):
             block_ticks = round((VIRTUAL_BLOCK_S if virtual else BLOCK_S) * rig.info.sample_rate_hz)
@@ -267,7 +270,7 @@ class SafeDevice:
         now_s, monotonic = None if virtual else self._clock.now_s, type(self._clock) is RealClock
         return SteppedRunner(rig, self._governor, virtual, now_s, monotonic)
 
-    def _drive_of(self, clock: Clock) -> VirtualDrive | RealtimeDrive:
+    def _make_drive(self, clock: Clock) -> VirtualDrive | RealtimeDrive:
         rate_hz = self._info.sample_rate_hz
         if isinstance(clock, VirtualClock):
             return VirtualDrive(self._runner, self._governor, clock, rate_hz)
@@ -275,9 +278,9 @@ class SafeDevice:
         return RealtimeDrive(self._runner, self._governor, clock, rate_hz, self._limits.watchdog_s, first)
 
 
-def _still_playing() -> DeviceError:
-    return _refusal("It is still playing.", "Call release first.")
+def _playing_error() -> DeviceError:
+    return _usage_error("It is still playing.", "Call release first.")
 
 
-def _refusal(happened: str, do_now: str) -> DeviceError:
-    return DeviceError("The device cannot do this now", happened, do_now)
+def _usage_error(problem: str, remedy: str) -> DeviceError:
+    return DeviceError("The device cannot do this now", problem, remedy)

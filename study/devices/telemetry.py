@@ -77,15 +77,15 @@ class Ring:
 
     def _make(self, rows: int) -> None:
         # Kept open: as long as it is locked, the ring is in use.
-        self._descriptor, self.path = tempfile.mkstemp(SUFFIX, PREFIX, _folder())
+        self._descriptor, self.path = tempfile.mkstemp(SUFFIX, PREFIX, _ring_folder())
         blank = np.zeros((1 + rows, cells.RING_WIDTH))
         blank[0, cells.RING_FORMAT] = FORMAT
         try:
             # Written, not reserved: a page that the system cannot give must fail here and not in the loop.
-            whole = _lock(self._descriptor) and Path(self.path).write_bytes(blank.tobytes()) == blank.nbytes
+            is_complete = _lock_file(self._descriptor) and Path(self.path).write_bytes(blank.tobytes()) == blank.nbytes
         except OSError:
-            whole = False
-        if not whole:
+            is_complete = False
+        if not is_complete:
             self.remove()
 
 
@@ -129,7 +129,7 @@ class TelemetryReader:
                 "Begin the sitting anew; its recordings are written all the same.",
             ) from problem
         self.rate_hz = float(self._rows[0, cells.RING_RATE_HZ])
-        self._next = int(self._rows[0, cells.RING_COUNT])
+        self._next_row = int(self._rows[0, cells.RING_COUNT])
         self.lost = 0
         """Rows that were overwritten before they were read, since the beginning."""
 
@@ -137,18 +137,18 @@ class TelemetryReader:
         """The rows since the last call. Rows that were overwritten before are counted in `lost`."""
         size = len(self._rows) - 1
         count = int(self._rows[0, cells.RING_COUNT])
-        first = max(self._next, count - size)
-        wanted = np.arange(first, count)
-        rows = self._rows[1 + wanted % size]  # a copy
-        good = _is_consistent(rows) & (rows[:, cells.RING_INDEX] == wanted)
+        first = max(self._next_row, count - size)
+        row_numbers = np.arange(first, count)
+        rows = self._rows[1 + row_numbers % size]  # a copy
+        intact = _is_consistent(rows) & (rows[:, cells.RING_INDEX] == row_numbers)
         # An inconsistent row was overwritten meanwhile, and is lost, or is being written, and is left to the next call.
-        too_new = wanted[~good & (wanted > int(self._rows[0, cells.RING_COUNT]) - size)]
+        too_new = row_numbers[~intact & (row_numbers > int(self._rows[0, cells.RING_COUNT]) - size)]
         if len(too_new):
             count = int(too_new[0])
-        kept = good & (wanted < count)
-        self.lost += count - self._next - int(np.count_nonzero(kept))
-        self._next = count
-        return _telemetry(rows[kept])
+        readable = intact & (row_numbers < count)
+        self.lost += count - self._next_row - int(np.count_nonzero(readable))
+        self._next_row = count
+        return _make_telemetry(rows[readable])
 
 
 def _is_consistent(rows: FloatArray) -> np.ndarray:
@@ -161,7 +161,7 @@ def _is_consistent(rows: FloatArray) -> np.ndarray:
     return consistent
 
 
-def _telemetry(rows: FloatArray) -> Telemetry:
+def _make_telemetry(rows: FloatArray) -> Telemetry:
     def vector(first: int) -> FloatArray:
         return rows[:, first : first + 3]
 
@@ -193,12 +193,12 @@ def _map_rows(path: Path, access: int) -> FloatArray:
     return rows
 
 
-def _folder() -> str:
+def _ring_folder() -> str:
     memory = Path("/dev/shm")
     return str(memory) if memory.is_dir() else tempfile.gettempdir()
 
 
-def _lock(descriptor: int) -> bool:
+def _lock_file(descriptor: int) -> bool:
     """Lock the file. False where another program has the lock. Where the system has no such locks, always True."""
     if sys.platform == "win32":
         return True
@@ -216,12 +216,16 @@ def _remove_abandoned_rings() -> None:
     no lock, they remain."""
     if sys.platform == "win32":
         return
-    for path in Path(_folder()).glob(f"{PREFIX}*{SUFFIX}"):
+    for path in Path(_ring_folder()).glob(f"{PREFIX}*{SUFFIX}"):
         with contextlib.suppress(OSError):
             descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW)
             try:
-                is_own = os.fstat(descriptor).st_uid == os.getuid()
-                if is_own and time.time() - os.fstat(descriptor).st_mtime > ABANDONED_AFTER_S and _lock(descriptor):
+                has_same_owner = os.fstat(descriptor).st_uid == os.getuid()
+                if (
+                    has_same_owner
+                    and time.time() - os.fstat(descriptor).st_mtime > ABANDONED_AFTER_S
+                    and _lock_file(descriptor)
+                ):
                     path.unlink()
             finally:
                 os.close(descriptor)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.wording import number, typeset
+from analysis.wording import format_number, typeset
 from equalizer.signals.clock_offset import NoOffsetError, offset_by_correlation
 from study.importing.expressions.functions import Value
 from study.importing.expressions.namespace import Namespace
@@ -37,49 +37,52 @@ class Logger:
         return values
 
 
-def align_signals(loggers: tuple[Logger, ...], say: Callable[[str], None]) -> tuple[Logger, ...]:
-    """The loggers with the offsets (s) of their clocks to the clock of the first. `say` is called with a sentence for
-    each offset. Raises ImportProblemError."""
-    first, *others = loggers
-    return (first, *(_with_offset(first, other, say) for other in others))
+def align_signals(loggers: tuple[Logger, ...], report: Callable[[str], None]) -> tuple[Logger, ...]:
+    """The loggers with the offsets (s) of their clocks to the clock of the first. `report` is called with a sentence
+    for each offset. Raises ImportProblemError."""
+    first, *other_loggers = loggers
+    return (first, *(_with_offset(first, logger, report) for logger in other_loggers))
 
 
-def _with_offset(first: Logger, other: Logger, say: Callable[[str], None]) -> Logger:
+def _with_offset(first: Logger, logger: Logger, report: Callable[[str], None]) -> Logger:
     """The logger with the offset that the map asks for: by correlation, by a trigger, or as stated."""
-    clock = other.clock
+    clock = logger.clock
     if clock.align:
-        offset_s, how = _align_by_correlation(first, other)
+        offset_s, method = _align_by_correlation(first, logger)
     elif clock.trigger:
-        offset_s, how = _align_by_trigger(first, other)
+        offset_s, method = _align_by_trigger(first, logger)
     else:
-        offset_s, how = clock.offset_s, "as the map states"
-    moved_ms = typeset(f"{offset_s * 1e3:.4g}")
-    say(f"Clock '{clock.name}' is moved by {moved_ms} ms to that of '{first.clock.name}', {how}.")
-    return replace(other, base=replace(other.base, offset_s=offset_s))
+        offset_s, method = clock.offset_s, "as the map states"
+    offset_text = typeset(f"{offset_s * 1e3:.4g}")
+    report(f"Clock '{clock.name}' is moved by {offset_text} ms to that of '{first.clock.name}', {method}.")
+    return replace(logger, base=replace(logger.base, offset_s=offset_s))
 
 
-def _align_by_correlation(first: Logger, other: Logger) -> tuple[float, str]:
+def _align_by_correlation(first: Logger, logger: Logger) -> tuple[float, str]:
     """Offset (s) from the cross-correlation of one motion on both clocks, and how it was found, in words. Raises
     ImportProblemError."""
-    clock = other.clock
+    clock = logger.clock
     reference = first.base.samples(first.line(clock.align_to))
-    own = other.base.samples(other.line(clock.align))
+    aligned = logger.base.samples(logger.line(clock.align))
     try:
-        found = offset_by_correlation(reference, own, clock.offset_s, clock.align_within_s)
+        match = offset_by_correlation(reference, aligned, clock.offset_s, clock.align_within_s)
     except ValueError as error:
         kind = "" if isinstance(error, NoOffsetError) else "correlation is not possible: "
         raise ImportProblemError(f"clock '{clock.name}' cannot be aligned: {kind}{error}") from error
-    turned = ", its sign turned" if found.correlation < 0 else ""
-    how = f"found by correlating {clock.align} with {clock.align_to} ({number(found.correlation, 3)} there{turned})"
-    return found.offset_s, how
+    sign_text = ", its sign turned" if match.correlation < 0 else ""
+    method = (
+        f"found by correlating {clock.align} with {clock.align_to} "
+        f"({format_number(match.correlation, 3)} there{sign_text})"
+    )
+    return match.offset_s, method
 
 
-def _align_by_trigger(first: Logger, other: Logger) -> tuple[float, str]:
+def _align_by_trigger(first: Logger, logger: Logger) -> tuple[float, str]:
     """Offset (s) between the crossings of the trigger levels on both clocks, and how it was found, in words."""
-    clock = other.clock
-    here_s = _find_crossing_s(other, clock.trigger, clock.trigger_level)
-    there_s = _find_crossing_s(first, clock.reference_trigger, clock.reference_level)
-    return there_s - here_s, f"from the trigger in {clock.trigger} and {clock.reference_trigger}"
+    clock = logger.clock
+    trigger_s = _find_crossing_s(logger, clock.trigger, clock.trigger_level)
+    reference_s = _find_crossing_s(first, clock.reference_trigger, clock.reference_level)
+    return reference_s - trigger_s, f"from the trigger in {clock.trigger} and {clock.reference_trigger}"
 
 
 def _find_crossing_s(logger: Logger, text: str, level: float) -> float:
@@ -87,16 +90,16 @@ def _find_crossing_s(logger: Logger, text: str, level: float) -> float:
     ImportProblemError without a crossing."""
     values: Any = logger.line(text)
     times_s = logger.base.times_s(len(values))
-    known = np.flatnonzero(np.isfinite(values))
-    above = values[known] >= level
-    change = np.flatnonzero(above[1:] != above[:-1])
-    if not len(change):
+    finite = np.flatnonzero(np.isfinite(values))
+    above = values[finite] >= level
+    crossings = np.flatnonzero(above[1:] != above[:-1])
+    if not len(crossings):
         raise ImportProblemError(f"clock '{logger.clock.name}': {text} never passes the trigger level of {level:g}")
-    k, after = (int(place) for place in known[change[0] : change[0] + 2])
-    if after > k + 1:
+    index, next_index = (int(sample) for sample in finite[crossings[0] : crossings[0] + 2])
+    if next_index > index + 1:
         raise ImportProblemError(
             f"clock '{logger.clock.name}': {text} passes the trigger level of {level:g} where samples are missing, "
-            f"between {k} and {after}; fill them, or state offset_s in place of the trigger"
+            f"between {index} and {next_index}; fill them, or state offset_s in place of the trigger"
         )
-    share = (level - values[k]) / (values[k + 1] - values[k])
-    return float(times_s[k] + share * (times_s[k + 1] - times_s[k]))
+    share = (level - values[index]) / (values[index + 1] - values[index])
+    return float(times_s[index] + share * (times_s[index + 1] - times_s[index]))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.diagnosis.data.found_segments import find_segments
+from analysis.diagnosis.data.find_segments import find_segments
 from analysis.look.clock import rate_objection
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.recording_checks import check_recording
@@ -21,15 +21,15 @@ from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, 
 from study.importing.alignment import Logger, align_signals
 from study.importing.arrays.arrays import Arrays, read_arrays
 from study.importing.expressions.budget import Budget
-from study.importing.expressions.namespace import of_file
+from study.importing.expressions.namespace import namespace_of
 from study.importing.map_format.import_map import ChannelMap, ComputedMap, ImportMap
 from study.importing.map_format.map_errors import ImportProblemError, ImportRefusedError
 from study.importing.map_format.map_files import PartFiles, part_files
-from study.importing.map_format.map_segments import segments_of
+from study.importing.map_format.map_segments import place_segments
 from study.importing.part_signals import Key, PartSignals, part_signals
-from study.importing.time_base import NUMBERED_HZ, time_base, without_doubled_rows
+from study.importing.time_base import NUMBERED_HZ, drop_doubled_rows, time_base
 
-_NAMED = 3
+_MAX_PARTS_NAMED = 3
 """Most parts that a sentence names."""
 
 
@@ -56,8 +56,8 @@ class ImportNotes:
 
 def _abbreviate_list(parts: Sequence[str]) -> str:
     """The first parts, and the number of further ones."""
-    shown = ", ".join(parts[:_NAMED])
-    return shown + (f" and {len(parts) - _NAMED} more" if len(parts) > _NAMED else "")
+    text = ", ".join(parts[:_MAX_PARTS_NAMED])
+    return text + (f" and {len(parts) - _MAX_PARTS_NAMED} more" if len(parts) > _MAX_PARTS_NAMED else "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,28 +78,30 @@ class _Part:
 
 
 def build_recording(
-    wanted: ImportMap, files: Sequence[Path], on_progress: Callable[[float], None] = lambda share: None
+    import_map: ImportMap, files: Sequence[Path], on_progress: Callable[[float], None] = lambda share: None
 ) -> BuiltRecording:
     """Read, align, resample and convert. on_progress: called with the fraction done, 0 to 1. Raises CannotReadError;
     ImportRefusedError where map and files do not agree or the recording is invalid."""
-    what = files[0].name if len(files) == 1 else f"{files[0].name} with {len(files) - 1} more"
+    subject = files[0].name if len(files) == 1 else f"{files[0].name} with {len(files) - 1} more"
     import_notes = ImportNotes()
     try:
-        units = _units(wanted)
-        planned = part_files(wanted, files)
-        steps = len(planned) * (len(wanted.channel) + len(wanted.computed))
+        units = _parse_units(import_map)
+        planned_parts = part_files(import_map, files)
+        steps = len(planned_parts) * (len(import_map.channel) + len(import_map.computed))
         parts = []
         budget = Budget()
-        for number, part in enumerate(planned):
-            counter = _Counter(number * steps / len(planned), steps, on_progress)
-            parts.append(_build_part(wanted, part, import_notes, counter, budget))
-        recording, repeats = find_segments(_concatenate(wanted, parts, units))
+        for number, part in enumerate(planned_parts):
+            counter = _Counter(number * steps / len(planned_parts), steps, on_progress)
+            parts.append(_build_part(import_map, part, import_notes, counter, budget))
+        recording, repeats = find_segments(_concatenate(import_map, parts, units))
     except ImportProblemError as error:
-        raise ImportRefusedError(what, str(error)) from error
+        raise ImportRefusedError(subject, str(error)) from error
     if problems := check_recording(recording):
-        raise ImportRefusedError(what, "; ".join(problems))
-    notes = import_notes.sentences([part.label for part in planned])
-    return BuiltRecording(recording, (*notes, *_unit_remark(wanted), *filter(None, (_odd_rate(recording), repeats))))
+        raise ImportRefusedError(subject, "; ".join(problems))
+    notes = import_notes.sentences([part.label for part in planned_parts])
+    return BuiltRecording(
+        recording, (*notes, *_unit_remark(import_map), *filter(None, (_rate_remark(recording), repeats)))
+    )
 
 
 class _Counter:
@@ -116,31 +118,31 @@ class _Counter:
 
 
 def _build_part(
-    wanted: ImportMap, files: PartFiles, import_notes: ImportNotes, counter: _Counter, budget: Budget
+    import_map: ImportMap, files: PartFiles, import_notes: ImportNotes, counter: _Counter, budget: Budget
 ) -> _Part:
     """Read one part, and put its channels onto its time grid. Raises ImportProblemError, ImportRefusedError,
     CannotReadError."""
-    read: dict[Path, Arrays] = {}
+    arrays_by_path: dict[Path, Arrays] = {}
     loggers = []
     notes: list[str] = []
-    for clock in wanted.clock:
+    for clock in import_map.clock:
         path = files.by_clock[clock.name]
-        read[path] = read.get(path) or read_arrays(path, wanted.csv)
-        every = of_file(read[path], {**wanted.let, **files.part.let}, files.part.prefix, budget)
-        names, doubled = without_doubled_rows(clock, every)
-        notes += [doubled] if doubled else []
+        arrays_by_path[path] = arrays_by_path.get(path) or read_arrays(path, import_map.csv)
+        namespace = namespace_of(arrays_by_path[path], {**import_map.let, **files.part.let}, files.part.prefix, budget)
+        names, remark = drop_doubled_rows(clock, namespace)
+        notes += [remark] if remark else []
         loggers.append(Logger(clock, names, time_base(clock, names)))
 
-    def say(sentence: str) -> None:
+    def report(sentence: str) -> None:
         import_notes.add(files.label, sentence)
 
-    for note in dict.fromkeys((*(note for arrays in read.values() for note in arrays.notes), *notes)):
-        say(note)
-    ready = align_signals(tuple(loggers), say)
-    signals = part_signals(wanted, files.part, ready, say, counter.step)
-    numbers = {name: ready[0].names.number(text) for name, text in wanted.numbers.items()}
+    for note in dict.fromkeys((*(note for arrays in arrays_by_path.values() for note in arrays.notes), *notes)):
+        report(note)
+    aligned = align_signals(tuple(loggers), report)
+    signals = part_signals(import_map, files.part, aligned, report, counter.step)
+    numbers = {name: aligned[0].names.number(text) for name, text in import_map.numbers.items()}
     facts = {"file": files.file.name, "prefix": files.part.prefix, "clock_start_s": signals.grid.start_s, **numbers}
-    offsets = {logger.clock.name: logger.base.offset_s for logger in ready[1:]}
+    offsets = {logger.clock.name: logger.base.offset_s for logger in aligned[1:]}
     return _Part(signals, {**facts, **({"clock_offsets_s": offsets} if offsets else {})})
 
 
@@ -154,13 +156,15 @@ class _ChannelUnit:
     quantity: str
 
 
-def _units(wanted: ImportMap) -> dict[Key, _ChannelUnit]:
+def _parse_units(import_map: ImportMap) -> dict[Key, _ChannelUnit]:
     """Units of all channels; helpers are not written and need none. Raises ImportProblemError."""
-    every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
-    return {(channel.role, channel.name): _unit(channel) for channel in every if channel.role != "helper"}
+    channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
+    return {
+        (channel.role, channel.name): _parse_channel_unit(channel) for channel in channels if channel.role != "helper"
+    }
 
 
-def _unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
+def _parse_channel_unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
     """Unit of one channel. Raises ImportProblemError where it is unknown or does not fit the quantity."""
     try:
         unit = parse_unit(channel.unit.strip() or UNSTATED)
@@ -170,50 +174,52 @@ def _unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
     return _ChannelUnit(unit.si, unit.factor, unit.offset, channel.quantity or quantity_of(unit.si))
 
 
-def _unit_remark(wanted: ImportMap) -> Iterator[str]:
+def _unit_remark(import_map: ImportMap) -> Iterator[str]:
     """Remarks on what cannot be verified: units of computed channels, channels without a unit, an unknown time."""
-    for computed in (entry for entry in wanted.computed if entry.role != "helper"):
+    for computed in (entry for entry in import_map.computed if entry.role != "helper"):
         yield f"Computed: {computed.role} '{computed.name}' = {computed.value}, in {computed.unit.strip() or UNSTATED}."
-    every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
-    bare = [f"{entry.role} '{entry.name}'" for entry in every if entry.role != "helper" and not entry.unit.strip()]
-    if bare:
-        yield f"No unit is stated for {', '.join(bare)}: the numbers are kept as they are (unit {UNSTATED})."
-    if any(clock.unknown for clock in wanted.clock):
+    channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
+    unitless = [
+        f"{entry.role} '{entry.name}'" for entry in channels if entry.role != "helper" and not entry.unit.strip()
+    ]
+    if unitless:
+        yield f"No unit is stated for {', '.join(unitless)}: the numbers are kept as they are (unit {UNSTATED})."
+    if any(clock.unknown for clock in import_map.clock):
         yield f"No time is known: samples are numbered, at {NUMBERED_HZ:g} Hz."
 
 
-def _concatenate(wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Recording:
+def _concatenate(import_map: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Recording:
     """The recording of all parts, one after another. Raises ImportProblemError for different rates, or without command
     or response."""
     _require_one_rate(parts)
-    command = _signal("command", wanted, parts, units)
-    response = _signal("response", wanted, parts, units)
+    command = _join_signal("command", import_map, parts, units)
+    response = _join_signal("response", import_map, parts, units)
     if command is None or response is None:
         raise ImportProblemError("a recording needs both a command and a response")
-    facts, segments = _facts_and_segments(wanted, parts, units)
+    facts, segments = _facts_and_segments(import_map, parts, units)
     return Recording(
-        device=wanted.device,
+        device=import_map.device,
         command=command,
         response=response,
-        position=_signal("position", wanted, parts, units),
-        excitation=_signal("excitation", wanted, parts, units),
-        condition=_signal("condition", wanted, parts, units),
-        hold=Hold(wanted.hold),
+        position=_join_signal("position", import_map, parts, units),
+        excitation=_join_signal("excitation", import_map, parts, units),
+        condition=_join_signal("condition", import_map, parts, units),
+        hold=Hold(import_map.hold),
         segments=segments,
-        meta={**wanted.meta, **_time_facts(wanted), "title": wanted.title, "parts": facts},
+        meta={**import_map.meta, **_time_facts(import_map), "title": import_map.title, "parts": facts},
     )
 
 
-def _odd_rate(recording: Recording) -> str:
+def _rate_remark(recording: Recording) -> str:
     """A sentence on an implausible sample rate; empty for a plausible or unknown one."""
     return "" if recording.meta.get("time") == "unknown" else rate_objection(recording.sample_rate_hz)
 
 
-def _time_facts(wanted: ImportMap) -> dict[str, str]:
+def _time_facts(import_map: ImportMap) -> dict[str, str]:
     """Origin of the times, for the metadata: `unknown`, `stamps`, or nothing for a stated rate."""
-    if any(clock.unknown for clock in wanted.clock):
+    if any(clock.unknown for clock in import_map.clock):
         return {"time": "unknown"}
-    return {"time": "stamps"} if wanted.clock[0].time else {}
+    return {"time": "stamps"} if import_map.clock[0].time else {}
 
 
 def _require_one_rate(parts: Sequence[_Part]) -> None:
@@ -227,35 +233,37 @@ def _require_one_rate(parts: Sequence[_Part]) -> None:
             )
 
 
-def _signal(role: str, wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Signal | None:
+def _join_signal(
+    role: str, import_map: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]
+) -> Signal | None:
     """All channels of a role in SI units, with parts concatenated; None without a channel of the role."""
-    every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
-    names = tuple(channel.name for channel in every if channel.role == role)
+    channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
+    names = tuple(channel.name for channel in channels if channel.role == role)
     if not names:
         return None
-    stated = [units[role, name] for name in names]
+    channel_units = [units[role, name] for name in names]
     columns = [
         np.concatenate([part.signals.columns[role, name] for part in parts]) * unit.factor + unit.offset
-        for name, unit in zip(names, stated, strict=True)
+        for name, unit in zip(names, channel_units, strict=True)
     ]
     return Signal(
         samples=np.column_stack(columns),
         sample_rate_hz=parts[0].signals.grid.rate_hz,
-        quantity=tuple(unit.quantity for unit in stated),
-        unit=tuple(unit.si for unit in stated),
+        quantity=tuple(unit.quantity for unit in channel_units),
+        unit=tuple(unit.si for unit in channel_units),
         channels=names,
     )
 
 
 def _facts_and_segments(
-    wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]
+    import_map: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]
 ) -> tuple[list[dict[str, Any]], tuple[Segment, ...]]:
     """Facts of each part with its range of samples, and segments of all parts by samples of the recording. Amplitudes
     are converted to SI where all commands have the same factor."""
-    every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
-    commands = [(channel.role, channel.name) for channel in every if channel.role == "command"]
+    channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
+    commands = [(channel.role, channel.name) for channel in channels if channel.role == "command"]
     factors = {units[key].factor for key in commands}
-    if len(factors) > 1 and any(segment.amplitude > 0 for segment in wanted.segment):
+    if len(factors) > 1 and any(segment.amplitude > 0 for segment in import_map.segment):
         raise ImportProblemError(
             "a segment states its amplitude, but the commands have units of different size; leave amplitude out, so "
             "that it is measured, or give the commands in SI units"
@@ -268,9 +276,9 @@ def _facts_and_segments(
             [part.signals.columns[key] * (units[key].factor / scale) for key in commands]
         )
         label = (str(part.facts["file"]), str(part.facts["prefix"]))
-        for segment in segments_of(wanted.segment, label, command, grid.rate_hz):
-            moved = replace(segment, start=segment.start + start, stop=segment.stop + start)
-            segments.append(replace(moved, amplitude=segment.amplitude * scale))
+        for segment in place_segments(import_map.segment, label, command, grid.rate_hz):
+            shifted = replace(segment, start=segment.start + start, stop=segment.stop + start)
+            segments.append(replace(shifted, amplitude=segment.amplitude * scale))
         facts.append({**part.facts, "start": start, "stop": start + grid.count})
         start += grid.count
     return facts, tuple(segments)

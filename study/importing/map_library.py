@@ -14,15 +14,15 @@ from pathlib import Path
 from study.errors import StudyError, WrongUseError
 from study.importing.arrays.arrays import read_arrays
 from study.importing.expressions.budget import Budget
-from study.importing.expressions.expression import names_in
-from study.importing.expressions.namespace import of_file
+from study.importing.expressions.expression import find_names
+from study.importing.expressions.namespace import namespace_of
 from study.importing.header_map import header_map, header_problems, read_without_map
 from study.importing.map_format.import_map import ImportMap
 from study.importing.map_format.map_errors import NOTHING_WRITTEN, ImportProblemError, MapNeededError, suggestion
 from study.importing.map_format.map_files import part_files
 from study.importing.map_format.map_toml import KIND, is_map, parse_map
 from study.importing.map_skeleton import map_skeleton
-from study.store.disk.hdf5_file import format_of, is_hdf5
+from study.store.disk.hdf5_file import is_hdf5, read_format
 from study.store.disk.text_file import read_toml_text
 from study.store.formats.recording_layout import FORMAT
 
@@ -30,7 +30,7 @@ NO_DATA = (".toml", ".md")
 """Endings of files in a folder of recordings that hold no data."""
 _NUMBER = re.compile(r"\d+")
 """A number in a file name: files whose names differ only by their numbers are parts of one recording."""
-_SHOWN = 4
+_MAX_SHOWN = 4
 """Most files that a message names."""
 
 
@@ -88,58 +88,61 @@ def find_map(folder: Path) -> tuple[FoundMap, ...]:
     """Maps for the recordings in a folder: maps in the folder, otherwise shipped maps that fit file names and arrays.
     Raises CannotReadError; UnusableFileError for an invalid map."""
     paths = sorted(path for path in folder.iterdir() if path.is_file())
-    own = [path for path in paths if path.suffix == ".toml" and _is_map_file(path)]
-    if own:
-        candidates = [read_map(str(path)) for path in own]
-        return tuple(found for source in candidates for found in _recordings(source, paths))
+    own_maps = [path for path in paths if path.suffix == ".toml" and _is_map_file(path)]
+    if own_maps:
+        candidates = [read_map(str(path)) for path in own_maps]
+        return tuple(found_map for source in candidates for found_map in _find_recordings(source, paths))
     shipped = (read_map(name) for name in list_shipped_maps())
-    return tuple(found for source in shipped for found in _recordings(source, paths) if _fits(found))
+    return tuple(found_map for source in shipped for found_map in _find_recordings(source, paths) if _fits(found_map))
 
 
 def map_of_files(paths: Sequence[Path]) -> MapFile | None:
     """The only shipped map that makes one recording of exactly these files; None if there is none, or several."""
-    found = [
+    sources = [
         entry.source
         for name in list_shipped_maps()
-        for entry in _recordings(read_map(name), paths)
+        for entry in _find_recordings(read_map(name), paths)
         if set(entry.files) == set(paths) and _fits(entry)
     ]
-    return found[0] if len(found) == 1 else None
+    return sources[0] if len(sources) == 1 else None
 
 
 def map_by_header(folder: Path) -> FoundMap:
     """A map from headers, for a folder without a map; the names of its files may differ only by numbers. Raises
     WrongUseError, MapNeededError, CannotReadError, ImportRefusedError."""
-    data = sorted((path for path in folder.iterdir() if path.is_file() and path.suffix not in NO_DATA), key=_in_order)
-    none = f"No map is for the files of the folder {folder.name}: there is none in it, and no shipped map fits"
+    data = sorted(
+        (path for path in folder.iterdir() if path.is_file() and path.suffix not in NO_DATA), key=_natural_sort_key
+    )
+    no_map_text = f"No map is for the files of the folder {folder.name}: there is none in it, and no shipped map fits"
     if not data:
-        raise _unclear(f"{none}.", "Give the files.")
-    if any(is_hdf5(path) and format_of(path) == FORMAT for path in data):
-        raise _unclear(
-            f"{none}; it has hapteq recordings.", "Give these recordings, to hapteq import, look or diagnose."
+        raise _ask_which_recording(f"{no_map_text}.", "Give the files.")
+    if any(is_hdf5(path) and read_format(path) == FORMAT for path in data):
+        raise _ask_which_recording(
+            f"{no_map_text}; it has hapteq recordings.", "Give these recordings, to hapteq import, look or diagnose."
         )
     if len({_NUMBER.sub("#", path.name) for path in data}) > 1:
-        shown = ", ".join(path.name for path in data[:_SHOWN])
-        raise _unclear(
-            f"{none}; nor are they parts of one recording by their names ({shown}{', ...' if data[_SHOWN:] else ''}).",
+        names = ", ".join(path.name for path in data[:_MAX_SHOWN])
+        raise _ask_which_recording(
+            f"{no_map_text}; nor are they parts of one recording by their names "
+            f"({names}{', ...' if data[_MAX_SHOWN:] else ''}).",
             "Give the files that belong together, in their order; or a map with --map.",
         )
     arrays = read_without_map(data[0])
-    wanted = header_map(arrays)
-    if wanted is None:
-        raise MapNeededError(folder.name, f"{none}; {'; '.join(header_problems(arrays))}", map_skeleton(arrays))
-    return FoundMap(MapFile(folder.name, wanted, "", folder), tuple(data))
+    import_map = header_map(arrays)
+    if import_map is None:
+        raise MapNeededError(folder.name, f"{no_map_text}; {'; '.join(header_problems(arrays))}", map_skeleton(arrays))
+    return FoundMap(MapFile(folder.name, import_map, "", folder), tuple(data))
 
 
-def _unclear(happened: str, do_now: str) -> WrongUseError:
+def _ask_which_recording(cause: str, remedy: str) -> WrongUseError:
     """The error that asks which recording is meant."""
-    return WrongUseError("Which recording is meant?", happened, do_now, saved=NOTHING_WRITTEN)
+    return WrongUseError("Which recording is meant?", cause, remedy, saved=NOTHING_WRITTEN)
 
 
-def _in_order(path: Path) -> tuple[tuple[bool, int, str], ...]:
+def _natural_sort_key(path: Path) -> tuple[tuple[bool, int, str], ...]:
     """Sort key by which rec_2 precedes rec_10."""
-    pieces = re.split(r"(\d+)", path.name)
-    return tuple((piece.isdigit(), int(piece) if piece.isdigit() else 0, piece) for piece in pieces)
+    parts = re.split(r"(\d+)", path.name)
+    return tuple((part.isdigit(), int(part) if part.isdigit() else 0, part) for part in parts)
 
 
 def _is_map_file(path: Path) -> bool:
@@ -150,34 +153,34 @@ def _is_map_file(path: Path) -> bool:
         return False
 
 
-def _recordings(source: MapFile, paths: Sequence[Path]) -> Iterator[FoundMap]:
+def _find_recordings(source: MapFile, paths: Sequence[Path]) -> Iterator[FoundMap]:
     """Recordings that a map makes of the files. Without `separate`, every pattern of the map must match a file;
     otherwise the recording is incomplete and not given."""
     data = [path for path in paths if path.suffix not in NO_DATA]
     by_pattern = [[path for path in data if fnmatchcase(path.name, pattern)] for pattern in source.map.files]
-    fitting = tuple(dict.fromkeys(path for found in by_pattern for path in found))
+    fitting = tuple(dict.fromkeys(path for matches in by_pattern for path in matches))
     if source.map.separate:
         yield from (FoundMap(source, (path,)) for path in fitting)
     elif all(by_pattern):
         yield FoundMap(source, fitting)
 
 
-def _fits(found: FoundMap) -> bool:
+def _fits(found_map: FoundMap) -> bool:
     """Whether the first part of a recording has all arrays that the map names."""
-    wanted = found.source.map
+    import_map = found_map.source.map
     try:
-        part = part_files(wanted, found.files)[0]
-        definitions = {**wanted.let, **part.part.let}
+        part = part_files(import_map, found_map.files)[0]
+        definitions = {**import_map.let, **part.part.let}
         budget = Budget()
-        spaces = {
-            clock: of_file(read_arrays(path, wanted.csv), definitions, part.part.prefix, budget)
+        namespaces = {
+            clock: namespace_of(read_arrays(path, import_map.csv), definitions, part.part.prefix, budget)
             for clock, path in part.by_clock.items()
         }
-        first = wanted.clock[0].name
-        needs = [(channel.clock or first, channel.value) for channel in wanted.channel]
-        needs += [(clock.name, text) for clock in wanted.clock for text in (clock.time, clock.rate) if text]
+        first = import_map.clock[0].name
+        needs = [(channel.clock or first, channel.value) for channel in import_map.channel]
+        needs += [(clock.name, text) for clock in import_map.clock for text in (clock.time, clock.rate) if text]
         return all(
-            text in spaces[clock].arrays or all(spaces[clock].has(name) for name in names_in(text))
+            text in namespaces[clock].arrays or all(namespaces[clock].has_name(name) for name in find_names(text))
             for clock, text in needs
         )
     except (ImportProblemError, StudyError):

@@ -12,11 +12,16 @@ from itertools import takewhile
 from textwrap import wrap
 
 from study.importing.arrays.array_groups import Groups, groups_in
-from study.importing.arrays.arrays import Array, Arrays, left_out
+from study.importing.arrays.arrays import Array, Arrays, unread_reason
 from study.importing.arrays.csv_arrays import FaultyColumn
-from study.importing.arrays.mat_arrays import OF_CELL, instead
-from study.importing.imposed_roles import IMPOSED, NOT_IMPOSED, turn_imposed
-from study.importing.map_format.signal_words import may_be_imposed, name_signal, propose_roles, unit_in
+from study.importing.arrays.mat_arrays import OF_CELL, conversion_advice
+from study.importing.imposed_roles import IMPOSED_REMARK, NOT_IMPOSED_REMARK, swap_imposed_roles
+from study.importing.map_format.signal_words import (
+    may_be_imposed_motion,
+    parse_signal_name,
+    propose_roles,
+    split_bracketed_unit,
+)
 from study.importing.surplus_arrays import (
     LEAST_SAMPLES,
     equal_clocks,
@@ -29,9 +34,9 @@ from study.importing.surplus_arrays import (
 
 _FORCES = ("force", "torque")
 """Quantities of forces: in rotation, torques."""
-_NAMED = 4
+_MAX_NAMED = 4
 """Most further runs that a comment of the skeleton names; dots stand for the rest."""
-_SHARE = re.compile(r"(?i)_(test|tst|train|trn|est|estimation|fit|val|vad|valid|validation)(?=_|$)")
+_ROLE_SUFFIX = re.compile(r"(?i)_(test|tst|train|trn|est|estimation|fit|val|vad|valid|validation)(?=_|$)")
 """Parts of a name that state the role of the data, as in `u_test`."""
 _TIME_UNITS = ("s", "ms", "us", "min")
 """Units of time stamps, by the last part of a name."""
@@ -39,58 +44,66 @@ _TIME_UNITS = ("s", "ms", "us", "min")
 
 def map_skeleton(arrays: Arrays) -> str:
     """The map as TOML text. Unknown values are empty texts, which an import refuses with the name of the key."""
-    return "\n".join(_lines(arrays)) + "\n"
+    return "\n".join(_write_lines(arrays)) + "\n"
 
 
-def _lines(whole: Arrays) -> Iterator[str]:
+def _write_lines(all_arrays: Arrays) -> Iterator[str]:
     """Lines of the map: head, clocks, channels, parts, segment."""
-    groups = groups_in(whole.by_name, LEAST_SAMPLES)
-    beside = _runs_beside(whole, groups)
-    arrays = _first_run(whole, groups, beside)
+    groups = groups_in(all_arrays.by_name, LEAST_SAMPLES)
+    ungrouped = _find_ungrouped_runs(all_arrays, groups)
+    arrays = _first_run(all_arrays, groups, ungrouped)
     surplus = surplus_arrays(arrays)
-    every = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
-    clocks = [name for name in every if name not in surplus]
-    roles = _roles(arrays, [*every, *surplus])
+    all_clocks = [
+        name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)
+    ]
+    clocks = [name for name in all_clocks if name not in surplus]
+    roles = _roles(arrays, [*all_clocks, *surplus])
     yield f"# A map for {arrays.name}. Keys and examples: docs/importing.md."
     yield 'device = ""               # what was recorded'
     yield 'hold = "zero-order"       # how the command moves between samples: zero-order, band-limited, linear'
     yield from _clocks(arrays, clocks)
     yield from _direction(roles)
     for name, array in arrays.by_name.items():
-        own = _clock_of(name, arrays, every) if len(clocks) > 1 else ""
-        numbers = array.dtype.kind in "fiub" and array.size >= LEAST_SAMPLES
+        clock = _clock_of(name, arrays, all_clocks) if len(clocks) > 1 else ""
+        is_numeric = array.dtype.kind in "fiub" and array.size >= LEAST_SAMPLES
         if name in surplus:
             yield f"\n# {name} {surplus[name]}"
         elif name in clocks:
             continue
-        elif array.ndim == 1 and numbers:
-            yield from _channel((_stem(name), name, _stem(name)), _shape(array.shape), own, roles.get(name, ""))
-        elif array.ndim == 2 and numbers:
-            yield from _table(name, array, own, roles.get(name, ""))
+        elif array.ndim == 1 and is_numeric:
+            yield from _channel((_stem(name), name, _stem(name)), _shape(array.shape), clock, roles.get(name, ""))
+        elif array.ndim == 2 and is_numeric:
+            yield from _table(name, array, clock, roles.get(name, ""))
         else:
             yield from _no_channel(name, array)
     yield from _parts(groups.prefixes)
-    yield from _cells_beside(beside, groups)
+    yield from _ungrouped_comments(ungrouped, groups)
     yield ""
     yield "[[segment]]"
     yield 'kind = "noise"            # multisine, sweep, sine, slow, noise, binary, step, impact, free, rest'
     yield "split = { fit = 0.5, test = 0.5 }"
 
 
-def _runs_beside(whole: Arrays, groups: Groups) -> list[str]:
+def _find_ungrouped_runs(all_arrays: Arrays, groups: Groups) -> list[str]:
     """Arrays of runs in cells that belong to no group. Cells of single numbers hold constants and do not count."""
-    long_ones = [name for name, array in whole.by_name.items() if OF_CELL.match(name) and array.size >= LEAST_SAMPLES]
-    return [name for name in long_ones if not name.startswith(groups.prefixes)] if groups.prefixes else []
+    long_names = [
+        name for name, array in all_arrays.by_name.items() if OF_CELL.match(name) and array.size >= LEAST_SAMPLES
+    ]
+    return [name for name in long_names if not name.startswith(groups.prefixes)] if groups.prefixes else []
 
 
-def _first_run(whole: Arrays, groups: Groups, beside: Sequence[str]) -> Arrays:
-    """Arrays of the first of several runs and those that belong to no run, except `beside`; the times of tables [time,
-    value ...] as separate arrays."""
-    inside = [name for name in whole.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
-    common = {name: array for name, array in whole.by_name.items() if name not in (*inside, *beside)}
-    found = {**{name: whole.by_name[full] for name, full in groups.names.items()}, **common}
-    times = {_line(name, array, 0): _line_0(array) for name, array in found.items() if time_in_table(array)}
-    return Arrays(whole.path, {**found, **times}, (*whole.clocks, *times))
+def _first_run(all_arrays: Arrays, groups: Groups, ungrouped: Sequence[str]) -> Arrays:
+    """Arrays of the first of several runs and those that belong to no run, except `ungrouped`; the times of tables
+    [time, value ...] as separate arrays."""
+    run_names = [name for name in all_arrays.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
+    common = {name: array for name, array in all_arrays.by_name.items() if name not in (*run_names, *ungrouped)}
+    first_arrays = {**{name: all_arrays.by_name[full] for name, full in groups.names.items()}, **common}
+    times = {
+        _line_expression(name, array, 0): _first_line(array)
+        for name, array in first_arrays.items()
+        if time_in_table(array)
+    }
+    return Arrays(all_arrays.path, {**first_arrays, **times}, (*all_arrays.clocks, *times))
 
 
 def _clock_of(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
@@ -98,33 +111,38 @@ def _clock_of(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
     is kept. Empty without a clock of this length."""
     fitting = [clock for clock in clocks if len(arrays.by_name[clock]) == max(arrays.by_name[name].shape, default=0)]
 
-    def alike(clock: str) -> int:
+    def common_length(clock: str) -> int:
         return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(name, clock, strict=False)))
 
-    near = max(fitting, key=alike, default="")
-    return equal_clocks(arrays).get(near, near)
+    best_clock = max(fitting, key=common_length, default="")
+    return equal_clocks(arrays).get(best_clock, best_clock)
 
 
 def _direction(roles: Mapping[str, str]) -> Iterator[str]:
     """A comment on which of force and motion is taken for the command, where names leave it open."""
-    columns = [name_signal(_stem(name)) for name in roles]
-    if may_be_imposed(columns):
+    columns = [parse_signal_name(_stem(name)) for name in roles]
+    if may_be_imposed_motion(columns):
         forces = [roles[name] for name, column in zip(roles, columns, strict=True) if column.quantity in _FORCES]
         yield from (
             "",
-            *wrap(IMPOSED if "response" in forces else NOT_IMPOSED, 110, initial_indent="# ", subsequent_indent="# "),
+            *wrap(
+                IMPOSED_REMARK if "response" in forces else NOT_IMPOSED_REMARK,
+                110,
+                initial_indent="# ",
+                subsequent_indent="# ",
+            ),
         )
 
 
 def _no_channel(name: str, array: Array) -> Iterator[str]:
     """A comment on an array that is not a channel: invalid, without numbers, constant, or of more than two
     dimensions."""
-    what = left_out(array)
-    if isinstance(what, FaultyColumn):
-        yield f"\n# Left out: {what}"
+    reason = unread_reason(array)
+    if isinstance(reason, FaultyColumn):
+        yield f"\n# Left out: {reason}"
     elif array.dtype.kind not in "fiub":
-        yield f"\n# {name} holds no numbers" + (f": it is {what}" if what else "")
-        yield from (f"# {mend}" for mend in (instead(name, what),) if mend)
+        yield f"\n# {name} holds no numbers" + (f": it is {reason}" if reason else "")
+        yield from (f"# {advice}" for advice in (conversion_advice(name, reason),) if advice)
     elif array.size < LEAST_SAMPLES:
         yield f"\n# {name}: {_shape(array.shape)}, a constant for expressions"
     else:
@@ -139,21 +157,21 @@ def _stem(name: str) -> str:
     return name
 
 
-def _line(name: str, array: Array, number: int) -> str:
+def _line_expression(name: str, array: Array, number: int) -> str:
     """Expression for one line of a table, along its longer side."""
     return f"{quote(name)}[{number}]" if array.shape[0] < array.shape[1] else f"{quote(name)}[:, {number}]"
 
 
-def _line_0(array: Array) -> Array:
+def _first_line(array: Array) -> Array:
     """First line of a table, along its longer side."""
     return array[0] if array.shape[0] < array.shape[1] else array[:, 0]
 
 
-def _roles(arrays: Arrays, others: list[str]) -> dict[str, str]:
-    """Roles by name, where names, units and data determine them. others: arrays that are not channels."""
-    channels = [name for name, array in arrays.by_name.items() if array.size >= LEAST_SAMPLES and name not in others]
-    columns = [replace(name_signal(_stem(name)), header=name) for name in channels]
-    return dict(zip(channels, turn_imposed(columns, arrays.by_name, propose_roles(columns)), strict=True))
+def _roles(arrays: Arrays, excluded: list[str]) -> dict[str, str]:
+    """Roles by name, where names, units and data determine them. excluded: arrays that are not channels."""
+    channels = [name for name, array in arrays.by_name.items() if array.size >= LEAST_SAMPLES and name not in excluded]
+    columns = [replace(parse_signal_name(_stem(name)), header=name) for name in channels]
+    return dict(zip(channels, swap_imposed_roles(columns, arrays.by_name, propose_roles(columns)), strict=True))
 
 
 def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
@@ -165,16 +183,16 @@ def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
         yield f"prefix = {json.dumps(prefix)}"
 
 
-def _cells_beside(beside: Sequence[str], groups: Groups) -> Iterator[str]:
+def _ungrouped_comments(ungrouped: Sequence[str], groups: Groups) -> Iterator[str]:
     """Comments on runs in cells of another length, and on how to add them where their names identify the arrays."""
-    if beside:
-        shown = ", ".join(beside[:_NAMED]) + (" ..." if beside[_NAMED:] else "")
-        yield f"\n# Also in the file, in cells of another length: {shown}"
-    same = {_SHARE.sub("", name): name for name in groups.names if name.isidentifier()}
+    if ungrouped:
+        names_text = ", ".join(ungrouped[:_MAX_NAMED]) + (" ..." if ungrouped[_MAX_NAMED:] else "")
+        yield f"\n# Also in the file, in cells of another length: {names_text}"
+    name_by_stem = {_ROLE_SUFFIX.sub("", name): name for name in groups.names if name.isidentifier()}
     lets: dict[str, list[str]] = {}
-    for prefix, slash, name in (full.partition("/") for full in beside):
-        if (plain := _SHARE.sub("", name)) in same:
-            lets.setdefault(prefix + slash, []).append(f"{same[plain]} = {json.dumps(quote(name))}")
+    for prefix, slash, name in (full.partition("/") for full in ungrouped):
+        if (stem := _ROLE_SUFFIX.sub("", name)) in name_by_stem:
+            lets.setdefault(prefix + slash, []).append(f"{name_by_stem[stem]} = {json.dumps(quote(name))}")
     for prefix, pairs in list(lets.items())[-1:]:
         yield f'# Such a run is added by [[part]] with prefix = "{prefix}" and let = {{ {", ".join(pairs)} }}'
 
@@ -182,13 +200,17 @@ def _cells_beside(beside: Sequence[str], groups: Groups) -> Iterator[str]:
 def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
     """A [[clock]] for each time column; without one, a clock with the rate of the file, or with a comment."""
     for name in clocks:
-        plain, unit = unit_in(name) if name in arrays.by_name and name_signal(name).quantity == "time" else (name, "")
-        last = plain.rpartition("_")[2]
+        stem, unit = (
+            split_bracketed_unit(name)
+            if name in arrays.by_name and parse_signal_name(name).quantity == "time"
+            else (name, "")
+        )
+        ending = stem.rpartition("_")[2]
         yield "\n[[clock]]"
         if len(clocks) > 1:
             yield f"name = {json.dumps(name)}"
         yield f"time = {json.dumps(name)}"
-        yield f'time_unit = {json.dumps(unit or (last if last in _TIME_UNITS else ""))}            # "s", "ms"'
+        yield f'time_unit = {json.dumps(unit or (ending if ending in _TIME_UNITS else ""))}            # "s", "ms"'
     if clocks:
         return
     yield "\n[[clock]]"
@@ -201,26 +223,29 @@ def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
 
 def _table(name: str, array: Array, clock: str, role: str) -> Iterator[str]:
     """A channel per line of a table; a table [time, value] gives one channel, with the name and role of the table."""
-    timed = time_in_table(array)
-    for number in range(int(timed), min(array.shape)):
-        single = timed and min(array.shape) == 2
-        own = name if single else f"{name}{number + (not timed)}"
+    has_time = time_in_table(array)
+    for number in range(int(has_time), min(array.shape)):
+        is_single = has_time and min(array.shape) == 2
+        channel_name = name if is_single else f"{name}{number + (not has_time)}"
         yield from _channel(
-            (own, _line(name, array, number), name), _shape(array.shape), clock if timed else "", role if single else ""
+            (channel_name, _line_expression(name, array, number), name),
+            _shape(array.shape),
+            clock if has_time else "",
+            role if is_single else "",
         )
 
 
 def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> Iterator[str]:
     """A [[channel]]. names: of the channel, of its value (an expression), and of the array."""
     name, value, header = names
-    parsed = name_signal(header)
+    parsed = parse_signal_name(header)
     yield ""
     yield f"[[channel]]               # {header}: {shape}"
     yield f"role = {json.dumps(role):20s} # command, response, position, excitation, condition, helper"
     yield f"name = {json.dumps(parsed.name if name == header else name)}"
     yield f"value = {json.dumps(value)}"
-    unit, why = parsed.unit, f"{parsed.doubt}; " if parsed.doubt else ""
-    yield f'unit = {json.dumps(unit):20s} # {why}as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
+    unit, doubt = parsed.unit, f"{parsed.doubt}; " if parsed.doubt else ""
+    yield f'unit = {json.dumps(unit):20s} # {doubt}as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
     if clock:
         yield f"clock = {json.dumps(clock)}"
 

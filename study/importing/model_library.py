@@ -17,8 +17,8 @@ def list_shipped_models() -> tuple[str, ...]:
 def model_for(name: str, folder: Path) -> Path:
     """Path of a model: a file in the folder of the map, otherwise a shipped model. Raises WrongUseError where neither
     exists."""
-    if (beside := folder / name).is_file():
-        return beside
+    if (local_path := folder / name).is_file():
+        return local_path
     if name in list_shipped_models():
         return Path(str(resources("study.importing").joinpath("models").joinpath(f"{name}.toml")))
     raise WrongUseError(

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.resampling import FLAT_TO, SAME_INSTANT, Grid, Method, Samples, resample
+from equalizer.signals.resampling import PASSBAND, TIME_TOLERANCE, Grid, Method, Samples, resample
 from equalizer.signals.signal import FloatArray
 from study.importing.alignment import Logger
 from study.importing.expressions.functions import Value
@@ -51,65 +51,69 @@ class _GridClock:
 
 
 def part_signals(
-    wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], say: Callable[[str], None], step: Callable[[], None]
+    import_map: ImportMap,
+    part: PartMap,
+    loggers: tuple[Logger, ...],
+    report: Callable[[str], None],
+    step: Callable[[], None],
 ) -> PartSignals:
-    """Channels of one part on its grid. `say` is called with a sentence for each deviation from the file, `step` after
-    each channel. Raises ImportProblemError."""
+    """Channels of one part on its grid. `report` is called with a sentence for each deviation from the file, `step`
+    after each channel. Raises ImportProblemError."""
     by_clock = {logger.clock.name: logger for logger in loggers}
     first = loggers[0].clock.name
     sources: list[tuple[ChannelMap, Samples]] = []
-    for channel in wanted.channel:
+    for channel in import_map.channel:
         logger = by_clock[channel.clock or first]
-        values = _values(channel, logger, wanted)
+        values = _read_values(channel, logger, import_map)
         sources.append((channel, logger.base.samples(values)))
-    grid = _grid(wanted, part, loggers, [samples for _, samples in sources])
+    grid = _make_grid(import_map, part, loggers, [samples for _, samples in sources])
     columns: dict[Key, FloatArray] = {}
     for channel, samples in sources:
-        columns[channel.role, channel.name] = _on_grid(channel, samples, grid, say)
+        columns[channel.role, channel.name] = _put_on_grid(channel, samples, grid, report)
         step()
     for logger in loggers:
-        for remark in filter(None, (logger.base.gaps(), logger.base.wander())):
-            say(remark)
-    for computed in wanted.computed:
+        for remark in filter(None, (logger.base.describe_gaps(), logger.base.describe_wander())):
+            report(remark)
+    for computed in import_map.computed:
         # Of several channels with the same name, the first is used.
-        named = {name: column for (_, name), column in reversed(columns.items())}
+        columns_by_name = {name: column for (_, name), column in reversed(columns.items())}
         columns[computed.role, computed.name] = _compute_channel(
-            computed.name, computed.value, named, grid, loggers[0].names
+            computed.name, computed.value, columns_by_name, grid, loggers[0].names
         )
         step()
     return PartSignals(grid, columns)
 
 
-def _values(channel: ChannelMap, logger: Logger, wanted: ImportMap) -> Value:
+def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> Value:
     """Samples of a channel on its own clock; a single number is repeated. Raises ImportProblemError for another shape
     or length, or infinite values."""
-    where = f"channel '{channel.name}'"
+    subject = f"channel '{channel.name}'"
     try:
         values = logger.names.value_of(channel.value, logger.base)
     except ImportProblemError as error:
-        raise ImportProblemError(f"{where}: {error}") from error
+        raise ImportProblemError(f"{subject}: {error}") from error
     if values.ndim > 1:
         raise ImportProblemError(
-            f"{where}: {channel.value} has the shape {values.shape}; take one row or column, as in {channel.value}[0]"
+            f"{subject}: {channel.value} has the shape {values.shape}; take one row or column, as in {channel.value}[0]"
         )
-    count = _count(logger, wanted)
+    count = _count_samples(logger, import_map)
     if values.ndim == 0:
         return np.full(count or 1, float(values))
     if count and len(values) != count:
         clock = f"clock '{logger.clock.name}'"
-        raise ImportProblemError(f"{where}: {channel.value} has {len(values)} samples, but {clock} has {count}")
+        raise ImportProblemError(f"{subject}: {channel.value} has {len(values)} samples, but {clock} has {count}")
     if np.isinf(values).any():
-        raise ImportProblemError(f"{where}: {channel.value} holds infinite values; a missing sample is NaN")
+        raise ImportProblemError(f"{subject}: {channel.value} holds infinite values; a missing sample is NaN")
     return values
 
 
-def _count(logger: Logger, wanted: ImportMap) -> int:
+def _count_samples(logger: Logger, import_map: ImportMap) -> int:
     """Number of samples of a clock: that of its stamps, otherwise of its first channel that is not constant; 0 without
     one."""
     if logger.base.stamps_s is not None:
         return len(logger.base.stamps_s)
-    first = wanted.clock[0].name
-    for channel in wanted.channel:
+    first = import_map.clock[0].name
+    for channel in import_map.channel:
         if (channel.clock or first) == logger.clock.name:
             values = logger.names.value_of(channel.value, logger.base)
             if values.ndim == 1:
@@ -117,11 +121,11 @@ def _count(logger: Logger, wanted: ImportMap) -> int:
     return 0
 
 
-def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources: list[Samples]) -> Grid:
+def _make_grid(import_map: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources: list[Samples]) -> Grid:
     """Grid over the time range common to all channels, at the stated rate or the highest of the clocks. Raises
     ImportProblemError for uneven stamps without a stated rate, and for too many or too few samples."""
     uneven = [logger for logger in loggers if not logger.base.rate_hz]
-    if uneven and not wanted.rate_hz:
+    if uneven and not import_map.rate_hz:
         steps_ms = np.diff(uneven[0].base.times_s(0)) * 1e3
         raise ImportProblemError(
             f"clock '{uneven[0].clock.name}' has uneven stamps (steps of {steps_ms.min():.4g} to {steps_ms.max():.4g} "
@@ -129,17 +133,17 @@ def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources
             f"at the top of the map rate_hz = {uneven[0].base.fastest_hz:.4g}, under each [[channel]] "
             f'resample = "linear". {_OF_COMMANDS}'
         )
-    rate_hz = wanted.rate_hz or max(logger.base.rate_hz for logger in loggers)
+    rate_hz = import_map.rate_hz or max(logger.base.rate_hz for logger in loggers)
     begin_s = max(float(samples.times_s[0]) for samples in sources)
     end_s = min(float(samples.times_s[-1]) for samples in sources)
     if part.stop_s:
-        end_s = min(end_s, begin_s + part.stop_s - (1 - SAME_INSTANT) / rate_hz)
-    begin_s += np.ceil(part.start_s * rate_hz - SAME_INSTANT) / rate_hz
+        end_s = min(end_s, begin_s + part.stop_s - (1 - TIME_TOLERANCE) / rate_hz)
+    begin_s += np.ceil(part.start_s * rate_hz - TIME_TOLERANCE) / rate_hz
     # The grid lies on the samples of a clock with this rate, so that its channels need no resampling.
     for logger in [logger for logger in loggers if logger.base.rate_hz == rate_hz][:1]:
         origin_s = float(logger.base.times_s(1)[0]) + logger.base.offset_s
-        begin_s = origin_s + np.ceil((begin_s - origin_s) * rate_hz - SAME_INSTANT) / rate_hz
-    count = int(np.floor((end_s - begin_s) * rate_hz + SAME_INSTANT)) + 1
+        begin_s = origin_s + np.ceil((begin_s - origin_s) * rate_hz - TIME_TOLERANCE) / rate_hz
+    count = int(np.floor((end_s - begin_s) * rate_hz + TIME_TOLERANCE)) + 1
     if count > MOST_SAMPLES:
         raise ImportProblemError(
             f"{part.file}: {end_s - begin_s:.9g} s at {rate_hz:g} Hz are {count:.3g} samples, more than "
@@ -152,11 +156,11 @@ def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources
     return Grid(begin_s, rate_hz, count)
 
 
-def _on_grid(channel: ChannelMap, samples: Samples, grid: Grid, say: Callable[[str], None]) -> FloatArray:
+def _put_on_grid(channel: ChannelMap, samples: Samples, grid: Grid, report: Callable[[str], None]) -> FloatArray:
     """Samples of a channel on the grid (grid.count,): copied where they lie on it, otherwise resampled. Raises
     ImportProblemError where the map does not state how to resample."""
     first = (grid.start_s - float(samples.times_s[0])) * grid.rate_hz
-    if _same_rate(samples, grid) and abs(first - round(first)) < SAME_INSTANT:
+    if _has_same_rate(samples, grid) and abs(first - round(first)) < TIME_TOLERANCE:
         column = samples.values[round(first) : round(first) + grid.count]
     elif channel.resample == "":
         raise ImportProblemError(
@@ -165,19 +169,19 @@ def _on_grid(channel: ChannelMap, samples: Samples, grid: Grid, say: Callable[[s
             f"under its [[channel]] in the map.{' ' + _OF_COMMANDS if channel.role == 'command' else ''}"
         )
     else:
-        column = _resample(channel, channel.resample, samples, grid, say)
+        column = _resample(channel, channel.resample, samples, grid, report)
     if missing := int(np.isnan(column).sum()):
-        say(f"{channel.name}: {missing} of {len(column)} samples are missing.")
+        report(f"{channel.name}: {missing} of {len(column)} samples are missing.")
     return column
 
 
-def _same_rate(samples: Samples, grid: Grid) -> bool:
-    """Whether two rates differ by less than `SAME_INSTANT` periods over the whole grid."""
-    return abs(samples.rate_hz / grid.rate_hz - 1) * grid.count < SAME_INSTANT
+def _has_same_rate(samples: Samples, grid: Grid) -> bool:
+    """Whether two rates differ by less than `TIME_TOLERANCE` periods over the whole grid."""
+    return abs(samples.rate_hz / grid.rate_hz - 1) * grid.count < TIME_TOLERANCE
 
 
 def _resample(
-    channel: ChannelMap, method: Method, samples: Samples, grid: Grid, say: Callable[[str], None]
+    channel: ChannelMap, method: Method, samples: Samples, grid: Grid, report: Callable[[str], None]
 ) -> FloatArray:
     """Resample a channel to the grid and report how. Raises ImportProblemError."""
     try:
@@ -185,9 +189,9 @@ def _resample(
     except ValueError as error:
         raise ImportProblemError(f"channel '{channel.name}': {error}") from error
     source_hz = samples.rate_hz or 1 / float(np.median(np.diff(samples.times_s)))
-    came = f"{samples.rate_hz:.6g} Hz" if samples.rate_hz else f"uneven stamps (about {source_hz:.4g} Hz)"
-    flat = f", flat to {FLAT_TO / 2 * min(source_hz, grid.rate_hz):.4g} Hz" if method == "band-limited" else ""
-    say(f"{channel.name}: resampled from {came} to {grid.rate_hz:.6g} Hz, {method}{flat}.")
+    source_text = f"{samples.rate_hz:.6g} Hz" if samples.rate_hz else f"uneven stamps (about {source_hz:.4g} Hz)"
+    band_text = f", flat to {PASSBAND / 2 * min(source_hz, grid.rate_hz):.4g} Hz" if method == "band-limited" else ""
+    report(f"{channel.name}: resampled from {source_text} to {grid.rate_hz:.6g} Hz, {method}{band_text}.")
     return column
 
 
@@ -196,9 +200,9 @@ def _compute_channel(
 ) -> FloatArray:
     """Evaluate a computed channel on the grid (grid.count,). Raises ImportProblemError for another shape or infinite
     values."""
-    own = {**file.arrays, "clock_s": grid.times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
+    arrays = {**file.arrays, "clock_s": grid.times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
     try:
-        value = Namespace(own, file.definitions, file.where, file.budget).value_of(text, _GridClock(grid))
+        value = Namespace(arrays, file.definitions, file.file_name, file.budget).value_of(text, _GridClock(grid))
     except ImportProblemError as error:
         raise ImportProblemError(f"computed channel '{name}': {error}") from error
     if value.ndim == 0:

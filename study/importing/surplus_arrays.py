@@ -10,7 +10,7 @@ import numpy as np
 
 from equalizer.signals.units import UnknownUnitError, parse_unit
 from study.importing.arrays.arrays import Array, Arrays
-from study.importing.map_format.signal_words import FOREIGN_WORDS, unit_in
+from study.importing.map_format.signal_words import FOREIGN_WORDS, split_bracketed_unit
 
 LEAST_SAMPLES = 16
 """Arrays with fewer samples are constants."""
@@ -33,7 +33,7 @@ _STEP_WORDS = {"ts", "dt"}
 """Names of a sampling interval."""
 _USUAL_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
 """Ratios of the units of two clocks that are tried where a name states no unit."""
-_EVEN = 0.02
+_MAX_STEP_SPREAD = 0.02
 """Largest range of a clock's steps, relative to their median, for them to count as even."""
 SAME_CLOCK = 0.5
 """Stamps that both begin at 0 are one clock if they differ by at most this fraction of a step."""
@@ -45,9 +45,15 @@ def surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
     empty |= {
         name: "holds no numbers" for name, array in arrays.by_name.items() if array.dtype.kind in "SU" and array.ndim
     }
-    timed = any(name in arrays.clocks or is_growing_time(name, array) for name, array in arrays.by_name.items())
-    numbered = {name: "numbers the rows" for name, array in arrays.by_name.items() if timed and _is_index(name, array)}
-    return empty | numbered | {name: f"is the same time as '{other}'" for name, other in equal_clocks(arrays).items()}
+    has_clock = any(name in arrays.clocks or is_growing_time(name, array) for name, array in arrays.by_name.items())
+    row_numbers = {
+        name: "numbers the rows" for name, array in arrays.by_name.items() if has_clock and _is_index(name, array)
+    }
+    return (
+        empty
+        | row_numbers
+        | {name: f"is the same time as '{kept_clock}'" for name, kept_clock in equal_clocks(arrays).items()}
+    )
 
 
 @np.errstate(all="ignore")
@@ -63,17 +69,17 @@ def is_growing_time(name: str, array: Array) -> bool:
 
 def name_words(name: str) -> set[str]:
     """Words of a name without its unit, in lower case."""
-    return set(_split_words(unit_in(name)[0]))
+    return set(_split_words(split_bracketed_unit(name)[0]))
 
 
-def _split_words(plain: str) -> list[str]:
+def _split_words(text: str) -> list[str]:
     """Words of a text in lower case, in order."""
-    return "".join(letter if letter.isalnum() else " " for letter in plain.lower()).split()
+    return "".join(letter if letter.isalnum() else " " for letter in text.lower()).split()
 
 
 def _last_part(name: str) -> str:
     """Last part of a name of several levels (`data.fs`, `1-of-2/fs`), without its unit."""
-    return re.split(r"[./](?=\w)(?!k?Hz\b)", unit_in(name)[0])[-1]
+    return re.split(r"[./](?=\w)(?!k?Hz\b)", split_bracketed_unit(name)[0])[-1]
 
 
 def rates_in(arrays: Arrays) -> Mapping[str, str]:
@@ -98,22 +104,24 @@ def _is_empty(array: Array) -> bool:
 @np.errstate(all="ignore")
 def _is_index(name: str, array: Array) -> bool:
     """Whether an array has no name or one of a row number, and counts the rows."""
-    plain = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
-    return plain and bool(_INDEX.fullmatch(name)) and bool((np.diff(array.astype(float)) == 1).all())
+    is_column = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
+    return is_column and bool(_INDEX.fullmatch(name)) and bool((np.diff(array.astype(float)) == 1).all())
 
 
 def equal_clocks(arrays: Arrays) -> Mapping[str, str]:
     """Time columns that repeat another time column, each with the name of the other."""
-    kept: list[str] = []
-    found = {}
+    kept_clocks: list[str] = []
+    repeated = {}
     clocks = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
     for name in sorted(clocks, key=lambda name: (_seconds(name) is None, name not in arrays.clocks)):
-        same = next((other for other in kept if _is_same_clock(arrays.by_name, other, name)), None)
-        if same is None:
-            kept.append(name)
+        equal_clock = next(
+            (kept_clock for kept_clock in kept_clocks if _is_same_clock(arrays.by_name, kept_clock, name)), None
+        )
+        if equal_clock is None:
+            kept_clocks.append(name)
         else:
-            found[name] = same
-    return found
+            repeated[name] = equal_clock
+    return repeated
 
 
 @np.errstate(all="ignore")
@@ -123,31 +131,35 @@ def time_in_table(array: Array) -> bool:
     if array.ndim != 2 or array.dtype.kind not in "fiu" or max(array.shape) < LEAST_SAMPLES:
         return False
     lines = array if array.shape[0] < array.shape[1] else array.T
-    grows = [bool((line[1:] > line[:-1]).all()) for line in lines]
+    is_growing = [bool((line[1:] > line[:-1]).all()) for line in lines]
     steps = np.diff(lines[0].astype(float))
-    even = bool(np.ptp(steps) <= _EVEN * abs(np.median(steps)))  # even where the values increase, too
-    return len(lines) > 1 and grows[0] and (even or not all(grows))
+    is_even = bool(np.ptp(steps) <= _MAX_STEP_SPREAD * abs(np.median(steps)))  # even where the values increase, too
+    return len(lines) > 1 and is_growing[0] and (is_even or not all(is_growing))
 
 
 @np.errstate(all="ignore")
 def _is_same_clock(by_name: Mapping[str, Array], first: str, second: str) -> bool:
     """Whether two time columns are equal, apart from their starts and from the ratio of their units. Where a name
     states no unit, usual ratios are tried."""
-    one, other = (by_name[name].astype(float) for name in (first, second))
-    if one.shape != other.shape or one.ndim != 1 or not np.isfinite([one[[0, -1]], other[[0, -1]]]).all():
+    first_times, second_times = (by_name[name].astype(float) for name in (first, second))
+    if (
+        first_times.shape != second_times.shape
+        or first_times.ndim != 1
+        or not np.isfinite([first_times[[0, -1]], second_times[[0, -1]]]).all()
+    ):
         return False
-    one, other = one - one[0], other - other[0]
+    first_times, second_times = first_times - first_times[0], second_times - second_times[0]
     units = _seconds(first), _seconds(second)
     ratios = _USUAL_RATIOS if None in units else ((units[1] or 1) / (units[0] or 1),)
-    ratio = min(ratios, key=lambda ratio: abs(other[-1] * ratio - one[-1]))
-    step = float(np.nanmedian(np.diff(one)))
-    return bool(np.nanmax(np.abs(other * ratio - one)) <= SAME_CLOCK * step)
+    ratio = min(ratios, key=lambda ratio: abs(second_times[-1] * ratio - first_times[-1]))
+    step = float(np.nanmedian(np.diff(first_times)))
+    return bool(np.nanmax(np.abs(second_times * ratio - first_times)) <= SAME_CLOCK * step)
 
 
 def _seconds(name: str) -> float | None:
     """Factor from the unit in brackets to seconds; None without a unit of time."""
     try:
-        unit = parse_unit(unit_in(name)[1])
+        unit = parse_unit(split_bracketed_unit(name)[1])
     except UnknownUnitError:
         return None
     return unit.factor if unit.si == "s" else None

@@ -3,7 +3,7 @@
 Stamps are refused where they are missing, run backwards (a counter that wraps around, a clock that is set back),
 repeat, or jump; the message names the key of the map that corrects them. Stamps that are uniform apart from rounding
 and skipped rows give a rate and the index of each sample (`uniform_stamps`). Rows that a logger wrote twice are removed
-(`without_doubled_rows`).
+(`drop_doubled_rows`).
 """
 
 from dataclasses import dataclass, replace
@@ -43,7 +43,7 @@ class TimeBase:
     """Sample rate (Hz); 0 if stamps are not uniform."""
     stamps_s: Value | None
     """(n,) as logged, in seconds; None for a clock with a rate only."""
-    places: IntArray | None
+    sample_index: IntArray | None
     """(n,): index of each stamp's sample at the uniform rate; None if stamps are not uniform."""
     gap_s: float
     """A step of the stamps longer than this is a gap, in which samples are missing (s)."""
@@ -60,12 +60,12 @@ class TimeBase:
         stamps."""
         if self.stamps_s is None:
             return np.arange(count) / self.rate_hz
-        if self.places is not None:
-            evened: Value = self.stamps_s[0] + self.places / self.rate_hz
-            return evened
+        if self.sample_index is not None:
+            uniform_s: Value = self.stamps_s[0] + self.sample_index / self.rate_hz
+            return uniform_s
         return self.stamps_s
 
-    def gaps(self) -> str:
+    def describe_gaps(self) -> str:
         """Sentence with the number of gaps in the stamps, and with the key that declares that nothing is missing; empty
         without gaps."""
         steps_s = np.diff(self.times_s(0)) if self.stamps_s is not None else np.zeros(0)
@@ -79,31 +79,35 @@ class TimeBase:
             "[[clock]] in the map, and resample under each [[channel]]."
         )
 
-    def wander(self) -> str:
+    def describe_wander(self) -> str:
         """Sentence with the deviation of the stamps from the uniform grid that was fitted; empty where it is
         negligible."""
-        if self.stamps_s is None or self.places is None:
+        if self.stamps_s is None or self.sample_index is None:
             return ""
-        off_s = float(np.max(np.abs(self.times_s(0) - self.stamps_s)))
-        if off_s * self.rate_hz <= UNEVEN:
+        deviation_s = float(np.max(np.abs(self.times_s(0) - self.stamps_s)))
+        if deviation_s * self.rate_hz <= UNEVEN:
             return ""
         return (
             f"Clock '{self.name}': its stamps are uniform apart from the rounding of their last decimal, so "
-            f"{self.rate_hz:.6g} Hz is taken; they lie up to {off_s:.2g} s from a uniform grid."
+            f"{self.rate_hz:.6g} Hz is taken; they lie up to {deviation_s:.2g} s from a uniform grid."
         )
 
     def samples(self, values: Value) -> Samples:
         """The values (n,) with their times by the reference clock. Rows that a uniform logger skipped become NaN,
         unless the map says that there are no gaps."""
         times_s = self.times_s(len(values)) + self.offset_s
-        widest_s = 0.0 if self.places is None else float(np.max(np.diff(self.places))) / self.rate_hz
-        if self.places is not None and self.places[-1] > len(self.places) - 1 and widest_s <= self.gap_s:
+        widest_s = 0.0 if self.sample_index is None else float(np.max(np.diff(self.sample_index))) / self.rate_hz
+        if (
+            self.sample_index is not None
+            and self.sample_index[-1] > len(self.sample_index) - 1
+            and widest_s <= self.gap_s
+        ):
             return Samples(times_s, values, 0.0, self.gap_s)  # the map declares that nothing is missing between them
-        if self.places is None or self.places[-1] == len(self.places) - 1:
+        if self.sample_index is None or self.sample_index[-1] == len(self.sample_index) - 1:
             return Samples(times_s, values, self.rate_hz, self.gap_s)
-        every = np.full(self.places[-1] + 1, np.nan)
-        every[self.places] = values
-        return Samples(times_s[0] + np.arange(len(every)) / self.rate_hz, every, self.rate_hz, self.gap_s)
+        padded = np.full(self.sample_index[-1] + 1, np.nan)
+        padded[self.sample_index] = values
+        return Samples(times_s[0] + np.arange(len(padded)) / self.rate_hz, padded, self.rate_hz, self.gap_s)
 
 
 def time_base(clock: ClockMap, names: Namespace) -> TimeBase:
@@ -130,21 +134,22 @@ def _base_from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
         raise ImportProblemError(
             f"clock '{clock.name}': {clock.time} has the shape {stamps_s.shape}; stamps are one row of two or more"
         )
-    if problem := _wrong_stamps(stamps_s, _as_expression(clock.time, names), unit.factor):
+    if problem := _find_stamp_problem(stamps_s, _as_expression(clock.time, names), unit.factor):
         raise ImportProblemError(f"clock '{clock.name}': {clock.time} {problem}")
-    rate_hz, places = fit_uniform_rate(stamps_s, last_decimal(stamps_s / unit.factor) * unit.factor)
-    if places is not None and places[-1] >= MOST_SAMPLES:
+    rate_hz, sample_index = fit_uniform_rate(stamps_s, last_decimal(stamps_s / unit.factor) * unit.factor)
+    if sample_index is not None and sample_index[-1] >= MOST_SAMPLES:
         widest = int(np.argmax(np.diff(stamps_s)))
         raise ImportProblemError(
-            f"clock '{clock.name}': {clock.time} jumps from {stamps_s[widest]:.9g} to {stamps_s[widest + 1]:.9g} s at "
-            f"sample {widest + 1}; at {rate_hz:g} Hz the recording would be {places[-1] + 1:.3g} samples long, most of "
-            "them missing. Correct the stamps, or cut the file there into several, which are imported together"
+            f"clock '{clock.name}': {clock.time} jumps from {stamps_s[widest]:.9g} to {stamps_s[widest + 1]:.9g} s "
+            f"at sample {widest + 1}; at {rate_hz:g} Hz the recording would be {sample_index[-1] + 1:.3g} "
+            "samples long, most of them missing. Correct the stamps, or cut the file there into several, which are "
+            "imported together"
         )
     gap_s = clock.gap_s or _USUAL_GAP * float(np.median(np.diff(stamps_s)))
     # On a uniform grid, one skipped row is a gap.
-    if places is not None and not clock.gap_s:
+    if sample_index is not None and not clock.gap_s:
         gap_s = min(gap_s, 1.5 / rate_hz)
-    return TimeBase(clock.name, rate_hz, stamps_s, places, gap_s)
+    return TimeBase(clock.name, rate_hz, stamps_s, sample_index, gap_s)
 
 
 def _as_expression(time: str, names: Namespace) -> str:
@@ -152,7 +157,7 @@ def _as_expression(time: str, names: Namespace) -> str:
     return f"array('{time}')" if time in names.arrays and not time.isidentifier() else time
 
 
-def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
+def _find_stamp_problem(stamps_s: Value, time: str, unit_s: float) -> str:
     """Problem with the stamps (n,) and the key of the map that corrects it, as a clause after the name of the stamps;
     empty if they are finite and increase without a jump of an hour. time: expression of the stamps. unit_s: their
     unit."""
@@ -162,19 +167,21 @@ def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
     steps_s = np.diff(stamps_s)
     if (steps_s < 0).any():
         first = int(np.argmax(steps_s < 0)) + 1
-        back_s = float(-steps_s[first - 1])
-        found = f"runs backwards at sample {first}, from {stamps_s[first - 1]:.9g} to {stamps_s[first]:.9g} s"
+        backward_s = float(-steps_s[first - 1])
+        problem = f"runs backwards at sample {first}, from {stamps_s[first - 1]:.9g} to {stamps_s[first]:.9g} s"
         usual_s = float(np.median(steps_s))
-        turn = next((turn for turn in _COUNTERS if abs(back_s + usual_s - turn * unit_s) < 2 * usual_s), 0)
-        if turn and stamps_s.max() < turn * unit_s and stamps_s.min() >= 0:
+        wrap = next((wrap for wrap in _COUNTERS if abs(backward_s + usual_s - wrap * unit_s) < 2 * usual_s), 0)
+        if wrap and stamps_s.max() < wrap * unit_s and stamps_s.min() >= 0:
             return (
-                f"{found}, as a counter that restarts at {turn}; the map's [[clock]] mends it: "
-                f'time = "{time} + {turn} * cumsum(diff({time}) < 0)"'
+                f"{problem}, as a counter that restarts at {wrap}; the map's [[clock]] mends it: "
+                f'time = "{time} + {wrap} * cumsum(diff({time}) < 0)"'
             )
-        if abs(back_s - _HOUR_S) > _HOUR_S / 60:
-            return f"{found}; put the rows in order, or cut the file there into several, which are imported together"
-        mended = f"{time} + {_HOUR_S / unit_s:g} * cumsum(diff({time}) < 0)"
-        return f'{found}, as a clock that is set back by an hour; the map\'s [[clock]] mends it: time = "{mended}"'
+        if abs(backward_s - _HOUR_S) > _HOUR_S / 60:
+            return f"{problem}; put the rows in order, or cut the file there into several, which are imported together"
+        expression = f"{time} + {_HOUR_S / unit_s:g} * cumsum(diff({time}) < 0)"
+        return (
+            f'{problem}, as a clock that is set back by an hour; the map\'s [[clock]] mends it: time = "{expression}"'
+        )
     if (steps_s == 0).any():
         first = int(np.argmax(steps_s == 0)) + 1
         rate_hz = (len(stamps_s) - 1) / float(np.ptp(stamps_s)) if np.ptp(stamps_s) else 1000.0
@@ -183,17 +190,17 @@ def _wrong_stamps(stamps_s: Value, time: str, unit_s: float) -> str:
             f"stamps are coarse, state the rate in place of `time` in the map's [[clock]], as in "
             f"rate_hz = {rate_hz:.4g}; where a sample was logged twice with other values, remove either of the two"
         )
-    ahead = np.flatnonzero(np.abs(steps_s - _HOUR_S) < 10 * float(np.median(steps_s)))
-    if len(ahead) == 1 and float(np.median(steps_s)) < _HOUR_S / 1000:
-        mended = f"{time} - {_HOUR_S / unit_s:g} * cumsum(diff({time}) > {steps_s[ahead[0]] / 2 / unit_s:.4g})"
+    hour_steps = np.flatnonzero(np.abs(steps_s - _HOUR_S) < 10 * float(np.median(steps_s)))
+    if len(hour_steps) == 1 and float(np.median(steps_s)) < _HOUR_S / 1000:
+        expression = f"{time} - {_HOUR_S / unit_s:g} * cumsum(diff({time}) > {steps_s[hour_steps[0]] / 2 / unit_s:.4g})"
         return (
-            f"jumps ahead by an hour at sample {ahead[0] + 1}, as a clock that is set to summer time; the map's "
-            f'[[clock]] mends it: time = "{mended}"'
+            f"jumps ahead by an hour at sample {hour_steps[0] + 1}, as a clock that is set to summer time; the map's "
+            f'[[clock]] mends it: time = "{expression}"'
         )
     return ""
 
 
-def without_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, str]:
+def drop_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, str]:
     """The arrays without rows that repeat the row above, and a sentence with their number. Nothing is removed if any
     row with a repeated stamp has other values than the row above. Raises ImportProblemError."""
     if not clock.time:
@@ -202,27 +209,31 @@ def without_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, 
     if stamps.ndim != 1 or len(stamps) < 2:
         return names, ""
     repeated = np.flatnonzero(stamps[1:] == stamps[:-1]) + 1
-    rows = [array for array in names.arrays.values() if _is_row(array, len(stamps)) and not _counts(array)]
-    if not len(repeated) or not all(_repeats(array, repeated) for array in rows):
+    row_arrays = [
+        array for array in names.arrays.values() if _has_row_count(array, len(stamps)) and not _is_counter(array)
+    ]
+    if not len(repeated) or not all(_is_repeated(array, repeated) for array in row_arrays):
         return names, ""
-    kept = np.delete(np.arange(len(stamps)), repeated)
-    arrays = {name: array[kept] if _is_row(array, len(stamps)) else array for name, array in names.arrays.items()}
+    kept_rows = np.delete(np.arange(len(stamps)), repeated)
+    arrays = {
+        name: array[kept_rows] if _has_row_count(array, len(stamps)) else array for name, array in names.arrays.items()
+    }
     count = f"{len(repeated)} row{'s' if len(repeated) > 1 else ''}"
     text = f"Clock '{clock.name}': {count} logged twice (the same stamp, the same values) left out."
     return replace(names, arrays=arrays), text
 
 
-def _repeats(array: Array, rows: npt.NDArray[np.intp]) -> bool:
+def _is_repeated(array: Array, rows: npt.NDArray[np.intp]) -> bool:
     """Whether each of these rows of an array equals the row above it."""
     return np.array_equal(array[rows], array[rows - 1], equal_nan=array.dtype.kind == "f")
 
 
 @np.errstate(all="ignore")
-def _counts(array: Array) -> bool:
+def _is_counter(array: Array) -> bool:
     """Whether an array is a row counter, which grows even where a row was logged twice."""
     return array.ndim == 1 and array.dtype.kind in "fiu" and bool((array[1:] - array[:-1] == 1).all())
 
 
-def _is_row(array: Array, count: int) -> bool:
+def _has_row_count(array: Array, count: int) -> bool:
     """Whether an array has an entry for each of `count` rows."""
     return array.ndim >= 1 and len(array) == count

@@ -13,7 +13,7 @@ IntArray = npt.NDArray[np.int64]
 
 UNEVEN = 0.02
 """Tolerance for uniform stamps: largest deviation from the grid, as a fraction of a step. By hand."""
-LEFT_OUT = 0.02
+MAX_SKIPPED_SHARE = 0.02
 """Largest fraction of rows that a uniform logger skips; if more steps are long, stamps were rounded instead. By
 hand."""
 _MOST_DECIMALS = 6
@@ -33,21 +33,21 @@ def fit_uniform_rate(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | 
     which is right where some are. Each is first rounded to a few digits (1000 for 1000.0003). unit_s: unit of the last
     decimal place of the stamps.
     """
-    since_s = stamps_s - stamps_s[0]
-    mean_hz = (len(stamps_s) - 1) / float(since_s[-1])
+    elapsed_s = stamps_s - stamps_s[0]
+    mean_hz = (len(stamps_s) - 1) / float(elapsed_s[-1])
     usual_hz = 1 / float(np.median(np.diff(stamps_s)))
-    for about_hz in (mean_hz, usual_hz):
-        for rate_hz in (*(float(f"{about_hz:.{digits}g}") for digits in _PLAIN_DIGITS), about_hz):
-            places = np.round(since_s * rate_hz).astype(np.int64)
-            uneven = np.max(np.abs(since_s * rate_hz - places))
-            steps = np.diff(places)
-            if uneven <= UNEVEN and (steps >= 1).all() and np.mean(steps > 1) <= LEFT_OUT:
-                return rate_hz, places
-    rate_hz = _estimate_rounded_rate(since_s, unit_s)
+    for estimate_hz in (mean_hz, usual_hz):
+        for rate_hz in (*(float(f"{estimate_hz:.{digits}g}") for digits in _PLAIN_DIGITS), estimate_hz):
+            sample_index = np.round(elapsed_s * rate_hz).astype(np.int64)
+            deviation = np.max(np.abs(elapsed_s * rate_hz - sample_index))
+            steps = np.diff(sample_index)
+            if deviation <= UNEVEN and (steps >= 1).all() and np.mean(steps > 1) <= MAX_SKIPPED_SHARE:
+                return rate_hz, sample_index
+    rate_hz = _estimate_rounded_rate(elapsed_s, unit_s)
     return rate_hz, np.arange(len(stamps_s)) if rate_hz else None
 
 
-def _estimate_rounded_rate(since_s: Value, unit_s: float) -> float:
+def _estimate_rounded_rate(elapsed_s: Value, unit_s: float) -> float:
     """Rate (Hz) of stamps without a gap that are uniform apart from rounding to their last decimal place; else 0.
 
     Rounding moves a stamp by at most half a unit of that place, so deviations from the grid must lie within one unit.
@@ -55,17 +55,17 @@ def _estimate_rounded_rate(since_s: Value, unit_s: float) -> float:
     Otherwise the rate of the median step is taken where stamps wander slowly: single steps differ from it by one unit
     of a fine decimal, and no stamp deviates by half a step.
     """
-    ticks = np.round(np.diff(since_s) / unit_s) if unit_s else np.zeros(1)
+    ticks = np.round(np.diff(elapsed_s) / unit_s) if unit_s else np.zeros(1)
     if ticks.min() < 1 or _skips_rows(ticks):
         return 0.0
-    numbers = np.arange(len(since_s))
-    mean_hz = (len(since_s) - 1) / float(since_s[-1])
-    least = float(np.ptp(since_s * mean_hz - numbers)) + UNEVEN
+    sample_index = np.arange(len(elapsed_s))
+    mean_hz = (len(elapsed_s) - 1) / float(elapsed_s[-1])
+    smallest_spread = float(np.ptp(elapsed_s * mean_hz - sample_index)) + UNEVEN
     for rate_hz in (*(float(f"{mean_hz:.{digits}g}") for digits in range(1, max(_PLAIN_DIGITS) + 1)), mean_hz):
-        if np.ptp(since_s * rate_hz - numbers) <= min(unit_s * rate_hz * (1 + _BINARY), least):
+        if np.ptp(elapsed_s * rate_hz - sample_index) <= min(unit_s * rate_hz * (1 + _BINARY), smallest_spread):
             return rate_hz
     usual_hz = 1 / float(np.sort(ticks)[len(ticks) // 2] * unit_s)
-    deviation, unit = since_s * usual_hz - numbers, unit_s * usual_hz * (1 + _BINARY)
+    deviation, unit = elapsed_s * usual_hz - sample_index, unit_s * usual_hz * (1 + _BINARY)
     wanders = unit <= UNEVEN * (1 + _BINARY) and np.max(np.abs(np.diff(deviation))) <= unit
     wanders = wanders and np.max(np.abs(deviation)) < 0.5
     return usual_hz if wanders else 0.0
@@ -73,9 +73,9 @@ def _estimate_rounded_rate(since_s: Value, unit_s: float) -> float:
 
 def _skips_rows(ticks: Value) -> bool:
     """Whether rows were skipped: all steps are multiples of the shortest, and no more of them are longer than
-    `LEFT_OUT` allows, plus three standard deviations of a Poisson count. ticks: (n - 1,), steps in units of the last
-    decimal."""
-    expected = LEFT_OUT * len(ticks)
+    `MAX_SKIPPED_SHARE` allows, plus three standard deviations of a Poisson count. ticks: (n - 1,), steps in units of
+    the last decimal."""
+    expected = MAX_SKIPPED_SHARE * len(ticks)
     skipped = np.count_nonzero(ticks > ticks.min())
     return not (ticks % ticks.min()).any() and bool(skipped <= expected + 3 * np.sqrt(expected) + 1)
 
@@ -83,7 +83,7 @@ def _skips_rows(ticks: Value) -> bool:
 def last_decimal(stamps: Value) -> float:
     """Unit of the last decimal place of the stamps, such as 0.001; 0 with more than `_MOST_DECIMALS` decimals."""
     for digits in range(_MOST_DECIMALS + 1):
-        whole = stamps * 10**digits
-        if (np.abs(whole - np.round(whole)) <= _BINARY).all():
+        scaled = stamps * 10**digits
+        if (np.abs(scaled - np.round(scaled)) <= _BINARY).all():
             return float(10**-digits)
     return 0.0

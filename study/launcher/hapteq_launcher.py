@@ -25,13 +25,13 @@ def home() -> Path | None:
 def foreign_packages() -> list[Path]:
     """Files that would be imported under the name of one of the packages without belonging to hapteq."""
     ours = home()
-    found = []
+    foreign_paths = []
     for name in PACKAGES:
         spec = importlib.util.find_spec(name)
         origin = Path(spec.origin).resolve() if spec is not None and spec.origin else None
         if origin is not None and (ours is None or origin != ours / name / "__init__.py"):
-            found.append(origin)
-    return found
+            foreign_paths.append(origin)
+    return foreign_paths
 
 
 def main() -> int:

@@ -17,13 +17,13 @@ _OBSERVERS = 0x0B5E
 otherwise be correlated with the directions."""
 
 
-def uniform(felt: PerceivedStimulus, seed: int, count: int) -> tuple[float, ...]:
+def draw_uniform(felt: PerceivedStimulus, seed: int, count: int) -> tuple[float, ...]:
     """`count` independent draws, uniform in (0, 1), for one presentation. seed: of the session."""
     key = (_OBSERVERS, felt.run, felt.trial, felt.attempt)
     words = np.random.SeedSequence(entropy=seed, spawn_key=key).generate_state(count, np.uint64)
     return tuple(((int(word) >> 11) + 0.5) * 2.0**-53 for word in words)
 
 
-def response_time_s(luck: float) -> float:
-    """Log-normal response time (s). luck: uniform in (0, 1)."""
-    return _MEDIAN_RESPONSE_S * math.exp(_SPREAD_OF_LOG * NormalDist().inv_cdf(luck))
+def draw_response_time_s(draw: float) -> float:
+    """Log-normal response time (s). draw: uniform in (0, 1)."""
+    return _MEDIAN_RESPONSE_S * math.exp(_SPREAD_OF_LOG * NormalDist().inv_cdf(draw))

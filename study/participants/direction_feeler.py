@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 from protocols.trial import Phase
-from study.participants.chance import response_time_s, uniform
+from study.participants.chance import draw_response_time_s, draw_uniform
 from study.participants.detection import DETECTION_SLOPE, TYPICAL_DETECTION_N
 from study.participants.observer import PerceivedStimulus, Reply
 from study.participants.psychometric_curve import WeibullCurve, threshold_at
@@ -52,9 +52,9 @@ class DirectionFeeler:
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """Answer (1 or 2) and response time (s) for one presentation, random but the same for equal arguments."""
-        luck, delay = uniform(felt, seed, 2)
-        answer = 1 if luck < self.share_of_1(felt) else 2
-        return Reply(answer, response_time_s(delay))
+        choice_draw, time_draw = draw_uniform(felt, seed, 2)
+        answer = 1 if choice_draw < self.share_of_1(felt) else 2
+        return Reply(answer, draw_response_time_s(time_draw))
 
     def share_of_1(self, felt: PerceivedStimulus) -> float:
         """Probability of answer 1."""

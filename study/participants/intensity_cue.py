@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 from protocols.trial import Phase
-from study.participants.chance import response_time_s, uniform
+from study.participants.chance import draw_response_time_s, draw_uniform
 from study.participants.detection import DETECTION_SLOPE
 from study.participants.observer import PerceivedStimulus, Reply
 from study.participants.psychometric_curve import WeibullCurve
@@ -38,12 +38,12 @@ class IntensityCue:
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """Answer (1 or 2) and response time (s) for one presentation."""
-        luck, delay = uniform(felt, seed, 2)
+        choice_draw, time_draw = draw_uniform(felt, seed, 2)
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         detection = WeibullCurve(self.detection_n, DETECTION_SLOPE)
         distance = detection.distance if felt.phase is Phase.DETECTION else self.d_prime
         share_of_1 = NormalDist().cdf(sign * distance(felt.level_n) / 2 + self._rove_deviation(felt))
-        return Reply(1 if luck < share_of_1 else 2, response_time_s(delay))
+        return Reply(1 if choice_draw < share_of_1 else 2, draw_response_time_s(time_draw))
 
     def _rove_deviation(self, felt: PerceivedStimulus) -> float:
         """Change of the felt strength by roving, in standard deviations; 0 without roving and in detection trials."""

@@ -8,9 +8,9 @@ from study.participants.delivered_feeler import DeliveredFeeler
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.intensity_cue import IntensityCue
 from study.participants.observer import Observer
-from study.participants.population import KINDS, TYPICAL_THRESHOLDS_N, member, person
+from study.participants.population import KINDS, TYPICAL_THRESHOLDS_N, draw_person, make_member
 from study.participants.strategies import Alternator, Constant, Guesser, Scripted
-from study.participants.unsure import UnsureRepeater
+from study.participants.unsure_repeater import UnsureRepeater
 
 OBSERVERS = {
     "ideal": "feels directions as the median participant does, never lapses",
@@ -40,34 +40,34 @@ _MEMBER = re.compile(rf"(?P<kind>{'|'.join(KINDS)})_(?P<number>[1-9]\d*)_seed_(?
 def find_observer(name: str, seed: int) -> Observer:
     """The simulated participant of this name. seed: selects the person for the name "person"; unused for other names.
     Raises WrongUseError for an unknown name."""
-    known = name.replace("-", "_")
-    if found := _MEMBER.fullmatch(known):
-        return member(found["kind"], int(found["number"]), int(found["seed"]))
-    typical = DirectionFeeler(known, TYPICAL_THRESHOLDS_N)
+    observer_name = name.replace("-", "_")
+    if match := _MEMBER.fullmatch(observer_name):
+        return make_member(match["kind"], int(match["number"]), int(match["seed"]))
+    typical_observer = DirectionFeeler(observer_name, TYPICAL_THRESHOLDS_N)
     observers: dict[str, Observer] = {
-        "ideal": typical,
+        "ideal": typical_observer,
         # One trial in ten without attention: half of these random answers are right.
-        "lapsing": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, lapse=0.05),
-        "biased": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, criterion=-0.5),
-        "guesser": Guesser(known),
-        "alternator": Alternator(known),
-        "always_1": Constant(known, 1),
-        "always_2": Constant(known, 2),
-        "vibration_only": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, numb_above_hz=20.0),
-        "intensity_cue": IntensityCue(known),
-        "delivered": DeliveredFeeler(known, typical),
-        "repeating": UnsureRepeater(known, typical),
-        "criterion_drift": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, criterion_per_100_trials=0.3),
-        "drifting": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, drift_db_per_100_trials=1.0),
-        "scripted": Scripted(known),
-        "person": person(1, seed),
+        "lapsing": DirectionFeeler(observer_name, TYPICAL_THRESHOLDS_N, lapse=0.05),
+        "biased": DirectionFeeler(observer_name, TYPICAL_THRESHOLDS_N, criterion=-0.5),
+        "guesser": Guesser(observer_name),
+        "alternator": Alternator(observer_name),
+        "always_1": Constant(observer_name, 1),
+        "always_2": Constant(observer_name, 2),
+        "vibration_only": DirectionFeeler(observer_name, TYPICAL_THRESHOLDS_N, numb_above_hz=20.0),
+        "intensity_cue": IntensityCue(observer_name),
+        "delivered": DeliveredFeeler(observer_name, typical_observer),
+        "repeating": UnsureRepeater(observer_name, typical_observer),
+        "criterion_drift": DirectionFeeler(observer_name, TYPICAL_THRESHOLDS_N, criterion_per_100_trials=0.3),
+        "drifting": DirectionFeeler(observer_name, TYPICAL_THRESHOLDS_N, drift_db_per_100_trials=1.0),
+        "scripted": Scripted(observer_name),
+        "person": draw_person(1, seed),
     }
-    if known not in observers:
-        close = get_close_matches(known, OBSERVERS, n=1)
-        guess = f" Did you mean {close[0]}?" if close else ""
+    if observer_name not in observers:
+        suggestions = get_close_matches(observer_name, OBSERVERS, n=1)
+        hint = f" Did you mean {suggestions[0]}?" if suggestions else ""
         raise WrongUseError(
             title="There is no such simulated participant",
-            happened=f"No observer is called {name}.{guess}",
+            happened=f"No observer is called {name}.{hint}",
             do_now=f"Choose one of {', '.join(OBSERVERS)}.",
         )
-    return observers[known]
+    return observers[observer_name]

@@ -13,7 +13,7 @@ import numpy as np
 from study.participants.delivered_feeler import DeliveredFeeler
 from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.direction_feeler import DirectionFeeler
-from study.participants.unsure import UnsureRepeater
+from study.participants.unsure_repeater import UnsureRepeater
 
 TYPICAL_THRESHOLDS_N = ((5.0, 0.35), (15.0, 0.6), (25.0, 0.85), (35.0, 2.2), (45.0, 2.2))
 """(Hz, N): thresholds of the median participant. With the spreads below, 19 % of the participants have a threshold
@@ -28,9 +28,9 @@ SPREAD_OF_DETECTION_DB = 2.5
 thresholds."""
 
 
-def population(n: int, seed: int) -> tuple[DirectionFeeler, ...]:
+def draw_population(n: int, seed: int) -> tuple[DirectionFeeler, ...]:
     """Participants 1 to n of the population of this seed. Each depends on its number and the seed only, not on n."""
-    return tuple(person(number, seed) for number in range(1, n + 1))
+    return tuple(draw_person(number, seed) for number in range(1, n + 1))
 
 
 KINDS = ("person", "delivered", "repeating", "criterion_drift")
@@ -41,24 +41,24 @@ CRITERION_DRIFT_SD = 0.3
 of the evidence): in a session of 350 trials the criterion moves by about 1."""
 
 
-def member(kind: str, number: int, seed: int) -> DirectionFeeler | DeliveredFeeler | UnsureRepeater:
+def make_member(kind: str, number: int, seed: int) -> DirectionFeeler | DeliveredFeeler | UnsureRepeater:
     """Participant `number` (from 1) of the population of this seed, as a `kind` of `KINDS`; the thresholds are the same
     for all kinds. The name contains number and seed. Raises ValueError for another kind."""
-    one, name = person(number, seed), f"{kind}_{number}_seed_{seed}"
+    feeler, name = draw_person(number, seed), f"{kind}_{number}_seed_{seed}"
     match kind:
         case "person":
-            return one
+            return feeler
         case "delivered":
-            return DeliveredFeeler(name, one)
+            return DeliveredFeeler(name, feeler)
         case "repeating":
-            return UnsureRepeater(name, one)
+            return UnsureRepeater(name, feeler)
         case "criterion_drift":
             drift = CRITERION_DRIFT_SD * float(np.random.default_rng([seed, number, 1]).standard_normal())
-            return replace(one, name=name, criterion_per_100_trials=drift)
+            return replace(feeler, name=name, criterion_per_100_trials=drift)
     raise ValueError(f"a population is made of {', '.join(KINDS)}, not of {kind}")
 
 
-def person(number: int, seed: int) -> DirectionFeeler:
+def draw_person(number: int, seed: int) -> DirectionFeeler:
     """Participant `number` (from 1) of the population of this seed. The name contains both numbers, so that the
     participant can be recreated from a log."""
     rng = np.random.default_rng([seed, number])

@@ -3,7 +3,7 @@ participant with scripted answers."""
 
 from dataclasses import dataclass
 
-from study.participants.chance import response_time_s, uniform
+from study.participants.chance import draw_response_time_s, draw_uniform
 from study.participants.observer import PerceivedStimulus, Reply
 
 
@@ -15,8 +15,8 @@ class Guesser:
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """1 or 2 with equal probability."""
-        luck, delay = uniform(felt, seed, 2)
-        return Reply(1 if luck < 0.5 else 2, response_time_s(delay))
+        choice_draw, time_draw = draw_uniform(felt, seed, 2)
+        return Reply(1 if choice_draw < 0.5 else 2, draw_response_time_s(time_draw))
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +27,8 @@ class Alternator:
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """1 after an even number of answers in the session, else 2."""
-        _, delay = uniform(felt, seed, 2)
-        return Reply(1 + felt.trials_before % 2, response_time_s(delay))
+        _, time_draw = draw_uniform(felt, seed, 2)
+        return Reply(1 + felt.trials_before % 2, draw_response_time_s(time_draw))
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +40,8 @@ class Constant:
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """The same answer to every stimulus."""
-        _, delay = uniform(felt, seed, 2)
-        return Reply(self.answer, response_time_s(delay))
+        _, time_draw = draw_uniform(felt, seed, 2)
+        return Reply(self.answer, draw_response_time_s(time_draw))
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +57,6 @@ class Scripted:
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """The character of the script at run + trial, modulo its length. A repetition of a void trial gets the same
         answer."""
-        _, delay = uniform(felt, seed, 2)
-        right = self.script[(felt.run + felt.trial) % len(self.script)] == "1"
-        return Reply(felt.direction_shown if right else 3 - felt.direction_shown, response_time_s(delay))
+        _, time_draw = draw_uniform(felt, seed, 2)
+        is_right = self.script[(felt.run + felt.trial) % len(self.script)] == "1"
+        return Reply(felt.direction_shown if is_right else 3 - felt.direction_shown, draw_response_time_s(time_draw))

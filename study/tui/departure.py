@@ -22,15 +22,16 @@ LAST_RESORT_S = 10.0
 Longer than the engine takes to end."""
 
 
-def leave_with_the_terminal(app: App[Any], leave: Callable[[], None]) -> None:
-    """Call `leave` in the event loop on SIGTERM, on SIGHUP, and when the terminal has disappeared without a signal. If
-    the process still runs `LAST_RESORT_S` later, it exits with `ExitCode.INTERRUPTED`. Call from the event loop."""
+def leave_with_the_terminal(app: App[Any], on_departure: Callable[[], None]) -> None:
+    """Call `on_departure` in the event loop on SIGTERM, on SIGHUP, and when the terminal has disappeared without a
+    signal. If the process still runs `LAST_RESORT_S` later, it exits with `ExitCode.INTERRUPTED`. Call from the event
+    loop."""
 
     def depart() -> None:
         last_resort = threading.Timer(LAST_RESORT_S, os._exit, (ExitCode.INTERRUPTED,))
         last_resort.daemon = True
         last_resort.start()
-        leave()
+        on_departure()
 
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGTERM, signal.SIGHUP):

@@ -3,9 +3,9 @@
 Symbol and word differ between states, so that the status can be read without seeing colour.
 """
 
-from study.session.views.archive_views import TURNED_AWAY, SessionLine, Standing
+from study.session.views.archive_views import INELIGIBILITY_REASONS, SessionLine, SessionStatus
 
-SYMBOLS: dict[Standing, str] = {
+SYMBOLS: dict[SessionStatus, str] = {
     "finished": "✓",
     "unfinished": "◐",
     "running": "▶",
@@ -16,7 +16,7 @@ SYMBOLS: dict[Standing, str] = {
 }
 """Symbol of each status, a single character."""
 
-STYLES: dict[Standing, str] = {
+STYLES: dict[SessionStatus, str] = {
     "finished": "$text-success",
     "unfinished": "$text-warning",
     "running": "bold $text-accent",
@@ -28,7 +28,7 @@ STYLES: dict[Standing, str] = {
 """Style of symbol and word for each status, in Textual's notation."""
 
 
-def status_text(standing: Standing) -> str:
+def status_text(standing: SessionStatus) -> str:
     """Symbol and word of a status."""
     return f"{SYMBOLS[standing]} {standing}"
 
@@ -44,7 +44,7 @@ def describe(line: SessionLine) -> str:
         case "running":
             return f"{_observer_text(line)} is running now in another program. You can watch it."
         case "refused" | "excluded":
-            return f"{line.name} is over: {TURNED_AWAY[line.standing]}. The person does not take part."
+            return f"{line.name} is over: {INELIGIBILITY_REASONS[line.standing]}. The person does not take part."
         case "withdrawn":
             return f"{line.subject}: {line.remark or 'the participant withdrew; the data were erased.'}"
         case "unreadable":

@@ -60,7 +60,7 @@ CONTRAST = Theme(
 
 THEMES = (DARK, LIGHT, CONTRAST)
 """All themes."""
-NEXT = {"hapteq-dark": "hapteq-light", "hapteq-light": "hapteq-contrast", "hapteq-contrast": "hapteq-dark"}
+NEXT_THEME = {"hapteq-dark": "hapteq-light", "hapteq-light": "hapteq-contrast", "hapteq-contrast": "hapteq-dark"}
 """Name of the theme that follows each theme, for a key that cycles through them."""
 
 

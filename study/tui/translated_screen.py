@@ -32,10 +32,10 @@ class TranslatedScreen(Screen[Reply]):
         return {key: self._in_words(active) for key, active in super().active_bindings.items()}
 
     def _in_words(self, active: ActiveBinding) -> ActiveBinding:
-        binding, shown = active.binding, active.binding.key_display
+        binding, key_display = active.binding, active.binding.key_display
         translated = replace(
             binding,
             description=self.words.key(binding.description),
-            key_display=shown and self.words.key(shown),
+            key_display=key_display and self.words.key(key_display),
         )
         return active._replace(binding=translated)

@@ -8,7 +8,7 @@ from typing import Literal
 
 from protocols.trial import Phase
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.facts.void_reasons import ACCELERATION_MISSING, SCREEN_SILENT, computer_too_busy
+from study.session.facts.void_reasons import ACCELERATION_MISSING, SCREEN_SILENT, is_computer_busy
 from study.session.views.form_views import Form, Limits
 from study.session.views.views import DemoMenu, Progress, Question, Task, Welcome
 
@@ -45,21 +45,21 @@ def plan(notice: Welcome, words: Words = ENGLISH_WORDS) -> str:
     """Number of runs of the sitting, and whether training is among them."""
     if not notice.runs:
         return words["plan_training"]
-    return words.counted("plan_training_runs" if notice.training_runs else "plan_runs", notice.runs)
+    return words.fill_count("plan_training_runs" if notice.training_runs else "plan_runs", notice.runs)
 
 
-def felt_so_far(menu: DemoMenu, vibration: int, words: Words = ENGLISH_WORDS) -> str:
+def describe_felt(menu: DemoMenu, vibration: int, words: Words = ENGLISH_WORDS) -> str:
     """Which of the two directions were felt at a vibration in the demonstration. vibration: its number, from 1."""
-    felt = [str(number) for number in (1, 2) if (vibration, number) in menu.felt]
-    if not felt:
+    numbers = [str(number) for number in (1, 2) if (vibration, number) in menu.played_pairs]
+    if not numbers:
         return words["demo_none"]
-    both = words.fill("demo_and", {"first": felt[0], "second": felt[-1]})
-    return words.fill("demo_felt", {"numbers": both if len(felt) == 2 else felt[0]})
+    both_numbers = words.fill("demo_and", {"first": numbers[0], "second": numbers[-1]})
+    return words.fill("demo_felt", {"numbers": both_numbers if len(numbers) == 2 else numbers[0]})
 
 
 def void_words(reason: str, words: Words = ENGLISH_WORDS) -> str:
     """Text for the participant after a void trial. reason: as in the session log."""
-    if computer_too_busy(reason):
+    if is_computer_busy(reason):
         return words["void_busy"]
     if reason == SCREEN_SILENT:
         return words["void_screen"]

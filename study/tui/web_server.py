@@ -98,10 +98,10 @@ class ScreenServer(Server):
     ) -> web.StreamResponse:
         """Refuse every request without the token in the same way (404), so that existing and unknown addresses cannot
         be distinguished. The comparison takes constant time."""
-        given = request.path.split("/")[1]
-        if given == "download" and await self._is_offered(request.path.rpartition("/")[2]):
+        first_part = request.path.split("/")[1]
+        if first_part == "download" and await self._is_offered(request.path.rpartition("/")[2]):
             return await handler(request)
-        if not hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode()):
+        if not hmac.compare_digest(first_part.encode("utf-8", "replace"), self._token.encode()):
             raise web.HTTPNotFound(text="The study is at the address that hapteq serve said, to its last letter.")
         if request.path == f"/{self._token}":
             raise web.HTTPFound(f"/{self._token}/")
@@ -125,14 +125,16 @@ class ScreenServer(Server):
         from other servers, fonts included."""
         page = (self.templates_path / "app_index.html").read_text("utf-8")
         scripts = " ".join(f"'sha256-{_sha256(script)}'" for script in _inline_scripts(page))
-        own = " ".join(sorted(origin for origin in self._origins if "[" not in origin))  # a policy holds no IPv6
+        own_origins = " ".join(
+            sorted(origin for origin in self._origins if "[" not in origin)
+        )  # a policy holds no IPv6
         policy = (
             "default-src 'none'",
-            f"script-src 'self' {own} 'unsafe-hashes' {scripts}",
-            f"style-src 'self' {own} 'unsafe-inline'",  # the terminal in the page sets styles while it draws
-            f"img-src 'self' {own} data:",
-            f"font-src 'self' {own} data:",
-            f"connect-src 'self' {own} {own.replace('http:', 'ws:')}",
+            f"script-src 'self' {own_origins} 'unsafe-hashes' {scripts}",
+            f"style-src 'self' {own_origins} 'unsafe-inline'",  # the terminal in the page sets styles while it draws
+            f"img-src 'self' {own_origins} data:",
+            f"font-src 'self' {own_origins} data:",
+            f"connect-src 'self' {own_origins} {own_origins.replace('http:', 'ws:')}",
             "base-uri 'none'",
             "form-action 'none'",
             "frame-ancestors 'none'",

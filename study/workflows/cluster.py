@@ -26,7 +26,7 @@ WORKER_TIMEOUT_S = 60.0
 restarting."""
 POLL_S = 1.0
 """Interval in seconds at which the workers are counted."""
-KEPT = "What was finished is kept."
+RESULTS_KEPT = "What was finished is kept."
 """Sentence on what was saved, for errors after the work began."""
 INSTALL = "pip install 'hapteq[cluster]'"
 """Command that installs dask with its scheduler."""
@@ -102,26 +102,26 @@ def _cancel(executor: Executor) -> None:
 def _watch(client: "Client", executor: Executor, address: str, causes: list[StudyError]) -> Iterator[None]:
     """While the context lasts: cancel all tasks, and append the cause to `causes`, if for `WORKER_TIMEOUT_S` the
     scheduler has no worker or does not answer."""
-    left = threading.Event()
-    watcher = threading.Thread(target=partial(_await_loss, client, executor, address, causes, left), daemon=True)
+    stop_event = threading.Event()
+    watcher = threading.Thread(target=partial(_await_loss, client, executor, address, causes, stop_event), daemon=True)
     watcher.start()
     try:
         yield
     finally:
-        left.set()
+        stop_event.set()
         watcher.join(POLL_S)  # if the scheduler does not answer, the thread still waits for it, and does nothing more
 
 
 def _await_loss(
-    client: "Client", executor: Executor, address: str, causes: list[StudyError], left: threading.Event
+    client: "Client", executor: Executor, address: str, causes: list[StudyError], stop_event: threading.Event
 ) -> None:
-    """Count the workers every `POLL_S` until `left` is set or they are lost; runs in the thread of `_watch`."""
+    """Count the workers every `POLL_S` until `stop_event` is set or they are lost; runs in the thread of `_watch`."""
     last_seen_s = time.monotonic()
-    while not left.wait(POLL_S):
+    while not stop_event.wait(POLL_S):
         workers, problem = _workers(client)
         if workers:
             last_seen_s = time.monotonic()
-        elif time.monotonic() - last_seen_s > WORKER_TIMEOUT_S and not left.is_set():
+        elif time.monotonic() - last_seen_s > WORKER_TIMEOUT_S and not stop_event.is_set():
             causes.append(_no_workers_error(address) if problem is None else _silent_error(address, problem))
             _cancel(executor)
             return
@@ -140,7 +140,7 @@ def _no_workers_error(address: str) -> StudyError:
         "The cluster has no workers any more",
         f"For {WORKER_TIMEOUT_S:g} s the scheduler at {address} had none: they ended, or cannot reach it.",
         f"Start some: dask worker {address}. Then run the same command again: it continues where it stopped.",
-        saved=KEPT,
+        saved=RESULTS_KEPT,
     )
 
 
@@ -151,7 +151,7 @@ def _silent_error(address: str, problem: Exception) -> StudyError:
         f"{type(problem).__name__}: {problem}".rstrip(" :.")
         + ".",
         "Look at the scheduler and the network, then run the same command again: it continues where it stopped.",
-        saved=KEPT,
+        saved=RESULTS_KEPT,
     )
 
 
@@ -160,11 +160,11 @@ def _undone_error(problem: BaseException) -> StudyError:
         "The cluster did not do this",
         f"{type(problem).__name__}: {problem}.",
         "Look at the scheduler and its workers, then run the same command again: it continues where it stopped.",
-        saved=KEPT,
+        saved=RESULTS_KEPT,
     )
 
 
-def own_version() -> str:
+def hapteq_version() -> str:
     """Version of hapteq in the process that calls it, this one or a worker; empty where hapteq is not installed."""
     try:
         return version("hapteq")
@@ -173,7 +173,7 @@ def own_version() -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class _Found:
+class _WorkerSetup:
     """Versions and threads of the workers of a scheduler."""
 
     versions: dict[str, str]
@@ -182,32 +182,32 @@ class _Found:
     """Number of threads of each worker."""
 
 
-def _ask(client: "Client") -> _Found:
+def _ask(client: "Client") -> _WorkerSetup:
     """Ask the workers for their version of hapteq, and the scheduler for their threads."""
     try:
-        versions: dict[str, str] = client.run(own_version)
-    except ImportError:  # raised by a worker without hapteq, which cannot import `own_version`
+        versions: dict[str, str] = client.run(hapteq_version)
+    except ImportError:  # raised by a worker without hapteq, which cannot import `hapteq_version`
         versions = dict.fromkeys(client.scheduler_info()["workers"], "")
     workers = client.scheduler_info(n_workers=-1)["workers"].values()
-    return _Found(versions, tuple(worker["nthreads"] for worker in workers))
+    return _WorkerSetup(versions, tuple(worker["nthreads"] for worker in workers))
 
 
-def _ask_in_time(client: "Client", address: str) -> _Found:
+def _ask_in_time(client: "Client", address: str) -> _WorkerSetup:
     """`_ask` with a time limit, `WORKER_TIMEOUT_S`: distributed waits without a limit for a scheduler or a worker that
     does not answer. Raises StudyError."""
-    asked = Future[_Found]()
+    answer = Future[_WorkerSetup]()
 
     def ask() -> None:
         try:
-            asked.set_result(_ask(client))
+            answer.set_result(_ask(client))
         except BaseException as problem:  # noqa: BLE001 — raised where the result is waited for
-            asked.set_exception(problem)
+            answer.set_exception(problem)
 
     threading.Thread(target=ask, daemon=True).start()
     try:
-        return asked.result(timeout=WORKER_TIMEOUT_S)
+        return answer.result(timeout=WORKER_TIMEOUT_S)
     except TimeoutError as problem:
-        if asked.done():  # the TimeoutError was raised by `_ask` itself, before the time limit
+        if answer.done():  # the TimeoutError was raised by `_ask` itself, before the time limit
             raise _cluster_error(
                 f"The scheduler at {address} was reached, and asking its workers failed: "
                 f"{str(problem) or type(problem).__name__}.",
@@ -223,17 +223,19 @@ def _ask_in_time(client: "Client", address: str) -> _Found:
 
 def _require_workers(client: "Client", address: str, one_thread: bool) -> None:
     """Raise StudyError unless there are workers, with this version of hapteq, and with one thread each if needed."""
-    asked = _ask_in_time(client, address)
-    found = asked.versions
-    if not found or not asked.threads:  # workers may have left between the two requests
+    setup = _ask_in_time(client, address)
+    versions = setup.versions
+    if not versions or not setup.threads:  # workers may have left between the two requests
         raise _cluster_error(f"The scheduler at {address} has no workers.", f"Start some: dask worker {address}.")
-    own = own_version()
-    if wrong := sorted({each or "none" for each in found.values() if each != own}):
+    local_version = hapteq_version()
+    if wrong := sorted(
+        {worker_version or "none" for worker_version in versions.values() if worker_version != local_version}
+    ):
         raise _cluster_error(
-            f"Workers at {address} have hapteq {', '.join(wrong)}; here it is {own}.",
+            f"Workers at {address} have hapteq {', '.join(wrong)}; here it is {local_version}.",
             "Install the same version for all of them.",
         )
-    threads = max(asked.threads)
+    threads = max(setup.threads)
     if one_thread and threads > 1:
         raise _cluster_error(
             f"Workers at {address} have up to {threads} threads, and this work needs a process for each piece.",
@@ -241,5 +243,5 @@ def _require_workers(client: "Client", address: str, one_thread: bool) -> None:
         )
 
 
-def _cluster_error(happened: str, do_now: str) -> StudyError:
-    return StudyError("The cluster cannot do this", happened, do_now, saved="Nothing was begun.")
+def _cluster_error(explanation: str, advice: str) -> StudyError:
+    return StudyError("The cluster cannot do this", explanation, advice, saved="Nothing was begun.")

@@ -2,14 +2,14 @@
 
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.device import DeviceSettings
-from study.session.stimulus.limits import limits_of_study
+from study.session.stimulus.limits import make_study_limits
 
 
 def device_settings(protocol: StudyProtocol, hand_on_handle: bool = True) -> DeviceSettings:
     """Settings with which a device is opened for a study. hand_on_handle: whether a person holds the handle; a
     simulated device then carries a simulated hand."""
     return DeviceSettings(
-        limits=limits_of_study(protocol),
+        limits=make_study_limits(protocol),
         spring_frequency_hz=protocol.spring.natural_frequency_hz,
         spring_damping_n_s_per_m=protocol.spring.damping_n_s_per_m,
         keep_s=protocol.measurement.keep_s,

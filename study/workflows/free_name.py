@@ -8,20 +8,22 @@ from pathlib import Path
 from study.errors import StudyError
 
 
-def require_free(out: Path, *beside: Path, title: str, kind: str, saved: str = "Nothing was written.") -> None:
-    """Raise StudyError if `out` or another path exists, or if the folder of `out` does not.
+def require_free(
+    out_path: Path, *further_paths: Path, title: str, kind: str, saved: str = "Nothing was written."
+) -> None:
+    """Raise StudyError if `out_path` or another path exists, or if the folder of `out_path` does not.
 
-    beside: further paths that will be written into the same folder. title, saved: of the error. kind: name of the files
+    further_paths: paths that will be written into the same folder. title, saved: of the error. kind: name of the files
     that are never overwritten, in the plural, for the error.
     """
-    for path in (out, *beside):
+    for path in (out_path, *further_paths):
         if path.exists():
-            happened = f"{path} exists already, and {kind} are never overwritten."
-            raise StudyError(title, happened, "Choose another name with --out.", saved=saved)
-    if not out.absolute().parent.is_dir():
+            explanation = f"{path} exists already, and {kind} are never overwritten."
+            raise StudyError(title, explanation, "Choose another name with --out.", saved=saved)
+    if not out_path.absolute().parent.is_dir():
         raise StudyError(
             title,
-            f"There is no folder {out.parent} to write {out.name} into.",
+            f"There is no folder {out_path.parent} to write {out_path.name} into.",
             "Make the folder first, or choose another name with --out.",
             saved=saved,
         )

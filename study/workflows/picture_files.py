@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.figures.picture import Picture, picture_svg, without_figure
+from analysis.figures.picture import Picture, remove_figure, render_picture_svg
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.privacy import make_folder
@@ -23,10 +23,10 @@ FIGURE_DPI = 150
 def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
     """Draw the pictures and write them into `folder`, which is created if necessary: an SVG file each, and a PNG file
     where `Picture.bitmap` is set. Existing files are replaced. Raises CannotWriteError."""
-    drawn = map_forked(draw_picture, pictures)
-    for picture, each in zip(pictures, drawn, strict=True):
-        picture.drawn[:] = each.picture.drawn
-    write_drawn(folder, drawn)
+    drawn_pictures = map_forked(draw_picture, pictures)
+    for picture, drawn_picture in zip(pictures, drawn_pictures, strict=True):
+        picture.rendered_svg[:] = drawn_picture.picture.rendered_svg
+    write_drawn(folder, drawn_pictures)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,30 +43,32 @@ class DrawnPicture:
 def draw_picture(picture: Picture) -> DrawnPicture:
     """Draw a picture as SVG and, where `Picture.bitmap` is set, as PNG. Runs in a worker process."""
     svg, png = _draw_files(picture)
-    picture.drawn[:] = [svg]
-    return DrawnPicture(without_figure(picture), png)
+    picture.rendered_svg[:] = [svg]
+    return DrawnPicture(remove_figure(picture), png)
 
 
 def _draw_files(picture: Picture) -> tuple[str, bytes]:
     """Text of the SVG file and content of the PNG file; the latter is empty unless `Picture.bitmap` is set."""
-    return picture_svg(picture), _png(picture) if picture.bitmap else b""
+    return render_picture_svg(picture), _png(picture) if picture.bitmap else b""
 
 
-def write_drawn(folder: Path, drawn: Iterable[DrawnPicture]) -> None:
+def write_drawn(folder: Path, drawn_pictures: Iterable[DrawnPicture]) -> None:
     """Write pictures that are already drawn into `folder`, as `write_pictures` does. Raises CannotWriteError."""
     try:
         make_folder(folder)
     except OSError as problem:
         raise CannotWriteError(folder, problem) from problem
-    for each in drawn:
-        write_text(folder / f"{each.picture.name}.svg", picture_svg(each.picture), overwrite=True)
-        if each.png:
-            write_atomically(folder / f"{each.picture.name}.png", each.png, overwrite=True)
+    for drawn_picture in drawn_pictures:
+        write_text(
+            folder / f"{drawn_picture.picture.name}.svg", render_picture_svg(drawn_picture.picture), overwrite=True
+        )
+        if drawn_picture.png:
+            write_atomically(folder / f"{drawn_picture.picture.name}.png", drawn_picture.png, overwrite=True)
 
 
 def _png(picture: Picture) -> bytes:
     """Content of the PNG file at `FIGURE_DPI`."""
-    drawn = io.BytesIO()
+    buffer = io.BytesIO()
     # Without the version of matplotlib in the file, the same data give the same file.
-    picture.figure.savefig(drawn, format="png", dpi=FIGURE_DPI, metadata={"Software": None})
-    return drawn.getvalue()
+    picture.figure.savefig(buffer, format="png", dpi=FIGURE_DPI, metadata={"Software": None})
+    return buffer.getvalue()

@@ -1,6 +1,6 @@
-"""Pieces of work on an executor (processes of this computer, or a cluster), with results in the order of finishing.
+"""Tasks on an executor (processes of this computer, or a cluster), with results in the order of finishing.
 
-The number of pieces in flight is bounded. Workers get the command line of the calling process, for the provenance of
+The number of tasks in flight is bounded. Workers get the command line of the calling process, for the provenance of
 their results, and keep freed memory, which saves processor time.
 """
 
@@ -15,36 +15,36 @@ import numpy as np
 
 Key = TypeVar("Key")
 Result = TypeVar("Result")
-AHEAD = 100
-"""Largest number of pieces in flight, set by hand: it bounds the inputs and results in memory."""
+MAX_IN_FLIGHT = 100
+"""Largest number of tasks in flight, set by hand: it bounds the inputs and results in memory."""
 _FREED_BYTES = 30 * 2**20
 """Size of the block that `keep_freed_memory` allocates and frees: below 32 MB, the largest size to which glibc adapts
 its thresholds."""
 
 
-def run_pieces(
+def run_tasks(
     executor: Executor,
     function: Callable[..., Result],
-    pieces: Iterable[tuple[Key, tuple[Any, ...]]],
-    ahead: int = AHEAD,
+    tasks: Iterable[tuple[Key, tuple[Any, ...]]],
+    max_running: int = MAX_IN_FLIGHT,
 ) -> Iterator[tuple[Key, Result]]:
-    """Call `function(*arguments)` for each (key, arguments) of `pieces`, and yield (key, result) in the order of
-    finishing. Function, arguments and results are sent between processes; `pieces` is read as needed, at most `ahead`
-    in flight.
+    """Call `function(*arguments)` for each (key, arguments) of `tasks`, and yield (key, result) in the order of
+    finishing. Function, arguments and results are sent between processes; `tasks` is read as needed, at most
+    `max_running` in flight.
 
     An exception of the function is raised here, after the results that finished at the same time. When the iteration
-    ends early, pieces that have not begun are cancelled.
+    ends early, tasks that have not begun are cancelled.
     """
-    waiting, running = iter(pieces), dict[Future[Result], Key]()
+    waiting, running = iter(tasks), dict[Future[Result], Key]()
     try:
         while True:
-            for key, arguments in islice(waiting, ahead - len(running)):
+            for key, arguments in islice(waiting, max_running - len(running)):
                 running[executor.submit(_run_in_worker, tuple(sys.argv), function, arguments)] = key
             if not running:
                 return
             done = wait(running, return_when=FIRST_COMPLETED).done
             # Results before errors: an error ends the iteration, and results that finished with it would be lost.
-            for future in sorted(done, key=lambda each: each.cancelled() or each.exception() is not None):
+            for future in sorted(done, key=lambda finished: finished.cancelled() or finished.exception() is not None):
                 key = running.pop(future)
                 yield key, future.result()
     finally:

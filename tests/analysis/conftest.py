@@ -13,8 +13,8 @@ from protocols.definition.exposure import CatchSettings, DetectionSettings
 from protocols.definition.preparation import PracticeSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 from protocols.definition.study_protocol import StimulusSettings, StudyProtocol, TrainingSettings
-from protocols.procedure.run_rules import staircase_rule
-from protocols.procedure.staircase import StaircaseState, begin, is_finished, level_n, step
+from protocols.procedure.run_rules import make_staircase_rule
+from protocols.procedure.staircase import StaircaseState, begin_staircase, is_finished, level_n, step
 from protocols.trial import Phase, Trial, TrialStatus
 
 PUBLISHED = StaircaseRule(
@@ -30,7 +30,7 @@ GUESSER = math.inf
 DELIVERED_PER_NEWTON = 4.0
 
 
-def chance_of_right(level: float, true_n: float, slope: float, lapse: float) -> float:
+def probability_correct(level: float, true_n: float, slope: float, lapse: float) -> float:
     """Weibull observer of two alternatives whose 79.37 % level is true_n."""
     if math.isinf(true_n):
         return 0.5
@@ -61,7 +61,7 @@ TEMPLATE = Trial(
 )
 
 
-def simulated_run(
+def simulate_run(
     true_n: float,
     generator: np.random.Generator,
     *,
@@ -71,59 +71,59 @@ def simulated_run(
     **columns: object,
 ) -> list[Trial]:
     """One run of a Weibull observer; columns: values of the trial's columns that differ from the template."""
-    state, trials = begin(rule), []
+    state, trials = begin_staircase(rule), []
     template = replace(TEMPLATE, **columns)
     while not is_finished(rule, state):
-        level = level_n(rule, state)
-        correct = bool(generator.random() < chance_of_right(level, true_n, slope, lapse))
-        state, trial = played(rule, state, template, correct, int(generator.integers(1, 3)))
+        level_played = level_n(rule, state)
+        correct = bool(generator.random() < probability_correct(level_played, true_n, slope, lapse))
+        state, trial = play_trial(rule, state, template, correct, int(generator.integers(1, 3)))
         trials.append(trial)
     return trials
 
 
-def caught_run(
+def simulate_run_with_catches(
     generator: np.random.Generator, *, lapse: float, one_in: int, true_n: float = 0.6, **columns: object
 ) -> list[Trial]:
     """A test run with a catch trial in every block of `one_in`, wrong with the chance `lapse`; it steers nothing."""
-    steering, trials = simulated_run(true_n, generator, **columns), []
+    steering, trials = simulate_run(true_n, generator, **columns), []
     for trial in steering:
-        place = len(trials) % one_in
-        if place == one_in - 1:
+        block_position = len(trials) % one_in
+        if block_position == one_in - 1:
             wrong = bool(generator.random() < lapse)
-            shown = trial.direction_shown
-            answer = 3 - shown if wrong else shown
-            full = replace(trial, phase=Phase.CATCH, level_n=PUBLISHED.cap_n, correct=not wrong, answer=answer)
-            trials.append(replace(full, trial=len(trials) + 1, reversal=False))
+            direction = trial.direction_shown
+            answer = 3 - direction if wrong else direction
+            catch_trial = replace(trial, phase=Phase.CATCH, level_n=PUBLISHED.cap_n, correct=not wrong, answer=answer)
+            trials.append(replace(catch_trial, trial=len(trials) + 1, reversal=False))
         trials.append(replace(trial, trial=len(trials) + 1))
     return trials
 
 
-def played(
-    rule: StaircaseRule, state: StaircaseState, template: Trial, correct: bool, shown: int
+def play_trial(
+    rule: StaircaseRule, state: StaircaseState, template: Trial, correct: bool, direction: int
 ) -> tuple[StaircaseState, Trial]:
     level = level_n(rule, state)
-    after = step(rule, state, correct)
+    next_state = step(rule, state, correct)
     trial = replace(
         template,
-        trial=after.trials,
+        trial=next_state.trials,
         level_n=level,
-        direction_shown=shown,
-        answer=shown if correct else 3 - shown,
+        direction_shown=direction,
+        answer=direction if correct else 3 - direction,
         correct=correct,
-        reversal=after.reversals > state.reversals,
+        reversal=next_state.reversals > state.reversals,
         delivered_mps2=DELIVERED_PER_NEWTON * level,
         off_axis_mps2=0.5 * level,
         displacement_mm=0.1 * level,
     )
-    return after, trial
+    return next_state, trial
 
 
-def answered_run(answers: str, rule: StaircaseRule = PUBLISHED) -> list[Trial]:
+def run_from_answers(answers: str, rule: StaircaseRule = PUBLISHED) -> list[Trial]:
     """A run from answers written as 1 (right) and 0 (wrong), directions in turn; the rest after the end is not used."""
-    state, trials = begin(rule), []
+    state, trials = begin_staircase(rule), []
     for index, answer in enumerate(answers):
         if not is_finished(rule, state):
-            state, trial = played(rule, state, TEMPLATE, answer == "1", 1 + index % 2)
+            state, trial = play_trial(rule, state, TEMPLATE, answer == "1", 1 + index % 2)
             trials.append(trial)
     return trials
 
@@ -148,17 +148,17 @@ def protocol() -> StudyProtocol:
 
 @pytest.fixture
 def simulate() -> Callable[..., list[Trial]]:
-    return simulated_run
+    return simulate_run
 
 
 @pytest.fixture
-def caught() -> Callable[..., list[Trial]]:
-    return caught_run
+def simulate_with_catches() -> Callable[..., list[Trial]]:
+    return simulate_run_with_catches
 
 
 @pytest.fixture
-def answered() -> Callable[..., list[Trial]]:
-    return answered_run
+def make_run_from_answers() -> Callable[..., list[Trial]]:
+    return run_from_answers
 
 
 @pytest.fixture(scope="session")
@@ -178,7 +178,7 @@ def simulate_study() -> Callable[..., list[Trial]]:
             generator = np.random.default_rng([seed, number])
             factor = 10 ** (generator.normal(0, 3.0) / 20)
             for run, index in enumerate(generator.permutation(len(true_n)), start=1):
-                trials += simulated_run(
+                trials += simulate_run(
                     true_n[index] * factor,
                     generator,
                     rule=rule,
@@ -205,33 +205,37 @@ def full_protocol(protocol: StudyProtocol) -> StudyProtocol:
 
 
 @pytest.fixture
-def everything(simulate_study: Callable[..., list[Trial]], full_protocol: StudyProtocol) -> list[Trial]:
+def all_trial_kinds(simulate_study: Callable[..., list[Trial]], full_protocol: StudyProtocol) -> list[Trial]:
     """Three participants of `simulate_study` with every kind of trial beside the staircases."""
     trials = [replace(trial, run=trial.run + 2) for trial in simulate_study(subjects=3)]
-    rule = staircase_rule(full_protocol, Phase.DETECTION)
+    rule = make_staircase_rule(full_protocol, Phase.DETECTION)
     generator = np.random.default_rng(6)
-    beside: list[Trial] = []
+    other_trials: list[Trial] = []
     for subject in dict.fromkeys(trial.subject for trial in trials):
-        mine = {"subject": subject}
-        beside += simulated_run(0.5, generator, run=0, phase=Phase.TRAINING, frequency_hz=5.0, **mine)
+        person_columns = {"subject": subject}
+        other_trials += simulate_run(0.5, generator, run=0, phase=Phase.TRAINING, frequency_hz=5.0, **person_columns)
         for run, frequency in ((1, 15.0), (2, 35.0)):
-            practice = replace(TEMPLATE, run=run, phase=Phase.TRAINING, frequency_hz=frequency, level_n=2.0, **mine)
-            beside += [replace(practice, trial=number) for number in range(4)]
-        beside += simulated_run(0.1, generator, rule=rule, run=8, phase=Phase.DETECTION, frequency_hz=35.0, **mine)
+            practice = replace(
+                TEMPLATE, run=run, phase=Phase.TRAINING, frequency_hz=frequency, level_n=2.0, **person_columns
+            )
+            other_trials += [replace(practice, trial=number) for number in range(4)]
+        other_trials += simulate_run(
+            0.1, generator, rule=rule, run=8, phase=Phase.DETECTION, frequency_hz=35.0, **person_columns
+        )
     for last in {(trial.subject, trial.run): trial for trial in trials}.values():
         first = replace(last, trial=0, phase=Phase.CATCH, level_n=PUBLISHED.cap_n, correct=True)
-        beside.append(replace(first, answer=first.direction_shown, reversal=False))
-    return beside + trials
+        other_trials.append(replace(first, answer=first.direction_shown, reversal=False))
+    return other_trials + trials
 
 
 @pytest.fixture(scope="session")
-def friction_found(diagnosed):
+def friction_findings(diagnosed):
     """Findings on one axis whose model lacks dry friction and has a damping that is 0.8 % off."""
     model = diagnosed.device(1)
     return diagnosed.diagnosed(diagnosed.recorded(1), replace(model, damping=1.008 * model.damping))
 
 
 @pytest.fixture(scope="session")
-def friction_pictures(friction_found):
+def friction_pictures(friction_findings):
     """Drawn once."""
-    return diagnosis_pictures(friction_found)
+    return diagnosis_pictures(friction_findings)

@@ -138,7 +138,7 @@ def watched_screen(protocol: str, data: str, news: int) -> None:
     """The application itself, with a task in its event loop that measures how late it comes."""
     from study.tui.app.app import HapteqApp
     from study.tui.app.app_start import AppStart
-    from study.tui.engine.to_engine import Begin, SessionOrder
+    from study.tui.engine.to_engine import BeginSession, SessionOrder
 
     class FollowedSession(HapteqApp):
         async def on_mount(self) -> None:
@@ -156,7 +156,9 @@ def watched_screen(protocol: str, data: str, news: int) -> None:
                     told = state
                     os.write(news, f"{state} {late_ms:.1f}\n".encode())
 
-    app = FollowedSession(AppStart(data, "simulated", first=Begin(SessionOrder(protocol, "simulated", "B01", data, 4))))
+    app = FollowedSession(
+        AppStart(data, "simulated", first=BeginSession(SessionOrder(protocol, "simulated", "B01", data, 4)))
+    )
     try:
         app.run()
     finally:

@@ -24,7 +24,7 @@ from study.devices.force_dimension.loop_cells import LIBRARY
 from study.devices.governor import cells
 from study.devices.governor.governor import Governor
 from study.devices.safe import SafeDevice
-from study.workflows.checks.bare_loop import judge_beside, run_bare_loop_beside
+from study.workflows.checks.bare_loop import compare_with_bare_loop, run_bare_loop_beside
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import rigs
@@ -144,7 +144,7 @@ def main() -> int:
                 stub.set("watchdog_stretch", 10)
                 rig = stub.rig(sensed=False)
                 health = timed(rig if way == "compiled" else Interpreted(rig))
-            found = judge_beside(health.late_ticks + health.missed_ticks, health.ticks, bare)
+            found = compare_with_bare_loop(health.late_ticks + health.missed_ticks, health.ticks, bare)
             report(f"{way}: {health.fault.name}, the latest {1000 * health.latest_s:.1f} ms; {found.value}")
             good &= found.fine or way != "compiled"
     return int(not good)

@@ -14,7 +14,7 @@ import effect_bench
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import simulate_mechanism, simulate_response
-from equalizer.plant.linear_simulation import linear_steps
+from equalizer.plant.linear_simulation import discretise_model
 
 SAMPLES, RATE_HZ, REPEATS = 105_000, 1000.0, 7
 PLAIN_SAMPLES = 10_000
@@ -31,7 +31,7 @@ FORCES = {
 
 def plain(model, commands: np.ndarray) -> np.ndarray:
     """(n, p): state after state in numpy, the sensor's pole by scipy."""
-    linear = linear_steps(model, 1 / RATE_HZ)
+    linear = discretise_model(model, 1 / RATE_HZ)
     state, before, out = np.zeros(len(linear.advance)), np.zeros(commands.shape[1]), []
     for u in commands:
         out.append(linear.response @ state + linear.response_by_command @ before)

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from study.devices.clock import VirtualClock
-from study.devices.drive.runner import PUBLISHED, run_block
+from study.devices.drive.runner import PUBLISH_POINTER, run_block
 from study.devices.governor import govern
 from study.devices.governor.governor import Governor
 from study.devices.opening import open_device
@@ -53,7 +53,7 @@ def ns_per_tick(rig: CompiledRig, tick) -> float:
             rig.sense,
             tick,
             rig.advance,
-            PUBLISHED,
+            PUBLISH_POINTER,
             (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE)),
             arrays,
             TICKS,

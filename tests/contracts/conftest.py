@@ -15,10 +15,10 @@ import pytest
 from protocols.trial import Phase
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.participants.observers import find_observer
-from study.session.state.due_trial import Present
+from study.session.state.due_trial import PresentTrial
 from study.session.views.form_views import Form
 from study.tui.line_mode.line_input import LineInput
-from study.tui.line_mode.plain import PlainDisplay
+from study.tui.line_mode.plain_display import PlainDisplay
 from study.workflows.session.simulated_display import SimulatedDisplay
 from study.workflows.trial.display import Display
 
@@ -72,7 +72,7 @@ class SimulatedSeat:
     def __init__(self) -> None:
         self.clock: Clock = VirtualClock()
         display = SimulatedDisplay(find_observer("ideal", 1), 1, self.clock)
-        stimulus = Present(0, 0, 0, Phase.TEST, 25.0, 0.0, 1.0, label=1, direction=1, angle_deg=45.0, polarity=1)
+        stimulus = PresentTrial(0, 0, 0, Phase.TEST, 25.0, 0.0, 1.0, label=1, direction=1, angle_deg=45.0, polarity=1)
         display.feel(stimulus, answers_before=0)
         self.display: Display = display
 

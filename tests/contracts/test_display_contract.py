@@ -33,11 +33,11 @@ pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
 QUESTION = Question(Phase.TEST, 1, 5, 3, repeated=False, time_limit_s=0.0, picture=PICTURE, progress=Progress(0.3, 9))
-MENU = DemoMenu(PICTURE, vibrations=3, vibration=1, felt=(), handle_moves=True)
+MENU = DemoMenu(PICTURE, vibrations=3, vibration=1, played_pairs=(), handle_moves=True)
 PLAYING = PlayingNotice("Interval 1", number=1, seconds=0.4, picture=None)
 REST = RestNotice(seconds=0.4, runs_left=2)
 PAUSE = PauseNotice("the experimenter asked for a pause", answers=4)
-WELCOME = Welcome("A study", PICTURE, runs=5, training_runs=1, device="a device", felt=True, resumed_after=0)
+WELCOME = Welcome("A study", PICTURE, runs=5, training_runs=1, device="a device", device_moves=True, resumed_after=0)
 REPORT = DeviceReport("a device", True, (DeviceFinding("rate", "1000 Hz", fine=True),))
 FORM = Form(
     FormKind.DEBRIEF,
@@ -85,7 +85,7 @@ def test_a_device_can_be_checked_again(persons_seat):
     ("call", "value"),
     [
         ("welcome", WELCOME),
-        ("practice_over", PracticeResult(True, right=4, of=5)),
+        ("practice_over", PracticeResult(True, correct_count=4, answer_count=5)),
         ("await_return", "the stimulus was held too long"),
     ],
 )
@@ -119,7 +119,7 @@ def test_an_answer_is_one_or_two_and_stamped_between_question_and_reply(seat):
     before_s = seat.clock.now_s()
     reply = seat.display.ask(QUESTION, Signs())
     assert isinstance(reply, Answered)
-    assert before_s <= reply.at_s <= seat.clock.now_s()
+    assert before_s <= reply.key_time_s <= seat.clock.now_s()
     assert reply.answer == 2 or not seat.person
 
 
@@ -140,7 +140,7 @@ def test_leaving_repeating_and_pausing_are_distinguished(persons_seat, key, leav
     persons_seat.press(key)
     reply = persons_seat.display.ask(QUESTION, Signs())
     assert isinstance(reply, Unanswered)
-    assert (reply.leave, reply.asked, reply.pause) == (leave, asked, pause)
+    assert (reply.ends_sitting, reply.repeat_requested, reply.pause) == (leave, asked, pause)
 
 
 def test_a_wrong_key_answers_nothing(persons_seat):
@@ -153,7 +153,7 @@ def test_a_wrong_key_answers_nothing(persons_seat):
 def test_the_time_limit_ends_a_question(seat):
     reply = seat.display.ask(replace(QUESTION, time_limit_s=0.2), Signs())
     assert isinstance(reply, Unanswered)
-    assert not (reply.leave or reply.asked or reply.pause)
+    assert not (reply.ends_sitting or reply.repeat_requested or reply.pause)
 
 
 def playing(display, signs) -> object:
@@ -205,7 +205,7 @@ def test_each_reason_ends_a_wait_at_once(seat, wait, after):
         assert reply < 600.0
     else:
         assert isinstance(reply, Unanswered)
-        assert not reply.leave
+        assert not reply.ends_sitting
     assert seat.clock.now_s() - started_s < 5.0
 
 
@@ -227,12 +227,12 @@ def test_the_handle_is_looked_at_until_it_is_back(seat):
 
 def test_a_pause_ends_with_the_choice_to_continue(seat):
     seat.press("enter")
-    assert seat.display.pause(PAUSE, lambda: True) is AfterPause.GO_ON
+    assert seat.display.pause(PAUSE, lambda: True) is AfterPause.CONTINUE_SITTING
 
 
 def test_a_pause_can_end_the_sitting(persons_seat):
     persons_seat.press("q")
-    assert persons_seat.display.pause(PAUSE, lambda: True) is AfterPause.LEAVE
+    assert persons_seat.display.pause(PAUSE, lambda: True) is AfterPause.END_SITTING
 
 
 def test_consent_can_be_taken_back_during_a_pause(persons_seat):

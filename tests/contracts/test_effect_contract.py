@@ -80,12 +80,12 @@ def test_a_play_is_finite_repeats_and_knows_no_future(name, bench, played):
         np.testing.assert_allclose(played(name, placed, half).response[:-9], once.response[: half - 9], atol=1e-8)
 
 
-@pytest.mark.parametrize("name", [effect.name for effect in CATALOGUE if isinstance(effect.acts, OnResponse)])
+@pytest.mark.parametrize("name", [effect.name for effect in CATALOGUE if isinstance(effect.action, OnResponse)])
 def test_a_sensor_leaves_the_motion_alone(name, bench, played):
     with_it, without = played(name, bench.example(name, bench.bench_of(name))), played(name, ())
     np.testing.assert_array_equal(with_it.axis_position, without.axis_position)
     assert np.abs(with_it.response - without.response).max() > 1e-3
-    if EFFECTS[name].acts.on_position is None:
+    if EFFECTS[name].action.on_position is None:
         np.testing.assert_array_equal(with_it.position, without.position)
 
 
@@ -178,9 +178,9 @@ def test_more_forces_than_can_be_played_are_refused(bench):
 def test_structures_and_joints_keep_the_mass_that_was_there(bench):
     model = bench.one_axis()
     for effect in CATALOGUE:
-        if not isinstance(effect.acts, Structure | JointForce):
+        if not isinstance(effect.action, Structure | JointForce):
             continue
-        changed = effect.acts.change(model, 0, bench.EXAMPLES[effect.name])
+        changed = effect.action.change(model, 0, bench.EXAMPLES[effect.name])
         grown = changed[0] if isinstance(changed, tuple) else changed
         moving_together = [whole.mass.sum() for whole in (model, grown)]
         added = bench.EXAMPLES[effect.name].get("mass", 0.0)

@@ -34,7 +34,6 @@ LONG_FILES = {"analysis/diagnosis/settings.py"}
 SMALL_BESIDE_THEIR_IMPORTER = {
     "study/tui/app/load_screens.py",
     "study/tui/app/outcomes.py",
-    "study/workflows/diagnosis/clean_recordings.py",
 }
 
 

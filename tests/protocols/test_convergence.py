@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
-from protocols.procedure.staircase import begin, is_finished, level_n, step, to_newton
+from protocols.procedure.staircase import begin_staircase, is_finished, level_n, step, to_newton
 
 TARGET = 0.5 ** (1 / 3)
 RUNS = 250
@@ -23,7 +23,7 @@ def measured(rule: StaircaseRule, share_right, seed: int) -> tuple[np.ndarray, n
     rng = np.random.default_rng(seed)
     found, trials = [], []
     for _ in range(RUNS):
-        state = begin(rule)
+        state = begin_staircase(rule)
         while not is_finished(rule, state):
             state = step(rule, state, rng.random() < share_right(level_n(rule, state)))
         found.append(np.mean([to_newton(level) for level in state.reversal_levels_db[-rule.averaged_reversals :]]))
@@ -59,7 +59,7 @@ def test_long_runs_of_small_steps_converge_where_levitt_says(published, down, ta
     rng = np.random.default_rng(3)
     shares = []
     for _ in range(12):
-        state = begin(rule)
+        state = begin_staircase(rule)
         while not is_finished(rule, state):
             state = step(rule, state, rng.random() < share_right(level_n(rule, state)))
         shares.append(share_right(to_newton(float(np.mean(state.reversal_levels_db[-90:])))))

@@ -23,7 +23,7 @@ from analysis.psychophysics.catch_trials import wilson_interval
 from analysis.psychophysics.group_contrasts import contrasts
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
-from analysis.psychophysics.hierarchy.inference import median_thresholds, pseudo_thresholds
+from analysis.psychophysics.hierarchy.inference import compute_pseudo_thresholds, estimate_medians
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.psychophysics.repeated_measures import repeated_measures
 from analysis.psychophysics.two_analyses import SIMULATED_RULE
@@ -42,8 +42,8 @@ TURN = (*CELLS, NULL, NULL, NULL)
 def judge(crowd: Crowd, seed: tuple[int, ...]) -> dict[str, list[float] | list[bool]]:
     study = simulate_study(crowd, SIMULATED_RULE, PEOPLE, seed)
     fit = fit_hierarchy(study.answers)
-    pseudo, true_db = pseudo_thresholds(fit), 20.0 * np.log10(crowd.medians_n)
-    medians = median_thresholds(fit, to_db(SIMULATED_RULE.cap_n), 0.95)
+    pseudo, true_db = compute_pseudo_thresholds(fit), 20.0 * np.log10(crowd.medians_n)
+    medians = estimate_medians(fit, to_db(SIMULATED_RULE.cap_n), 0.95)
     found, true_differences = contrasts(HZ, pseudo, 0.95), true_db[1:] - true_db[0]
     pairs = list(zip(found, true_differences, strict=True))
     return {
@@ -58,7 +58,7 @@ def judge(crowd: Crowd, seed: tuple[int, ...]) -> dict[str, list[float] | list[b
 
 def judge_null(seed: tuple[int, ...]) -> dict[str, list[float]]:
     study = simulate_study(Crowd(HZ, (3.5,) * 5, frequency_sd_db=UNEQUAL), SIMULATED_RULE, PEOPLE, seed)
-    pseudo = pseudo_thresholds(fit_hierarchy(study.answers))
+    pseudo = compute_pseudo_thresholds(fit_hierarchy(study.answers))
     overall = repeated_measures(study.answers.subjects, pseudo.tolist()).p_huynh_feldt
     return {"p": [1.0 if overall is None else overall, *(c.p for c in contrasts(HZ, pseudo, 0.95))]}
 

@@ -21,7 +21,7 @@ from analysis.psychophysics.criterion_drift import criterion_drifts
 from analysis.psychophysics.study_warnings import DRIFT_LEVEL, LEFT_OUT_LEVEL, STRONG_BIAS
 from protocols.trial import Trial
 from study.participants.observers import find_observer
-from study.participants.population import member
+from study.participants.population import make_member
 from tests.study.participants.test_flagged_people import session
 
 Run = tuple[list[int], list[bool]]
@@ -44,7 +44,9 @@ def simulated_session(per_100_trials: float, criterion_sd: float, seed: tuple[in
 
 def staircase_session(kind: str, number: int, seed: int) -> list[Run]:
     """kind: "honest", of a simulated population, or "drifting" by 0.3 in 100 trials."""
-    observer = find_observer("criterion_drift", number) if kind == "drifting" else member("person", 1 + number, seed)
+    observer = (
+        find_observer("criterion_drift", number) if kind == "drifting" else make_member("person", 1 + number, seed)
+    )
     return answers_by_run(session(observer, "P01", 100_000 * seed + number))
 
 

@@ -29,7 +29,7 @@ from scipy.stats import t as student
 from analysis.psychophysics.catch_trials import wilson_interval
 from analysis.psychophysics.group_contrasts import contrasts
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
-from analysis.psychophysics.hierarchy.inference import pseudo_thresholds
+from analysis.psychophysics.hierarchy.inference import compute_pseudo_thresholds
 from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, simulate_study
 from analysis.psychophysics.repeated_measures import repeated_measures
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
@@ -64,7 +64,7 @@ def drawn_crowd(number: int, seed: int = SEED) -> Crowd:
 
 def judge(crowd: Crowd, seed: tuple[int, ...]) -> dict[str, list[float]]:
     study = simulate_study(crowd, RULE, PEOPLE, seed)
-    pseudo = pseudo_thresholds(fit_hierarchy(study.answers))
+    pseudo = compute_pseudo_thresholds(fit_hierarchy(study.answers))
     true_db = 20.0 * np.log10(crowd.medians_n)
     within = repeated_measures(study.answers.subjects, pseudo.tolist())
     found = contrasts(HZ, pseudo, 0.95)

@@ -17,7 +17,7 @@ from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.group_contrasts import contrasts
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
-from analysis.psychophysics.hierarchy.inference import lower_bound, pseudo_thresholds
+from analysis.psychophysics.hierarchy.inference import compute_pseudo_thresholds, find_lower_bound
 from analysis.psychophysics.hierarchy.objective import Prior
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.psychophysics.repeated_measures import repeated_measures
@@ -51,7 +51,7 @@ def measure(crowd: Crowd, studies: int, bounds: bool) -> dict[str, list[float]]:
     for number in range(studies):
         study = simulate_study(crowd, RULE, PEOPLE, (19, number))
         fit = fit_hierarchy(study.answers)
-        pseudo = pseudo_thresholds(fit)
+        pseudo = compute_pseudo_thresholds(fit)
         error = fit.means_db - true
         covered = np.abs(error) <= half * pseudo.std(axis=0, ddof=1) / PEOPLE**0.5
         found = contrasts(HZ, pseudo, 0.95)
@@ -66,7 +66,8 @@ def measure(crowd: Crowd, studies: int, bounds: bool) -> dict[str, list[float]]:
             "any Holm": [min(c.p_holm for c in found) < 0.05],
             "Huynh-Feldt, Greenhouse-Geisser": [within.p_huynh_feldt < 0.05, within.p < 0.05],
             "one-way": [paper.p is not None and paper.p < 0.05],
-            "bound": [(low := lower_bound(fit, 4, 0.95, Prior())) is None or low <= true[4]] if bounds else [np.nan],
+            "bound": [(low := find_lower_bound(fit, 4, 0.95, Prior())) is None or low <= true[4]]
+            if bounds else [np.nan],
         })  # fmt: skip
     return {key: np.mean([row[key] for row in rows], axis=0).round(4).tolist() for key in rows[0]}
 

@@ -11,7 +11,7 @@ import sys
 import numpy as np
 
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
-from protocols.procedure.staircase import begin, is_finished, level_n, step
+from protocols.procedure.staircase import begin_staircase, is_finished, level_n, step
 from protocols.trial import Phase
 from study.participants.observer import PerceivedStimulus
 from study.participants.observers import find_observer
@@ -23,7 +23,7 @@ HZ, RUNS = 15.0, 150
 def run(name: str, seed: int, most: float) -> tuple[float, int]:
     """Threshold in dB, the mean of the last ten reversals, and how often a trial was asked for again. most: repeats
     that are allowed."""
-    observer, rng, state = find_observer(name, seed), np.random.default_rng([seed, 15]), begin(RULE)
+    observer, rng, state = find_observer(name, seed), np.random.default_rng([seed, 15]), begin_staircase(RULE)
     asked = 0
     while not is_finished(RULE, state):
         shown = int(rng.integers(1, 3))

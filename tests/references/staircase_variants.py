@@ -10,7 +10,7 @@ import sys
 import numpy as np
 
 from protocols.definition.staircase_rule import StaircaseRule, StepChange, StepPhase
-from protocols.procedure.staircase import begin, is_finished, level_n, step, to_newton
+from protocols.procedure.staircase import begin_staircase, is_finished, level_n, step, to_newton
 
 TRUE_DB = -10.0
 TARGET = 0.5 ** (1 / 3)
@@ -28,7 +28,7 @@ def thresholds_db(rule: StaircaseRule, slope: float, lapse: float, runs: int, se
     alpha_n = to_newton(TRUE_DB) / at_target
     results = []
     for _ in range(runs):
-        state = begin(rule)
+        state = begin_staircase(rule)
         while not is_finished(rule, state):
             p = 0.5 + (0.5 - lapse) * -math.expm1(-((level_n(rule, state) / alpha_n) ** slope))
             state = step(rule, state, bool(rng.random() < p))

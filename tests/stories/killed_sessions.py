@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 from study.cli.main import main as hapteq
-from study.store.sessions.archive import SessionFolder, session_folders
+from study.store.sessions.archive import SessionFolder, list_session_folders
 from study.store.sessions.event_log import read_log
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
@@ -53,7 +53,7 @@ def exit_code(asked: list[str]) -> int:
 
 def begun(data: Path, subject: str) -> SessionFolder | None:
     """The subject's session, once its log has a whole first line; before that there is nothing to lose."""
-    folders = [f for f in session_folders(data) if f.subject == subject and f.log.exists()]
+    folders = [f for f in list_session_folders(data) if f.subject == subject and f.log.exists()]
     return next((f for f in folders if b"\n" in f.log.read_bytes()), None)
 
 

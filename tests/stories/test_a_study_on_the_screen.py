@@ -94,7 +94,7 @@ class SaysTheSame(SimulatedDisplay):
 
     def ask(self, question, sign_of_life):
         super().ask(question, sign_of_life)
-        shown = self._felt.direction_shown
+        shown = self._perceived.direction_shown
         return Answered(shown if next(self._given) else 3 - shown, self._clock.now_s())
 
 

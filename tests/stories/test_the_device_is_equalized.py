@@ -20,8 +20,8 @@ from study.devices.clock import VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.rig import CompiledRig
 from study.devices.safe import SafeDevice
-from study.session.stimulus.limits import limits_of_recording
-from study.session.stimulus.recording_pieces import pieces
+from study.session.stimulus.limits import make_recording_limits
+from study.session.stimulus.recording_pieces import make_pieces
 
 RATE_HZ, LOOP = 1000.0, 10_000
 LINES_HZ = np.fft.rfftfreq(LOOP, 1 / RATE_HZ)
@@ -30,7 +30,7 @@ BAND = (LINES_HZ > 4.99) & (LINES_HZ < 35.01)
 
 def linear_omega3(hand: bool, seed: int) -> CompiledRig:
     from study.devices.simulated.compiled import advance, sense
-    from study.devices.simulated.packing import effective_mass_kg, pack_parameters, state_at_rest
+    from study.devices.simulated.packing import effective_mass_kg, make_rest_state, pack_parameters
     from study.devices.simulated.parameters import Omega3Parameters
 
     parameters = Omega3Parameters()
@@ -40,11 +40,11 @@ def linear_omega3(hand: bool, seed: int) -> CompiledRig:
     packed = pack_parameters(parameters, hand, (0.0, 0.0, 0.0))
     info = DeviceInfo("linear omega.3", True, RATE_HZ, 12.0, effective_mass_kg(parameters, packed))
     noise = np.array(np.random.SeedSequence(seed).generate_state(1, np.uint64), dtype=np.uint64)
-    return CompiledRig(info, state_at_rest(packed, (0.0, 0.0, 0.0)), packed, noise, sense, advance)
+    return CompiledRig(info, make_rest_state(packed, (0.0, 0.0, 0.0)), packed, noise, sense, advance)
 
 
 def opened(protocol, hand, seed) -> SafeDevice:
-    settings = DeviceSettings(limits_of_recording(protocol), 3.5, 0.0, 1.0, hand)
+    settings = DeviceSettings(make_recording_limits(protocol), 3.5, 0.0, 1.0, hand)
     return SafeDevice(linear_omega3(hand, seed), settings, VirtualClock())
 
 
@@ -53,7 +53,9 @@ def equalized(hand: bool, seed: int):
     protocol = load_protocol(files("protocols").joinpath("sweep_band.toml").read_text("utf-8"), "sweep_band")
     device = opened(protocol, hand, seed)
     try:
-        recordings = [recorded(device, piece) for piece in pieces(protocol, RATE_HZ) if piece.segment.role == "fit"]
+        recordings = [
+            recorded(device, piece) for piece in make_pieces(protocol, RATE_HZ) if piece.segment.role == "fit"
+        ]
         equalizer = ModelEqualizer(identify(estimate_transfer(recordings)).model)
         return measure_quality(np.stack([played(device, equalizer, axis) for axis in range(3)], axis=2))
     finally:

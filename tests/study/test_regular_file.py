@@ -28,12 +28,12 @@ from study.store.formats.thresholds_file import read_thresholds
 from study.store.formats.trajectory_file import read_trajectory
 from study.store.formats.trials_file import read_trials
 from study.store.sessions.archive import SessionFolder
-from study.store.sessions.event_log import EventLog, read_log, readable_events
+from study.store.sessions.event_log import EventLog, read_log, read_valid_events
 from study.store.sessions.live_file import read_live
 from study.store.sessions.log_writer import is_log_locked
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
-from study.workflows.views.list_sessions import home_view
+from study.workflows.views.view_home import home_view
 from study.workflows.views.watch_session import follow
 
 pytestmark = pytest.mark.timeout(60)
@@ -120,7 +120,7 @@ def test_a_folder_of_sessions_is_listed_although_a_log_a_model_and_a_protocol_ar
     folder = SessionFolder(data / "P01_001")
     assert is_log_locked(folder.log) is None
     assert read_live(folder.path) is None
-    assert readable_events(folder.log) == ()
+    assert read_valid_events(folder.log) == ()
     with pytest.raises(StudyError):
         fold_session(folder)
     follower = follow(folder.path)

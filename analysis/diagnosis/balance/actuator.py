@@ -6,8 +6,8 @@ without noise:
 
     a = g(u) / m - (c v + k x + sum of w phi) / m
 
-with the command's rate of change beside it, for a short lag. g(u) is tried in place of u, together with the best sums
-of laws of the motion, and is named where it explains most of their residual.
+with the command's rate of change as a further regressor, for a short lag. g(u) is tried in place of u, together with
+the best sums of laws of the motion, and is named where it explains most of their residual. Called by `balances`.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ from analysis.diagnosis.balance.inverse_balance import InverseBalance
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
 from analysis.diagnosis.balance.law import Law
-from analysis.diagnosis.balance.linear_part import search_beside_linear
+from analysis.diagnosis.balance.linear_part import search_with_linear_part
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, StructureSearch
@@ -47,12 +47,13 @@ from analysis.diagnosis.settings import (
 from analysis.diagnosis.types import Mapper, TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
-ROUNDS = 8
-"""Most passes of the coordinate search over a law's nonlinear parameters."""
-NEEDLESS = "a law of the command reaches as small an error without it"
-CURVED = "quadratic_damping"
+MOST_PASSES = 8
+"""Largest number of passes of the coordinate search over a law's nonlinear parameters."""
+UNNECESSARY_REASON = "a law of the command reaches as small an error without it"
+CURVE_LIKE_LAW = "quadratic_damping"
 """Law of the motion that resembles an actuator's curve when the speed follows the command."""
-HOLDS_AT_REST = (*SLIDING, "presliding_hysteresis")
+HOLDING_LAWS = (*SLIDING, "presliding_hysteresis")
+"""Laws with a friction that balances any small force at rest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,10 +61,10 @@ class Actuator:
     """The law of the command that fits best, and its test on held-out data."""
 
     law: CommandLaw
-    judged: JudgedLaw
-    alone: bool
+    judged_law: JudgedLaw
+    needs_no_motion_law: bool
     """Whether its error is as small without laws of the motion."""
-    instead: bool = False
+    replaces_motion_laws: bool = False
     """Whether its error alone is smaller than that of the named laws of the motion."""
     suffices: bool = False
     """Whether its error alone is no larger than that of the best sum of laws of the motion with the unchanged
@@ -81,198 +82,210 @@ class DrivenAxis:
 
 
 def find_balance(
-    motions: Sequence[Motion],
-    driven: DrivenAxis,
-    without: frozenset[str],
-    time_left: TimeBudget,
-    map_: Mapper = map,
+    motions: Sequence[Motion], driven: DrivenAxis, excluded: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> Balance:
     """The balance of one axis: laws of the motion and, where it is significant, a law of the command, through which the
     commanded force is then passed before the laws of the motion are searched again."""
     axis, rotational = driven.number, driven.rotational
-    balance = judge_laws(search_beside_linear(motions, axis, rotational, without, time_left))
-    actuator = find_actuator(balance, driven, without, map_) if balance.tested else None
+    balance = judge_laws(search_with_linear_part(motions, axis, rotational, excluded, time_left))
+    actuator = find_actuator(balance, driven, excluded, map_) if balance.tested else None
     if actuator is None:
         return balance
-    judged = actuator.judged
-    if judged.named:
-        own = balance.search.regression.beside.own
-        through = [_pass_through_law(motion, axis, own, actuator.law) for motion in motions]
-        again = judge_laws(search_beside_linear(through, axis, rotational, without, time_left))
-        return replace(again, laws=(judged, *again.laws), linear=balance.linear)
-    if judged.gain_low <= 0 or judged.gain < FURTHER_LAW_OF_ALL:
+    judged_law = actuator.judged_law
+    if judged_law.named:
+        driven_channel = balance.search.regression.base_terms.driven_channel
+        passed_motions = [_pass_through_law(motion, axis, driven_channel, actuator.law) for motion in motions]
+        second_balance = judge_laws(search_with_linear_part(passed_motions, axis, rotational, excluded, time_left))
+        return replace(second_balance, laws=(judged_law, *second_balance.laws), linear=balance.linear)
+    if judged_law.gain_low <= 0 or judged_law.gain < FURTHER_LAW_OF_ALL:
         return balance
-    if judged.gain < COMMAND_LAW_LEAVES and not actuator.instead:
-        kept = tuple(_unless_curved(law, actuator) for law in balance.laws)
-        others = tuple(sorted((*balance.others, judged), key=lambda each: -each.gain))
-        return replace(balance, laws=kept, others=others)
+    if judged_law.gain < COMMAND_LAW_LEAVES and not actuator.replaces_motion_laws:
+        motion_laws = tuple(_withdraw_if_curved(law, actuator) for law in balance.laws)
+        further_laws = tuple(sorted((*balance.further_laws, judged_law), key=lambda item: -item.gain))
+        return replace(balance, laws=motion_laws, further_laws=further_laws)
     laws = (
-        [replace(each, why_not=each.why_not or NEEDLESS) for each in balance.laws] if actuator.alone else balance.laws
+        [replace(item, objection=item.objection or UNNECESSARY_REASON) for item in balance.laws]
+        if actuator.needs_no_motion_law
+        else balance.laws
     )
-    return replace(balance, laws=(judged, *laws))
+    return replace(balance, laws=(judged_law, *laws))
 
 
-def _unless_curved(law: JudgedLaw, actuator: Actuator) -> JudgedLaw:
-    needless = law.named and law.law.effect == CURVED and actuator.suffices
-    return replace(law, why_not=NEEDLESS) if needless else law
+def _withdraw_if_curved(law: JudgedLaw, actuator: Actuator) -> JudgedLaw:
+    is_unnecessary = law.named and law.law.effect == CURVE_LIKE_LAW and actuator.suffices
+    return replace(law, objection=UNNECESSARY_REASON) if is_unnecessary else law
 
 
-def _pass_through_law(motion: Motion, axis: int, own: int, law: CommandLaw) -> Motion:
+def _pass_through_law(motion: Motion, axis: int, driven_channel: int, law: CommandLaw) -> Motion:
     force = motion.force.copy()
-    force[:, [axis]] = law.of(force[:, axis], motion.position[:, own])
+    force[:, [axis]] = law.of(force[:, axis], motion.position[:, driven_channel])
     return replace(motion, force=force)
 
 
-def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str], map_: Mapper = map) -> Actuator | None:
+def find_actuator(
+    balance: Balance, driven: DrivenAxis, excluded: frozenset[str], map_: Mapper = map
+) -> Actuator | None:
     """The law of the command with the smallest error; None where the balance has no time axis, no command varies, no
     law of the command is allowed, or none can explain enough."""
     search, target = balance.search, driven.target
     # A limited rate is tried for servo targets only: for forces, hardening springs and friction resemble it.
-    barred = without if target is not None else without | {"slew_limit"}
-    kinds = _kinds_of_laws(search.regression, driven.rotational, barred)
+    excluded_effects = excluded if target is not None else excluded | {"slew_limit"}
+    kinds = _list_law_kinds(search.regression, driven.rotational, excluded_effects)
     if not np.isfinite(search.regression.motions[0].band_hz) or not kinds:
         return None
-    turned = InverseBalance(
-        search, map_, any(each.law.effect in HOLDS_AT_REST and each.gain_low > 0 for each in balance.laws), target
+    inverse = InverseBalance(
+        search, map_, any(entry.law.effect in HOLDING_LAWS and entry.gain_low > 0 for entry in balance.laws), target
     )
-    instead = _replace_motion_laws(turned, kinds, tuple(each.place for each in balance.named))
-    if instead is not None:
-        return instead
+    replacement = _replace_motion_laws(inverse, kinds, tuple(entry.place for entry in balance.named))
+    if replacement is not None:
+        return replacement
     # Laws of the position are left out where the balance is solved for it: they would reproduce it.
-    sums = _sums_to_try(search) if target is None else [()]
-    plain, beside = min((turned.total_error(AS_COMMANDED, each), each) for each in sums)
-    laws = _worth_trying(turned, kinds, (1 - FURTHER_LAW_OF_ALL / 2) * plain, beside)
+    sums = _list_sums(search) if target is None else [()]
+    unchanged_error, motion_laws = min((inverse.total_error(AS_COMMANDED, entry), entry) for entry in sums)
+    laws = _select_promising(inverse, kinds, (1 - FURTHER_LAW_OF_ALL / 2) * unchanged_error, motion_laws)
     if not laws:
         return None
-    best = _best_of_each(turned, laws, beside)
-    law = min(best, key=lambda each: each[0])[1]
-    alone, held = (turned.total_error(law, each) for each in ((), beside))
-    rivals = [other for _, other in best if other is not law]
+    best = _refine_best_per_effect(inverse, laws, motion_laws)
+    law = min(best, key=lambda entry: entry[0])[1]
+    error_alone, error_with_laws = (inverse.total_error(law, entry) for entry in ((), motion_laws))
+    rivals = [rival_law for _, rival_law in best if rival_law is not law]
     law = _scale_to_command(law, search.regression)
-    judged = _judge_law(turned, law, rivals, (beside, beside))
-    as_little = alone <= held / (1 - COMMAND_RIVAL_LEAVES_MORE)
-    return Actuator(law, judged, bool(beside) and as_little, suffices=as_little and alone <= plain)
+    judged_law = _judge_law(inverse, law, rivals, (motion_laws, motion_laws))
+    is_as_small = error_alone <= error_with_laws / (1 - COMMAND_RIVAL_LEAVES_MORE)
+    return Actuator(
+        law, judged_law, bool(motion_laws) and is_as_small, suffices=is_as_small and error_alone <= unchanged_error
+    )
 
 
-Kinds = Sequence[tuple[PiecewiseCommandLaw | None, Sequence[CommandLaw]]]
-"""Laws of the command of one kind, and a sum of functions that approximates each of them; None = there is none."""
+LawKinds = Sequence[tuple[PiecewiseCommandLaw | None, Sequence[CommandLaw]]]
+"""By kind: a sum of functions that approximates each law of the kind (None without one), and the laws."""
 
 
-def _kinds_of_laws(regression: Regression, rotational: bool, without: frozenset[str]) -> Kinds:
-    """Kinds of laws to try. Those of coils need the measured position of a translation. Empty where no command
-    varies."""
-    motions, own = regression.motions, regression.beside.own
+def _list_law_kinds(regression: Regression, rotational: bool, excluded: frozenset[str]) -> LawKinds:
+    """Kinds of laws to try. Those of coils need the measured position of a translation. Empty where the command is
+    zero."""
+    motions, driven_channel = regression.motions, regression.base_terms.driven_channel
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
     if not np.any(command):
         return ()
-    whole = [motion.force[:, regression.axis] for motion in motions]
+    commands = [motion.force[:, regression.axis] for motion in motions]
     kinds: list[tuple[PiecewiseCommandLaw | None, list[CommandLaw]]] = [
         (piecewise_curve(command), list(command_laws(command))),
-        (None, list(slew_laws(whole, motions[0].rate_hz))),
+        (None, list(slew_laws(commands, motions[0].rate_hz))),
     ]
     if motions[0].order == 0 and not rotational:
-        position = np.concatenate([motion.position[motion.fit, own] for motion in motions])
+        position = np.concatenate([motion.position[motion.fit, driven_channel] for motion in motions])
         kinds.append((piecewise_pull(position), list(coil_laws(position))))
-    allowed = [(near, [law for law in laws if law.effect not in without]) for near, laws in kinds]
+    allowed = [(approx, [law for law in laws if law.effect not in excluded]) for approx, laws in kinds]
     return [kind for kind in allowed if kind[1]]
 
 
-def _worth_trying(turned: InverseBalance, kinds: Kinds, most: float, beside: tuple[int, ...]) -> list[CommandLaw]:
-    """Laws of those kinds whose approximating sum has an error of at most `most` on the samples that it is fitted to:
+def _select_promising(
+    inverse: InverseBalance, kinds: LawKinds, limit: float, motion_laws: tuple[int, ...]
+) -> list[CommandLaw]:
+    """Laws of those kinds whose approximating sum has an error of at most `limit` on the samples that it is fitted to:
     the laws of other kinds need not be tried one by one."""
-    return [law for near, laws in kinds if near is None or turned.least_error(near, beside) <= most for law in laws]
+    return [
+        law
+        for approx, laws in kinds
+        if approx is None or inverse.least_error(approx, motion_laws) <= limit
+        for law in laws
+    ]
 
 
-def _replace_motion_laws(turned: InverseBalance, kinds: Kinds, named: tuple[int, ...]) -> Actuator | None:
+def _replace_motion_laws(inverse: InverseBalance, kinds: LawKinds, named_laws: tuple[int, ...]) -> Actuator | None:
     """Whether a law of the command alone explains most of the residual of the named laws of the motion, or has a
     smaller error than several of them: they had compensated for it, as a drag does for an actuator whose gain falls."""
-    if not named:
+    if not named_laws:
         return None
     # Half of the gain required below, because the sums only approximate the laws.
-    share = 1 - COMMAND_LAW_LEAVES / 2 if len(named) == 1 else 1 / (1 - COMMAND_RIVAL_LEAVES_MORE)
-    most = share * turned.total_error(AS_COMMANDED, named)
-    laws = _worth_trying(turned, kinds, most, ())
+    error_share = 1 - COMMAND_LAW_LEAVES / 2 if len(named_laws) == 1 else 1 / (1 - COMMAND_RIVAL_LEAVES_MORE)
+    largest_error = error_share * inverse.total_error(AS_COMMANDED, named_laws)
+    laws = _select_promising(inverse, kinds, largest_error, ())
     if not laws:
         return None
-    best = _best_of_each(turned, laws, ())
-    law = min(best, key=lambda each: each[0])[1]
-    rivals = [other for _, other in best if other is not law]
-    law = _scale_to_command(law, turned.search.regression)
-    judged = _judge_law(turned, law, rivals, (named, ()))
-    less = judged.gain >= COMMAND_LAW_LEAVES or len(named) > 1
-    return Actuator(law, judged, True, True) if less and judged.gain_low > 0 else None
+    best = _refine_best_per_effect(inverse, laws, ())
+    law = min(best, key=lambda candidate: candidate[0])[1]
+    rivals = [rival_law for _, rival_law in best if rival_law is not law]
+    law = _scale_to_command(law, inverse.search.regression)
+    judged_law = _judge_law(inverse, law, rivals, (named_laws, ()))
+    explains_more = judged_law.gain >= COMMAND_LAW_LEAVES or len(named_laws) > 1
+    return Actuator(law, judged_law, True, True) if explains_more and judged_law.gain_low > 0 else None
 
 
 def _scale_to_command(law: CommandLaw, regression: Regression) -> CommandLaw:
-    motions, own = regression.motions, regression.beside.own
+    motions, driven_channel = regression.motions, regression.base_terms.driven_channel
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
-    return law.scale_to(command, np.concatenate([motion.position[motion.fit, own] for motion in motions]))
+    return law.scale_to(command, np.concatenate([motion.position[motion.fit, driven_channel] for motion in motions]))
 
 
-def _sums_to_try(search: StructureSearch) -> list[tuple[int, ...]]:
-    """Laws that are linear in the motion are left out: filters of the acceleration would reproduce it."""
+def _list_sums(search: StructureSearch) -> list[tuple[int, ...]]:
+    """The best sums of laws of the motion, first none. Laws that are linear in the motion are left out: as filters of
+    the acceleration they would reproduce it."""
     laws = search.regression.laws
-    plain = [each.laws for each in search.ranked if each.laws and not any(laws[k].linear for k in each.laws)]
-    return [(), *plain[:SUMS_BESIDE_COMMAND_LAW]]
+    sums = [s.laws for s in search.ranked if s.laws and not any(laws[k].linear for k in s.laws)]
+    return [(), *sums[:SUMS_BESIDE_COMMAND_LAW]]
 
 
-def _best_of_each(
-    turned: InverseBalance, laws: Sequence[CommandLaw], beside: tuple[int, ...]
+def _refine_best_per_effect(
+    inverse: InverseBalance, laws: Sequence[CommandLaw], motion_laws: tuple[int, ...]
 ) -> list[tuple[float, CommandLaw]]:
     best: dict[str, tuple[float, CommandLaw]] = {}
-    for law, error in zip(laws, turned.total_errors(laws, beside), strict=True):
+    for law, error in zip(laws, inverse.total_errors(laws, motion_laws), strict=True):
         if law.effect not in best or error < best[law.effect][0]:
             best[law.effect] = error, law
-    moved = cast(
-        list[tuple[float, dict[str, float]]], list(turned.map_(partial(_refine_values, turned, beside), best.values()))
+    results = cast(
+        list[tuple[float, dict[str, float]]],
+        list(inverse.map_(partial(_refine_values, inverse, motion_laws), best.values())),
     )
     refined = [
-        (error, replace(law, values=values)) for (_, law), (error, values) in zip(best.values(), moved, strict=True)
+        (error, replace(law, values=values)) for (_, law), (error, values) in zip(best.values(), results, strict=True)
     ]
-    plain = min((error for error, law in refined if not law.flexible), default=np.inf)
+    limit = min((error for error, law in refined if not law.flexible), default=np.inf)
     return [
-        (error, law) for error, law in refined if not law.flexible or error < (1 - COMMAND_RIVAL_LEAVES_MORE) * plain
+        (error, law) for error, law in refined if not law.flexible or error < (1 - COMMAND_RIVAL_LEAVES_MORE) * limit
     ]
 
 
 def _refine_values(
-    turned: InverseBalance, beside: tuple[int, ...], found: tuple[float, CommandLaw]
+    inverse: InverseBalance, motion_laws: tuple[int, ...], start: tuple[float, CommandLaw]
 ) -> tuple[float, dict[str, float]]:
     """Error and parameters of a law after a coordinate search over its parameters."""
-    error, law = found
-    for _ in range(ROUNDS):
-        tried = [(turned.total_error(other, beside), other) for other in neighbours_of(law)]
-        if not tried or min(tried, key=lambda each: each[0])[0] >= error * (1 - 1e-3):
+    error, law = start
+    for _ in range(MOST_PASSES):
+        neighbours = [(inverse.total_error(neighbour, motion_laws), neighbour) for neighbour in neighbours_of(law)]
+        if not neighbours or min(neighbours, key=lambda candidate: candidate[0])[0] >= error * (1 - 1e-3):
             break
-        error, law = min(tried, key=lambda each: each[0])
+        error, law = min(neighbours, key=lambda candidate: candidate[0])
     return error, law.values
 
 
 def _judge_law(
-    turned: InverseBalance,
+    inverse: InverseBalance,
     law: CommandLaw,
     rivals: Sequence[CommandLaw],
     sums: tuple[tuple[int, ...], tuple[int, ...]],
 ) -> JudgedLaw:
-    """sums: laws of the motion beside the unchanged command, and beside the command after the law."""
-    plain, beside = sums
-    without, held = turned.errors(AS_COMMANDED, plain, True), turned.errors(law, beside, True)
-    linear = float(turned.errors(AS_COMMANDED, (), True).sum())
-    drawn = bootstrap_draws(len(held))
-    behind = [(turned.errors(rival, beside, True), rival.effect) for rival in rivals]
-    most = float(held.sum()) / (1 - COMMAND_RIVAL_LEAVES_MORE)
-    alike = tuple(effect for errors, effect in behind if float(errors.sum()) <= most)
-    first = [errors[drawn].sum(axis=1) >= held[drawn].sum(axis=1) for errors, _ in behind]
-    gain, low = gain_with_bound(without, held)
-    known = Law(law.effect, turned.search.regression.axis, (), lambda m, _: m.force, lambda w, n, mass: None)
+    """The law with its gain and rivals. sums: laws of the motion fitted without and with the law of the command."""
+    laws_without, laws_with = sums
+    errors_without, errors_with = inverse.errors(AS_COMMANDED, laws_without, True), inverse.errors(law, laws_with, True)
+    linear = float(inverse.errors(AS_COMMANDED, (), True).sum())
+    draws = bootstrap_draws(len(errors_with))
+    rival_errors = [(inverse.errors(rival, laws_with, True), rival.effect) for rival in rivals]
+    largest_error = float(errors_with.sum()) / (1 - COMMAND_RIVAL_LEAVES_MORE)
+    equivalents = tuple(effect for errors, effect in rival_errors if float(errors.sum()) <= largest_error)
+    is_first = [errors[draws].sum(axis=1) >= errors_with[draws].sum(axis=1) for errors, _ in rival_errors]
+    gain, low = gain_with_bound(errors_without, errors_with)
+    placeholder_law = Law(law.effect, inverse.search.regression.axis, (), lambda m, _: m.force, lambda w, n, mass: None)
     return JudgedLaw(
-        NO_COLUMN, known, dict(law.values), gain, low, float((without - held).sum()) / max(linear, 1e-300), alike,
-        float(np.mean(np.all(first, axis=0))) if first else 1.0, _why_not(law, gain, low, alike),
+        NO_COLUMN, placeholder_law, dict(law.values), gain, low,
+        float((errors_without - errors_with).sum()) / max(linear, 1e-300), equivalents,
+        float(np.mean(np.all(is_first, axis=0))) if is_first else 1.0, _find_objection(law, gain, low, equivalents),
         formula=law.as_formula(),
     )  # fmt: skip
 
 
-def _why_not(law: CommandLaw, gain: float, low: float, alike: tuple[str, ...]) -> str:
+def _find_objection(law: CommandLaw, gain: float, low: float, equivalents: tuple[str, ...]) -> str:
     """Reason not to name the law, as a sentence; empty where it is to be named."""
     if gain < COMMAND_LAW_LEAVES or low <= 0:
         return (
@@ -280,7 +293,7 @@ def _why_not(law: CommandLaw, gain: float, low: float, alike: tuple[str, ...]) -
             "leave, and not most of it"
         )
     # A curve of the command and a force that changes with the distance are different physics.
-    different = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.factor_at is not None]
-    if different or len(alike) >= LARGEST_CLASS:
-        return f"these data cannot distinguish it from {', '.join(alike)}"
+    different = [effect for effect in equivalents if effect not in EFFECTS_BY_NAME or law.factor_at is not None]
+    if different or len(equivalents) >= LARGEST_CLASS:
+        return f"these data cannot distinguish it from {', '.join(equivalents)}"
     return "" if law.effect in EFFECTS_BY_NAME or law.formula else "hapteq cannot simulate it yet"

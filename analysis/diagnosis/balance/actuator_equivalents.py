@@ -17,7 +17,7 @@ import numpy as np
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.balance.structures import SLIDING, Structure, is_better
+from analysis.diagnosis.balance.structures import SLIDING, Structure, improves_significantly
 from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, STILL_SHARE
 
 DEAD_BAND = "force_deadband"
@@ -30,48 +30,52 @@ BACKWARDS = "the motion never changes direction"
 def doubt_laws_of_actuator(balance: Balance) -> Balance:
     """The balance of a driven axis without the names of laws that its actuator explains equally well. Where this leaves
     no law of the command with a name, the other laws lose theirs too: they were fitted to the force behind that law."""
-    laws = tuple(_doubt_law(each, balance) for each in balance.laws)
-    through = [each.law.effect for each in balance.named if not each.has_column]
-    if through and not any(each.named and not each.has_column for each in laws):
-        why = f"it was found together with {through[0]}, which these data do not confirm"
-        laws = tuple(replace(each, why_not=each.why_not or why) for each in laws)
+    laws = tuple(_doubt_law(law, balance) for law in balance.laws)
+    command_laws = [law.law.effect for law in balance.named if not law.has_column]
+    if command_laws and not any(law.named and not law.has_column for law in laws):
+        reason = f"it was found together with {command_laws[0]}, which these data do not confirm"
+        laws = tuple(replace(law, objection=law.objection or reason) for law in laws)
     return replace(balance, laws=laws)
 
 
-def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
+def _doubt_law(judged_law: JudgedLaw, balance: Balance) -> JudgedLaw:
     """The law, with its name withdrawn or with its equivalent added, by the three cases of the module's docstring."""
-    regression, effect = balance.search.regression, judged.law.effect
-    if judged.named and effect == DEAD_BAND and not judged.has_column and _rests_within(regression):
-        return replace(judged, alike=tuple(dict.fromkeys((*judged.alike, EQUIVALENT_LAWS[DEAD_BAND]))))
-    if not judged.named or judged.law.channel < 0:
-        return judged
-    if effect in SLIDING and not _reverses(regression, judged.law.channel):
-        return _mark_alike(judged, DEAD_BAND, BACKWARDS)
+    regression, effect = balance.search.regression, judged_law.law.effect
+    if judged_law.named and effect == DEAD_BAND and not judged_law.has_column and _rests_in_dead_band(regression):
+        return replace(
+            judged_law, equivalents=tuple(dict.fromkeys((*judged_law.equivalents, EQUIVALENT_LAWS[DEAD_BAND])))
+        )
+    if not judged_law.named or judged_law.law.channel < 0:
+        return judged_law
+    if effect in SLIDING and not _reverses(regression, judged_law.law.channel):
+        return _add_equivalent(judged_law, DEAD_BAND, BACKWARDS)
     if effect == "quadratic_damping":
         has_friction = any(
-            each.law.effect in SLIDING and each.law.channel == judged.law.channel for each in balance.named
+            law.law.effect in SLIDING and law.law.channel == judged_law.law.channel for law in balance.named
         )
-        if has_friction and not _reverses(regression, judged.law.channel):
-            return _mark_alike(judged, "force_nonlinearity", BACKWARDS)
+        if has_friction and not _reverses(regression, judged_law.law.channel):
+            return _add_equivalent(judged_law, "force_nonlinearity", BACKWARDS)
     if effect in EQUIVALENT_LAWS and not _has_inertia(regression, balance.chosen.laws):
-        return _mark_alike(judged, EQUIVALENT_LAWS[effect], "the inertia is negligible in this recording")
-    return judged
+        return _add_equivalent(judged_law, EQUIVALENT_LAWS[effect], "the inertia is negligible in this recording")
+    return judged_law
 
 
-def _rests_within(regression: Regression) -> bool:
+def _rests_in_dead_band(regression: Regression) -> bool:
     """Whether the axis rests in most samples in which its dead band passes no force. The forces of the regression are
     those behind the dead band, so that such samples have a force of exactly 0."""
-    motions, axis, own = regression.motions, regression.axis, regression.beside.own
-    speed = np.concatenate([motion.velocity[motion.fit, own] for motion in motions])
+    motions, axis, driven_channel = regression.motions, regression.axis, regression.base_terms.driven_channel
+    speed = np.concatenate([motion.velocity[motion.fit, driven_channel] for motion in motions])
     force = np.concatenate([motion.force[motion.fit, axis] for motion in motions])
-    moves = speed**2 > STILL_SHARE * np.mean(speed**2)
-    return bool(np.mean(moves[force == 0.0]) < MOVES_MOST_OF_THE_TIME) if np.any(force == 0.0) else False
+    is_moving = speed**2 > STILL_SHARE * np.mean(speed**2)
+    return bool(np.mean(is_moving[force == 0.0]) < MOVES_MOST_OF_THE_TIME) if np.any(force == 0.0) else False
 
 
-def _mark_alike(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:
+def _add_equivalent(judged_law: JudgedLaw, twin: str, reason: str) -> JudgedLaw:
     """The law with a reason not to name it, and with its equivalent (`twin`) added to its class."""
-    alike = tuple(dict.fromkeys((twin, *judged.alike)))
-    return replace(judged, alike=alike, why_not=f"these data cannot distinguish it from {twin}, because {why}")
+    equivalents = tuple(dict.fromkeys((twin, *judged_law.equivalents)))
+    return replace(
+        judged_law, equivalents=equivalents, objection=f"these data cannot distinguish it from {twin}, because {reason}"
+    )
 
 
 def _reverses(regression: Regression, channel: int) -> bool:
@@ -83,14 +87,18 @@ def _reverses(regression: Regression, channel: int) -> bool:
 
 
 def _has_inertia(regression: Regression, laws: tuple[int, ...]) -> bool:
-    """Whether a mass reduces the cross-validated error significantly (`is_better`) and its time constant m / d exceeds
-    a sample. True without a test where the mass is given, or where the data have no time axis to determine it from."""
-    columns, own = regression.columns_of(laws), regression.beside.own
+    """Whether a mass reduces the cross-validated error (`improves_significantly`) and its time constant m / d exceeds a
+    sample. True without a test where the mass is given, or where the data have no time axis to determine it from."""
+    columns, driven_channel = regression.columns_of(laws), regression.base_terms.driven_channel
     if regression.mass is not None or not np.isfinite(regression.motions[0].band_hz):
         return True
-    massless = [column for column in columns if column != own]
-    without, with_mass = (Structure(laws, regression.cross_validated_errors(each)) for each in (massless, columns))
+    massless = [column for column in columns if column != driven_channel]
+    without_mass, with_mass = (
+        Structure(laws, regression.cross_validated_errors(column_set)) for column_set in (massless, columns)
+    )
     weights = regression.weights(columns)
-    mass, damping = (float(weights[columns.index(k)]) for k in (own, len(regression.motions[0].channels) + own))
+    mass, damping = (
+        float(weights[columns.index(k)]) for k in (driven_channel, len(regression.motions[0].channels) + driven_channel)
+    )
     # A time constant m / d below a sample cannot be distinguished from the hold of the command.
-    return mass * regression.motions[0].rate_hz > max(damping, 0.0) and is_better(without, with_mass)
+    return mass * regression.motions[0].rate_hz > max(damping, 0.0) and improves_significantly(without_mass, with_mass)

@@ -1,7 +1,7 @@
-"""Entry of the force balance: one regression M a + B v + K x + laws = command per axis of the recordings.
+"""Force balance of each axis of the recordings: the regression M a + B v + K x + laws = command.
 
 Each axis is first fitted in the band that noise allows (`band.py`). If no law is named there, the regression is
-repeated in the narrower band in which the device moves, and then with the samples in motion only.
+repeated in the narrower band in which the device moves, and then with the samples in motion only. Called by `diagnose`.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,8 +12,8 @@ import numpy as np
 from analysis.diagnosis.balance.actuator import DrivenAxis, find_balance
 from analysis.diagnosis.balance.actuator_equivalents import doubt_laws_of_actuator
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
-from analysis.diagnosis.balance.linear_part import driven_motion, search_beside_linear
-from analysis.diagnosis.balance.motion import Motion, NoMotionError, motion_band_hz, motions_of
+from analysis.diagnosis.balance.linear_part import driven_motion, search_with_linear_part
+from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motion_band_hz, compute_motions
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, SECOND_BAND_NARROWER, STILL_SHARE
@@ -23,91 +23,93 @@ from equalizer.signals.recording import Recording
 
 
 def find_balances(
-    recordings: Sequence[Recording], without: frozenset[str], time_left: TimeBudget, map_: Mapper = map
+    recordings: Sequence[Recording], excluded: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> tuple[Balance, ...]:
-    """One force balance per command; empty where no motion was measured, or too little of it. without: effects that are
-    left out. Where no law is named in the band that noise allows, the narrower band in which the device moves is tried,
-    because power of the command above that band hides laws; then the samples in motion alone."""
+    """One force balance per command; empty where no motion was measured, or too little of it. excluded: names of
+    effects that are left out. Where no law is named in the band that noise allows, the narrower band in which the
+    device moves is tried, because power of the command above that band hides laws; then the samples in motion alone."""
     try:
         records = observe_parts(recordings, len(recordings[0].response.channels))
-        motions = motions_of(records)
-        found = _balances_per_axis(motions, recordings, without, time_left, map_)
+        motions = compute_motions(records)
+        balances = _fit_balances(motions, recordings, excluded, time_left, map_)
     except (NoMotionError, np.linalg.LinAlgError):
         return ()
-    for select in (motions_in_own_band, samples_in_motion):
-        if any(balance.named or not balance.tested for balance in found) or not time_left():
-            return found
-        found = look_again(select, records, motions, without, time_left, map_) or found
-    return found
+    for select in (restrict_to_motion_band, select_samples_in_motion):
+        if any(balance.named or not balance.tested for balance in balances) or not time_left():
+            return balances
+        balances = balance_selected_motions(select, records, motions, excluded, time_left, map_) or balances
+    return balances
 
 
-Select = Callable[[Sequence[Observed], Sequence[Motion]], Sequence[Motion]]
+MotionSelector = Callable[[Sequence[Observed], Sequence[Motion]], Sequence[Motion]]
 """Maps records and their motions to motions with a narrower band or fewer samples; empty where little would change."""
 
 
-def look_again(
-    select: Select,
+def balance_selected_motions(
+    select: MotionSelector,
     records: Sequence[Observed],
     motions: Sequence[Motion],
-    without: frozenset[str],
+    excluded: frozenset[str],
     time_left: TimeBudget,
     map_: Mapper,
 ) -> tuple[Balance, ...]:
     """The balances of the motions that `select` returns; empty where these name no law, or cannot be fitted."""
     try:
-        kept = select(records, motions)
-        recordings = [each.recording for each in records]
-        found = _balances_per_axis(kept, recordings, without, time_left, map_) if kept else ()
+        selected = select(records, motions)
+        recordings = [record.recording for record in records]
+        balances = _fit_balances(selected, recordings, excluded, time_left, map_) if selected else ()
     except (NoMotionError, np.linalg.LinAlgError):
         return ()
-    return found if any(balance.named for balance in found) else ()
+    return balances if any(balance.named for balance in balances) else ()
 
 
-def motions_in_own_band(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
+def restrict_to_motion_band(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
     """The motions filtered to the band of the driven motions; empty where that band is hardly narrower. A further
     measured motion, such as the deflection of a beam, may be mere noise at high frequencies. Raises NoMotionError."""
-    narrow_hz = motion_band_hz(motions, driven_motion(motions))
-    return motions_of(records, narrow_hz) if narrow_hz < SECOND_BAND_NARROWER * motions[0].band_hz else ()
+    narrow_hz = compute_motion_band_hz(motions, driven_motion(motions))
+    return compute_motions(records, narrow_hz) if narrow_hz < SECOND_BAND_NARROWER * motions[0].band_hz else ()
 
 
-def samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
+def select_samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
     """The motions with masks of the samples in which the device moves; empty where it moves most of the time. At rest,
     friction balances any applied force: no law predicts that force, and linear terms would be fitted to it."""
-    moving = [_is_moving(motion, motions) for motion in motions]
-    if np.mean(np.concatenate(moving)) > MOVES_MOST_OF_THE_TIME:
+    moving_masks = [_find_moving_samples(motion, motions) for motion in motions]
+    if np.mean(np.concatenate(moving_masks)) > MOVES_MOST_OF_THE_TIME:
         return ()
     return [
-        replace(motion, fit=motion.fit & moves, test=motion.test & moves)
-        for motion, moves in zip(motions, moving, strict=True)
+        replace(motion, fit=motion.fit & is_moving, test=motion.test & is_moving)
+        for motion, is_moving in zip(motions, moving_masks, strict=True)
     ]
 
 
-def _is_moving(motion: Motion, motions: Sequence[Motion]) -> Mask:
+def _find_moving_samples(motion: Motion, motions: Sequence[Motion]) -> Mask:
     """(n,): whether the squared velocity of any channel exceeds `STILL_SHARE` of its mean square over all motions."""
-    squares = np.concatenate([each.velocity[each.fit] ** 2 for each in motions]).mean(axis=0)
+    squares = np.concatenate([fitted_motion.velocity[fitted_motion.fit] ** 2 for fitted_motion in motions]).mean(axis=0)
     return np.asarray((motion.velocity**2 > STILL_SHARE * squares).any(axis=1))
 
 
-def _balances_per_axis(
+def _fit_balances(
     motions: Sequence[Motion],
     recordings: Sequence[Recording],
-    without: frozenset[str],
+    excluded: frozenset[str],
     time_left: TimeBudget,
     map_: Mapper,
 ) -> tuple[Balance, ...]:
     # With an imposed motion, the force is the response of the device, so that no actuator needs to be tested.
-    turning = any(unit.startswith("rad") for unit in recordings[0].response.units)
-    turning |= any(unit.startswith("N m") for unit in recordings[0].command.units)
+    rotational = any(unit.startswith("rad") for unit in recordings[0].response.units)
+    rotational |= any(unit.startswith("N m") for unit in recordings[0].command.units)
     axes = range(len(recordings[0].command.channels))
     if any(recording.meta.get("imposed") for recording in recordings):
-        return tuple(judge_laws(search_beside_linear(motions, axis, turning, without, time_left)) for axis in axes)
+        return tuple(
+            judge_laws(search_with_linear_part(motions, axis, rotational, excluded, time_left)) for axis in axes
+        )
     targets = [
         None if quantity == "voltage" else DERIVATIVE_OF_QUANTITY.get(quantity)
         for quantity in recordings[0].command.quantities
     ]
     return tuple(
         doubt_laws_of_actuator(
-            find_balance(motions, DrivenAxis(axis, turning, targets[axis]), without, time_left, map_)
+            find_balance(motions, DrivenAxis(axis, rotational, targets[axis]), excluded, time_left, map_)
         )
         for axis in axes
     )

@@ -18,24 +18,26 @@ from equalizer.signals.spectral_density import spectral_density
 def band_end_hz(samples: Sequence[FloatArray], rate_hz: float, order: int) -> float:
     """Upper end of the band in Hz: median over recordings and channels, between limits set by length and sample rate.
     samples: (n, d) each. order: time derivative of the position that was measured (0, 1 or 2)."""
-    ends = [_end_hz(column, rate_hz, 2 * (2 - order)) for each in samples for column in each.T]
-    longest = max(len(each) for each in samples)
+    ends = [
+        _end_hz(column, rate_hz, 2 * (2 - order)) for recording_samples in samples for column in recording_samples.T
+    ]
+    longest = max(len(recording_samples) for recording_samples in samples)
     return float(np.clip(np.median(ends), BAND_NARROWEST_CYCLES * rate_hz / longest, BAND_WIDEST * rate_hz))
 
 
 def band_begin_hz(samples: Sequence[FloatArray], rate_hz: float) -> float:
     """Lower end in Hz of the band in which accelerations are integrated twice: median over recordings and channels, at
     least two cycles per recording. samples: accelerations (n, d) each."""
-    begins = []
-    for column in (column for each in samples for column in each.T):
+    lower_ends_hz = []
+    for column in (column for recording_samples in samples for column in recording_samples.T):
         frequency_hz, density, floor = _spectrum(column, rate_hz)
         weight = frequency_hz**-4.0
         signal = np.cumsum((np.maximum(density - floor, 0.0) * weight)[::-1])[::-1]
         noise = np.cumsum((floor * weight)[::-1])[::-1]
         allowed = np.flatnonzero(noise <= ACCELERATION_NOISE_SHARE * signal)
-        begins.append(float(frequency_hz[allowed[0]]) if len(allowed) else float(frequency_hz[0]))
-    shortest = min(len(each) for each in samples)
-    return max(float(np.median(begins)), 2 * rate_hz / shortest)
+        lower_ends_hz.append(float(frequency_hz[allowed[0]]) if len(allowed) else float(frequency_hz[0]))
+    shortest = min(len(recording_samples) for recording_samples in samples)
+    return max(float(np.median(lower_ends_hz)), 2 * rate_hz / shortest)
 
 
 def _end_hz(column: FloatArray, rate_hz: float, power: int) -> float:

@@ -57,30 +57,30 @@ def blocks_of(
     first part of each block is used."""
     scale, mean = units
     total = sum(int(mask.sum()) for mask in masks)
-    found = []
+    blocks = []
     share = min(1.0, BALANCE_MOST_SAMPLES / max(total, 1))
     for number, (columns, force, mask) in enumerate(zip(rows, forces, masks, strict=True)):
-        places = np.flatnonzero(mask)
-        count = int(np.clip(round(2 * BALANCE_FOLDS * len(places) / max(total, 1)), 1, len(places) or 1))
-        for whole in np.array_split(places, count) if len(places) else []:
-            part = whole[: max(int(share * len(whole)), 1)]
+        indices = np.flatnonzero(mask)
+        count = int(np.clip(round(2 * BALANCE_FOLDS * len(indices) / max(total, 1)), 1, len(indices) or 1))
+        for block_indices in np.array_split(indices, count) if len(indices) else []:
+            part = block_indices[: max(int(share * len(block_indices)), 1)]
             x, y = columns[part] / scale, force[part]
-            found.append(Block(x.T @ x, x.T @ y, float(y @ y), float(np.sum((y - mean) ** 2)), number, part))
-    return tuple(found)
+            blocks.append(Block(x.T @ x, x.T @ y, float(y @ y), float(np.sum((y - mean) ** 2)), number, part))
+    return tuple(blocks)
 
 
 def block_products(block: Block, columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """Gram matrix (k, k) and cross products (k,) of k chosen columns of a block."""
-    at = list(columns)
-    return block.gram[np.ix_(at, at)], block.cross[at]
+    indices = list(columns)
+    return block.gram[np.ix_(indices, indices)], block.cross[indices]
 
 
 def products_per_block(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """(blocks, c, c) and (blocks, c): each block's Gram matrix and cross products of c columns."""
-    at = np.asarray(columns, dtype=np.intp)
-    grid = at[:, None], at[None, :]
-    grams = np.array([block.gram[grid] for block in blocks]).reshape(-1, len(at), len(at))
-    return grams, np.array([block.cross[at] for block in blocks]).reshape(-1, len(at))
+    indices = np.asarray(columns, dtype=np.intp)
+    grid = indices[:, None], indices[None, :]
+    grams = np.array([block.gram[grid] for block in blocks]).reshape(-1, len(indices), len(indices))
+    return grams, np.array([block.cross[indices] for block in blocks]).reshape(-1, len(indices))
 
 
 def sum_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
@@ -101,9 +101,9 @@ def solve_normal_equations(products: tuple[FloatArray, FloatArray], ridge: float
 def solve_without_columns(gram: FloatArray, cross: FloatArray, fixed: Mask) -> FloatArray:
     """Weights (..., c), with those of the `fixed` (c,) columns held at zero; see `solve_normal_equations`."""
     free = np.flatnonzero(~fixed)
-    found = np.zeros_like(cross)
-    found[..., free] = solve_normal_equations((gram[..., free[:, None], free], cross[..., free]), RIDGE)
-    return found
+    weights = np.zeros_like(cross)
+    weights[..., free] = solve_normal_equations((gram[..., free[:, None], free], cross[..., free]), RIDGE)
+    return weights
 
 
 def solve_ridge(products: tuple[FloatArray, FloatArray], ridge: float, free: Mask) -> FloatArray:
@@ -126,18 +126,19 @@ def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[F
     return gram, cross
 
 
-def compute_squared_error(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
-    """Residual sum of squares of given weights (c,), at least 0. own: Gram matrix (c, c) and cross products (c,).
+def compute_squared_error(products: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
+    """Residual sum of squares of given weights (c,), at least 0. products: Gram matrix (c, c) and cross products (c,).
     power: sum of squares of the fitted force."""
-    gram, cross = own
+    gram, cross = products
     return max(power - 2 * float(weights @ cross) + float(weights @ gram @ weights), 0.0)
 
 
 def compute_squared_errors(
-    blocks: Sequence[Block], own: tuple[FloatArray, FloatArray], weights: FloatArray
+    blocks: Sequence[Block], products: tuple[FloatArray, FloatArray], weights: FloatArray
 ) -> FloatArray:
-    """(blocks,): residual sums of squares. own: `products_per_block` of these blocks. weights: (c,), or (blocks, c)."""
-    weights = np.broadcast_to(weights, own[1].shape)
+    """(blocks,): residual sums of squares. products: `products_per_block` of these blocks. weights: (c,) or
+    (blocks, c)."""
+    weights = np.broadcast_to(weights, products[1].shape)
     power = np.array([block.power for block in blocks])
-    squares = ((own[0] @ weights[..., None])[..., 0] * weights).sum(axis=-1)
-    return np.asarray(np.maximum(power - 2 * (own[1] * weights).sum(axis=-1) + squares, 0.0))
+    squares = ((products[0] @ weights[..., None])[..., 0] * weights).sum(axis=-1)
+    return np.asarray(np.maximum(power - 2 * (products[1] * weights).sum(axis=-1) + squares, 0.0))

@@ -79,8 +79,8 @@ class CommandLaw:
         it then keeps its size. command, position: (n,) each."""
         if self.formula is None:
             return self
-        given = self.of(command, position)[:, 0]
-        return replace(self, scale=self.scale * float(given @ command) / max(float(given @ given), 1e-300))
+        force = self.of(command, position)[:, 0]
+        return replace(self, scale=self.scale * float(force @ command) / max(float(force @ force), 1e-300))
 
     def as_formula(self) -> Formula | None:
         """Formula of the force with these values and scale; None where the catalogue has the effect."""
@@ -98,7 +98,9 @@ def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
             yield CommandLaw("force_deadband", {"width": width, "jump": jump}, _deadband_force)
     for limit in _sizes(size, SATURATION_QUANTILES):
         yield CommandLaw(
-            "force_saturation", {"limit": limit}, lambda u, of: np.clip(u, -of["limit"], of["limit"])[:, None]
+            "force_saturation",
+            {"limit": limit},
+            lambda u, parameters: np.clip(u, -parameters["limit"], parameters["limit"])[:, None],
         )
     unit = float(size.max(initial=0.0)) or 1.0
     for square in SQUARES:
@@ -114,18 +116,20 @@ def slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[Comman
     """Slew-rate limits: the command is followed at a limited rate, as by a positioning servo. commands: (n,) each. The
     rates range from the full stroke within the longest command to its fastest change. A rate is left out where the
     limited output hardly ever reaches the command, so that only the sign of the command would matter."""
-    fastest = max(float(np.abs(np.diff(each)).max(initial=0.0)) for each in commands) * rate_hz
-    slowest = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(each) for each in commands)
+    fastest = max(float(np.abs(np.diff(command)).max(initial=0.0)) for command in commands) * rate_hz
+    slowest = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(command) for command in commands)
     for rate in np.geomspace(slowest, fastest, RATES)[:-1] if 0 < slowest < fastest else ():
         law = CommandLaw("slew_limit", {"rate": float(rate)}, partial(_compute_slewed_force, 1 / rate_hz))
-        reached = [np.abs(law.columns(each, law.values)[:, 0] - each) < rate / rate_hz for each in commands]
-        if np.mean(np.concatenate(reached)) > SLEW_REACHED:
+        reaches_command = [
+            np.abs(law.columns(command, law.values)[:, 0] - command) < rate / rate_hz for command in commands
+        ]
+        if np.mean(np.concatenate(reaches_command)) > SLEW_REACHED:
             yield law
 
 
-def _compute_slewed_force(step_s: float, command: FloatArray, of: dict[str, float]) -> FloatArray:
+def _compute_slewed_force(step_s: float, command: FloatArray, parameters: dict[str, float]) -> FloatArray:
     # The output equals the first command when the recording begins.
-    return limit_slew(command, step_s, of["rate"], float(command[0]))[:, None]
+    return limit_slew(command, step_s, parameters["rate"], float(command[0]))[:, None]
 
 
 def coil_laws(position: FloatArray) -> Iterator[CommandLaw]:
@@ -139,19 +143,19 @@ def coil_laws(position: FloatArray) -> Iterator[CommandLaw]:
                 yield CommandLaw("electromagnet", {"gap": gap * (high - low)}, columns, factor_at, True)
 
 
-def _attraction_at(side: float, end: float, position: FloatArray, of: dict[str, float]) -> FloatArray:
+def _attraction_at(side: float, end: float, position: FloatArray, parameters: dict[str, float]) -> FloatArray:
     """side: 1 where the position is a distance that grows, from `end` on; -1 where it falls."""
-    return np.asarray((of["gap"] + np.maximum(side * (position - end), 0.0)) ** -2)
+    return np.asarray((parameters["gap"] + np.maximum(side * (position - end), 0.0)) ** -2)
 
 
-def _power_formula(of: dict[str, float], scale: float) -> Formula:
+def _power_formula(parameters: dict[str, float], scale: float) -> Formula:
     """Formula of `_power_force`: scale sgn(f) max(|f| - width, 0)^power of a command f."""
-    if not of["width"]:
-        return Formula(f"{scale:.6g}*sign(f)*abs(f)**p0", (of["power"],))
-    return Formula(f"{scale:.6g}*sign(f)*maximum(abs(f) - p0, 0)**p1", (of["width"], of["power"]))
+    if not parameters["width"]:
+        return Formula(f"{scale:.6g}*sign(f)*abs(f)**p0", (parameters["power"],))
+    return Formula(f"{scale:.6g}*sign(f)*maximum(abs(f) - p0, 0)**p1", (parameters["width"], parameters["power"]))
 
 
-def _force_of_square(command: FloatArray, of: dict[str, float]) -> FloatArray:
+def _force_of_square(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
     return command[:, None] ** 2
 
 
@@ -164,25 +168,25 @@ def neighbours_of(law: CommandLaw) -> Iterator[CommandLaw]:
                 yield replace(law, values={**law.values, name: factor * value})
 
 
-def _nonlinear_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
-    return square_law_force(command, of["square"], of["reference"])[:, None]
+def _nonlinear_force(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+    return square_law_force(command, parameters["square"], parameters["reference"])[:, None]
 
 
-def _power_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
-    beyond = np.maximum(np.abs(command) - of["width"], 0.0)
-    return np.asarray(np.sign(command) * beyond ** of["power"])[:, None]
+def _power_force(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+    excess = np.maximum(np.abs(command) - parameters["width"], 0.0)
+    return np.asarray(np.sign(command) * excess ** parameters["power"])[:, None]
 
 
 def _sizes(size: FloatArray, shares: Sequence[float]) -> list[float]:
     """Quantiles of the command's size (n,) above zero and below its largest, ascending and each once."""
-    found = np.unique(np.quantile(size, shares))
-    return [float(value) for value in found if 0 < value < size.max()]
+    quantiles = np.unique(np.quantile(size, shares))
+    return [float(value) for value in quantiles if 0 < value < size.max()]
 
 
-def _deadband_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
-    width = of["width"]
-    beyond = command - np.clip(command, -width, width)
-    return np.asarray(beyond + of["jump"] * width * np.sign(beyond))[:, None]
+def _deadband_force(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+    width = parameters["width"]
+    passed = command - np.clip(command, -width, width)
+    return np.asarray(passed + parameters["jump"] * width * np.sign(passed))[:, None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -207,9 +211,9 @@ def piecewise_curve(command: FloatArray) -> PiecewiseCommandLaw:
 
     def columns(u: FloatArray, position: FloatArray) -> FloatArray:
         sides = (np.maximum(u, 0.0), np.maximum(-u, 0.0))
-        beyond = [np.maximum(side - bend, 0.0) for side in sides for bend in bends]
+        hinges = [np.maximum(side - bend, 0.0) for side in sides for bend in bends]
         jumps = [np.where(side > bend, 1.0, 0.0) for side in sides for bend in bends]
-        return np.stack([u, sides[0], *beyond, *jumps], axis=1)
+        return np.stack([u, sides[0], *hinges, *jumps], axis=1)
 
     return PiecewiseCommandLaw(columns, 2 + 2 * len(bends))
 

@@ -19,39 +19,39 @@ from analysis.diagnosis.balance.motion import Condition, Motion
 from equalizer.signals.signal import FloatArray
 
 
-def condition_laws(motions: Sequence[Motion], c: int, of: Scales) -> Iterator[Law]:
-    """Laws of one axis for every recorded condition. c: channel of the motion, of: the sizes of that motion."""
-    for k, known in enumerate(motions[0].conditions):
-        yield from _laws_of_condition(known, k, c, of)
+def condition_laws(motions: Sequence[Motion], c: int, scales: Scales) -> Iterator[Law]:
+    """Laws of one axis for every recorded condition. c: channel of the motion, scales: the sizes of that motion."""
+    for k, condition in enumerate(motions[0].conditions):
+        yield from _laws_of_condition(condition, k, c, scales)
 
 
-def _laws_of_condition(known: Condition, k: int, c: int, of: Scales) -> Iterator[Law]:
-    """Laws of one condition. k: its column in `Motion.condition`; c and of: as in `condition_laws`."""
-    sharp, spans = friction_widths(of)
+def _laws_of_condition(condition: Condition, k: int, c: int, scales: Scales) -> Iterator[Law]:
+    """Laws of one condition. k: its column in `Motion.condition`; c and scales: as in `condition_laws`."""
+    sharp, spans = friction_widths(scales)
     for width in sharp:
         yield Law(
             "condition_dependent_friction", c, (float(width),), _friction_columns(c, k), _friction_values,
-            bounded=spans, formula=_friction_formula(known),
+            bounded=spans, formula=_friction_formula(condition),
         )  # fmt: skip
-    if np.isfinite(of.band_hz):
+    if np.isfinite(scales.band_hz):
         yield Law(
             "condition_dependent_damping", c, (), lambda m, _: m.condition[:, [k]] * m.velocity[:, [c]],
-            name_weights("change"), formula=_formula(known, "v"),
+            name_weights("change"), formula=_formula(condition, "v"),
         )  # fmt: skip
     yield Law(
         "condition_dependent_stiffness", c, (), lambda m, _: m.condition[:, [k]] * m.position[:, [c]],
-        name_weights("change"), formula=_formula(known, "q"),
+        name_weights("change"), formula=_formula(condition, "q"),
     )  # fmt: skip
     yield Law(
         "condition_dependent_force", c, (), lambda m, _: m.condition[:, [k]], name_weights("change"),
-        formula=_formula(known),
+        formula=_formula(condition),
     )  # fmt: skip
 
 
 def _friction_columns(c: int, k: int) -> Columns:
     def columns(m: Motion, n: tuple[float, ...]) -> FloatArray:
-        rubbing = smooth_sign(m.velocity[:, [c]], n[0])
-        return np.hstack([rubbing, rubbing * m.condition[:, [k]]])
+        friction_sign = smooth_sign(m.velocity[:, [c]], n[0])
+        return np.hstack([friction_sign, friction_sign * m.condition[:, [k]]])
 
     return columns
 
@@ -60,24 +60,24 @@ def _friction_values(w: FloatArray, n: tuple[float, ...], mass: float) -> dict[s
     return {"level": float(w[0]), "change": float(w[1])} if w[0] > 0 else None
 
 
-def _friction_formula(known: Condition) -> Callable[[dict[str, float]], Formula]:
+def _friction_formula(condition: Condition) -> Callable[[dict[str, float]], Formula]:
     # Negative friction would drive the motion.
-    text = f"-maximum(p0 + p1*{_deviation(known)}, 0)*sign(v)"
-    return lambda of: Formula(text, (of["level"], of["change"]), "force")
+    text = f"-maximum(p0 + p1*{_deviation(condition)}, 0)*sign(v)"
+    return lambda parameters: Formula(text, (parameters["level"], parameters["change"]), "force")
 
 
-def _formula(known: Condition, *factors: str) -> Callable[[dict[str, float]], Formula]:
-    text = "*".join(("-p0", _deviation(known), *factors))
-    return lambda of: Formula(text, (of["change"],), "force")
+def _formula(condition: Condition, *factors: str) -> Callable[[dict[str, float]], Formula]:
+    text = "*".join(("-p0", _deviation(condition), *factors))
+    return lambda parameters: Formula(text, (parameters["change"],), "force")
 
 
-def _deviation(known: Condition) -> str:
+def _deviation(condition: Condition) -> str:
     """Formula of a condition's deviation from its mean, in standard deviations. Its numbers are integers, which belong
     to the form of a formula and are not fitted. The standard deviation is rounded to about four digits, the mean to
     the same decimal place."""
-    finer = 10 ** max(0, min(3 - math.floor(math.log10(known.spread)), 15 - _digits(known.mean)))
-    mean, spread = round(known.mean * finer), max(round(known.spread * finer), 1)
-    scaled = known.name if finer == 1 else f"{finer}*{known.name}"
+    factor = 10 ** max(0, min(3 - math.floor(math.log10(condition.spread)), 15 - _digits(condition.mean)))
+    mean, spread = round(condition.mean * factor), max(round(condition.spread * factor), 1)
+    scaled = condition.name if factor == 1 else f"{factor}*{condition.name}"
     return f"(({scaled} {'-' if mean >= 0 else '+'} {abs(mean)})/{spread})"
 
 

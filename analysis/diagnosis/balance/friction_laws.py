@@ -30,46 +30,46 @@ from analysis.diagnosis.balance.law import (
     smooth_sign,
 )
 from analysis.diagnosis.balance.motion import Motion
-from equalizer.effects.simulation.along_motion import RESTS
 from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
+from equalizer.effects.simulation.forces_along_motion import REST_SPEED_SHARE
 from equalizer.signals.signal import FloatArray
 
-SHARP = RESTS
+SHARP = REST_SPEED_SHARE
 """Least width of tanh(v / width), relative to the rms speed: the speed below which an axis may count as resting in a
 simulation. Larger widths are tried where the width is fitted."""
 
 
-def friction_widths(of: Scales) -> tuple[FloatArray, tuple[tuple[float, float]]]:
+def friction_widths(scales: Scales) -> tuple[FloatArray, tuple[tuple[float, float]]]:
     """Widths of the smoothed sign of dry friction in m/s (rad/s), and the bounds within which such speeds are
     refined."""
-    sharp = SHARP * of.speed
-    return sharp * np.geomspace(1.0, 50.0, 7), ((0.1 * sharp, 0.5 * of.speed),)
+    sharp = SHARP * scales.speed
+    return sharp * np.geomspace(1.0, 50.0, 7), ((0.1 * sharp, 0.5 * scales.speed),)
 
 
-def friction_laws(c: int, of: Scales) -> Iterator[Law]:
+def friction_laws(c: int, scales: Scales) -> Iterator[Law]:
     """Coulomb, Stribeck, presliding, asymmetric, drifting and position-dependent friction along channel c, with start
     values on grids of its speed and travel."""
-    sharp = SHARP * of.speed
+    sharp = SHARP * scales.speed
     # Stribeck velocities above half the rms speed keep their grid values: the law can then hardly be distinguished from
     # Coulomb friction with quadratic damping, and refining it gains nothing.
-    widths_of_sign, spans = friction_widths(of)
+    widths_of_sign, spans = friction_widths(scales)
     for width in widths_of_sign:
         yield Law(
             "coulomb_friction", c, (float(width),), lambda m, n: smooth_sign(m.velocity[:, c : c + 1], n[0]),
             name_positive_weight("level"), bounded=spans,
         )  # fmt: skip
-    for slow in of.speed * np.geomspace(0.03, 1.5, 7):
+    for slow in scales.speed * np.geomspace(0.03, 1.5, 7):
         yield Law("stribeck_friction", c, (float(slow),), _stribeck_columns(c, sharp), _stribeck_values, bounded=spans)
-    widths = np.geomspace(0.003, 0.5, 7) if of.turns else of.travel * np.geomspace(0.001, 0.3, 9)
+    widths = np.geomspace(0.003, 0.5, 7) if scales.turns else scales.travel * np.geomspace(0.001, 0.3, 9)
     for width in widths:
         yield Law(
             "presliding_hysteresis", c, (float(width),), lambda m, n: bristle_bend(m.position[:, c], n[0])[:, None],
             _read_presliding_values, bounded=((0.1 * widths[0], widths[-1]),),
         )  # fmt: skip
     yield Law("asymmetric_friction", c, (), _asymmetric_columns(c, sharp), _asymmetric_values)
-    if np.isfinite(of.band_hz):
+    if np.isfinite(scales.band_hz):
         yield Law("drifting_friction", c, (), _make_drifting_columns(c, sharp), _read_drifting_values)
-    if not of.turns:
+    if not scales.turns:
         yield Law(
             "position_dependent_friction", c, (), _position_dependent_columns(c, sharp), _position_dependent_values
         )
@@ -136,20 +136,20 @@ def _position_dependent_values(w: FloatArray, n: Numbers, mass: float) -> dict[s
     return {"level": float(w[0]), "slope_per_m": float(w[1] / w[0]), "bend_per_m2": float(w[2] / w[0])}
 
 
-def damping_laws(c: int, of: Scales) -> Iterator[Law]:
+def damping_laws(c: int, scales: Scales) -> Iterator[Law]:
     """Quadratic, drifting and viscoelastic damping along channel c; none without a time axis, because the speed is then
     unknown."""
-    if not np.isfinite(of.band_hz):
+    if not np.isfinite(scales.band_hz):
         return
     yield Law(
         "quadratic_damping", c, (), lambda m, _: m.velocity[:, [c]] * np.abs(m.velocity[:, [c]]),
         name_positive_weight("coefficient"),
     )  # fmt: skip
     yield Law("drifting_damping", c, (), lambda m, _: m.velocity[:, [c]] * relative_time(m), name_weights("change"))
-    for tau in np.geomspace(0.5 / of.band_hz, of.seconds / 10, 7):
+    for tau in np.geomspace(0.5 / scales.band_hz, scales.seconds / 10, 7):
         yield Law(
             "viscoelastic_relaxation", c, (float(tau),),
             lambda m, n: filter_from_rest(m.velocity[:, [c]], m.rate_hz, lambda s: n[0] / (1 + n[0] * s)),
             lambda w, n, mass: {"stiffness": float(w[0]), "time_constant": n[0]} if w[0] > 0 else None,
-            linear=True, bounded=((0.1 / of.band_hz, of.seconds / 4),),
+            linear=True, bounded=((0.1 / scales.band_hz, scales.seconds / 4),),
         )  # fmt: skip

@@ -2,7 +2,8 @@
 
 The force balance M a + D v + K x + (laws of the motion) = f(u) is a regression of the command u on the motion. A
 nonlinear actuator f(u) cannot be a regressor there, because u is the predicted quantity. Therefore the balance is
-solved for the acceleration, a = (f(u) - D v - K x - ...) / M: functions of the command then are regressors.
+solved for the acceleration, a = (f(u) - D v - K x - ...) / M: functions of the command then are regressors. Used by
+`actuator`.
 """
 
 from collections.abc import Sequence
@@ -55,82 +56,94 @@ class InverseBalance:
     """Order of the position's time derivative that the command sets; None = it is a force."""
 
     @property
-    def solved(self) -> int:
+    def solved_column(self) -> int:
         """Column that the balance is solved for: the quantity that the command sets, else the acceleration."""
         regression = self.search.regression
-        own, places = regression.beside.own, len(regression.motions[0].channels)
-        column = own if self.target is None else (2 - self.target) * places + own
-        return column if column < regression.matrices else own
+        driven_channel, channel_count = regression.base_terms.driven_channel, len(regression.motions[0].channels)
+        column = driven_channel if self.target is None else (2 - self.target) * channel_count + driven_channel
+        return column if column < regression.matrices else driven_channel
 
-    def total_errors(self, laws: Sequence[CommandLaw], beside: Sequence[int]) -> list[float]:
-        """Cross-validated sum of squares of each law. beside: indices of laws of the motion that are fitted with it."""
-        return cast(list[float], list(self.map_(partial(self.total_error, beside=beside), laws)))
+    def total_errors(self, laws: Sequence[CommandLaw], motion_laws: Sequence[int]) -> list[float]:
+        """Cross-validated sum of squares of each law. motion_laws: indices of laws of the motion fitted with it."""
+        return cast(list[float], list(self.map_(partial(self.total_error, motion_laws=motion_laws), laws)))
 
-    def total_error(self, law: CommandLaw, beside: Sequence[int]) -> float:
-        """Cross-validated sum of squares of one law of the command. beside: laws of the motion fitted with it."""
-        return float(self.errors(law, beside, False).sum())
+    def total_error(self, law: CommandLaw, motion_laws: Sequence[int]) -> float:
+        """Cross-validated sum of squares of one law of the command. motion_laws: laws of the motion fitted with it."""
+        return float(self.errors(law, motion_laws, False).sum())
 
-    def least_error(self, law: ForceOfCommand, beside: Sequence[int]) -> float:
+    def least_error(self, law: ForceOfCommand, motion_laws: Sequence[int]) -> float:
         """Sum of squares on the fitted samples: a lower bound for each law that this sum approximates."""
-        fit, _ = self._blocks(self._rows(law, beside), False)
+        fit, _ = self._build_blocks(self._build_rows(law, motion_laws), False)
         products = [block_products(block, range(len(fit[0].cross))) for block in fit]
         weights = solve_normal_equations(sum_products(fit, range(len(fit[0].cross))), RIDGE)
-        return sum(compute_squared_error(own, weights, block.power) for own, block in zip(products, fit, strict=True))
+        return sum(
+            compute_squared_error(block_sums, weights, block.power)
+            for block_sums, block in zip(products, fit, strict=True)
+        )
 
-    def errors(self, law: CommandLaw, laws: Sequence[int], judged: bool) -> FloatArray:
-        """(blocks,): sums of squares of one law. judged: on the held-out blocks where there are any; else on each block
-        to fit, with weights fitted to the others (cross-validation)."""
-        tested = judged and blocks_to_judge(self.search.regression) is self.search.regression.test
-        fit, test = self._blocks(self._rows(law, laws), tested)
+    def errors(self, law: CommandLaw, laws: Sequence[int], on_held_out: bool) -> FloatArray:
+        """(blocks,): sums of squares of one law. on_held_out: on the held-out blocks where there are any; else on each
+        block to fit, with weights fitted to the others (cross-validation)."""
+        uses_held_out = on_held_out and blocks_to_judge(self.search.regression) is self.search.regression.test
+        fit, test = self._build_blocks(self._build_rows(law, laws), uses_held_out)
         columns = list(range(len(fit[0].cross)))
-        whole = sum_products(fit, columns)
-        if tested:
-            weights = solve_normal_equations(whole, RIDGE)
+        total = sum_products(fit, columns)
+        if uses_held_out:
+            weights = solve_normal_equations(total, RIDGE)
             return np.array(
                 [compute_squared_error(block_products(block, columns), weights, block.power) for block in test]
             )
-        found = []
+        squares = []
         for block in fit:
-            own = block_products(block, columns)
-            found.append(
+            products = block_products(block, columns)
+            squares.append(
                 compute_squared_error(
-                    own, solve_normal_equations((whole[0] - own[0], whole[1] - own[1]), RIDGE), block.power
+                    products,
+                    solve_normal_equations((total[0] - products[0], total[1] - products[1]), RIDGE),
+                    block.power,
                 )
             )
-        return np.array(found)
+        return np.array(squares)
 
-    def _blocks(self, rows: Sequence[FloatArray], tested: bool) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
-        """Blocks of the samples to fit and, if `tested`, of the held-out samples. rows: regressors per motion."""
+    def _build_blocks(
+        self, rows: Sequence[FloatArray], uses_held_out: bool
+    ) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
+        """Blocks of samples to fit and, if `uses_held_out`, of held-out samples. rows: regressors per motion."""
         regression = self.search.regression
-        motions, solved = regression.motions, self.solved
-        aims = [columns[:, solved] for columns in regression.columns]
+        motions, solved_column = regression.motions, self.solved_column
+        targets = [columns[:, solved_column] for columns in regression.columns]
         fit, test = (
-            [motion.valid_samples(mask & moves) for motion, mask, moves in zip(motions, masks, moving, strict=True)]
-            for moving in [self._find_moving_samples()]
+            [
+                motion.valid_samples(mask & is_moving)
+                for motion, mask, is_moving in zip(motions, masks, motion_masks, strict=True)
+            ]
+            for motion_masks in [self._find_moving_samples()]
             for masks in ([m.fit for m in motions], [m.test for m in motions])
         )
-        mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
+        mean = float(np.concatenate([target[mask] for target, mask in zip(targets, fit, strict=True)]).mean())
         units = column_scale(rows, fit), mean
-        return blocks_of(rows, aims, fit, units), blocks_of(rows, aims, test, units) if tested else ()
+        return blocks_of(rows, targets, fit, units), blocks_of(rows, targets, test, units) if uses_held_out else ()
 
     def _find_moving_samples(self) -> list[Mask]:
         """(n,) per motion: mask of the samples that are evidence; those at rest are not, where there is friction."""
         regression = self.search.regression
-        speeds = [motion.velocity[:, regression.beside.own] for motion in regression.motions]
+        speeds = [motion.velocity[:, regression.base_terms.driven_channel] for motion in regression.motions]
         used = np.concatenate([speed[motion.fit] for speed, motion in zip(speeds, regression.motions, strict=True)])
-        least = STILL_SHARE * float(np.mean(used**2)) if self.has_friction else -1.0
-        return [speed**2 > least for speed in speeds]
+        least_square = STILL_SHARE * float(np.mean(used**2)) if self.has_friction else -1.0
+        return [speed**2 > least_square for speed in speeds]
 
-    def _rows(self, law: ForceOfCommand, laws: Sequence[int]) -> list[FloatArray]:
+    def _build_rows(self, law: ForceOfCommand, laws: Sequence[int]) -> list[FloatArray]:
         """Per motion the regression's columns (n, columns): the law's, their rates of change, the other axes' commands,
         and the laws of the motion."""
-        regression, found = self.search.regression, []
+        regression, rows = self.search.regression, []
         # Columns of the base that are filtered copies of the predicted quantity would reproduce it.
-        filters = {self.solved, *range(regression.matrices, regression.base - 1)}
-        beside = [column for column in regression.columns_of(laws) if column not in filters]
+        filters = {self.solved_column, *range(regression.matrices, regression.base - 1)}
+        law_columns = [column for column in regression.columns_of(laws) if column not in filters]
         for motion, columns in zip(regression.motions, regression.columns, strict=True):
-            force = law.of(motion.force[:, regression.axis], motion.position[:, regression.beside.own])
-            others = np.delete(motion.force, regression.axis, axis=1)
-            entered = np.hstack([force, np.gradient(force[:, : law.sloped], 1 / motion.rate_hz, axis=0), others])
-            found.append(np.hstack([motion.decimate(entered), columns[:, beside]]))
-        return found
+            force = law.of(motion.force[:, regression.axis], motion.position[:, regression.base_terms.driven_channel])
+            other_commands = np.delete(motion.force, regression.axis, axis=1)
+            command_columns = np.hstack(
+                [force, np.gradient(force[:, : law.sloped], 1 / motion.rate_hz, axis=0), other_commands]
+            )
+            rows.append(np.hstack([motion.decimate(command_columns), columns[:, law_columns]]))
+        return rows

@@ -1,9 +1,8 @@
-"""Decides which laws of a force balance are named, by their gain on held-out data.
+"""Decides by the gain on held-out data which laws of a force balance are named. Called by `balances` and `actuator`.
 
-No model of a real device reaches the sensors' noise, so that residuals are not judged in units of noise. A
-law is judged by its gain on held-out blocks against the same sum of laws without it, with an interval from resampled
-blocks (Kunsch, Ann. Stat. 17:1217, 1989), against the best rival in its place, and by its share of the gain of all laws
-together (a ceiling). Laws that cannot be distinguished on these blocks are returned as a class.
+No model of a real device reaches the sensors' noise. A law is therefore judged by its gain on held-out blocks over the
+same sum of laws without it, with an interval from resampled blocks (Kunsch, Ann. Stat. 17:1217, 1989), against its best
+rival, and by its share of the gain of all laws (a ceiling). Laws that cannot be distinguished are returned as a class.
 """
 
 from collections.abc import Sequence
@@ -18,9 +17,9 @@ from analysis.diagnosis.balance.regression import Regression, fit_all_laws
 from analysis.diagnosis.balance.structures import (
     Structure,
     StructureSearch,
+    choose_simplest_structure,
     count_parameters,
-    simplest_structure,
-    values_of,
+    fit_values,
 )
 from analysis.diagnosis.data.correlated_residuals import agrees_with_folds, bootstrap_draws, gain_with_bound
 from analysis.diagnosis.settings import (
@@ -40,11 +39,11 @@ from analysis.diagnosis.settings import (
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
-MENDS_SHAPE = "it acts like a named law, and may only correct the shape of that law"
-NOT_ALONE = ("its gain is too small to be named", "its gain varies too much from stretch to stretch of the recording")
+SHAPE_FIX = "it acts like a named law, and may only correct the shape of that law"
+SMALL_GAIN = ("its gain is too small to be named", "its gain varies too much from stretch to stretch of the recording")
 BY_CONDITION = {"condition_dependent_friction", "condition_dependent_damping"}
 """Laws of one condition that may form a class, although other friction acts differently."""
-PLAYED_AS = {"drifting_friction": "coulomb_friction"}
+SIMULATED_AS = {"drifting_friction": "coulomb_friction"}
 """Laws that have no simulation, and the law that is fitted in their place and forms a class with them."""
 
 
@@ -56,52 +55,52 @@ class Balance:
     chosen: Structure
     laws: tuple[JudgedLaw, ...]
     """Laws of the chosen structure, the largest gain first."""
-    others: tuple[JudgedLaw, ...]
-    """Further laws that would explain part of the residual of the chosen structure."""
+    further_laws: tuple[JudgedLaw, ...]
+    """Other laws that would explain part of the residual of the chosen structure."""
     linear: float
     """Held-out error of mass, damping and stiffness alone, relative to the signal's rms."""
     error: float
-    """The same of the chosen structure."""
+    """Held-out error of the chosen structure, in the same unit."""
     ceiling: float
-    """The same of all laws together."""
+    """Held-out error of all laws together, in the same unit."""
     complete: bool
     tested: bool = True
-    """Whether the held-out blocks, or the folds, hold enough motion to test by."""
+    """Whether the held-out blocks, or the folds, contain enough motion for a test."""
 
     @property
     def named(self) -> tuple[JudgedLaw, ...]:
         """Those of `laws` that are to be named, in their order."""
-        return tuple(each for each in self.laws if each.named)
+        return tuple(law for law in self.laws if law.named)
 
     @property
     def linear_laws(self) -> tuple[Law, ...]:
         """Linear laws beside mass, damping and stiffness, of the base and of the chosen structure."""
-        return (*self.search.regression.beside.laws, *(each.law for each in self.laws if each.law.linear))
+        return (*self.search.regression.base_terms.laws, *(law.law for law in self.laws if law.law.linear))
 
-    def without_names(self, why_not: str) -> "Balance":
-        """The balance with its named laws left as candidates."""
-        return replace(self, laws=tuple(replace(each, why_not=each.why_not or why_not) for each in self.laws))
+    def without_names(self, reason: str) -> "Balance":
+        """The balance with its named laws made candidates, for a reason in words."""
+        return replace(self, laws=tuple(replace(law, objection=law.objection or reason) for law in self.laws))
 
     def error_of(self, laws: Sequence[int]) -> float:
         """Held-out error with these laws, relative to the signal's rms. laws: by number in the regression."""
         regression = self.search.regression
-        return float(np.sqrt(_held_out_errors(regression, laws).sum() / _signal_power(regression)))
+        return float(np.sqrt(_compute_errors(regression, laws).sum() / _sum_signal_power(regression)))
 
 
 def judge_laws(search: StructureSearch) -> Balance:
     """The simplest structure of a search with each law tested on held-out blocks, and named or not."""
     regression = search.regression
     if not blocks_to_judge(regression):
-        alone = float(np.sqrt(search.linear.error / _signal_power(regression)))
-        return Balance(search, search.linear, (), (), alone, alone, alone, search.complete, tested=False)
-    judged = _judge_structure(search, simplest_structure(search))
-    if judged.named or not _shares_friction(regression, judged.chosen.laws):
-        return judged
+        error = float(np.sqrt(search.linear.error / _sum_signal_power(regression)))
+        return Balance(search, search.linear, (), (), error, error, error, search.complete, tested=False)
+    balance = _judge_structure(search, choose_simplest_structure(search))
+    if balance.named or not _shares_friction(regression, balance.chosen.laws):
+        return balance
     # Two frictions share the error that either could explain alone, so that neither would seem necessary.
-    apart = tuple(each for each in search.ranked if not _shares_friction(regression, each.laws))
-    best = min(apart, key=lambda each: each.error, default=search.linear)
-    single = _judge_structure(search, simplest_structure(replace(search, ranked=apart, best=best)))
-    return single if single.named else judged
+    single = tuple(s for s in search.ranked if not _shares_friction(regression, s.laws))
+    best = min(single, key=lambda s: s.error, default=search.linear)
+    simpler = _judge_structure(search, choose_simplest_structure(replace(search, ranked=single, best=best)))
+    return simpler if simpler.named else balance
 
 
 def _shares_friction(regression: Regression, laws: Sequence[int]) -> bool:
@@ -113,26 +112,26 @@ def _shares_friction(regression: Regression, laws: Sequence[int]) -> bool:
 
 def _judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
     regression = search.regression
-    held = _held_out_errors(regression, chosen.laws)
-    linear = _held_out_errors(regression, ())
-    ceiling = _error_of_all_laws(regression, held)
-    room = max(float(linear.sum() - ceiling), 1e-6 * float(linear.sum()), 1e-300)
-    explained = 1 - float(held.sum() - ceiling) / room
-    laws = [_judge_law(regression, chosen.laws, number, (held, room, explained)) for number in chosen.laws]
-    others = _judge_further_laws(regression, search, chosen, (held, room))
-    rms = [float(np.sqrt(error / _signal_power(regression))) for error in (linear.sum(), held.sum(), ceiling)]
-    ordered = _name_once_per_family(sorted(laws, key=lambda each: -each.gain))
-    return Balance(search, chosen, ordered, others, rms[0], rms[1], rms[2], search.complete)
+    errors = _compute_errors(regression, chosen.laws)
+    linear = _compute_errors(regression, ())
+    ceiling = _compute_ceiling(regression, errors)
+    excess = max(float(linear.sum() - ceiling), 1e-6 * float(linear.sum()), 1e-300)
+    coverage = 1 - float(errors.sum() - ceiling) / excess
+    laws = [_judge_law(regression, chosen.laws, number, (errors, excess, coverage)) for number in chosen.laws]
+    further_laws = _judge_further_laws(regression, search, chosen, (errors, excess))
+    rms = [float(np.sqrt(error / _sum_signal_power(regression))) for error in (linear.sum(), errors.sum(), ceiling)]
+    ordered = _name_once_per_family(sorted(laws, key=lambda law: -law.gain))
+    return Balance(search, chosen, ordered, further_laws, rms[0], rms[1], rms[2], search.complete)
 
 
 def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
-    """laws: the largest gain first. A second law of a family must explain most of the residual to be named: if it acts
-    like the first, it may only correct its shape."""
-    found: list[JudgedLaw] = []
+    """laws: the largest gain first. A second law of a family is named only if it explains most of the residual, because
+    it may only correct the shape of the first."""
+    checked: list[JudgedLaw] = []
     for law in laws:
-        mates = [other for other in found if other.named and family_of(other.law.effect) & {law.law.effect}]
-        found.append(replace(law, why_not=MENDS_SHAPE) if law.named and mates and law.gain < SECOND_OF_FAMILY else law)
-    return tuple(found)
+        kin = [prior for prior in checked if prior.named and family_of(prior.law.effect) & {law.law.effect}]
+        checked.append(replace(law, objection=SHAPE_FIX) if law.named and kin and law.gain < SECOND_OF_FAMILY else law)
+    return tuple(checked)
 
 
 def blocks_to_judge(regression: Regression) -> tuple[Block, ...]:
@@ -140,112 +139,115 @@ def blocks_to_judge(regression: Regression) -> tuple[Block, ...]:
     cross-validation, where it moves in several; else none, because a single move cannot test a law."""
     if len(regression.test) >= LEAST_JUDGED_BLOCKS and held_out_moves(regression):
         return regression.test
-    fit = _speeds(regression, regression.fit)
-    several = float(fit.sum()) ** 2 >= LEAST_JUDGED_BLOCKS * float(fit @ fit)
-    return regression.fit if several or len(regression.test) < LEAST_JUDGED_BLOCKS else ()
+    fit = _measure_speeds(regression, regression.fit)
+    moves_often = float(fit.sum()) ** 2 >= LEAST_JUDGED_BLOCKS * float(fit @ fit)
+    return regression.fit if moves_often or len(regression.test) < LEAST_JUDGED_BLOCKS else ()
 
 
 def held_out_moves(regression: Regression) -> bool:
-    """Whether the driven motion goes on in the held-out blocks; there must be some."""
-    fit, test = (_speeds(regression, blocks).mean() for blocks in (regression.fit, regression.test))
+    """Whether the device moves in the held-out blocks, at `STILL_SHARE` of the fitted power; at least one is needed."""
+    fit, test = (_measure_speeds(regression, blocks).mean() for blocks in (regression.fit, regression.test))
     return bool(test >= STILL_SHARE * fit)
 
 
-def _speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:
+def _measure_speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:
     """(blocks,): mean square speed of the driven motion, relative to its scale."""
-    speed = len(regression.motions[0].channels) + regression.beside.own
+    speed = len(regression.motions[0].channels) + regression.base_terms.driven_channel
     return np.array([block.gram[speed, speed] / max(len(block.rows), 1) for block in blocks])
 
 
-def _signal_power(regression: Regression) -> float:
+def _sum_signal_power(regression: Regression) -> float:
     return max(sum(block.signal for block in blocks_to_judge(regression) or regression.fit), 1e-300)
 
 
-def _held_out_errors(regression: Regression, laws: Sequence[int]) -> FloatArray:
+def _compute_errors(regression: Regression, laws: Sequence[int]) -> FloatArray:
     columns = regression.columns_of(laws)
-    held = blocks_to_judge(regression) is regression.test
-    return regression.held_out_errors(columns) if held else regression.cross_validated_errors(columns)
+    uses_held_out = blocks_to_judge(regression) is regression.test
+    return regression.held_out_errors(columns) if uses_held_out else regression.cross_validated_errors(columns)
 
 
-def _error_of_all_laws(regression: Regression, held: FloatArray) -> float:
+def _compute_ceiling(regression: Regression, chosen_errors: FloatArray) -> float:
     """Sum of squares with all laws together, but at most that of the chosen structure."""
-    crossed, blocks = fit_all_laws(regression, range(regression.columns[0].shape[1]))
-    whole = float(blocks.sum()) if blocks_to_judge(regression) is regression.test else crossed
-    return min(whole, float(held.sum()))
+    cross_validated, blocks = fit_all_laws(regression, range(regression.columns[0].shape[1]))
+    error = float(blocks.sum()) if blocks_to_judge(regression) is regression.test else cross_validated
+    return min(error, float(chosen_errors.sum()))
 
 
 def _judge_law(
-    regression: Regression, laws: Sequence[int], number: int, against: tuple[FloatArray, float, float]
+    regression: Regression, laws: Sequence[int], number: int, reference: tuple[FloatArray, float, float]
 ) -> JudgedLaw:
-    held, room, explained = against
-    rest = tuple(each for each in laws if each != number)
-    without = _held_out_errors(regression, rest)
-    gain, low = gain_with_bound(without, held)
-    share = float((without - held).sum()) / room
+    full, excess, coverage = reference
+    other_laws = tuple(index for index in laws if index != number)
+    reduced = _compute_errors(regression, other_laws)
+    gain, low = gain_with_bound(reduced, full)
+    share = float((reduced - full).sum()) / excess
     law = regression.laws[number]
-    values = dict(zip(laws, values_of(regression, laws), strict=True))[number]
-    alike, likely = _indistinguishable_effects(regression, rest, number, (without, held))
-    taken = float(np.sqrt(max(float((without - held).sum()), 0.0) / _signal_power(regression)))
-    small = f"it explains {100 * taken:.1f} % of the force, less than such recordings can confirm"
-    why_not = _why_not(law, values, (gain, low, share, explained), alike) or (small if taken < LAW_OF_SIGNAL else "")
-    times = force_ratio(regression, laws, number)
-    possible = values is not None and times <= LARGEST_LAW_FORCE
-    if not why_not and times > LARGEST_LAW_FORCE:
-        why_not = f"its force would be {times:.0f} times the recorded force, almost cancelled by other terms"
-    chosen = ""
-    if not why_not and law.effect in PLAYED_AS:
-        alike = (law.effect, *(effect for effect in alike if effect != PLAYED_AS[law.effect]))
-        chosen, law = law.effect, replace(law, effect=PLAYED_AS[law.effect])
+    values = dict(zip(laws, fit_values(regression, laws), strict=True))[number]
+    equivalents, likely = _find_equivalents(regression, other_laws, number, (reduced, full))
+    force_share = float(np.sqrt(max(float((reduced - full).sum()), 0.0) / _sum_signal_power(regression)))
+    small = f"it explains {100 * force_share:.1f} % of the force, less than such recordings can confirm"
+    objection = _find_objection(law, values, (gain, low, share, coverage), equivalents) or (
+        small if force_share < LAW_OF_SIGNAL else ""
+    )
+    ratio = force_ratio(regression, laws, number)
+    is_physical = values is not None and ratio <= LARGEST_LAW_FORCE
+    if not objection and ratio > LARGEST_LAW_FORCE:
+        objection = f"its force would be {ratio:.0f} times the recorded force, almost cancelled by other terms"
+    stands_for = ""
+    if not objection and law.effect in SIMULATED_AS:
+        equivalents = (law.effect, *(effect for effect in equivalents if effect != SIMULATED_AS[law.effect]))
+        stands_for, law = law.effect, replace(law, effect=SIMULATED_AS[law.effect])
     formula = None if law.formula is None or values is None else law.formula(values)
     return JudgedLaw(
-        number, law, values or {}, gain, low, share, alike, likely, why_not, chosen, formula=formula, possible=possible,
-        agreed=agrees_with_folds((without, held), _errors_of_folds(regression, (rest, laws))),
+        number, law, values or {}, gain, low, share, equivalents, likely, objection, stands_for, formula=formula,
+        is_physical=is_physical,
+        confirmed_by_folds=agrees_with_folds((reduced, full), _compute_fold_errors(regression, (other_laws, laws))),
     )  # fmt: skip
 
 
-def _errors_of_folds(regression: Regression, sums: Sequence[Sequence[int]]) -> list[FloatArray]:
+def _compute_fold_errors(regression: Regression, sums: Sequence[Sequence[int]]) -> list[FloatArray]:
     """Errors of each sum of laws on the folds, (blocks,); empty where laws are judged by the folds themselves."""
     if blocks_to_judge(regression) is not regression.test:
         return [np.zeros(0) for _ in sums]
-    return [regression.cross_validated_errors(regression.columns_of(each)) for each in sums]
+    return [regression.cross_validated_errors(regression.columns_of(laws)) for laws in sums]
 
 
-def _indistinguishable_effects(
-    regression: Regression, rest: tuple[int, ...], number: int, errors: tuple[FloatArray, FloatArray]
+def _find_equivalents(
+    regression: Regression, other_laws: tuple[int, ...], number: int, errors: tuple[FloatArray, FloatArray]
 ) -> tuple[tuple[str, ...], float]:
     """Effects with a similar error in a law's place, and the share of bootstrap draws in which none is better."""
-    without, held = errors
-    own = regression.laws[number]
-    found: dict[str, tuple[float, tuple[int, ...]]] = {}
+    reduced, full = errors
+    own_law = regression.laws[number]
+    best_by_effect: dict[str, tuple[float, tuple[int, ...]]] = {}
     for place, law in enumerate(regression.laws):
-        if law.effect == own.effect or law.linear or (own.linear and not law.linear):
+        if law.effect == own_law.effect or law.linear or (own_law.linear and not law.linear):
             continue
-        laws = (*rest, place)
-        if any(regression.laws[k].key == law.key for k in rest) or values_of(regression, laws)[-1] is None:
+        laws = (*other_laws, place)
+        if any(regression.laws[k].key == law.key for k in other_laws) or fit_values(regression, laws)[-1] is None:
             continue
-        crossed = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
-        if law.effect not in found or crossed < found[law.effect][0]:
-            found[law.effect] = crossed, laws
-    gained = float((without - held).sum())
-    alike, drawn = [], bootstrap_draws(len(held))
-    first = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
-    for effect, (_, laws) in found.items():
-        behind = _held_out_errors(regression, laws) - held
-        if own.effect not in special_cases(effect):
-            first &= behind[drawn].sum(axis=1) >= 0
-        # Of two equally good laws, the plainer: a law of another kind with more parameters must have a smaller error.
-        more = count_parameters(regression, laws[-1:]) > count_parameters(regression, [number])
-        most = 0.0 if more and effect not in family_of(own.effect) else RIVAL_STAYS_BEHIND * gained
-        if float(behind.sum()) <= most:
-            alike.append((float(behind.sum()), effect))
-    return tuple(effect for _, effect in sorted(alike)), float(first.mean())
+        error = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
+        if law.effect not in best_by_effect or error < best_by_effect[law.effect][0]:
+            best_by_effect[law.effect] = error, laws
+    total_gain = float((reduced - full).sum())
+    equivalents, draws = [], bootstrap_draws(len(full))
+    is_first = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
+    for effect, (_, laws) in best_by_effect.items():
+        excess = _compute_errors(regression, laws) - full
+        if own_law.effect not in special_cases(effect):
+            is_first &= excess[draws].sum(axis=1) >= 0
+        # Of two equally good laws, the simpler: a law of another kind with more parameters must have a smaller error.
+        more_parameters = count_parameters(regression, laws[-1:]) > count_parameters(regression, [number])
+        limit = 0.0 if more_parameters and effect not in family_of(own_law.effect) else RIVAL_STAYS_BEHIND * total_gain
+        if float(excess.sum()) <= limit:
+            equivalents.append((float(excess.sum()), effect))
+    return tuple(effect for _, effect in sorted(equivalents)), float(is_first.mean())
 
 
-def _why_not(
-    law: Law, values: dict[str, float] | None, numbers: tuple[float, float, float, float], alike: tuple[str, ...]
+def _find_objection(
+    law: Law, values: dict[str, float] | None, numbers: tuple[float, float, float, float], equivalents: tuple[str, ...]
 ) -> str:
     """Reason not to name the law, as a sentence; empty where it is to be named."""
-    gain, low, share, explained = numbers
+    gain, low, share, coverage = numbers
     if law.linear:
         return "it is a linear model of a higher order: part of the first model and no missing physics"
     if values is None:
@@ -254,45 +256,45 @@ def _why_not(
         return "its gain on held-out data is not larger than its variation between stretches of the recording"
     if share < LAW_OF_CEILING and gain < FURTHER_LAW_OF_ALL:
         return f"it explains {100 * share:.1f} % of what all laws together explain"
-    if explained < NAMED_OF_CEILING:
+    if coverage < NAMED_OF_CEILING:
         return (
-            f"even with it, {100 * (1 - explained):.0f} % of what all laws together explain remain: the main cause is "
+            f"even with it, {100 * (1 - coverage):.0f} % of what all laws together explain remain: the main cause is "
             "another"
         )
     family = family_of(law.effect) | (BY_CONDITION if law.effect in BY_CONDITION else set())
-    of_other_family = [effect for effect in alike if effect not in family]
-    others = [effect for effect in alike if law.effect not in special_cases(effect)]
-    if of_other_family or (len(others) >= LARGEST_CLASS and not {law.effect, *others} <= DRY_FRICTIONS):
-        return f"these data cannot distinguish it from {', '.join(of_other_family or alike)}"
-    played = law.formula is not None or not {law.effect, PLAYED_AS.get(law.effect)}.isdisjoint(EFFECTS_BY_NAME)
-    return "" if played else "hapteq cannot simulate it yet"
+    of_other_family = [effect for effect in equivalents if effect not in family]
+    rivals = [effect for effect in equivalents if law.effect not in special_cases(effect)]
+    if of_other_family or (len(rivals) >= LARGEST_CLASS and not {law.effect, *rivals} <= DRY_FRICTIONS):
+        return f"these data cannot distinguish it from {', '.join(of_other_family or equivalents)}"
+    simulated = law.formula is not None or not {law.effect, SIMULATED_AS.get(law.effect)}.isdisjoint(EFFECTS_BY_NAME)
+    return "" if simulated else "hapteq cannot simulate it yet"
 
 
 def _judge_further_laws(
-    regression: Regression, search: StructureSearch, chosen: Structure, against: tuple[FloatArray, float]
+    regression: Regression, search: StructureSearch, chosen: Structure, reference: tuple[FloatArray, float]
 ) -> tuple[JudgedLaw, ...]:
     """The best further law of each effect beside the chosen structure, the largest gain first."""
-    held, room = against
+    chosen_errors, excess = reference
     effects = {regression.laws[k].effect for k in chosen.laws}
     best: dict[str, tuple[float, int]] = {}
     for number, law in enumerate(regression.laws):
-        if law.effect in effects or values_of(regression, (*chosen.laws, number))[-1] is None:
+        if law.effect in effects or fit_values(regression, (*chosen.laws, number))[-1] is None:
             continue
         error = float(regression.cross_validated_errors(regression.columns_of((*chosen.laws, number))).sum())
         if law.effect not in best or error < best[law.effect][0]:
             best[law.effect] = error, number
-    found = []
+    judged_laws = []
     for _, number in sorted(best.values())[:8]:
         laws = (*chosen.laws, number)
-        errors = _held_out_errors(regression, laws)
-        gain, low = gain_with_bound(held, errors)
-        values, share = values_of(regression, laws)[-1] or {}, float((held - errors).sum()) / room
-        why = (
+        errors = _compute_errors(regression, laws)
+        gain, low = gain_with_bound(chosen_errors, errors)
+        values, share = fit_values(regression, laws)[-1] or {}, float((chosen_errors - errors).sum()) / excess
+        reason = (
             "it explains too little in addition to the named laws"
             if chosen.laws
-            else NOT_ALONE[gain > FURTHER_LAW_GAIN]
+            else SMALL_GAIN[gain > FURTHER_LAW_GAIN]
         )
         if gain > 0 and low > 0:
-            law, possible = regression.laws[number], force_ratio(regression, laws, number) <= LARGEST_LAW_FORCE
-            found.append(JudgedLaw(number, law, values, gain, low, share, (), 0.0, why, possible=possible))
-    return tuple(sorted(found, key=lambda each: -each.gain))
+            law, physical = regression.laws[number], force_ratio(regression, laws, number) <= LARGEST_LAW_FORCE
+            judged_laws.append(JudgedLaw(number, law, values, gain, low, share, (), 0.0, reason, is_physical=physical))
+    return tuple(sorted(judged_laws, key=lambda judged_law: -judged_law.gain))

@@ -47,26 +47,26 @@ class JudgedLaw:
     share: float
     """Decrease of the squared error by this law, over the decrease by all laws together; for a law of the command, over
     the error of the linear balance."""
-    alike: tuple[str, ...]
+    equivalents: tuple[str, ...]
     """Rivals: effects that fit about as well in place of this law."""
     probability: float
     """Share of bootstrap draws in which no other effect in its place has a smaller error, apart from effects that
     contain it as a special case."""
-    why_not: str
+    objection: str
     """Reason not to name the law, as a sentence; empty where it is named."""
     stands_for: str = ""
     """Effect that was chosen but has no simulation, where `law` replaces it; else empty."""
 
     formula: Formula | None = None
     """Formula for the simulation of a law that is no effect of the catalogue; else None."""
-    possible: bool = True
+    is_physical: bool = True
     """Whether its parameters have physically possible signs, and its force is not many times the recorded force."""
-    agreed: bool = False
+    confirmed_by_folds: bool = False
     """Whether the law has a gain on the held-out blocks, and a significant gain on these and the cross-validation folds
     together."""
 
     @property
-    def played_as(self) -> str:
+    def simulated_as(self) -> str:
         """Name of the effect that simulates the law: an effect of the catalogue, or `DISCOVERED_LAW` for a formula."""
         return self.law.effect if self.formula is None else DISCOVERED_LAW
 
@@ -78,7 +78,7 @@ class JudgedLaw:
     @property
     def named(self) -> bool:
         """Whether there is no reason not to name the law."""
-        return not self.why_not
+        return not self.objection
 
 
 def force_ratio(regression: Regression, laws: Sequence[int], number: int) -> float:
@@ -87,10 +87,10 @@ def force_ratio(regression: Regression, laws: Sequence[int], number: int) -> flo
     columns, place = regression.columns_of(laws), regression.places[number]
     weights = np.zeros(regression.columns[0].shape[1])
     weights[columns] = regression.weights(columns)
-    kept = [motion.valid_samples(motion.fit) for motion in regression.motions]
-    own = [c[mask, place] @ weights[place] for c, mask in zip(regression.columns, kept, strict=True)]
-    force = [f[mask] for f, mask in zip(regression.force, kept, strict=True)]
-    return float(np.concatenate(own).std() / max(float(np.concatenate(force).std()), 1e-300))
+    masks = [motion.valid_samples(motion.fit) for motion in regression.motions]
+    law_force = [c[mask, place] @ weights[place] for c, mask in zip(regression.columns, masks, strict=True)]
+    force = [f[mask] for f, mask in zip(regression.force, masks, strict=True)]
+    return float(np.concatenate(law_force).std() / max(float(np.concatenate(force).std()), 1e-300))
 
 
 def special_cases(effect: str) -> tuple[str, ...]:

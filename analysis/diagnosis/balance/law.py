@@ -69,7 +69,7 @@ class Law:
 class BaseTerms:
     """Linear terms in the balance of one axis, in addition to mass, damping and stiffness."""
 
-    own: int
+    driven_channel: int
     """Channel of the motion that the force drives."""
     laws: tuple[Law, ...] = ()
     """Laws that are linear in the motion."""
@@ -98,10 +98,10 @@ class Scales:
 
 def scales_of(motions: Sequence[Motion], channel: int, rotational: bool) -> Scales:
     """Sizes of a channel's motion over the samples to fit of all motions: rms speed, travel and its ends, duration."""
-    position = np.concatenate([each.position[each.fit, channel] for each in motions])
-    velocity = np.concatenate([each.velocity[each.fit, channel] for each in motions])
+    position = np.concatenate([motion.position[motion.fit, channel] for motion in motions])
+    velocity = np.concatenate([motion.velocity[motion.fit, channel] for motion in motions])
     low, high = float(position.min()), float(position.max())
-    seconds = sum(int(each.fit.sum()) for each in motions) / motions[0].rate_hz
+    seconds = sum(int(motion.fit.sum()) for motion in motions) / motions[0].rate_hz
     speed = float(np.sqrt(np.mean(velocity**2)))
     turns = rotational and high - low > 4 * np.pi
     return Scales(speed, high - low, low, high, seconds, motions[0].band_hz, turns, rotational)

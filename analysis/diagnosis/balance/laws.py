@@ -67,15 +67,15 @@ def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
         yield Law("drifting_force", -1, (), lambda m, _: relative_time(m), name_weights("change"))
 
 
-def _longest_pitch(of: Scales) -> float:
+def _longest_pitch(scales: Scales) -> float:
     """Longest pitch (m or rad) of cogging: half the travel; of a rotational axis at most half a turn, because the force
     of an unbalanced or eccentric shaft has a period of one turn."""
-    return min(0.5 * of.travel, np.pi) if of.rotational else 0.5 * of.travel
+    return min(0.5 * scales.travel, np.pi) if scales.rotational else 0.5 * scales.travel
 
 
-def cogging_law(channel: int, pitch: float, of: Scales) -> Law:
+def cogging_law(channel: int, pitch: float, scales: Scales) -> Law:
     """Cogging: a force that is periodic in the position, a sine and a cosine column. pitch: its period (m or rad)."""
-    longest = _longest_pitch(of)
+    longest = _longest_pitch(scales)
     return Law(
         "cogging", channel, (pitch,),
         lambda m, n: np.hstack(
@@ -90,51 +90,55 @@ def cogging_law(channel: int, pitch: float, of: Scales) -> Law:
 
 
 def likely_pitches(
-    motions: Sequence[Motion], remainders: Sequence[FloatArray], channel: int, of: Scales
+    motions: Sequence[Motion], remainders: Sequence[FloatArray], channel: int, scales: Scales
 ) -> list[float]:
     """Pitches (m or rad) of the strongest lines in the spectrum of the residual force over the position, the strongest
     first. remainders: per motion, residual force (kept samples,). For a shaft that turns, only whole numbers of periods
     per turn are searched."""
-    q = np.concatenate([each.position[:: each.step, channel][each.valid_samples(each.fit)] for each in motions])
-    residual = np.concatenate([r[each.valid_samples(each.fit)] for each, r in zip(motions, remainders, strict=True)])
-    longest = _longest_pitch(of)
+    q = np.concatenate(
+        [motion.position[:: motion.step, channel][motion.valid_samples(motion.fit)] for motion in motions]
+    )
+    residual = np.concatenate(
+        [r[motion.valid_samples(motion.fit)] for motion, r in zip(motions, remainders, strict=True)]
+    )
+    longest = _longest_pitch(scales)
     # At the rms speed, shorter pitches give frequencies above the end of the band.
-    shortest = of.speed / of.band_hz
+    shortest = scales.speed / scales.band_hz
     if shortest >= longest or not len(residual):
         return []
-    spacing = 1 / (2 * np.pi) if of.turns else LINE_SPACING / of.travel
+    spacing = 1 / (2 * np.pi) if scales.turns else LINE_SPACING / scales.travel
     lines = 1 / longest + spacing * np.arange(MOST_LINES)
     lines = lines[lines * shortest < 1]
-    every = max(len(q) // MOST_SAMPLES, 1)
-    power = np.array([abs(np.mean(residual[::every] * np.exp(-2j * np.pi * line * q[::every]))) for line in lines])
+    stride = max(len(q) // MOST_SAMPLES, 1)
+    power = np.array([abs(np.mean(residual[::stride] * np.exp(-2j * np.pi * line * q[::stride]))) for line in lines])
     peaks = [k for k in range(len(power)) if power[k] == power[max(k - 2, 0) : k + 3].max()]
     return [float(1 / lines[k]) for k in sorted(peaks, key=lambda k: -power[k])[:MOST_PITCHES]]
 
 
-def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
+def stiffness_laws(c: int, scales: Scales) -> Iterator[Law]:
     """Gravity torque, nonlinear springs, end stops and backlash along channel c, with starting values on grids over its
     travel. For a shaft that makes more than two turns: gravity torque only."""
-    if of.rotational and of.travel > LEAST_TRAVEL_RAD:
+    if scales.rotational and scales.travel > LEAST_TRAVEL_RAD:
         yield Law(
             "gravity_torque", c, (), lambda m, _: np.hstack([np.sin(m.position[:, [c]]), np.cos(m.position[:, [c]])]),
             lambda w, n, mass: {"torque": float(np.hypot(*w)), "angle": float(np.arctan2(w[1], w[0]))},
         )  # fmt: skip
-    if of.turns:
+    if scales.turns:
         return
     yield Law("hardening_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 3, name_weights("k3"))
     yield Law("asymmetric_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 2, name_weights("k2"))
     for share in STOP_AT:
-        for end, side in ((of.high - share * of.travel, 1.0), (of.low + share * of.travel, -1.0)):
+        for end, side in ((scales.high - share * scales.travel, 1.0), (scales.low + share * scales.travel, -1.0)):
             yield Law(
                 "end_stop", c, (float(end),),
-                _stop_columns(c, side), _stop_values(side), bounded=((of.low, of.high),),
+                _stop_columns(c, side), _stop_values(side), bounded=((scales.low, scales.high),),
             )  # fmt: skip
-    for half in of.travel * np.array(HALF_GAPS):
+    for half in scales.travel * np.array(HALF_GAPS):
         # Added to the balance's own spring term k x, it gives k (x - clip(x)): a spring that acts beyond the gap only.
         yield Law(
             "backlash", c, (float(half),), lambda m, n: -np.clip(m.position[:, [c]], -n[0], n[0]),
             lambda w, n, mass: {"gap": 2 * n[0], "contact_stiffness": float(w[0])} if w[0] > 0 else None,
-            bounded=((1e-3 * of.travel, 0.45 * of.travel),),
+            bounded=((1e-3 * scales.travel, 0.45 * scales.travel),),
         )  # fmt: skip
 
 
@@ -143,8 +147,8 @@ def _stop_values(side: float) -> Values:
     of the position does not imply it. None for a stiffness that is not positive."""
 
     def values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
-        beyond = {} if side * n[0] > 0 else {"side": side}
-        return {"position": n[0], "stiffness": float(w[0]), "opposite": 0.0, **beyond} if w[0] > 0 else None
+        side_parameter = {} if side * n[0] > 0 else {"side": side}
+        return {"position": n[0], "stiffness": float(w[0]), "opposite": 0.0, **side_parameter} if w[0] > 0 else None
 
     return values
 
@@ -154,10 +158,10 @@ def _stop_columns(c: int, side: float) -> Columns:
     return lambda m, n: side * np.maximum(side * (m.position[:, [c]] - n[0]), 0.0)
 
 
-def dynamic_laws(c: int, of: Scales) -> Iterator[Law]:
+def dynamic_laws(c: int, scales: Scales) -> Iterator[Law]:
     """Pose-dependent inertia, an extra mode on a grid of frequencies and damping ratios, and amplifier lag along
     channel c."""
-    if not of.turns:
+    if not scales.turns:
         # Lagrange's equation of a mass M (1 + c x) adds M c (x a + v² / 2) to M a; the weight is M c.
         yield Law(
             "pose_dependent_inertia", c, (),
@@ -165,10 +169,10 @@ def dynamic_laws(c: int, of: Scales) -> Iterator[Law]:
             lambda w, n, mass: {"per_m": float(w[0] / mass), "speed_share": 0.5} if mass > 0 else None,
         )  # fmt: skip
     for ratio in MODE_RATIOS:
-        for f in of.band_hz * np.array(MODE_HZ):
+        for f in scales.band_hz * np.array(MODE_HZ):
             yield Law(
                 "extra_mode", c, (float(f), ratio), lambda m, n: _mode_force(m, c, n), _mode_values, linear=True,
-                bounded=((0.005 * of.band_hz, 1.5 * of.band_hz), (0.002, 1.0)),
+                bounded=((0.005 * scales.band_hz, 1.5 * scales.band_hz), (0.002, 1.0)),
             )  # fmt: skip
     # With a first-order lag, the command is (1 + T s) times the delivered force. Only T s M a is no base term.
     yield Law(

@@ -31,45 +31,47 @@ class GivenBase:
     change per standard deviation of each free parameter; at the recording's rate."""
     mass: float
     """Mass that moves along the axis, kg (kg m^2)."""
-    least: float = 0.0
+    least_share: float = 0.0
     """Smallest share of the force's rms that all laws together must explain; below it no law is searched for."""
 
 
-def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: GivenBase) -> Regression:
+def regression_with_model(
+    motions: Sequence[Motion], axis: int, laws: Sequence[Law], model_base: GivenBase
+) -> Regression:
     """Build the regression of `regression_of` with the model's required force and its sensitivities as the base. Free
     parameters that change the force by less than 1e-9 of its rms are left out."""
-    varying = _sensitive_columns(given)
-    columns = [each[:, varying] for each in given.columns]
-    plain = replace(regression_of(motions, axis, laws, False, None, columns), mass=given.mass)
-    scale = plain.scale[: plain.base - 1]
+    varying = _sensitive_columns(model_base)
+    columns = [part[:, varying] for part in model_base.columns]
+    regression = replace(regression_of(motions, axis, laws, False, None, columns), mass=model_base.mass)
+    scale = regression.scale[: regression.base - 1]
     precision, cross = np.zeros(len(scale)), np.zeros(len(scale))
-    precision[0] = FIXED * sum(block.gram[0, 0] for block in plain.fit)
+    precision[0] = FIXED * sum(block.gram[0, 0] for block in regression.fit)
     cross[0] = precision[0] * scale[0]
-    free = replace(plain, prior=(precision.copy(), cross))
-    precision[1:] = _power_per_freedom(free) / scale[1:] ** 2
-    return replace(plain, prior=(precision, cross))
+    without_tolerances = replace(regression, prior=(precision.copy(), cross))
+    precision[1:] = _power_per_freedom(without_tolerances) / scale[1:] ** 2
+    return replace(regression, prior=(precision, cross))
 
 
-def takes_enough(plain: Regression, least: float) -> bool:
+def explains_enough(regression: Regression, least_share: float) -> bool:
     """Whether all laws together lower the cross-validated sum of squares by more than least² of the force's power, so
-    that they explain more than the share `least` of its rms."""
-    alone = float(plain.cross_validated_errors(plain.columns_of(())).sum())
-    whole = fit_all_laws(plain, range(plain.columns[0].shape[1]))[0]
-    return alone - whole > least**2 * sum(block.signal for block in plain.fit)
+    that they explain more than the share `least_share` of its rms."""
+    base_error = float(regression.cross_validated_errors(regression.columns_of(())).sum())
+    all_laws_error = fit_all_laws(regression, range(regression.columns[0].shape[1]))[0]
+    return base_error - all_laws_error > least_share**2 * sum(block.signal for block in regression.fit)
 
 
-def _sensitive_columns(given: GivenBase) -> list[int]:
+def _sensitive_columns(model_base: GivenBase) -> list[int]:
     """Indices of the required force and of the parameters that change it by more than rounding."""
-    size = np.sqrt(np.mean(np.vstack(given.columns) ** 2, axis=0))
+    size = np.sqrt(np.mean(np.vstack(model_base.columns) ** 2, axis=0))
     return [0, *(k for k in range(1, len(size)) if size[k] > 1e-9 * size[0])]
 
 
-def _power_per_freedom(plain: Regression) -> float:
+def _power_per_freedom(regression: Regression) -> float:
     """Residual sum of squares per equivalent degree of freedom; the free parameters are fitted without their prior.
     With the residual's power P on each spectral line, a motion has 2 (sum P)² / sum P² degrees of freedom."""
-    residuals = plain.remainder(plain.columns_of(()))
+    residuals = regression.remainder(regression.columns_of(()))
     power, freedom = 0.0, 0.0
-    for residual, motion in zip(residuals, plain.motions, strict=True):
+    for residual, motion in zip(residuals, regression.motions, strict=True):
         known_residual = np.where(motion.valid_samples(motion.fit), residual, 0.0)
         lines = np.abs(np.fft.rfft(known_residual)) ** 2
         power += float(known_residual @ known_residual)

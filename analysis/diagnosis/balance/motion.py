@@ -1,4 +1,4 @@
-"""Positions, velocities, accelerations and forces from one part of a recording.
+"""Positions, velocities, accelerations and forces from recordings, for force balances.
 
 Derivatives are computed in the frequency domain: each spectral line is multiplied by (i omega)^order and low-pass
 filtered. The upper end of the band is the highest frequency up to which white noise makes at most a hundredth of the
@@ -86,58 +86,61 @@ class Motion:
     def valid_samples(self, mask: Mask) -> Mask:
         """(kept samples,): the samples of a mask (n,) that are not within a filter length of the part's ends."""
         edge = int(MOTION_EDGE_PERIODS * self.rate_hz / self.band_hz) + 1
-        inside = np.zeros(len(mask), dtype=np.bool_)
-        inside[edge : len(mask) - edge] = True
-        return (mask & inside)[:: self.step]
+        interior = np.zeros(len(mask), dtype=np.bool_)
+        interior[edge : len(mask) - edge] = True
+        return (mask & interior)[:: self.step]
 
 
-def motion_signal(recording: Recording) -> Signal | None:
+def find_motion_signal(recording: Recording) -> Signal | None:
     """The channels of the lowest time derivative that was measured and varies: positions before velocities before
     accelerations; None without any."""
-    found: list[tuple[int, Signal]] = []
+    signals: list[tuple[int, Signal]] = []
     for signal in (recording.position, recording.response):
         if signal is None:
             continue
         orders = [DERIVATIVE_OF_QUANTITY.get(quantity) for quantity in signal.quantities]
-        known = [order for order in orders if order is not None]
-        if not known:
+        measured_orders = [order for order in orders if order is not None]
+        if not measured_orders:
             continue
-        lowest = min(known)
-        places = [k for k, order in enumerate(orders) if order == lowest and _varies(signal.samples[:, k])]
-        if places:
-            found.append((lowest, signal.select_channels(places)))
-    return min(found, key=lambda item: item[0])[1] if found else None
+        lowest = min(measured_orders)
+        columns = [k for k, order in enumerate(orders) if order == lowest and _is_varying(signal.samples[:, k])]
+        if columns:
+            signals.append((lowest, signal.select_channels(columns)))
+    return min(signals, key=lambda item: item[0])[1] if signals else None
 
 
-def _varies(samples: FloatArray) -> bool:
-    """Whether the finite samples change."""
-    known = samples[np.isfinite(samples)]
-    return bool(len(known)) and float(np.ptp(known)) > 0
+def _is_varying(samples: FloatArray) -> bool:
+    """Whether the finite samples are not all equal."""
+    finite = samples[np.isfinite(samples)]
+    return bool(len(finite)) and float(np.ptp(finite)) > 0
 
 
-def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tuple[Motion, ...]:
+def compute_motions(records: Sequence[Observed], band_hz: float | None = None) -> tuple[Motion, ...]:
     """One motion per record, with derivatives and forces. records: with the same channels, units and rate. band_hz:
     upper end of the band; None = the highest that the noise allows. Raises NoMotionError where there are no records, or
     a record contains no motion."""
-    signals = [motion_signal(record.recording) for record in records]
+    signals = [find_motion_signal(record.recording) for record in records]
     if not signals or any(signal is None for signal in signals):
         raise NoMotionError("no response is a position, velocity or acceleration")
-    moved = [signal for signal in signals if signal is not None]
-    order = DERIVATIVE_OF_QUANTITY[moved[0].quantities[0]]
+    motion_signals = [signal for signal in signals if signal is not None]
+    order = DERIVATIVE_OF_QUANTITY[motion_signals[0].quantities[0]]
     rate_hz = records[0].recording.sample_rate_hz
-    filled = [fill_gaps(signal.samples) for signal in moved]
+    filled = [fill_gaps(signal.samples) for signal in motion_signals]
     untimed = any(is_quasi_static(record.recording) for record in records)
     if band_hz is None:
         band_hz = np.inf if untimed else band_end_hz(filled, rate_hz, order)
     lowest_hz = band_begin_hz(filled, rate_hz) if order == 2 and not untimed else 0.0
-    known, conditions = _standardise_conditions(records)
+    conditions, condition_samples = _standardise_conditions(records)
     return tuple(
-        replace(_motion(record, (samples, order), (band_hz, lowest_hz), condition, moved[0].channels), conditions=known)
-        for record, samples, condition in zip(records, filled, conditions, strict=True)
+        replace(
+            _compute_motion(record, (samples, order), (band_hz, lowest_hz), condition, motion_signals[0].channels),
+            conditions=conditions,
+        )
+        for record, samples, condition in zip(records, filled, condition_samples, strict=True)
     )
 
 
-def motion_band_hz(motions: Sequence[Motion], columns: Iterable[int]) -> float:
+def compute_motion_band_hz(motions: Sequence[Motion], columns: Iterable[int]) -> float:
     """Frequency in Hz below which `MOVING_BAND_SHARE` of a channel's mean square velocity lies, the highest over the
     channels; infinite without a time axis. columns: indices of the channels."""
     if not np.isfinite(motions[0].band_hz):
@@ -149,36 +152,43 @@ def motion_band_hz(motions: Sequence[Motion], columns: Iterable[int]) -> float:
             speed = motion.velocity[:, column]
             power.append(np.abs(rfft(speed - speed.mean())) ** 2 / len(speed))
             frequency_hz.append(rfftfreq(len(speed), 1 / motion.rate_hz))
-        every, where = np.concatenate(power), np.concatenate(frequency_hz)
-        order = np.argsort(where)
-        below = np.cumsum(every[order])
-        ends.append(float(where[order][min(np.searchsorted(below, MOVING_BAND_SHARE * below[-1]), len(where) - 1)]))
+        all_power, all_frequencies_hz = np.concatenate(power), np.concatenate(frequency_hz)
+        ascending = np.argsort(all_frequencies_hz)
+        cumulative = np.cumsum(all_power[ascending])
+        ends.append(
+            float(
+                all_frequencies_hz[ascending][
+                    min(np.searchsorted(cumulative, MOVING_BAND_SHARE * cumulative[-1]), len(all_frequencies_hz) - 1)
+                ]
+            )
+        )
     return max(ends)
 
 
-def _motion(
+def _compute_motion(
     record: Observed,
     measured: tuple[FloatArray, int],
     band: tuple[float, float],
     condition: FloatArray,
-    names: tuple[str, ...],
+    channels: tuple[str, ...],
 ) -> Motion:
     """Motion of one record. measured: samples (n, d) and the order of their time derivative; band: upper and lower end
-    in Hz; condition: (n, q), standardised; names: channels of the motion."""
+    in Hz; condition: (n, q), standardised; channels: of the motion."""
     (samples, order), (band_hz, lowest_hz) = measured, band
     rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
     # Under a zero-order hold a command acts, in the mean, half a sample after the reading: the motion is shifted to it.
-    early_s = 0.5 / rate_hz if hold is Hold.ZERO_ORDER and not record.recording.meta.get("imposed") else 0.0
+    advance_s = 0.5 / rate_hz if hold is Hold.ZERO_ORDER and not record.recording.meta.get("imposed") else 0.0
     if not np.isfinite(band_hz):
-        return _motion_without_clock(record, samples, condition, names)
+        return _make_untimed_motion(record, samples, condition, channels)
     position, velocity, acceleration = (
-        _derivative(samples, rate_hz, (band_hz, lowest_hz), wanted - order, early_s) for wanted in range(3)
+        _differentiate_in_band(samples, rate_hz, (band_hz, lowest_hz), derivative_order - order, advance_s)
+        for derivative_order in range(3)
     )
     if is_read_as_free(record.recording):
         # The command of a free motion was computed from its acceleration, so that no law may use the acceleration.
         acceleration = np.zeros_like(acceleration)
     return Motion(
-        rate_hz, band_hz, max(int(rate_hz / (MOTION_OVERSAMPLED * band_hz)), 1), names, order, position, velocity,
+        rate_hz, band_hz, max(int(rate_hz / (MOTION_OVERSAMPLED * band_hz)), 1), channels, order, position, velocity,
         acceleration, fill_gaps(record.command), condition, record.fit | record.choose, record.test, lowest_hz,
     )  # fmt: skip
 
@@ -191,45 +201,45 @@ def band_pass(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: fl
 
 def _band_gain(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> FloatArray:
     """(lines,): real gain of the band-pass filter, of the low-pass filter alone where `lowest_hz` is 0."""
-    shaped = low_pass_gain(frequency_hz, band_hz)
-    return np.asarray(shaped * (1 - low_pass_gain(frequency_hz, lowest_hz)) if lowest_hz > 0 else shaped)
+    low_pass = low_pass_gain(frequency_hz, band_hz)
+    return np.asarray(low_pass * (1 - low_pass_gain(frequency_hz, lowest_hz)) if lowest_hz > 0 else low_pass)
 
 
-def _motion_without_clock(
-    record: Observed, samples: FloatArray, condition: FloatArray, names: tuple[str, ...]
+def _make_untimed_motion(
+    record: Observed, samples: FloatArray, condition: FloatArray, channels: tuple[str, ...]
 ) -> Motion:
     """Motion of a recording without a time axis: positions, their change per sample as velocity, and no
     acceleration."""
     return Motion(
-        record.recording.sample_rate_hz, np.inf, 1, names, 0, samples, np.gradient(samples, axis=0),
+        record.recording.sample_rate_hz, np.inf, 1, channels, 0, samples, np.gradient(samples, axis=0),
         np.zeros_like(samples), fill_gaps(record.command), condition, record.fit | record.choose, record.test,
     )  # fmt: skip
 
 
-def _derivative(
-    samples: FloatArray, rate_hz: float, band: tuple[float, float], times: int, early_s: float
+def _differentiate_in_band(
+    samples: FloatArray, rate_hz: float, band: tuple[float, float], order: int, advance_s: float
 ) -> FloatArray:
-    """(n, k): the time derivative of order `times`; an integral where that is negative. band: upper and lower end in
-    Hz. early_s: time in s by which the result is advanced. Integrals of an acceleration are high-pass filtered at the
+    """(n, k): the time derivative of order `order`; an integral where that is negative. band: upper and lower end in
+    Hz. advance_s: time in s by which the result is advanced. Integrals of an acceleration are high-pass filtered at the
     lower end of the band; the acceleration itself is not, like the force."""
     band_hz, lowest_hz = band
-    line, slope = _end_to_end_line(samples, rate_hz)
+    line, slope = _fit_end_line(samples, rate_hz)
 
     def gain(frequency_hz: FloatArray) -> FloatArray:
-        turn = 2j * np.pi * np.maximum(frequency_hz, 1e-12)
-        shaped = _band_gain(frequency_hz, band_hz, lowest_hz if times < 0 else 0.0)
-        return np.asarray(shaped * np.exp(turn * early_s) * turn**times)
+        i_omega = 2j * np.pi * np.maximum(frequency_hz, 1e-12)
+        band_gain = _band_gain(frequency_hz, band_hz, lowest_hz if order < 0 else 0.0)
+        return np.asarray(band_gain * np.exp(i_omega * advance_s) * i_omega**order)
 
-    if times < 0 and lowest_hz == 0:
+    if order < 0 and lowest_hz == 0:
         # The integral of a velocity is not periodic: it is summed in time instead of divided by i omega.
-        smooth = _derivative(samples, rate_hz, band, 0, early_s)
+        smooth = _differentiate_in_band(samples, rate_hz, band, 0, advance_s)
         return np.asarray(np.cumsum(smooth, axis=0) / rate_hz)
-    if times < 0:
-        return filter_spectrum(samples, rate_hz, gain, straightened=False)
-    bent = filter_spectrum(samples - line, rate_hz, gain, straightened=False)
-    if times == 0:
-        return bent + line + slope * early_s
-    return bent + slope if times == 1 else bent
+    if order < 0:
+        return filter_spectrum(samples, rate_hz, gain, subtract_line=False)
+    derivative = filter_spectrum(samples - line, rate_hz, gain, subtract_line=False)
+    if order == 0:
+        return derivative + line + slope * advance_s
+    return derivative + slope if order == 1 else derivative
 
 
 def low_pass_filter(samples: FloatArray, rate_hz: float, band_hz: float) -> FloatArray:
@@ -237,26 +247,26 @@ def low_pass_filter(samples: FloatArray, rate_hz: float, band_hz: float) -> Floa
     return filter_spectrum(samples, rate_hz, lambda f: low_pass_gain(f, band_hz))
 
 
-def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, times: int) -> FloatArray:
-    """(n, k): time derivative of order `times`, within 0 to `band_hz`, computed in the frequency domain."""
-    return _derivative(samples, rate_hz, (band_hz, 0.0), times, 0.0)
+def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, order: int) -> FloatArray:
+    """(n, k): time derivative of order `order`, within 0 to `band_hz`, computed in the frequency domain."""
+    return _differentiate_in_band(samples, rate_hz, (band_hz, 0.0), order, 0.0)
 
 
-def filter_spectrum(samples: FloatArray, rate_hz: float, gain: object, straightened: bool = True) -> FloatArray:
+def filter_spectrum(samples: FloatArray, rate_hz: float, gain: object, subtract_line: bool = True) -> FloatArray:
     """(n, k): samples filtered in the frequency domain. gain: function of the frequencies in Hz (lines,) that returns
-    the frequency response (lines,). Samples are continued beyond both ends by an odd extension. straightened: whether
-    the line between the end points is removed before and added after filtering."""
-    line = _end_to_end_line(samples, rate_hz)[0] if straightened else np.zeros_like(samples)
-    whole = odd_extension(samples - line)
-    spectrum = rfft(whole, axis=0)
-    lines = rfftfreq(len(whole), 1 / rate_hz)
-    return np.asarray(irfft(gain(lines)[:, None] * spectrum, len(whole), axis=0)[: len(samples)] + line)  # type: ignore[operator]
+    the frequency response (lines,). Samples are continued beyond both ends by an odd extension. subtract_line: whether
+    the line between the end points is subtracted before and added after filtering."""
+    line = _fit_end_line(samples, rate_hz)[0] if subtract_line else np.zeros_like(samples)
+    extended = odd_extension(samples - line)
+    spectrum = rfft(extended, axis=0)
+    frequency_hz = rfftfreq(len(extended), 1 / rate_hz)
+    return np.asarray(irfft(gain(frequency_hz)[:, None] * spectrum, len(extended), axis=0)[: len(samples)] + line)  # type: ignore[operator]
 
 
-def _end_to_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
+def _fit_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
     """The straight line from the first to the last sample, (n, k), and its slope per second, (k,)."""
-    along = np.linspace(0.0, 1.0, len(samples))[:, None]
-    line = (1 - along) * samples[0] + along * samples[-1]
+    fraction = np.linspace(0.0, 1.0, len(samples))[:, None]
+    line = (1 - fraction) * samples[0] + fraction * samples[-1]
     return np.asarray(line), np.asarray((samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz)
 
 
@@ -267,9 +277,9 @@ def _standardise_conditions(records: Sequence[Observed]) -> tuple[tuple[Conditio
     if len({None if signal is None else signal.channels for signal in signals}) > 1 or signals[0] is None:
         return (), [np.zeros((len(record.command), 0)) for record in records]
     filled = [fill_gaps(signal.samples) for signal in signals if signal is not None]
-    whole = np.vstack(filled)
-    mean, spread = whole.mean(axis=0), whole.std(axis=0)
+    stacked = np.vstack(filled)
+    mean, spread = stacked.mean(axis=0), stacked.std(axis=0)
     names = condition_names(law_channels(records[0].recording))
     varying = np.flatnonzero(spread > 0)
-    known = tuple(Condition(names[k], float(mean[k]), float(spread[k])) for k in varying)
-    return known, [(each[:, varying] - mean[varying]) / spread[varying] for each in filled]
+    conditions = tuple(Condition(names[k], float(mean[k]), float(spread[k])) for k in varying)
+    return conditions, [(samples[:, varying] - mean[varying]) / spread[varying] for samples in filled]

@@ -45,7 +45,7 @@ class Regression:
     axis: int
     """Index of the force's channel."""
     laws: tuple[Law, ...]
-    beside: BaseTerms
+    base_terms: BaseTerms
     """Terms of the base in addition to mass, damping and stiffness."""
     base: int
     """Number of columns of the base, which come first: mass, damping, stiffness, further linear laws, and a
@@ -76,8 +76,8 @@ class Regression:
     def columns_of(self, laws: Sequence[int]) -> list[int]:
         """Column indices of the base and of the laws with these indices. A law of the command has a negative index and
         no columns."""
-        more = [k for law in laws if law >= 0 for k in range(self.places[law].start, self.places[law].stop)]
-        return [*range(self.base), *more]
+        law_columns = [k for law in laws if law >= 0 for k in range(self.places[law].start, self.places[law].stop)]
+        return [*range(self.base), *law_columns]
 
     def weights(self, columns: Sequence[int]) -> FloatArray:
         """(len(columns),): weights fitted to all fit blocks, in the columns' own units."""
@@ -86,9 +86,11 @@ class Regression:
     def cross_validated_errors(self, columns: Sequence[int]) -> FloatArray:
         """(blocks,): residual sum of squares of each fit block, with weights fitted to the other blocks
         (leave-one-block-out cross-validation)."""
-        own = products_per_block(self.fit, columns)
-        weights = self._solve_nonnegative((own[0].sum(axis=0) - own[0], own[1].sum(axis=0) - own[1]))
-        return compute_squared_errors(self.fit, own, weights)
+        products = products_per_block(self.fit, columns)
+        weights = self._solve_nonnegative(
+            (products[0].sum(axis=0) - products[0], products[1].sum(axis=0) - products[1])
+        )
+        return compute_squared_errors(self.fit, products, weights)
 
     def held_out_errors(self, columns: Sequence[int]) -> FloatArray:
         """(blocks,): residual sum of squares of each test block, with weights fitted to all fit blocks."""
@@ -103,25 +105,25 @@ class Regression:
         driven motion are fixed at zero where they would be negative (active-set method). A fixed weight is not freed
         again."""
         gram, cross = products = with_prior(products, self.prior)
-        found = solve_normal_equations(products, RIDGE)
-        places = list(self.positive)
-        bound: Mask = np.zeros_like(found, dtype=np.bool_)
-        for _ in range(len(places) - 1):
-            below = found[..., places] < 0
-            if not below.any():
+        weights = solve_normal_equations(products, RIDGE)
+        nonnegative = list(self.positive)
+        bound: Mask = np.zeros_like(weights, dtype=np.bool_)
+        for _ in range(len(nonnegative) - 1):
+            is_negative = weights[..., nonnegative] < 0
+            if not is_negative.any():
                 break
-            bound[..., places] |= below
+            bound[..., nonnegative] |= is_negative
             for fixed in np.unique(bound.reshape(-1, bound.shape[-1]), axis=0):
                 if fixed.any():
-                    at = (bound == fixed).all(axis=-1)
-                    found[at] = solve_without_columns(gram[at], cross[at], fixed)
-        return np.where(bound, 0.0, found)
+                    rows = (bound == fixed).all(axis=-1)
+                    weights[rows] = solve_without_columns(gram[rows], cross[rows], fixed)
+        return np.where(bound, 0.0, weights)
 
     def remainder(self, columns: Sequence[int]) -> tuple[FloatArray, ...]:
         """Per motion, (kept samples,): the residual force f - X w, with the weights fitted to all fit blocks."""
-        found = self.weights(columns)
+        weights = self.weights(columns)
         return tuple(
-            force - rows[:, list(columns)] @ found for force, rows in zip(self.force, self.columns, strict=True)
+            force - rows[:, list(columns)] @ weights for force, rows in zip(self.force, self.columns, strict=True)
         )
 
 
@@ -130,38 +132,39 @@ def regression_of(
     axis: int,
     laws: Sequence[Law],
     turns: bool,
-    beside: BaseTerms | None = None,
+    base_terms: BaseTerms | None = None,
     bases: Sequence[FloatArray] | None = None,
 ) -> Regression:
     """The regression of the force of one axis on mass, damping, stiffness and laws. turns: whether the shaft turns
-    freely (`Scales.turns`) and so has no stiffness. beside: further terms of the base; None = none, and the force
+    freely (`Scales.turns`) and so has no stiffness. base_terms: further terms of the base; None = none, and the force
     drives the motion channel of the same index. bases: columns (n, k) per motion that replace mass, damping and
     stiffness. Laws whose columns vanish or are not finite are left out."""
     d = len(motions[0].channels)
-    beside = beside or BaseTerms(min(axis, d - 1))
-    aims = [each.decimate(each.force[:, [axis]])[:, 0] for each in motions]
-    linear = [_linear_columns(each, turns, beside.laws) for each in motions] if bases is None else bases
-    parts = [[_base_columns(each, columns) for each, columns in zip(motions, linear, strict=True)]]
-    kept, places, begin = [], [], parts[0][0].shape[1]
-    base = begin
+    base_terms = base_terms or BaseTerms(min(axis, d - 1))
+    targets = [motion.decimate(motion.force[:, [axis]])[:, 0] for motion in motions]
+    linear = [_linear_columns(motion, turns, base_terms.laws) for motion in motions] if bases is None else bases
+    parts = [[_base_columns(motion, columns) for motion, columns in zip(motions, linear, strict=True)]]
+    kept_laws, places, first = [], [], parts[0][0].shape[1]
+    base = first
     for law in laws:
         columns = _law_columns(motions, law)
         if columns is not None:
             parts.append(columns)
-            kept.append(law)
-            places.append(slice(begin, begin + columns[0].shape[1]))
-            begin = places[-1].stop
+            kept_laws.append(law)
+            places.append(slice(first, first + columns[0].shape[1]))
+            first = places[-1].stop
     rows = tuple(np.hstack([part[k] for part in parts]) for k in range(len(motions)))
-    fit = [each.valid_samples(each.fit) for each in motions]
+    fit = [motion.valid_samples(motion.fit) for motion in motions]
     scale = column_scale(rows, fit)
-    test = [each.valid_samples(each.test) for each in motions]
-    mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
-    own = beside.own
+    test = [motion.valid_samples(motion.test) for motion in motions]
+    mean = float(np.concatenate([target[mask] for target, mask in zip(targets, fit, strict=True)]).mean())
+    driven = base_terms.driven_channel
     return Regression(
-        tuple(motions), axis, tuple(kept), beside, base, (2 if turns else 3) * d if bases is None else base - 1,
-        (own, d + own, own) if bases is None else (0,), tuple(places),
-        scale, rows, tuple(aims),
-        blocks_of(rows, aims, fit, (scale, mean)), blocks_of(rows, aims, test, (scale, mean)),
+        tuple(motions), axis, tuple(kept_laws), base_terms, base,
+        (2 if turns else 3) * d if bases is None else base - 1,
+        (driven, d + driven, driven) if bases is None else (0,), tuple(places),
+        scale, rows, tuple(targets),
+        blocks_of(rows, targets, fit, (scale, mean)), blocks_of(rows, targets, test, (scale, mean)),
     )  # fmt: skip
 
 
@@ -170,11 +173,11 @@ def signal_power(blocks: Sequence[Block]) -> float:
     return sum(block.signal for block in blocks)
 
 
-def _linear_columns(motion: Motion, turns: bool, beside: Sequence[Law]) -> FloatArray:
+def _linear_columns(motion: Motion, turns: bool, linear_laws: Sequence[Law]) -> FloatArray:
     """(n, k): acceleration, velocity, position and linear laws; no position where a shaft turns freely, because it has
     no spring."""
-    more = [law.columns(motion, law.numbers) for law in beside]
-    return np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position]), *more])
+    law_columns = [law.columns(motion, law.numbers) for law in linear_laws]
+    return np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position]), *law_columns])
 
 
 def _base_columns(motion: Motion, linear: FloatArray) -> FloatArray:
@@ -185,7 +188,7 @@ def _base_columns(motion: Motion, linear: FloatArray) -> FloatArray:
 def _law_columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
     """A law's filtered and decimated columns per motion; None where any vanishes or is not finite."""
     columns = [motion.decimate(law.columns(motion, law.numbers)) for motion in motions]
-    usable = all(np.isfinite(each).all() for each in columns) and all(_has_size(columns))
+    usable = all(np.isfinite(column).all() for column in columns) and all(_has_size(columns))
     return columns if usable else None
 
 
@@ -203,46 +206,46 @@ def replace_law(regression: Regression, number: int, law: Law) -> Regression | N
     if columns is None or columns[0].shape[1] != place.stop - place.start:
         return None
     rows = tuple(
-        np.hstack([old[:, : place.start], new, old[:, place.stop :]])
-        for old, new in zip(regression.columns, columns, strict=True)
+        np.hstack([old_columns[:, : place.start], new_columns, old_columns[:, place.stop :]])
+        for old_columns, new_columns in zip(regression.columns, columns, strict=True)
     )
     scale = regression.scale.copy()
-    scale[place] = column_scale(columns, [each.valid_samples(each.fit) for each in regression.motions])
+    scale[place] = column_scale(columns, [motion.valid_samples(motion.fit) for motion in regression.motions])
     laws = (*regression.laws[:number], law, *regression.laws[number + 1 :])
-    changed = replace(regression, laws=laws, columns=rows, scale=scale)
+    updated = replace(regression, laws=laws, columns=rows, scale=scale)
     return replace(
-        changed,
-        fit=tuple(_renew_products(changed, block, place) for block in regression.fit),
-        test=tuple(_renew_products(changed, block, place) for block in regression.test),
+        updated,
+        fit=tuple(_renew_products(updated, block, place) for block in regression.fit),
+        test=tuple(_renew_products(updated, block, place) for block in regression.test),
     )
 
 
 def append_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
     """The regression with laws added after the present ones. Laws whose columns vanish or are not finite are left
     out."""
-    kept, rows = [], [[each] for each in regression.columns]
+    added_laws, rows = [], [[part] for part in regression.columns]
     ends = [regression.columns[0].shape[1]]
     for law in laws:
         columns = _law_columns(regression.motions, law)
         if columns is not None:
-            kept.append(law)
+            added_laws.append(law)
             ends.append(ends[-1] + columns[0].shape[1])
-            for held, new in zip(rows, columns, strict=True):
-                held.append(new)
-    more = tuple(np.hstack(each) for each in rows)
+            for column_parts, new in zip(rows, columns, strict=True):
+                column_parts.append(new)
+    extended = tuple(np.hstack(part) for part in rows)
     fit = [motion.valid_samples(motion.fit) for motion in regression.motions]
     test = [motion.valid_samples(motion.test) for motion in regression.motions]
-    scale = np.concatenate([regression.scale, column_scale([each[:, ends[0] :] for each in more], fit)])
-    mean = np.concatenate([aim[mask] for aim, mask in zip(regression.force, fit, strict=True)]).mean()
+    scale = np.concatenate([regression.scale, column_scale([part[:, ends[0] :] for part in extended], fit)])
+    mean = np.concatenate([target[mask] for target, mask in zip(regression.force, fit, strict=True)]).mean()
     units = scale, float(mean)
     return replace(
         regression,
-        laws=(*regression.laws, *kept),
-        places=(*regression.places, *(slice(begin, end) for begin, end in pairwise(ends))),
+        laws=(*regression.laws, *added_laws),
+        places=(*regression.places, *(slice(start, end) for start, end in pairwise(ends))),
         scale=scale,
-        columns=more,
-        fit=blocks_of(more, regression.force, fit, units),
-        test=blocks_of(more, regression.force, test, units),
+        columns=extended,
+        fit=blocks_of(extended, regression.force, fit, units),
+        test=blocks_of(extended, regression.force, test, units),
     )
 
 
@@ -254,9 +257,9 @@ def keep_laws(regression: Regression, laws: Sequence[int]) -> Regression:
     return replace(
         regression,
         laws=tuple(regression.laws[k] for k in laws),
-        places=tuple(slice(begin, end) for begin, end in pairwise(ends)),
+        places=tuple(slice(start, end) for start, end in pairwise(ends)),
         scale=regression.scale[columns],
-        columns=tuple(each[:, columns] for each in regression.columns),
+        columns=tuple(part[:, columns] for part in regression.columns),
         fit=tuple(_select_columns(block, columns) for block in regression.fit),
         test=tuple(_select_columns(block, columns) for block in regression.test),
     )
@@ -282,13 +285,14 @@ def fit_all_laws(regression: Regression, columns: Sequence[int]) -> tuple[float,
     The ridge parameter is the one of `RIDGES` with the least cross-validated error; it does not act on the base. The
     result estimates the least error that a sum of a few laws can reach."""
     free = np.array([k < regression.base for k in columns])
-    own = products_per_block(regression.fit, columns)
-    whole = own[0].sum(axis=0), own[1].sum(axis=0)
-    rest = with_prior((whole[0] - own[0], whole[1] - own[1]), regression.prior)
-    whole = with_prior(whole, regression.prior)
+    products = products_per_block(regression.fit, columns)
+    total = products[0].sum(axis=0), products[1].sum(axis=0)
+    training = with_prior((total[0] - products[0], total[1] - products[1]), regression.prior)
+    total = with_prior(total, regression.prior)
     errors = [
-        float(compute_squared_errors(regression.fit, own, solve_ridge(rest, ridge, free)).sum()) for ridge in RIDGES
+        float(compute_squared_errors(regression.fit, products, solve_ridge(training, ridge, free)).sum())
+        for ridge in RIDGES
     ]
     best = int(np.argmin(errors))
-    found = solve_ridge(whole, RIDGES[best], free)
-    return errors[best], compute_squared_errors(regression.test, products_per_block(regression.test, columns), found)
+    weights = solve_ridge(total, RIDGES[best], free)
+    return errors[best], compute_squared_errors(regression.test, products_per_block(regression.test, columns), weights)

@@ -1,10 +1,9 @@
-"""Sums of one to three laws that explain a force along a measured motion: a beam search over cross-validated errors.
+"""Beam search for sums of one to three laws that explain a force along a measured motion.
 
-From the linear structure (mass, damping, stiffness) on, every structure in the beam is extended by each further law;
-weights are least squares, nonlinear parameters of the best are refined, and the best `STRUCTURES_BEAM` are kept, while
-each size is significantly better than the one before (`is_better`). The error of a structure is the sum over folds of
-the squared force error with weights fitted to the other folds (`regression`). `simplest_structure` then selects, among
-all structures, the fewest parameters at about the least error.
+Each structure in the beam, at first mass, damping and stiffness alone, is extended by each further law; weights are
+least squares, nonlinear parameters of the best are refined, and the best `STRUCTURES_BEAM` are kept, as long as each
+size improves significantly. The error of a structure is the sum over folds of the squared force error with weights
+fitted to the other folds. `choose_simplest_structure` then selects the fewest parameters at about the least error.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,7 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, scales_of
 from analysis.diagnosis.balance.laws import cogging_law, laws_of, likely_pitches
-from analysis.diagnosis.balance.model_base import GivenBase, regression_beside_model, takes_enough
+from analysis.diagnosis.balance.model_base import GivenBase, explains_enough, regression_with_model
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.balance.regression import (
     Regression,
@@ -36,10 +35,10 @@ from analysis.diagnosis.settings import (
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
-REFINED = (0.8, 0.93, 1.075, 1.25)
+STEP_FACTORS = (0.8, 0.93, 1.075, 1.25)
 """Factors on a nonlinear parameter in one pass of a coordinate search."""
-ROUNDS = 6
-"""Largest number of steps of the coordinate search over the nonlinear parameters of one law."""
+MOST_PASSES = 6
+"""Largest number of passes of the coordinate search over the nonlinear parameters of one law."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +60,7 @@ class StructureSearch:
     """Result of the search for sums of laws."""
 
     regression: Regression
-    """With refined laws."""
+    """The regression with refined laws."""
     linear: Structure
     best: Structure
     ranked: tuple[Structure, ...]
@@ -74,175 +73,176 @@ def search_structures(
     motions: Sequence[Motion],
     axis: int,
     rotational: bool,
-    without: frozenset[str],
+    excluded: frozenset[str],
     time_left: TimeBudget,
-    beside: BaseTerms | GivenBase | None = None,
+    base: BaseTerms | GivenBase | None = None,
 ) -> StructureSearch:
     """Beam search for the sum of at most three laws with the least cross-validated error. without: effects that are
-    left out. beside: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
-    if not any(each.valid_samples(each.fit).any() for each in motions):
+    left out. base: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
+    if not any(motion.valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
     scales = [scales_of(motions, c, rotational) for c in range(len(motions[0].channels))]
-    turns = any(each.turns for each in scales)
-    held = {(law.key, law.numbers) for law in (beside.laws if isinstance(beside, BaseTerms) else ())}
+    turns = any(scale.turns for scale in scales)
+    fixed = {(law.key, law.numbers) for law in (base.laws if isinstance(base, BaseTerms) else ())}
     laws = [
-        law for law in laws_of(motions, rotational) if law.effect not in without and (law.key, law.numbers) not in held
+        law
+        for law in laws_of(motions, rotational)
+        if law.effect not in excluded and (law.key, law.numbers) not in fixed
     ]
-    if isinstance(beside, GivenBase):
-        first = regression_beside_model(motions, axis, laws, beside)
-        if not takes_enough(first, beside.least):
-            alone = _linear_structure(first)
-            return StructureSearch(first, alone, alone, (alone,), True)
+    if isinstance(base, GivenBase):
+        regression = regression_with_model(motions, axis, laws, base)
+        if not explains_enough(regression, base.least_share):
+            base_only = _fit_linear_structure(regression)
+            return StructureSearch(regression, base_only, base_only, (base_only,), True)
     else:
-        first = regression_of(motions, axis, laws, turns, beside)
-    if "cogging" not in without:
-        first = _add_cogging_laws(first, scales)
-    linear = _linear_structure(first)
-    first, ranked, best = _beam(first, linear, time_left)
-    return StructureSearch(first, linear, best, tuple(sorted(ranked, key=lambda each: each.error)), time_left())
+        regression = regression_of(motions, axis, laws, turns, base)
+    if "cogging" not in excluded:
+        regression = _add_cogging_laws(regression, scales)
+    linear = _fit_linear_structure(regression)
+    regression, ranked, best = _search(regression, linear, time_left)
+    return StructureSearch(regression, linear, best, tuple(sorted(ranked, key=lambda s: s.error)), time_left())
 
 
-def _beam(first: Regression, linear: Structure, time_left: TimeBudget) -> tuple[Regression, list[Structure], Structure]:
+def _search(fit: Regression, linear: Structure, time_left: TimeBudget) -> tuple[Regression, list[Structure], Structure]:
     """The regression with its laws refined, the structures of all sizes, and the best."""
     beam, ranked, best = [linear], [linear], linear
     for _ in range(MOST_SUMMED_LAWS):
         if not time_left():
             break
-        grown = _add_law_to_each(first, beam)
-        if not grown:
+        sums = _add_law_to_each(fit, beam)
+        if not sums:
             break
-        first = refine_parameters(first, grown[:STRUCTURES_BEAM])
-        grown = [replace(each, errors=first.cross_validated_errors(first.columns_of(each.laws))) for each in grown]
-        ranked += grown
-        beam = sorted(grown, key=lambda each: each.error)[:STRUCTURES_BEAM]
-        if not is_better(best, beam[0]):
+        fit = refine_parameters(fit, sums[:STRUCTURES_BEAM])
+        sums = [replace(s, errors=fit.cross_validated_errors(fit.columns_of(s.laws))) for s in sums]
+        ranked += sums
+        beam = sorted(sums, key=lambda s: s.error)[:STRUCTURES_BEAM]
+        if not improves_significantly(best, beam[0]):
             break
         best = beam[0]
-    return first, ranked, best
+    return fit, ranked, best
 
 
-def is_better(plain: Structure, richer: Structure) -> bool:
-    """Whether further laws are significant. With the errors p_i and r_i of the folds, the total must fall by
-    `FURTHER_LAW_GAIN`, and any of three sums must exceed `FURTHER_LAW_ERRORS` standard errors: of p_i - r_i; of
-    log(p_i / r_i), because an end stop that is reached in one fold makes the differences unequal; of p_i - r_i with the
-    standard error of a ratio estimate, because an end stop that is reached in few folds gains nothing in others."""
-    floor = 1e-12 * plain.error / len(plain.errors)
-    shares = np.log(np.maximum(plain.errors, floor) / np.maximum(richer.errors, floor)) if floor > 0 else np.zeros(1)
-    gains = plain.errors - richer.errors
+def improves_significantly(base: Structure, extended: Structure) -> bool:
+    """Whether the laws that `extended` adds are significant. With fold errors p_i of `base` and r_i of `extended`, the
+    total must fall by `FURTHER_LAW_GAIN`, and one of three sums must exceed `FURTHER_LAW_ERRORS` standard errors: of
+    p_i - r_i; of log(p_i / r_i), for folds with unequal errors; of p_i - r_i with the error of a ratio estimate."""
+    floor = 1e-12 * base.error / len(base.errors)
+    shares = np.log(np.maximum(base.errors, floor) / np.maximum(extended.errors, floor)) if floor > 0 else np.zeros(1)
+    gains = base.errors - extended.errors
     # Residuals of the gains about their ratio to the errors (Cochran, Sampling Techniques, 3rd ed., equation 6.4).
-    about_ratio = gains - (1 - richer.error / max(plain.error, 1e-300)) * plain.errors
-    agreed = _is_significant(gains, gains) or _is_significant(shares, shares) or _is_significant(gains, about_ratio)
-    return richer.error < (1 - FURTHER_LAW_GAIN) * plain.error and agreed
+    about_ratio = gains - (1 - extended.error / max(base.error, 1e-300)) * base.errors
+    passes = _is_significant(gains, gains) or _is_significant(shares, shares) or _is_significant(gains, about_ratio)
+    return extended.error < (1 - FURTHER_LAW_GAIN) * base.error and passes
 
 
 def _is_significant(gains: FloatArray, residuals: FloatArray) -> bool:
-    """Whether the sum of the gains exceeds `FURTHER_LAW_ERRORS` standard errors. residuals: gains less their mean."""
+    """Whether the sum of the gains exceeds `FURTHER_LAW_ERRORS` standard errors, from the scatter of `residuals`."""
     standard_error = float(np.std(residuals, ddof=1) * np.sqrt(len(residuals))) if len(residuals) > 1 else np.inf
     return float(gains.sum()) > FURTHER_LAW_ERRORS * standard_error
 
 
-def _linear_structure(regression: Regression) -> Structure:
+def _fit_linear_structure(regression: Regression) -> Structure:
     return Structure((), regression.cross_validated_errors(regression.columns_of(())))
 
 
 def _add_law_to_each(regression: Regression, beam: Sequence[Structure]) -> list[Structure]:
     """Each structure with one more law: the best physical one of each set of effects, sorted by error."""
-    found: dict[tuple[tuple[str, int], ...], Structure] = {}
+    best: dict[tuple[tuple[str, int], ...], Structure] = {}
     for structure in beam:
-        held = {regression.laws[k].key for k in structure.laws}
+        keys = {regression.laws[k].key for k in structure.laws}
         for number, law in enumerate(regression.laws):
-            if law.key in held or any(_overlap(law.key, other) for other in held):
+            if law.key in keys or any(_overlaps(law.key, key) for key in keys):
                 continue
             laws = tuple(sorted((*structure.laws, number)))
-            grown = Structure(laws, regression.cross_validated_errors(regression.columns_of(laws)))
+            extended = Structure(laws, regression.cross_validated_errors(regression.columns_of(laws)))
             effects = tuple(sorted(regression.laws[k].key for k in laws))
-            if (effects not in found or grown.error < found[effects].error) and _is_physical(regression, laws):
-                found[effects] = grown
-    return sorted(found.values(), key=lambda each: each.error)
+            if (effects not in best or extended.error < best[effects].error) and _is_physical(regression, laws):
+                best[effects] = extended
+    return sorted(best.values(), key=lambda s: s.error)
 
 
 SLIDING = (
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "position_dependent_friction", "drifting_friction"
 )  # fmt: skip
-"""Laws that share the column of dry friction: two of them on one motion would divide its level arbitrarily."""
+"""Laws that share the column of dry friction: two of them along one channel have no unique levels."""
 
 
-def _overlap(first: tuple[str, int], other: tuple[str, int]) -> bool:
-    return first[1] == other[1] and first[0] in SLIDING and other[0] in SLIDING
+def _overlaps(first: tuple[str, int], second: tuple[str, int]) -> bool:
+    return first[1] == second[1] and first[0] in SLIDING and second[0] in SLIDING
 
 
 def _is_physical(regression: Regression, laws: Sequence[int]) -> bool:
-    return all(values is not None for values in values_of(regression, laws))
+    return all(values is not None for values in fit_values(regression, laws))
 
 
-def values_of(regression: Regression, laws: Sequence[int]) -> list[dict[str, float] | None]:
+def fit_values(regression: Regression, laws: Sequence[int]) -> list[dict[str, float] | None]:
     """Parameters of each law, all fitted together; None where the signs of its weights are not physical."""
     columns = regression.columns_of(laws)
     weights = regression.weights(columns)
-    mass = float(weights[regression.beside.own]) if regression.mass is None else regression.mass
-    begin, found = regression.base, []
+    mass = float(weights[regression.base_terms.driven_channel]) if regression.mass is None else regression.mass
+    first, values = regression.base, []
     for number in laws:
         law, place = regression.laws[number], regression.places[number]
         count = place.stop - place.start
-        found.append(law.values(weights[begin : begin + count], law.numbers, mass))
-        begin += count
-    return found
+        values.append(law.values(weights[first : first + count], law.numbers, mass))
+        first += count
+    return values
 
 
-def _add_cogging_laws(first: Regression, scales: Sequence[Scales]) -> Regression:
+def _add_cogging_laws(regression: Regression, scales: Sequence[Scales]) -> Regression:
     """The regression with cogging at the pitches in the residual without laws, and in that with the best one."""
-    first = _add_pitches(first, scales, ())
-    grown = _add_law_to_each(first, [_linear_structure(first)])
-    return _add_pitches(first, scales, grown[0].laws) if grown else first
+    regression = _add_pitches(regression, scales, ())
+    extended = _add_law_to_each(regression, [_fit_linear_structure(regression)])
+    return _add_pitches(regression, scales, extended[0].laws) if extended else regression
 
 
 def _add_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequence[int]) -> Regression:
     """The regression with cogging at the pitches that the residual of these laws shows."""
     residuals = regression.remainder(regression.columns_of(laws))
-    more = [
-        cogging_law(c, pitch, of)
-        for c, of in enumerate(scales)
-        for pitch in likely_pitches(regression.motions, residuals, c, of)
+    cogging = [
+        cogging_law(c, pitch, scale)
+        for c, scale in enumerate(scales)
+        for pitch in likely_pitches(regression.motions, residuals, c, scale)
     ]
-    return append_laws(regression, more) if more else regression
+    return append_laws(regression, cogging) if cogging else regression
 
 
 def refine_parameters(regression: Regression, structures: Sequence[Structure]) -> Regression:
-    """The regression with the nonlinear parameters of the structures' laws moved to the least cross-validated error,
+    """The regression with the nonlinear parameters of the structures' laws refined to the least cross-validated error,
     each law in the first structure that has it."""
-    seen: set[int] = set()
+    refined: set[int] = set()
     for structure in structures:
         for place, number in enumerate(structure.laws):
-            if number not in seen and regression.laws[number].bounded:
-                seen.add(number)
+            if number not in refined and regression.laws[number].bounded:
+                refined.add(number)
                 fitted = replace(keep_laws(regression, structure.laws), test=())  # only the parameters are used
-                moved = replace_law(regression, number, _refine_law(fitted, place))
-                regression = moved or regression
+                replaced = replace_law(regression, number, _refine_law(fitted, place))
+                regression = replaced or regression
     return regression
 
 
-def _refine_law(alone: Regression, place: int) -> Law:
-    """One law of a structure, refined by steps to its best neighbour. alone: with the structure's laws alone."""
-    laws = tuple(range(len(alone.laws)))
-    best = float(alone.cross_validated_errors(alone.columns_of(laws)).sum())
-    for _ in range(ROUNDS):
-        tried = []
-        for there in _neighbours(alone.laws[place]):
-            other = replace_law(alone, place, there)
-            if other is not None and _is_physical(other, laws):
-                tried.append((float(other.cross_validated_errors(other.columns_of(laws)).sum()), other))
-        if not tried or min(tried, key=lambda each: each[0])[0] >= best * (1 - 1e-4):
+def _refine_law(regression: Regression, place: int) -> Law:
+    """One law of a structure, refined by steps to its best neighbour. regression: with the structure's laws alone."""
+    laws = tuple(range(len(regression.laws)))
+    best = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
+    for _ in range(MOST_PASSES):
+        trials = []
+        for neighbour in _list_neighbours(regression.laws[place]):
+            trial = replace_law(regression, place, neighbour)
+            if trial is not None and _is_physical(trial, laws):
+                trials.append((float(trial.cross_validated_errors(trial.columns_of(laws)).sum()), trial))
+        if not trials or min(trials, key=lambda pair: pair[0])[0] >= best * (1 - 1e-4):
             break
-        best, alone = min(tried, key=lambda each: each[0])
-    return alone.laws[place]
+        best, regression = min(trials, key=lambda pair: pair[0])
+    return regression.laws[place]
 
 
-def _neighbours(law: Law) -> Iterator[Law]:
+def _list_neighbours(law: Law) -> Iterator[Law]:
     """The law with each nonlinear parameter moved by each factor, within its bounds."""
     for place, (low, high) in enumerate(law.bounded):
         # Over a travel of many pitches, the phase of cogging turns by a multiple of a pitch's relative change.
         share = 0.05 if law.effect == "cogging" else 1.0
-        for factor in REFINED:
+        for factor in STEP_FACTORS:
             value = law.numbers[place] * (1 + (factor - 1) * share)
             if low <= value <= high:
                 numbers = (*law.numbers[:place], float(value), *law.numbers[place + 1 :])
@@ -253,40 +253,40 @@ WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
 """Laws whose only nonlinear parameter is the width of a smoothed sign."""
 
 
-def simplest_structure(search: StructureSearch) -> Structure:
+def choose_simplest_structure(search: StructureSearch) -> Structure:
     """The structure with the fewest parameters at about the least error, extended by laws that explain most of the
     remaining error."""
     allowed = search.best.error + PLAINER_LEAVES * (search.linear.error - search.best.error)
-    enough = [each for each in search.ranked if each.error <= allowed]
-    plain = min(
-        enough, key=lambda each: (count_parameters(search.regression, each.laws), each.error), default=search.linear
+    candidates = [s for s in search.ranked if s.error <= allowed]
+    simplest = min(
+        candidates, key=lambda s: (count_parameters(search.regression, s.laws), s.error), default=search.linear
     )
     least_error = fit_all_laws(search.regression, range(search.regression.columns[0].shape[1]))[0]
-    while (richer := _add_further_laws(search, plain, least_error)) is not None:
-        plain = richer
-    return plain
+    while (extended := _add_further_laws(search, simplest, least_error)) is not None:
+        simplest = extended
+    return simplest
 
 
-def _add_further_laws(search: StructureSearch, plain: Structure, least_error: float) -> Structure | None:
-    """The structure with further laws that explain most of what all laws (least_error) could; None = none such."""
-    allowed = plain.error - max(FURTHER_LAW_OF_REST * (plain.error - least_error), FURTHER_LAW_OF_ALL * plain.error)
-    more = [
-        each
-        for each in search.ranked
-        if _extends(search.regression, plain.laws, each.laws) and each.error <= allowed and is_better(plain, each)
+def _add_further_laws(search: StructureSearch, base: Structure, least_error: float) -> Structure | None:
+    """The structure with further laws that explain most of what all laws (least_error) could; None without any."""
+    allowed = base.error - max(FURTHER_LAW_OF_REST * (base.error - least_error), FURTHER_LAW_OF_ALL * base.error)
+    extensions = [
+        s
+        for s in search.ranked
+        if _extends(search.regression, base.laws, s.laws) and s.error <= allowed and improves_significantly(base, s)
     ]
-    return min(more, key=lambda each: (count_parameters(search.regression, each.laws), each.error), default=None)
+    return min(extensions, key=lambda s: (count_parameters(search.regression, s.laws), s.error), default=None)
 
 
-def _extends(regression: Regression, plain: Sequence[int], richer: Sequence[int]) -> bool:
-    """Whether `richer` contains all laws of `plain` and more; Coulomb friction may be replaced by friction that depends
-    on a condition."""
-    covered, known = set(richer), {regression.laws[number].key for number in richer}
-    for number in plain:
+def _extends(regression: Regression, base: Sequence[int], extended: Sequence[int]) -> bool:
+    """Whether `extended` contains all laws of `base` and more; Coulomb friction may be replaced by friction that
+    depends on a condition."""
+    covered, keys = set(extended), {regression.laws[number].key for number in extended}
+    for number in base:
         effect, channel = regression.laws[number].key
-        if effect == "coulomb_friction" and ("condition_dependent_friction", channel) in known:
+        if effect == "coulomb_friction" and ("condition_dependent_friction", channel) in keys:
             covered.add(number)
-    return set(plain) < covered
+    return set(base) < covered
 
 
 def count_parameters(regression: Regression, laws: Sequence[int]) -> int:

@@ -1,4 +1,4 @@
-"""Force balance with a given mechanical model as its base: which laws are missing in that model?
+"""Force balance with a given mechanical model as its base: finds the force laws that the model lacks.
 
 Inverse dynamics give the force that the model requires for the measured motion, with its actuator, modes and effects.
 The base of the regression (`balance.model_base`) consists of that force and its derivatives with respect to the model's
@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.model_base import GivenBase
-from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
+from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed
@@ -25,40 +25,41 @@ from analysis.diagnosis.settings import LAW_OF_SIGNAL, MOTION_OVERSAMPLED
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import PlacedEffect, Structure
 from equalizer.effects.placing import place_recorded_effects
-from equalizer.effects.simulation.along_motion import actuator_force, force_along
-from equalizer.effects.simulation.bodies import bodies_of
+from equalizer.effects.simulation.bodies import build_bodies
+from equalizer.effects.simulation.forces_along_motion import actuator_force, effect_forces_along_motion
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-FINEST = 6.0
+LEAST_SAMPLES_PER_PERIOD = 6.0
 """Least samples per period of the band's upper end at which laws are computed, so that harmonics of nonlinear laws are
 not aliased into the band."""
 DIFFERENCE_STEP = 0.1
 """Step of the finite differences for the parameters of modes, in standard deviations of the calibration."""
 
 
-def find_balances_beside_model(
-    recordings: Sequence[Recording], model: MechanicalModel, without: frozenset[str], time_left: TimeBudget
+def find_balances_with_model(
+    recordings: Sequence[Recording], model: MechanicalModel, excluded: frozenset[str], time_left: TimeBudget
 ) -> tuple[Balance, ...]:
     """One balance per command; empty where a command drives no measured position or velocity, where there is no time
-    axis, or where the model's inverse dynamics cannot be computed. without: names of effects that are not tested."""
+    axis, or where the model's inverse dynamics cannot be computed. excluded: names of effects that are not tested."""
     records = observe_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
         return ()
     try:
-        found = motions_of(records)
-        if len(found[0].channels) < model.inputs or found[0].order == 2 or not np.isfinite(found[0].band_hz):
+        motions = compute_motions(records)
+        if len(motions[0].channels) < model.inputs or motions[0].order == 2 or not np.isfinite(motions[0].band_hz):
             return ()
-        data = [_balance_data(record, motion, model) for record, motion in zip(records, found, strict=True)]
-        axes = driven_axes(model)
-        mass = np.einsum("nm,nk,km->m", axes, model.mass, axes)
+        data = [_prepare_axis_data(record, motion, model) for record, motion in zip(records, motions, strict=True)]
+        axis_directions = driven_axes(model)
+        mass = np.einsum("nm,nk,km->m", axis_directions, model.mass, axis_directions)
         return tuple(
             judge_laws(
                 search_structures(
-                    [_select_axis(each.motion, axis) for each in data], axis, model.rotational, without, time_left,
-                    GivenBase(tuple(each.columns[axis] for each in data), float(mass[axis]), LAW_OF_SIGNAL),
+                    [_select_axis(axis_data.motion, axis) for axis_data in data], axis, model.rotational, excluded,
+                    time_left,
+                    GivenBase(tuple(axis_data.columns[axis] for axis_data in data), float(mass[axis]), LAW_OF_SIGNAL),
                 )
             )
             for axis in range(model.inputs)
@@ -74,8 +75,9 @@ def _select_axis(motion: Motion, axis: int) -> Motion:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _BalanceData:
-    """One record along the m driven axes, decimated to `FINEST` samples or more per period of the band's upper end."""
+class _AxisData:
+    """One record along the m driven axes, decimated to at least `LEAST_SAMPLES_PER_PERIOD` samples per period of the
+    band's upper end."""
 
     motion: Motion
     """Motion of the driven axes; its force is that of the actuators and known effects there, in N (N m)."""
@@ -83,62 +85,71 @@ class _BalanceData:
     """Per axis, the columns of `GivenBase`, (n, 1 + parameters)."""
 
 
-def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _BalanceData:
+def _prepare_axis_data(record: Observed, motion: Motion, model: MechanicalModel) -> _AxisData:
     """Motion, force and base columns of one record. Raises LinAlgError where the model's outputs do not determine its
     motion."""
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
-    known = effects_under_conditions(place_recorded_effects(model, recording), recording)
-    at = _structure(add_carried_weight(model, recording), known)
-    whole = compute_required_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
-    motion_of_axis = whole.axis_position, whole.axis_velocity, whole.axis_acceleration
-    entered = actuator_force(model, motion.force, rate_hz, known, recording.hold)
-    added = force_along(at, known, motion_of_axis, (motion.force, entered - whole.force), rate_hz)
-    every = max(int(rate_hz / (FINEST * motion.band_hz)), 1)
-    position, velocity, acceleration = (each[::every] for each in motion_of_axis)
-    thin = replace(
-        motion, rate_hz=rate_hz / every, step=max(int(rate_hz / every / (MOTION_OVERSAMPLED * motion.band_hz)), 1),
+    known_effects = effects_under_conditions(place_recorded_effects(model, recording), recording)
+    structure = _apply_structural_effects(add_carried_weight(model, recording), known_effects)
+    required = compute_required_force(structure, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
+    axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration
+    applied = actuator_force(model, motion.force, rate_hz, known_effects, recording.hold)
+    effect_force = effect_forces_along_motion(
+        structure, known_effects, axis_motion, (motion.force, applied - required.force), rate_hz
+    )
+    stride = max(int(rate_hz / (LEAST_SAMPLES_PER_PERIOD * motion.band_hz)), 1)
+    position, velocity, acceleration = (series[::stride] for series in axis_motion)
+    decimated = replace(
+        motion, rate_hz=rate_hz / stride, step=max(int(rate_hz / stride / (MOTION_OVERSAMPLED * motion.band_hz)), 1),
         channels=motion.channels[:m], position=position, velocity=velocity, acceleration=acceleration,
-        force=motion.band_pass(entered + added)[::every], condition=motion.condition[::every],
-        fit=motion.fit[::every], test=motion.test[::every],
+        force=motion.band_pass(applied + effect_force)[::stride], condition=motion.condition[::stride],
+        fit=motion.fit[::stride], test=motion.test[::stride],
     )  # fmt: skip
-    changes = [*_make_grounded_columns(thin, model, recording), *_mode_columns(thin, model, recording, known)]
-    columns = np.stack([whole.force[::every], *changes], axis=1)
-    return _BalanceData(thin, tuple(columns[:, :, axis] for axis in range(m)))
+    changes = [
+        *_compute_grounded_columns(decimated, model, recording),
+        *_compute_mode_columns(decimated, model, recording, known_effects),
+    ]
+    columns = np.stack([required.force[::stride], *changes], axis=1)
+    return _AxisData(decimated, tuple(columns[:, :, axis] for axis in range(m)))
 
 
-def _make_grounded_columns(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
+def _compute_grounded_columns(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
     """(n, m) each: change of the required force per standard deviation of each entry of mass, damping and stiffness at
     the driven axes, in the order of `Tuning`. It is exact, because the force is linear in these entries."""
     tuning, m = tuning_of(model, recording.command.channels), model.inputs
-    pairs = [(i, j) for i in range(m) for j in range(i, m)]
-    length = np.linalg.norm(model.input, axis=0)
+    entries = [(i, j) for i in range(m) for j in range(i, m)]
+    input_norms = np.linalg.norm(model.input, axis=0)
     for part, signal in enumerate((motion.acceleration, motion.velocity, motion.position)):
-        for number, (i, j) in enumerate(pairs, part * len(pairs)):
-            added = np.zeros((len(signal), m))
-            added[:, i] = signal[:, j]
-            added[:, j] = signal[:, i]
-            yield tuning.deviation[number] * added / length
+        for parameter_index, (i, j) in enumerate(entries, part * len(entries)):
+            change = np.zeros((len(signal), m))
+            change[:, i] = signal[:, j]
+            change[:, j] = signal[:, i]
+            yield tuning.deviation[parameter_index] * change / input_norms
 
 
-def _mode_columns(
-    motion: Motion, model: MechanicalModel, recording: Recording, known: Sequence[PlacedEffect]
+def _compute_mode_columns(
+    motion: Motion, model: MechanicalModel, recording: Recording, known_effects: Sequence[PlacedEffect]
 ) -> Iterator[FloatArray]:
     """(n, m) each: change of the required force per standard deviation of each parameter of the modes, by forward
     differences."""
     tuning, m = tuning_of(model, recording.command.channels), model.inputs
-    first = 3 * m * (m + 1) // 2
-    if first == len(tuning.names):
+    first_mode_parameter = 3 * m * (m + 1) // 2
+    if first_mode_parameter == len(tuning.names):
         return
-    seen = motion.position @ (model.output[:m] @ driven_axes(model)).T
-    moved = band_motion(seen, motion.rate_hz, motion.band_hz)
-    steps = DIFFERENCE_STEP * np.eye(len(tuning.names))[first:]
-    here, *there = (
-        compute_required_force(_structure(add_carried_weight(tuning.tune(step), recording), known), moved).force
-        for step in (0 * steps[0], *steps)
+    output_position = motion.position @ (model.output[:m] @ driven_axes(model)).T
+    output_motion = band_motion(output_position, motion.rate_hz, motion.band_hz)
+    deviation_steps = DIFFERENCE_STEP * np.eye(len(tuning.names))[first_mode_parameter:]
+    base_force, *shifted_forces = (
+        compute_required_force(
+            _apply_structural_effects(add_carried_weight(tuning.tune(step), recording), known_effects), output_motion
+        ).force
+        for step in (0 * deviation_steps[0], *deviation_steps)
     )
-    yield from ((each - here) / DIFFERENCE_STEP for each in there)
+    yield from ((shifted_force - base_force) / DIFFERENCE_STEP for shifted_force in shifted_forces)
 
 
-def _structure(model: MechanicalModel, known: Sequence[PlacedEffect]) -> MechanicalModel:
-    """The linear model changed by those known effects that alter its masses, dampers or springs."""
-    return bodies_of(model, [effect for effect in known if isinstance(effect.effect.acts, Structure)]).structure
+def _apply_structural_effects(model: MechanicalModel, known_effects: Sequence[PlacedEffect]) -> MechanicalModel:
+    """Return the model changed by those known effects that alter its masses, dampers or springs."""
+    return build_bodies(
+        model, [effect for effect in known_effects if isinstance(effect.effect.action, Structure)]
+    ).structure

@@ -1,4 +1,4 @@
-"""Confirms laws that a force balance named by fitting them by output error.
+"""Confirmation, by simulation (output-error fits), of the laws that a force balance named.
 
 Theory of operation. Used where the model itself was fitted to the recordings. Without a calibration the size of the
 model's errors is unknown, so that a residual in units of noise is no evidence, but the gain on held-out data is. The
@@ -12,7 +12,7 @@ balance compares forces, where a wrong law may explain the model's own errors; a
 
    and if the model with the laws explains more than half of the held-out power (`held_out_gain.explains_half`).
 3. A law whose amplitude's 95 % interval contains zero is withdrawn, or replaced by the special case that lacks the
-   undetermined parameter, and the remaining laws are fitted again (`_find_vague_law`, `_prefer_special_case`).
+   undetermined parameter, and the remaining laws are fitted again (`_find_undetermined_law`, `_prefer_special_case`).
 4. The verdict is `explained` only if the noise is known from repeats, the residual is as good as noise, and held-out
    errors are at most `HELD_OUT_ERROR`; else `partly_explained`.
 
@@ -29,7 +29,7 @@ from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw, family_of
 from analysis.diagnosis.confirm.held_out_gain import explains_half
 from analysis.diagnosis.confirm.laws_for_simulation import (
-    can_be_played,
+    can_be_simulated,
     constants_of,
     find_special_case,
     hypothesis_of_judged,
@@ -41,205 +41,239 @@ from analysis.diagnosis.errors.hypothesis import combine
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.identifiability import final_errors
+from analysis.diagnosis.search.identifiability import compute_final_errors
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement, SearchResult, as_good_as_noise
 from analysis.diagnosis.settings import CONFIRMED_LEAVES, HELD_OUT_ERROR, INTERVAL_FACTOR
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.signal import FloatArray
 
-VAGUE = 1.96 * INTERVAL_FACTOR
+INTERVAL_HALF_WIDTH = 1.96 * INTERVAL_FACTOR
 """Half-width of a 95 % interval in standard errors, widened as in `identifiability`. A positive parameter is fitted as
 its logarithm: if the half-width exceeds 1, the parameter counts as undetermined."""
-_Named = list[tuple[int, JudgedLaw]]
-"""Index of the axis, and the law that was named on it."""
+_NamedLaws = list[tuple[int, JudgedLaw]]
+"""(axis index, law named on that axis) each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Confirming:
+class _ConfirmationStart:
     """Starting point of every fit of named laws."""
 
-    whole: SearchContext
+    search_context: SearchContext
     """Shared state of the search, with samples to fit and to choose by."""
     context: SearchContext
-    """`whole`, fitted to all samples but the held-out ones."""
+    """`search_context`, fitted to all samples but the held-out ones."""
     balances: tuple[Balance, ...]
     repeats: bool
     """Whether the noise is known from repeats."""
     constants: int
     """Number of constant forces, which come before the laws."""
-    before: FittedCandidate
+    as_given: FittedCandidate
     """The model with constants only, as it was given."""
     retuned: FittedCandidate
     """The same with its parameters fitted again."""
     confirmed: FittedCandidate
     """`retuned`, scored on the held-out samples."""
-    plain: FittedCandidate
-    """The better of `before` and `confirmed` on the held-out samples."""
+    baseline: FittedCandidate
+    """The better of `as_given` and `confirmed` on the held-out samples."""
 
 
 def search_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> SearchResult | None:
     """The named laws of the balances as a search result. repeats: whether the noise is known from repeats; otherwise
     nothing counts as explained. None where nothing is named, or simulations do not confirm it."""
-    named = [
+    named_laws = [
         (axis, law)
         for axis, balance in enumerate(balances)
         for law in balance.named
-        if law.law.effect != CONSTANT and can_be_played(balance.search.regression.beside.own, law)
+        if law.law.effect != CONSTANT and can_be_simulated(balance.search.regression.base_terms.driven_channel, law)
     ]
-    if not named:
+    if not named_laws:
         return None
-    within = context.fit_to_all()
-    constant = constants_of(balances)
-    given = evaluate_fit(within.measure, within.tuning, np.zeros(len(within.tuning.names)), constant)
-    before, retuned = within.with_test_score(within.candidate(given)), within.candidate(refine(within, given))
-    confirmed = within.with_test_score(retuned)
-    plain = Explanation(before, confirmed, confirmed, (), ()).plain
-    begun = _Confirming(
-        context, within, tuple(balances), repeats, len(constant.claims), before, retuned, confirmed, plain
+    full_context = context.fit_to_all()
+    constants = constants_of(balances)
+    given_fit = evaluate_fit(
+        full_context.measure, full_context.tuning, np.zeros(len(full_context.tuning.names)), constants
     )
-    found = _confirm(begun, named)
-    return None if found is None else _prefer_special_case(begun, *found)
+    as_given, retuned = (
+        full_context.with_test_score(full_context.candidate(given_fit)),
+        full_context.candidate(refine(full_context, given_fit)),
+    )
+    confirmed = full_context.with_test_score(retuned)
+    baseline = Explanation(as_given, confirmed, confirmed, (), ()).plain
+    start = _ConfirmationStart(
+        context, full_context, tuple(balances), repeats, len(constants.claims), as_given, retuned, confirmed, baseline
+    )
+    confirmed_laws = _confirm_by_simulation(start, named_laws)
+    return None if confirmed_laws is None else _prefer_special_case(start, *confirmed_laws)
 
 
-def _confirm(begun: _Confirming, named: Sequence[tuple[int, JudgedLaw]]) -> tuple[SearchResult, _Named] | None:
+def _confirm_by_simulation(
+    start: _ConfirmationStart, named_laws: Sequence[tuple[int, JudgedLaw]]
+) -> tuple[SearchResult, _NamedLaws] | None:
     """The result with those of the laws that simulations confirm, and these laws; None where there are none."""
-    context, named = begun.context, refit_laws(begun.balances, named)
-    while named:
-        steps, after = _fit_from_starts(context, begun.balances, (begun.retuned, begun.plain), named)
-        explained = Explanation(begun.before, begun.confirmed, after, tuple((step,) for step in steps), tuple(steps))
-        vague: int | None = len(named) - 1
+    context, named_laws = start.context, refit_laws(start.balances, named_laws)
+    while named_laws:
+        steps, with_laws = _fit_from_starts(context, start.balances, (start.retuned, start.baseline), named_laws)
+        explanation = Explanation(
+            start.as_given, start.confirmed, with_laws, tuple((step,) for step in steps), tuple(steps)
+        )
+        undetermined: int | None = len(named_laws) - 1
         errors: FloatArray | None = None
-        if _is_borne_out(begun.plain, after) and explains_half(context.whole, after):
-            errors = final_errors(context, explained)
-            vague = _find_vague_law(explained, errors[len(context.tuning.names) :], begun.constants)
-        if vague is None:
-            test_error = float(np.nanmax(after.score.test, initial=0.0))
-            whole = begun.repeats and as_good_as_noise(explained) and test_error <= HELD_OUT_ERROR
-            judged = Judgement("explained" if whole else "partly_explained", True)
-            return SearchResult(begun.whole, explained, judged, errors=errors), named
-        simpler = None if errors is None else find_special_case(begun.balances, _remove_law(named, vague), named[vague])
-        named = refit_laws(begun.balances, _remove_law(named, vague, simpler))
+        if _lowers_held_out_error(start.baseline, with_laws) and explains_half(context.whole, with_laws):
+            errors = compute_final_errors(context, explanation)
+            undetermined = _find_undetermined_law(explanation, errors[len(context.tuning.names) :], start.constants)
+        if undetermined is None:
+            test_error = float(np.nanmax(with_laws.score.test, initial=0.0))
+            is_complete = start.repeats and as_good_as_noise(explanation) and test_error <= HELD_OUT_ERROR
+            judgement = Judgement("explained" if is_complete else "partly_explained", True)
+            return SearchResult(start.search_context, explanation, judgement, errors=errors), named_laws
+        special_case = (
+            None
+            if errors is None
+            else find_special_case(start.balances, _remove_law(named_laws, undetermined), named_laws[undetermined])
+        )
+        named_laws = refit_laws(start.balances, _remove_law(named_laws, undetermined, special_case))
     return None
 
 
-def _prefer_special_case(begun: _Confirming, found: SearchResult, named: _Named) -> SearchResult:
+def _prefer_special_case(start: _ConfirmationStart, result: SearchResult, named_laws: _NamedLaws) -> SearchResult:
     """The result with a law replaced by its special case where its further parameters are undetermined (such as a
     stiffness before sliding) and the error hardly rises; else unchanged."""
-    for place in open_refinements(found, begun.constants):
-        simpler = find_special_case(begun.balances, _remove_law(named, place), named[place])
-        other = None if simpler is None else _confirm(begun, _remove_law(named, place, simpler))
-        if other is None or len(other[1]) < len(named):
+    for index in find_open_refinements(result, start.constants):
+        special_case = find_special_case(start.balances, _remove_law(named_laws, index), named_laws[index])
+        alternative = (
+            None
+            if special_case is None
+            else _confirm_by_simulation(start, _remove_law(named_laws, index, special_case))
+        )
+        if alternative is None or len(alternative[1]) < len(named_laws):
             continue
-        if other[0].found.after.held_out <= found.found.after.held_out - np.log(CONFIRMED_LEAVES):
-            return other[0]
-    return found
+        if alternative[0].found.after.held_out_error <= result.found.after.held_out_error - np.log(CONFIRMED_LEAVES):
+            return alternative[0]
+    return result
 
 
-def _remove_law(named: _Named, place: int, instead: tuple[int, JudgedLaw] | None = None) -> _Named:
-    """The named laws without that at `place`, or with `instead` in its place."""
-    return [*named[:place], *([] if instead is None else [instead]), *named[place + 1 :]]
+def _remove_law(named_laws: _NamedLaws, index: int, replacement: tuple[int, JudgedLaw] | None = None) -> _NamedLaws:
+    """The named laws without that at `index`, or with `replacement` in its place."""
+    return [*named_laws[:index], *([] if replacement is None else [replacement]), *named_laws[index + 1 :]]
 
 
 def _fit_from_starts(
     context: SearchContext,
     balances: Sequence[Balance],
-    without: tuple[FittedCandidate, FittedCandidate],
-    named: Sequence[tuple[int, JudgedLaw]],
+    reference_fits: tuple[FittedCandidate, FittedCandidate],
+    named_laws: Sequence[tuple[int, JudgedLaw]],
 ) -> tuple[list[FittedCandidate], FittedCandidate]:
     """The fits after each law, and the last of them scored on the held-out samples too. They start from the linear
-    parameters of the balance, or, where that fit is not confirmed, from those of the model if these do better. without:
-    the re-tuned model, and the better model without laws on held-out samples."""
-    retuned, plain = without
-    released = parameters_beside_laws(context.tuning, balances, [law.place for _, law in named])
-    steps = _steps(context, retuned, named, released)
-    after = context.with_test_score(steps[-1])
-    if np.any(released) and not _is_borne_out(plain, after):
-        again = _steps(context, retuned, named, np.zeros(len(released)))
-        other = context.with_test_score(again[-1])
-        if other.held_out < after.held_out:
-            return again, other
-    return steps, after
+    parameters of the balance, or, where that fit is not confirmed, from those of the model if these do better.
+    reference_fits: the re-tuned model, and the better model without laws on held-out samples."""
+    retuned, baseline = reference_fits
+    balance_deviations = parameters_beside_laws(context.tuning, balances, [law.place for _, law in named_laws])
+    steps = _fit_steps(context, retuned, named_laws, balance_deviations)
+    with_laws = context.with_test_score(steps[-1])
+    if np.any(balance_deviations) and not _lowers_held_out_error(baseline, with_laws):
+        steps_from_model = _fit_steps(context, retuned, named_laws, np.zeros(len(balance_deviations)))
+        with_laws_from_model = context.with_test_score(steps_from_model[-1])
+        if with_laws_from_model.held_out_error < with_laws.held_out_error:
+            return steps_from_model, with_laws_from_model
+    return steps, with_laws
 
 
-def _steps(
-    context: SearchContext, retuned: FittedCandidate, named: Sequence[tuple[int, JudgedLaw]], deviations: FloatArray
+def _fit_steps(
+    context: SearchContext,
+    retuned: FittedCandidate,
+    named_laws: Sequence[tuple[int, JudgedLaw]],
+    deviations: FloatArray,
 ) -> list[FittedCandidate]:
     """The fits with the constants and the laws, added one after the other; for each constant, the re-tuned model.
     deviations: where the model's parameters start, in standard deviations."""
-    whole = retuned.fitted.hypothesis
-    steps = [retuned for _ in whole.claims]
+    hypothesis = retuned.fitted.hypothesis
+    steps = [retuned for _ in hypothesis.claims]
     recording = context.measure.records[0].recording
-    for axis, law in named:
-        claimed = combine(whole, hypothesis_of_judged(axis, law, recording))
-        start = evaluate_fit(context.measure, context.tuning, deviations, claimed)
-        found = refine(context, start)
-        steps.append(context.candidate(found))
-        whole, deviations = found.hypothesis, found.deviations
+    for axis, law in named_laws:
+        extended = combine(hypothesis, hypothesis_of_judged(axis, law, recording))
+        start = evaluate_fit(context.measure, context.tuning, deviations, extended)
+        fitted = refine(context, start)
+        steps.append(context.candidate(fitted))
+        hypothesis, deviations = fitted.hypothesis, fitted.deviations
     return steps
 
 
-def _find_vague_law(explained: Explanation, errors: FloatArray, constants: int) -> int | None:
-    """Index of a named law that may be absent; None = there is none. A law may be absent if the intervals of all
+def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constants: int) -> int | None:
+    """Index of a named law that may be absent; None if there is none. A law may be absent if the intervals of all
     parameters that can make it vanish contain the vanishing value, or those of all signed parameters that its special
     case lacks. Where the law only refines another of its family, or is outside the catalogue, one such parameter is
     enough. errors: standard errors of the parameters; constants: number of constant forces before the laws."""
-    begin, hypothesis = 0, explained.steps[-1].fitted.hypothesis
-    families = [family_of(claim.effect.name) for claim in hypothesis.claims]
-    for place, claim in enumerate(hypothesis.claims):
-        free = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
-        every = (place > constants and families[place] in families[constants:place]) or claim.effect.law is not None
-        special = {parameter.name for name in claim.effect.simpler for parameter in EFFECTS[name].parameters}
-        vague, beyond = [], []
-        for number, parameter in enumerate(free, begin):
-            size = {"log": 1.0, "signed": abs(float(hypothesis.point[number])), "linear": np.inf}[parameter.scale]
-            if every or parameter.none is not None:
-                vague.append(VAGUE * errors[number] >= size)
-            if special and parameter.scale == "signed" and parameter.name not in special:
-                beyond.append(VAGUE * errors[number] >= size)
-        if place >= constants and (any(vague) if every else _all_of_some(vague) or _all_of_some(beyond)):
-            return place - constants
-        begin += len(free)
+    first_parameter, hypothesis = 0, explanation.steps[-1].fitted.hypothesis
+    law_families = [family_of(claim.effect.name) for claim in hypothesis.claims]
+    for index, claim in enumerate(hypothesis.claims):
+        free_parameters = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
+        any_suffices = (
+            index > constants and law_families[index] in law_families[constants:index]
+        ) or claim.effect.law is not None
+        special_case_names = {parameter.name for name in claim.effect.simpler for parameter in EFFECTS[name].parameters}
+        undetermined, extra_undetermined = [], []
+        for parameter_index, parameter in enumerate(free_parameters, first_parameter):
+            vanishing_distance = {
+                "log": 1.0,
+                "signed": abs(float(hypothesis.point[parameter_index])),
+                "linear": np.inf,
+            }[parameter.scale]
+            if any_suffices or parameter.none is not None:
+                undetermined.append(INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance)
+            if special_case_names and parameter.scale == "signed" and parameter.name not in special_case_names:
+                extra_undetermined.append(INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance)
+        if index >= constants and (
+            any(undetermined) if any_suffices else _has_only_true(undetermined) or _has_only_true(extra_undetermined)
+        ):
+            return index - constants
+        first_parameter += len(free_parameters)
     return None
 
 
-def _all_of_some(flags: Sequence[bool]) -> bool:
-    """Whether there are flags and all are true."""
+def _has_only_true(flags: Sequence[bool]) -> bool:
+    """Whether all flags are true; False for no flags."""
     return bool(flags) and all(flags)
 
 
-def leaves_open(result: SearchResult) -> bool:
+def has_open_parameter(result: SearchResult) -> bool:
     """Whether the interval of any positive parameter of a law reaches zero, such as a stiffness before sliding."""
-    return bool(_open_parameters(result))
+    return bool(_find_open_parameters(result))
 
 
-def open_refinements(result: SearchResult, constants: int) -> tuple[int, ...]:
+def find_open_refinements(result: SearchResult, constants: int) -> tuple[int, ...]:
     """Indices of the named laws with a parameter whose interval reaches zero and which their special case lacks.
     constants: number of constant forces before the laws."""
     hypothesis = result.found.steps[-1].fitted.hypothesis
-    found, begin, left_open = [], 0, set(_open_parameters(result))
-    for place, claim in enumerate(hypothesis.claims):
-        free = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
-        special = {parameter.name for name in claim.effect.simpler for parameter in EFFECTS[name].parameters}
-        beyond = [begin + number for number, parameter in enumerate(free) if parameter.name not in special]
-        if special and place >= constants and left_open & set(beyond):
-            found.append(place - constants)
-        begin += len(free)
-    return tuple(found)
+    indices, first_parameter, open_parameters = [], 0, set(_find_open_parameters(result))
+    for index, claim in enumerate(hypothesis.claims):
+        free_parameters = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
+        special_case_names = {parameter.name for name in claim.effect.simpler for parameter in EFFECTS[name].parameters}
+        extra_parameters = [
+            first_parameter + position
+            for position, parameter in enumerate(free_parameters)
+            if parameter.name not in special_case_names
+        ]
+        if special_case_names and index >= constants and open_parameters & set(extra_parameters):
+            indices.append(index - constants)
+        first_parameter += len(free_parameters)
+    return tuple(indices)
 
 
-def _open_parameters(result: SearchResult) -> list[int]:
+def _find_open_parameters(result: SearchResult) -> list[int]:
     """Indices of the positive parameters, over all claims in their order, whose intervals reach zero."""
     assert result.errors is not None
-    numbers = result.found.steps[-1].fitted.hypothesis.parameters
+    fitted_parameters = result.found.steps[-1].fitted.hypothesis.parameters
     errors = result.errors[len(result.context.tuning.names) :]
     return [
-        place
-        for place, (number, error) in enumerate(zip(numbers, errors, strict=True))
-        if number.parameter.scale == "log" and VAGUE * error >= 1
+        index
+        for index, (fitted_parameter, error) in enumerate(zip(fitted_parameters, errors, strict=True))
+        if fitted_parameter.parameter.scale == "log" and INTERVAL_HALF_WIDTH * error >= 1
     ]
 
 
-def _is_borne_out(plain: FittedCandidate, after: FittedCandidate) -> bool:
+def _lowers_held_out_error(baseline: FittedCandidate, with_laws: FittedCandidate) -> bool:
     """Whether the laws reduce the held-out error to `CONFIRMED_LEAVES` or less; True where nothing was held out."""
-    return not np.isfinite(plain.held_out) or after.held_out <= plain.held_out + np.log(CONFIRMED_LEAVES)
+    return not np.isfinite(baseline.held_out_error) or with_laws.held_out_error <= baseline.held_out_error + np.log(
+        CONFIRMED_LEAVES
+    )

@@ -4,7 +4,8 @@ Used where residuals exceed the noise. Where repeats show that the noise is abou
 likelihood decides (`verdict`). Otherwise the residual of a real device is far above its noise, and remains so even with
 a true law. An effect is then named if it removes enough of the held-out error power, with a 95 % interval by block
 bootstrap (`held_out_gain`): compared with the model without it and with its best rival. An effect that removes less
-than half of the power must also be named by the force balance. `objection` tests these conditions in their order.
+than half of the power must also be named by the force balance. `find_objection` tests these conditions in this order.
+Called by `diagnose`.
 """
 
 from collections.abc import Sequence
@@ -12,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.judge_laws import PLAYED_AS, Balance
-from analysis.diagnosis.confirm.balance_with_model import find_balances_beside_model
+from analysis.diagnosis.balance.judge_laws import SIMULATED_AS, Balance
+from analysis.diagnosis.confirm.balance_with_model import find_balances_with_model
 from analysis.diagnosis.confirm.confirm_laws import search_by_balance
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, held_out_gain
@@ -45,75 +46,75 @@ def decide_with_model(
 ) -> ResultWithModel:
     """The result after the decision, and the force balances with the model as their base. result: of the search by
     simulation, with errors compared sample by sample, after which some error is unexplained."""
-    known_noise = all(floor.how == "repeats" for floor in fitting.chosen.floors)
-    balances = find_balances_beside_model(recordings, fitting.model, result.context.barred, time_left)
+    known_noise = all(floor.method == "repeats" for floor in fitting.chosen.floors)
+    balances = find_balances_with_model(recordings, fitting.model, result.context.excluded, time_left)
     near_noise = float(np.nanmax(result.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
     if result.judgement.named or result.found.barred:
         return ResultWithModel(result, balances)
     if known_noise and near_noise:
-        why_not = "the noise is known here, and the residual with it is larger than the noise"
+        reason = "the noise is known here, and the residual with it is larger than the noise"
         return ResultWithModel(
-            replace(result, unconfirmed=(*result.unconfirmed, *_list_unconfirmed(result, why_not))), balances
+            replace(result, unconfirmed=(*result.unconfirmed, *_list_unconfirmed(result, reason))), balances
         )
-    why_not = objection(result, balances)
-    if result.found.steps and not why_not:
+    reason = find_objection(result, balances)
+    if result.found.steps and not reason:
         return ResultWithModel(replace(result, judgement=Judgement("partly_explained", True)), balances)
-    found = search_by_balance(result.context, balances, known_noise) if balances else None
-    if found is not None and not objection(found, balances):
-        judged = replace(found.judgement, verdict="partly_explained")
-        return ResultWithModel(replace(found, judgement=judged, remarks=result.remarks), balances)
+    balance_result = search_by_balance(result.context, balances, known_noise) if balances else None
+    if balance_result is not None and not find_objection(balance_result, balances):
+        judgement = replace(balance_result.judgement, verdict="partly_explained")
+        return ResultWithModel(replace(balance_result, judgement=judgement, remarks=result.remarks), balances)
     return ResultWithModel(
-        replace(result, unconfirmed=(*result.unconfirmed, *_list_unconfirmed(result, why_not))), balances
+        replace(result, unconfirmed=(*result.unconfirmed, *_list_unconfirmed(result, reason))), balances
     )
 
 
-def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
+def find_objection(result: SearchResult, balances: Sequence[Balance]) -> str:
     """Reason not to name the effects that were found, as a sentence; empty where they are named."""
-    context, found = result.context, result.found
-    if not found.steps:
+    context, explanation = result.context, result.found
+    if not explanation.steps:
         return "it explains too little of the error to be added"
-    whole = held_out_gain(context.whole, found.plain, found.after)
-    before = context.with_test_score(found.steps[-2]) if len(found.steps) > 1 else found.plain
-    last = held_out_gain(context.whole, before, found.after)
-    if whole is None or last is None:
+    total_gain = held_out_gain(context.whole, explanation.plain, explanation.after)
+    previous = context.with_test_score(explanation.steps[-2]) if len(explanation.steps) > 1 else explanation.plain
+    last_gain = held_out_gain(context.whole, previous, explanation.after)
+    if total_gain is None or last_gain is None:
         return "too little data was held out to confirm it"
-    if min(whole.low, last.low) <= 0:
+    if min(total_gain.low, last_gain.low) <= 0:
         return "its gain on held-out data is not larger than its variation between stretches of the recording"
-    if min(whole.gain, last.gain) < FURTHER_LAW_OF_ALL:
+    if min(total_gain.gain, last_gain.gain) < FURTHER_LAW_OF_ALL:
         return (
-            f"on held-out data it explains {100 * min(whole.gain, last.gain):.1f} % of the error's power, "
+            f"on held-out data it explains {100 * min(total_gain.gain, last_gain.gain):.1f} % of the error's power, "
             f"and {100 * FURTHER_LAW_OF_ALL:.0f} % are required"
         )
-    if context.tuning.is_at_bound(found.after.fitted.deviations):
+    if context.tuning.is_at_bound(explanation.after.fitted.deviations):
         return "with it, the fit moves a parameter of the model to the limit of its tolerance"
-    rival = _best_rival(context, result)
-    if rival is not None and _not_better(context, rival, found.after):
+    rival = _find_best_rival(context, result)
+    if rival is not None and _is_indistinguishable(context, rival, explanation.after):
         return f"these data cannot distinguish it from {rival.newest.replace('_', ' ')}"
-    claims = found.after.fitted.hypothesis.claims
-    if whole.gain < NAMED_OF_CEILING and not all(_is_named_by_balance(claim, balances) for claim in claims):
+    claims = explanation.after.fitted.hypothesis.claims
+    if total_gain.gain < NAMED_OF_CEILING and not all(_is_named_by_balance(claim, balances) for claim in claims):
         return "it explains less than half of the error's power, and the force balance does not confirm it"
     return ""
 
 
-def _not_better(context: SearchContext, rival: FittedCandidate, after: FittedCandidate) -> bool:
+def _is_indistinguishable(context: SearchContext, rival: FittedCandidate, with_effect: FittedCandidate) -> bool:
     """Whether the 95 % interval of the gain over the rival reaches zero, or the gain cannot be computed."""
-    gain_over_rival = held_out_gain(context.whole, rival, after)
+    gain_over_rival = held_out_gain(context.whole, rival, with_effect)
     return gain_over_rival is None or gain_over_rival.low <= 0
 
 
-def _best_rival(context: SearchContext, result: SearchResult) -> FittedCandidate | None:
-    """The best rival of the last effect that is no refinement of it, scored on held-out samples; None = there is
-    none."""
+def _find_best_rival(context: SearchContext, result: SearchResult) -> FittedCandidate | None:
+    """The best rival of the last effect that is no refinement of it, scored on held-out samples; None without a
+    rival."""
     steps = result.found.steps
     if len(result.found.rounds) < len(steps):
         return None
     best = steps[-1]
-    others = [
-        other
-        for other in result.found.rounds[len(steps) - 1]
-        if other.newest != best.newest and not only_refines(other, best)
+    rivals = [
+        rival
+        for rival in result.found.rounds[len(steps) - 1]
+        if rival.newest != best.newest and not only_refines(rival, best)
     ]
-    return context.with_test_score(others[0]) if others else None
+    return context.with_test_score(rivals[0]) if rivals else None
 
 
 def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
@@ -122,32 +123,32 @@ def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
         return False
     names = {
         name
-        for weighed in balances[claim.sites[0]].named
-        for name in (weighed.law.effect, PLAYED_AS.get(weighed.law.effect, ""), *weighed.alike)
+        for judged_law in balances[claim.sites[0]].named
+        for name in (judged_law.law.effect, SIMULATED_AS.get(judged_law.law.effect, ""), *judged_law.equivalents)
     }
     return claim.effect.name in names
 
 
-def _list_unconfirmed(result: SearchResult, why_not: str) -> tuple[Unconfirmed, ...]:
+def _list_unconfirmed(result: SearchResult, reason: str) -> tuple[Unconfirmed, ...]:
     """The best candidates of the round in which the search ended, the largest gain first."""
     rounds = [fitted_candidates for fitted_candidates in result.found.rounds if fitted_candidates]
     if not rounds:
         return ()
-    number = max(min(len(result.found.steps), len(rounds)) - 1, 0)
-    first: dict[str, FittedCandidate] = {}
-    for candidate in rounds[number]:
-        first.setdefault(candidate.newest, candidate)
-    found = []
-    for place, candidate in enumerate([*first.values()][:CANDIDATES_WITH_GAIN]):
+    round_number = max(min(len(result.found.steps), len(rounds)) - 1, 0)
+    best_by_effect: dict[str, FittedCandidate] = {}
+    for candidate in rounds[round_number]:
+        best_by_effect.setdefault(candidate.newest, candidate)
+    unconfirmed = []
+    for rank, candidate in enumerate([*best_by_effect.values()][:CANDIDATES_WITH_GAIN]):
         gain = held_out_gain(result.context.whole, result.found.plain, result.context.with_test_score(candidate))
         if gain is not None and gain.gain > 0:
-            found.append(
-                Unconfirmed(candidate.fitted.hypothesis, gain.gain, why_not if place == 0 else _why_behind(gain))
+            unconfirmed.append(
+                Unconfirmed(candidate.fitted.hypothesis, gain.gain, reason if rank == 0 else _explain_not_best(gain))
             )
-    return tuple(sorted(found, key=lambda each: -each.gain))
+    return tuple(sorted(unconfirmed, key=lambda item: -item.gain))
 
 
-def _why_behind(gain: HeldOutGain) -> str:
+def _explain_not_best(gain: HeldOutGain) -> str:
     """Reason, as a sentence, why a candidate other than the best is not named."""
     if gain.low <= 0:
         return "its gain on held-out data is not larger than its variation between stretches of the recording"

@@ -14,10 +14,10 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.confirm.fitting_measures import ABOUT_MEAN, FittingMeasure, about_mean_force
+from analysis.diagnosis.confirm.fitting_measures import CONSTANT_ADDED, FittingMeasure, shift_to_mean_force
 from analysis.diagnosis.data.measured_motion import is_quasi_static, is_read_as_free
 from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, measure_by_force, measure_of
-from analysis.diagnosis.first_model.model_from_balance import first_model, share_within
+from analysis.diagnosis.first_model.model_from_balance import first_model, law_power_share_in_band
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.settings import LAWS_WITHIN
@@ -54,10 +54,10 @@ def list_fitting_measures(
         reduced, linear = _model_of_balances(recordings, balances, model.name)
         if linear is not None:
             narrow = measure_by_force(reduced, linear, None)
-            inside = 0.0
+            power_share = 0.0
             if isinstance(narrow.measure, PredictedForce):
-                inside = share_within(balances, narrow.measure.band_hz)
-            if inside >= LAWS_WITHIN:
+                power_share = law_power_share_in_band(balances, narrow.measure.band_hz)
+            if power_share >= LAWS_WITHIN:
                 yield FittingMeasure(linear, narrow, narrow=True)
             band_hz = balances[0].search.regression.motions[0].band_hz
             yield FittingMeasure(linear, measure_by_force(reduced, linear, band_hz))
@@ -75,23 +75,25 @@ def choose_forces_of_balance(
     to fit and to choose by. A model fitted to spectra in closed loop may need modes that are unnecessary where the
     motion of a second body is measured.
     """
-    given = fitting.chosen.measure
-    named, first = any(balance.named for balance in balances), recordings[0]
-    if not balances or named or is_quasi_static(first) or is_read_as_free(first):
+    given_measure = fitting.chosen.measure
+    has_named_law, first = any(balance.named for balance in balances), recordings[0]
+    if not balances or has_named_law or is_quasi_static(first) or is_read_as_free(first):
         return fitting
-    if not isinstance(given, PredictedForce):
+    if not isinstance(given_measure, PredictedForce):
         return fitting
     try:
         reduced, linear = _model_of_balances(recordings, balances, fitting.model.name)
         if linear is None:
             return fitting
-        chosen = _predict_about_mean(reduced, linear, given.band_hz)
+        chosen = _predict_about_mean(reduced, linear, given_measure.band_hz)
     except (MechanicalModelError, np.linalg.LinAlgError):
         return fitting
     measure = chosen.measure
-    if not isinstance(measure, PredictedForce) or not _predicts_better((linear, measure), (fitting.model, given)):
+    if not isinstance(measure, PredictedForce) or not _predicts_better(
+        (linear, measure), (fitting.model, given_measure)
+    ):
         return fitting
-    remarks = tuple(remark for remark in fitting.chosen.remarks if remark != ABOUT_MEAN)
+    remarks = tuple(remark for remark in fitting.chosen.remarks if remark != CONSTANT_ADDED)
     chosen = replace(chosen, remarks=(*remarks, BALANCE_PREDICTS_BETTER))
     return FittingMeasure(linear, chosen, is_reduced=is_reduced(balances))
 
@@ -111,7 +113,7 @@ def _predict_about_mean(recordings: Sequence[Recording], model: MechanicalModel,
     chosen = measure_by_force(recordings, model, band_hz)
     if not isinstance(chosen.measure, PredictedForce):
         return chosen
-    return measure_by_force(about_mean_force(recordings, model, chosen.measure), model, band_hz)
+    return measure_by_force(shift_to_mean_force(recordings, model, chosen.measure), model, band_hz)
 
 
 Prediction = tuple[MechanicalModel, PredictedForce]
@@ -124,16 +126,16 @@ def _predicts_better(linear: Prediction, given: Prediction) -> bool:
     The error is mean over axes of (power of predicted force minus command) / (power of the command), over the samples
     to fit and to choose by of both measures; axes without a command are left out.
     """
-    kept = [
-        (own.fit | own.choose) & (other.fit | other.choose)
-        for own, other in zip(linear[1].records, given[1].records, strict=True)
+    masks = [
+        (linear_record.fit | linear_record.choose) & (given_record.fit | given_record.choose)
+        for linear_record, given_record in zip(linear[1].records, given[1].records, strict=True)
     ]
-    commands = np.vstack([record.command[mask] for record, mask in zip(given[1].records, kept, strict=True)])
+    commands = np.vstack([record.command[mask] for record, mask in zip(given[1].records, masks, strict=True)])
     power = np.mean(commands**2, axis=0)
     driven = power > 0
     shares = []
     for model, measure in (linear, given):
-        parts = [part[mask] for part, mask in zip(measure.residuals(model, ()), kept, strict=True)]
+        parts = [part[mask] for part, mask in zip(measure.residuals(model, ()), masks, strict=True)]
         errors = np.vstack(parts) * measure.unit
         shares.append(np.mean(errors[:, driven] ** 2 / power[driven]))
     return bool(shares[0] < shares[1])

@@ -31,58 +31,60 @@ class HeldOutGain:
     """Upper bound of the 95 % interval."""
 
 
-def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: FittedCandidate) -> HeldOutGain | None:
-    """The gain of the candidate `with_it` over the candidate `without`, both fitted with this measure. None where fewer
-    than `LEAST_HELD_OUT_STRETCHES` are held out, or where a residual is not finite."""
-    left, right = (_powers(measure, each) for each in (without, with_it))
-    if len(left) < LEAST_HELD_OUT_STRETCHES or not (np.isfinite(left).all() and np.isfinite(right).all()):
+def held_out_gain(measure: ErrorMeasure, baseline: FittedCandidate, candidate: FittedCandidate) -> HeldOutGain | None:
+    """The gain of `candidate` over `baseline`, both fitted with this measure. None where fewer than
+    `LEAST_HELD_OUT_STRETCHES` are held out, or where a residual is not finite."""
+    powers_without, powers_with = (_stretch_powers(measure, fit) for fit in (baseline, candidate))
+    if len(powers_without) < LEAST_HELD_OUT_STRETCHES or not (
+        np.isfinite(powers_without).all() and np.isfinite(powers_with).all()
+    ):
         return None
     # Each channel in units of its residual without the effect, so that no channel dominates.
-    size = np.maximum(left.sum(axis=0), np.finfo(float).tiny)
-    before, after = (left / size).mean(axis=1), (right / size).mean(axis=1)
-    drawn = bootstrap_draws(len(before))
-    shares = 1 - after[drawn].sum(axis=1) / np.maximum(before[drawn].sum(axis=1), np.finfo(float).tiny)
+    size = np.maximum(powers_without.sum(axis=0), np.finfo(float).tiny)
+    scaled_without, scaled_with = (powers_without / size).mean(axis=1), (powers_with / size).mean(axis=1)
+    draws = bootstrap_draws(len(scaled_without))
+    shares = 1 - scaled_with[draws].sum(axis=1) / np.maximum(scaled_without[draws].sum(axis=1), np.finfo(float).tiny)
     low, high = np.quantile(shares, [BOOTSTRAP_LEVEL, 1 - BOOTSTRAP_LEVEL])
-    return HeldOutGain(float(1 - after.sum() / before.sum()), float(low), float(high))
+    return HeldOutGain(float(1 - scaled_with.sum() / scaled_without.sum()), float(low), float(high))
 
 
-def predicts_something(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
+def predicts_motion(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
     """Whether the model with its effects predicts a held-out motion better than the mean of that motion does. A law
     that only stabilises an unstable model fails this test. Channels that contain only noise are not counted. True
     without a test where forces are compared, or where no motion is held out."""
-    return measure.name == "predicted force" or _share_left(measure, candidate, 0.0) < 1
+    return measure.name == "predicted force" or _remaining_share(measure, candidate, 0.0) < 1
 
 
 def explains_half(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
     """Whether the model with its effects explains more than half of the held-out power beyond noise. With less, its law
     may only be the best substitute for a law that was not found. True where no motion is held out."""
-    return predicts_something(measure, candidate) and _share_left(measure, candidate, 1.0) < 0.5
+    return predicts_motion(measure, candidate) and _remaining_share(measure, candidate, 1.0) < 0.5
 
 
-def _share_left(measure: ErrorMeasure, candidate: FittedCandidate, noise_taken: float) -> float:
+def _remaining_share(measure: ErrorMeasure, candidate: FittedCandidate, noise_factor: float) -> float:
     """Mean over channels of (e^2 - k n^2) / (s^2 - k n^2) on held-out samples: rms residual e, rms signal s, rms noise
-    n, and k = noise_taken (1 subtracts the noise power, 0 does not). Channels with s up to `HELD_OUT_SURPRISE` n are
+    n, and k = noise_factor (1 subtracts the noise power, 0 does not). Channels with s up to `HELD_OUT_SURPRISE` n are
     left out; 0 where none remains, or nothing is held out."""
     masks = [record.test for record in measure.records]
     if not any(mask.any() for mask in masks):
         return 0.0
-    left = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit
+    residual_rms = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit
     size = signal_rms(measure.records, masks)
-    moves = size > HELD_OUT_SURPRISE * measure.noise
-    if not moves.any():
+    is_moving = size > HELD_OUT_SURPRISE * measure.noise
+    if not is_moving.any():
         return 0.0
-    noise = noise_taken * measure.noise[moves] ** 2
-    return float(np.mean((left[moves] ** 2 - noise) / (size[moves] ** 2 - noise)))
+    noise = noise_factor * measure.noise[is_moving] ** 2
+    return float(np.mean((residual_rms[is_moving] ** 2 - noise) / (size[is_moving] ** 2 - noise)))
 
 
-def _powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:
+def _stretch_powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:
     """(stretches, c): sums of squares of the held-out residuals, in units of `measure.unit`. All records together are
     cut into about `HELD_OUT_STRETCHES` consecutive stretches, at least one per record."""
     total = sum(int(record.test.sum()) for record in measure.records)
-    found = []
+    sums = []
     for record, residuals in zip(measure.records, candidate.fitted.residuals, strict=True):
-        places = np.flatnonzero(record.test)
-        if len(places):
-            count = int(np.clip(round(HELD_OUT_STRETCHES * len(places) / total), 1, len(places)))
-            found += [np.sum(residuals[part] ** 2, axis=0) for part in np.array_split(places, count)]
-    return np.array(found).reshape(len(found), -1)
+        indices = np.flatnonzero(record.test)
+        if len(indices):
+            count = int(np.clip(round(HELD_OUT_STRETCHES * len(indices) / total), 1, len(indices)))
+            sums += [np.sum(residuals[part] ** 2, axis=0) for part in np.array_split(indices, count)]
+    return np.array(sums).reshape(len(sums), -1)

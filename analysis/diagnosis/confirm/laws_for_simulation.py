@@ -12,75 +12,77 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.balance.structures import values_of
+from analysis.diagnosis.balance.structures import fit_values
 from analysis.diagnosis.confirm.require_gain import CONSTANT
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-_OWN = re.compile(r"\b[qvf]\b")
+_OWN_SIGNALS = re.compile(r"\b[qvf]\b")
 """Position, velocity and command of the own axis in a formula."""
 _PREFIX = {"q": "", "v": "v", "f": "f"}
 """Prefix of an axis's name in the language of laws, by the symbol in a formula of the balance: on axis x, q becomes x,
 v becomes vx and f becomes fx."""
 
 
-def can_be_played(own: int, judged: JudgedLaw) -> bool:
+def can_be_simulated(own_channel: int, judged_law: JudgedLaw) -> bool:
     """Whether a simulation can use the law: it has a formula, or is an effect of the catalogue that depends on the
-    motion of its own axis and has all parameters within their bounds. own: channel of that motion."""
-    if judged.formula is not None:
+    motion of its own axis and has all parameters within their bounds. own_channel: channel of that motion."""
+    if judged_law.formula is not None:
         return True
-    effect = EFFECTS.get(judged.law.effect)
-    if effect is None or judged.law.channel != own:
+    effect = EFFECTS.get(judged_law.law.effect)
+    if effect is None or judged_law.law.channel != own_channel:
         return False
     return all(
-        parameter.name in judged.values and parameter.lower <= judged.values[parameter.name] <= parameter.upper
+        parameter.name in judged_law.values and parameter.lower <= judged_law.values[parameter.name] <= parameter.upper
         for parameter in effect.parameters
     )
 
 
-def refit_laws(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]]) -> list[tuple[int, JudgedLaw]]:
+def refit_laws(balances: Sequence[Balance], named_laws: Sequence[tuple[int, JudgedLaw]]) -> list[tuple[int, JudgedLaw]]:
     """The laws with the parameters that the balances give when only these laws are fitted."""
-    found = []
-    for axis, law in named:
+    refitted = []
+    for axis, law in named_laws:
         if not law.has_column:
-            found.append((axis, law))
+            refitted.append((axis, law))
             continue
         regression = balances[axis].search.regression
-        places = [other.place for of, other in named if of == axis and other.has_column]
-        values = values_of(regression, places)[places.index(law.place)]
-        found.append((axis, law if values is None else _with_values(law, values)))
-    return found
+        places = [
+            other_law.place for other_axis, other_law in named_laws if other_axis == axis and other_law.has_column
+        ]
+        values = fit_values(regression, places)[places.index(law.place)]
+        refitted.append((axis, law if values is None else _with_values(law, values)))
+    return refitted
 
 
-def _with_values(judged: JudgedLaw, values: dict[str, float]) -> JudgedLaw:
+def _with_values(judged_law: JudgedLaw, values: dict[str, float]) -> JudgedLaw:
     """The law with these parameters, also in its formula where there is a formula."""
-    formula = judged.formula if judged.law.formula is None else judged.law.formula(values)
-    return replace(judged, values=values, formula=formula)
+    formula = judged_law.formula if judged_law.law.formula is None else judged_law.law.formula(values)
+    return replace(judged_law, values=values, formula=formula)
 
 
 def find_special_case(
-    balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]], refining: tuple[int, JudgedLaw]
+    balances: Sequence[Balance], named_laws: Sequence[tuple[int, JudgedLaw]], refining: tuple[int, JudgedLaw]
 ) -> tuple[int, JudgedLaw] | None:
     """The special case of a law on the same axis, such as Coulomb friction of Stribeck friction, with the parameters of
     the refining law until `refit_laws`. None where the balance does not contain it, or it is named already."""
-    axis, judged = refining
-    effect = EFFECTS.get(judged.law.effect)
-    taken = {law.law.effect for of, law in named if of == axis}
+    axis, judged_law = refining
+    effect = EFFECTS.get(judged_law.law.effect)
+    named_effects = {law.law.effect for law_axis, law in named_laws if law_axis == axis}
     for place, law in enumerate(balances[axis].search.regression.laws):
-        alike = law.channel == judged.law.channel and law.effect not in taken
-        if effect is not None and alike and law.effect in effect.simpler:
-            return axis, replace(judged, place=place, law=law)
+        is_unnamed = law.channel == judged_law.law.channel and law.effect not in named_effects
+        if effect is not None and is_unnamed and law.effect in effect.simpler:
+            return axis, replace(judged_law, place=place, law=law)
     return None
 
 
 def constants_of(balances: Sequence[Balance]) -> Hypothesis:
     """Constant forces along the axes: a weight, or the offset of an amplifier or sensor, which mass, damping and
     stiffness do not describe."""
-    whole = NOTHING
+    hypothesis = NO_EFFECTS
     for axis, balance in enumerate(balances):
         regression = balance.search.regression
         if regression.prior is not None:
@@ -88,25 +90,25 @@ def constants_of(balances: Sequence[Balance]) -> Hypothesis:
         force = -float(regression.weights(regression.columns_of(()))[-1])
         if force:
             claim = Claim(EFFECTS[CONSTANT], "one", (axis,))
-            whole = combine(whole, hypothesis_of_claim(claim, [{"force": force}]))
-    return whole
+            hypothesis = combine(hypothesis, hypothesis_of_claim(claim, [{"force": force}]))
+    return hypothesis
 
 
-def hypothesis_of_judged(axis: int, judged: JudgedLaw, recording: Recording) -> Hypothesis:
+def hypothesis_of_judged(axis: int, judged_law: JudgedLaw, recording: Recording) -> Hypothesis:
     """A named law of the balance as a hypothesis to simulate. recording: has the channels that a formula refers to."""
-    if judged.formula is not None:
+    if judged_law.formula is not None:
         # Imported here: few diagnoses have such a law.
         from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
         from equalizer.effects.discovered_law import axis_names
         from equalizer.laws.law import Law
 
-        name, formula = axis_names(recording.command.channels)[axis], judged.formula
-        text = _OWN.sub(lambda signal: f"{_PREFIX[signal[0]]}{name}", formula.text)
+        name, formula = axis_names(recording.command.channels)[axis], judged_law.formula
+        text = _OWN_SIGNALS.sub(lambda signal: f"{_PREFIX[signal[0]]}{name}", formula.text)
         return hypothesis_of_law(Law(text, formula.numbers, (), formula.acts_on, name), axis, recording)
-    known = EFFECTS_BY_NAME[judged.law.effect].parameters
+    parameters = EFFECTS_BY_NAME[judged_law.law.effect].parameters
     return hypothesis_of_claim(
-        Claim(EFFECTS[judged.law.effect], "one", (axis,)),
-        [{p.name: judged.values[p.name] for p in known if p.name in judged.values}],
+        Claim(EFFECTS[judged_law.law.effect], "one", (axis,)),
+        [{p.name: judged_law.values[p.name] for p in parameters if p.name in judged_law.values}],
     )
 
 
@@ -122,8 +124,8 @@ def parameters_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Se
         return start
     regression = balances[0].search.regression
     weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
-    given = (model.mass, model.damping, model.stiffness)
-    for place, (weight, matrix) in enumerate(zip(weights, given, strict=False)):
+    matrices = (model.mass, model.damping, model.stiffness)
+    for place, (weight, matrix) in enumerate(zip(weights, matrices, strict=False)):
         if tuning.deviation[place] == 0:  # the parameter is not tuned
             continue
         if place == 0:

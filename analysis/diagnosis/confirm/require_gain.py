@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.confirm.held_out_gain import held_out_gain, predicts_something
+from analysis.diagnosis.confirm.held_out_gain import held_out_gain, predicts_motion
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.revise_selection import without_effect
 from analysis.diagnosis.search.search_context import SearchContext
@@ -37,22 +37,22 @@ def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
     effects are dropped from the last on until the last one removes enough. repeats: whether repeated periods show the
     noise; without them no verdict is `explained`, because no error is known to be noise alone. Constants are parameters
     of the model: where all effects are constants, `explained` is kept."""
-    found = result.found
-    while found.steps and not _takes_enough(result.context, found):
-        found = without_effect(result.context, found, len(found.steps) - 1)
-        result = replace(result, found=found, judgement=judge(found), errors=None)
-    names = {placed.effect.name for placed in found.after.fitted.hypothesis.list_placed_effects()}
+    explanation = result.found
+    while explanation.steps and not _removes_enough(result.context, explanation):
+        explanation = without_effect(result.context, explanation, len(explanation.steps) - 1)
+        result = replace(result, found=explanation, judgement=judge(explanation), errors=None)
+    names = {placed.effect.name for placed in explanation.after.fitted.hypothesis.list_placed_effects()}
     if repeats or result.judgement.verdict != "explained" or names <= set(CONSTANTS):
         return result
     return replace(result, judgement=replace(result.judgement, verdict="partly_explained"))
 
 
-def _takes_enough(context: SearchContext, found: Explanation) -> bool:
+def _removes_enough(context: SearchContext, explanation: Explanation) -> bool:
     """Whether the last effect removes `FURTHER_LAW_OF_ALL` of the held-out error power that remains with the effects
     before it. True where nothing is held out: both errors are then infinite."""
-    before = context.with_test_score(found.steps[-2]) if len(found.steps) > 1 else found.plain
-    # `held_out` is a logarithm of rms errors, and thus half of the logarithm of the error power.
-    return not found.after.held_out > before.held_out + np.log(1 - FURTHER_LAW_OF_ALL) / 2
+    previous = context.with_test_score(explanation.steps[-2]) if len(explanation.steps) > 1 else explanation.plain
+    # `held_out_error` is a logarithm of rms errors, and thus half of the logarithm of the error power.
+    return not explanation.after.held_out_error > previous.held_out_error + np.log(1 - FURTHER_LAW_OF_ALL) / 2
 
 
 def unname_doubtful_effects(result: SearchResult) -> SearchResult:
@@ -60,18 +60,20 @@ def unname_doubtful_effects(result: SearchResult) -> SearchResult:
     model was fitted to these recordings, so that a law of the motion that the catalogue lacks may look like a nonlinear
     or late sensor. What the signal shows is a candidate, too, where the model without it predicts nothing. A candidate
     is reported with the gain of all effects up to it, if that is positive on the held-out samples."""
-    found, context, candidates = result.found, result.context, []
-    doubtful = [number for number, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
-    if len(doubtful) < len(found.steps) and not predicts_something(context.whole, found.plain):
-        doubtful = list(range(len(found.steps)))
-    if not doubtful:
+    explanation, context, candidates = result.found, result.context, []
+    doubtful_indices = [number for number, step in enumerate(explanation.steps) if step.newest not in SHOWN_BY_SIGNAL]
+    if len(doubtful_indices) < len(explanation.steps) and not predicts_motion(context.whole, explanation.plain):
+        doubtful_indices = list(range(len(explanation.steps)))
+    if not doubtful_indices:
         return result
-    for number in reversed(doubtful):  # the last first: the numbers of those before it stay
-        step = found.steps[number]
-        gain = held_out_gain(context.whole, found.plain, context.with_test_score(step))
+    for number in reversed(doubtful_indices):  # the last first: the numbers of those before it stay
+        step = explanation.steps[number]
+        gain = held_out_gain(context.whole, explanation.plain, context.with_test_score(step))
         if gain is not None and gain.gain > 0:
-            why_not = BESIDE_DIVERGENCE if step.newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
-            candidates.append(Unconfirmed(step.fitted.hypothesis, gain.gain, why_not))
-        found = without_effect(context, found, number)
-    ranked = tuple(sorted(candidates, key=lambda each: -each.gain))
-    return replace(result, found=found, judgement=judge(found), errors=None, unconfirmed=(*result.unconfirmed, *ranked))
+            reason = BESIDE_DIVERGENCE if step.newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
+            candidates.append(Unconfirmed(step.fitted.hypothesis, gain.gain, reason))
+        explanation = without_effect(context, explanation, number)
+    ranked = tuple(sorted(candidates, key=lambda candidate: -candidate.gain))
+    return replace(
+        result, found=explanation, judgement=judge(explanation), errors=None, unconfirmed=(*result.unconfirmed, *ranked)
+    )

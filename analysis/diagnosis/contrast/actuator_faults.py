@@ -35,12 +35,12 @@ from equalizer.signals.signal import FloatArray
 
 CommandChange = Callable[[FloatArray, float], FloatArray]
 """Maps one axis's command (n,), at a rate in Hz, to the force of the faulty actuator."""
-AROUND = (0.75, 1.35)
+SIZE_RANGE = (0.75, 1.35)
 """Range of sizes within which a change that is nonlinear in its size is scaled, before it is linearised about another
 size. By hand."""
 GRID = 12
 """Number of sizes on the logarithmic grid of a fault that is nonlinear in its size."""
-BEGUN = (0.0, 0.25, 0.5)
+EARLIER_DRIFT_SHARES = (0.0, 0.25, 0.5)
 """Shares of a drift that are assumed to have occurred before the recording began."""
 
 
@@ -71,14 +71,14 @@ def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: boo
     whether the base predicts the command, not the response."""
     axis = _Axis(number, name)
     commands = np.concatenate([part.command[:, number] for part in parts])
-    top = float(np.abs(commands).max(initial=0.0)) or 1.0
-    rms = float(np.std(commands)) or top
+    peak = float(np.abs(commands).max(initial=0.0)) or 1.0
+    rms = float(np.std(commands)) or peak
     yield from _gains(axis, by_force)
     yield axis.fault(
         "force_offset", [Variant((axis.undo_by(lambda u, rate: u + rms),), proportional_parameter("offset", rms))]
     )
-    cubed = Variant((axis.undo_by(lambda u, rate: u + u**3 / top**2),), proportional_parameter("cubic", 1 / top**2))
-    yield axis.fault("actuator_cubic", [cubed])
+    cubic = Variant((axis.undo_by(lambda u, rate: u + u**3 / peak**2),), proportional_parameter("cubic", 1 / peak**2))
+    yield axis.fault("actuator_cubic", [cubic])
     longest = max(parts, key=lambda part: len(part.command))
     times = delays_to_try(longest.command[:, number], longest.rate_hz)
     yield axis.fault("transport_delay", [
@@ -86,8 +86,8 @@ def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: boo
         *(replace(fix_size(_delay(axis, time_s), rows.late_step_s), column_change=None) for time_s in rows.late_s),
     ])  # fmt: skip
     yield axis.fault("amplifier_lag", [_lag(axis, time_s) for time_s in times])
-    shares = np.quantile(np.abs(commands), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / top
-    limits = sorted(top * share for share in (*shares.tolist(), 0.5, 0.6, 0.7, 0.8, 0.9) if 0 < share < 0.995)
+    shares = np.quantile(np.abs(commands), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / peak
+    limits = sorted(peak * share for share in (*shares.tolist(), 0.5, 0.6, 0.7, 0.8, 0.9) if 0 < share < 0.995)
     yield axis.fault("force_saturation", [_saturation(axis, limit) for limit in limits])
     fastest = max(float(np.abs(np.diff(part.command[:, number])).max(initial=0.0)) * part.rate_hz for part in parts)
     if fastest > 0:
@@ -108,16 +108,19 @@ def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
         Variant((axis.undo_by(lambda u, rate: 2 * u),), lambda s: {"gain": gain(float(s[0]))}, -0.9, 20.0,
                 column_change=lambda x, rate, part: 2 * x),
     ])  # fmt: skip
-    drifts = [_gain_drift(axis, begun, lambda s: {"change": gain(float(s[0])) - 1}) for begun in BEGUN]
+    drifts = [
+        _gain_drift(axis, earlier_share, lambda s: {"change": gain(float(s[0])) - 1})
+        for earlier_share in EARLIER_DRIFT_SHARES
+    ]
     yield replace(axis.fault("force_gain_drift", drifts), varies=True, simpler=("force_gain",))
 
 
-def _gain_drift(axis: _Axis, begun: float, parameters_of: ParametersOf) -> Variant:
-    """A gain that drifts linearly. begun: share of the drift before the file began."""
+def _gain_drift(axis: _Axis, earlier_share: float, parameters_of: ParametersOf) -> Variant:
+    """A gain that drifts linearly. earlier_share: share of the drift before the file began."""
 
     def ramp(part: Part, count: int) -> FloatArray:
         """(count, 1): the gain at `count` evenly spaced times of a part, as rows may be decimated."""
-        gain = 1 + drift_shape(part, begun)
+        gain = 1 + drift_shape(part, earlier_share)
         return np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(gain)), gain)[:, None]
 
     def undo(part: Part) -> Part:
@@ -128,9 +131,9 @@ def _gain_drift(axis: _Axis, begun: float, parameters_of: ParametersOf) -> Varia
     return Variant((undo,), parameters_of, -0.9, 20.0, column_change=lambda x, rate, part: x * ramp(part, len(x)))
 
 
-def drift_shape(part: Part, begun: float) -> FloatArray:
-    """(n,): a drift to 1 at the end of the file, of which a share `begun` had occurred before the file began."""
-    return np.asarray(begun + (1 - begun) * part.elapsed_share)
+def drift_shape(part: Part, earlier_share: float) -> FloatArray:
+    """(n,): a drift to 1 at the end of the file, of which `earlier_share` had occurred before the file began."""
+    return np.asarray(earlier_share + (1 - earlier_share) * part.elapsed_share)
 
 
 def _delay(axis: _Axis, time_s: float) -> Variant:
@@ -138,21 +141,23 @@ def _delay(axis: _Axis, time_s: float) -> Variant:
     change: ColumnChange = lambda x, rate, part: shift_samples(x, -time_s * rate)  # noqa: E731
 
     def undo(part: Part) -> Part:
-        late = time_s * part.rate_hz
-        undone = axis.undo_by(lambda u, rate: shift_samples(u[:, None], late)[:, 0])(part)
-        return replace(undone, known=part.known & (np.arange(len(part.known)) >= late))
+        delay_samples = time_s * part.rate_hz
+        undone = axis.undo_by(lambda u, rate: shift_samples(u[:, None], delay_samples)[:, 0])(part)
+        return replace(undone, known=part.known & (np.arange(len(part.known)) >= delay_samples))
 
-    about = lambda size: _delay(axis, size * time_s)  # noqa: E731
+    at_size = lambda size: _delay(axis, size * time_s)  # noqa: E731
     delay = proportional_parameter("delay", time_s)
-    return Variant((undo,), delay, *AROUND, column_change=change, about=about, exact=True)
+    return Variant((undo,), delay, *SIZE_RANGE, column_change=change, at_size=at_size, exact=True)
 
 
 def _lag(axis: _Axis, time_s: float) -> Variant:
     # The command is (1 + T s) times the delivered force.
     undo = axis.undo_by(lambda u, rate: apply_lag(u, time_s * rate))
     change: ColumnChange = lambda x, rate, part: x + time_s * rate * np.gradient(x, axis=0)  # noqa: E731
-    about = lambda size: _lag(axis, size * time_s)  # noqa: E731
-    return Variant((undo,), proportional_parameter("time_constant", time_s), *AROUND, column_change=change, about=about)
+    at_size = lambda size: _lag(axis, size * time_s)  # noqa: E731
+    return Variant(
+        (undo,), proportional_parameter("time_constant", time_s), *SIZE_RANGE, column_change=change, at_size=at_size
+    )
 
 
 def _saturation(axis: _Axis, limit: float) -> Variant:
@@ -166,8 +171,8 @@ def _slew_limit(axis: _Axis, limit: float) -> Variant:
 
 def _deadband(axis: _Axis, width: float) -> Variant:
     undo = axis.undo_by(lambda u, rate: np.sign(u) * np.maximum(np.abs(u) - width, 0.0))
-    about = lambda size: _deadband(axis, size * width)  # noqa: E731
-    return Variant((undo,), proportional_parameter("width", width), *AROUND, about=about)
+    at_size = lambda size: _deadband(axis, size * width)  # noqa: E731
+    return Variant((undo,), proportional_parameter("width", width), *SIZE_RANGE, at_size=at_size)
 
 
 def delays_to_try(samples: FloatArray, rate_hz: float) -> list[float]:
@@ -175,8 +180,8 @@ def delays_to_try(samples: FloatArray, rate_hz: float) -> list[float]:
     shortest, longest = 0.1 / rate_hz, LONGEST_DELAY / median_frequency_hz(samples, rate_hz)
     if longest <= shortest:
         return []
-    # So many that the ranges `AROUND` of neighbouring delays overlap.
-    count = int(np.ceil(np.log(longest / shortest) / np.log(AROUND[1] / AROUND[0]))) + 1
+    # So many that the ranges `SIZE_RANGE` of neighbouring delays overlap.
+    count = int(np.ceil(np.log(longest / shortest) / np.log(SIZE_RANGE[1] / SIZE_RANGE[0]))) + 1
     return [float(time_s) for time_s in np.geomspace(shortest, longest, max(count, GRID))]
 
 

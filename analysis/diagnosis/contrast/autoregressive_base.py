@@ -36,9 +36,11 @@ class AutoregressiveBase:
     responses: int
     """Number of response channels."""
 
-    def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
+    def rows(
+        self, parts: Sequence[Part], reusable_rows: tuple[FloatArray, ...] | None = None
+    ) -> tuple[FloatArray, ...]:
         """Per part (n, 1 + columns): predicted value and regressors of each decimated sample from index `order` on.
-        like: not used; a force balance reuses columns of it."""
+        reusable_rows: not used; a force balance reuses columns of it."""
         return tuple(self._rows(part) for part in parts)
 
     def command_columns(self, width: int) -> Mask:
@@ -49,29 +51,39 @@ class AutoregressiveBase:
         """Per part (n,): mask of the rows whose own and past samples are known, without the first two and last two. A
         sample that was lost between those that decimation keeps is interpolated and low-passed with its neighbours, and
         does not count as lost."""
-        found = []
+        masks = []
         for part in parts:
-            known = part.known[:: self.step]
+            is_known = part.known[:: self.step]
             # A row reaches back over `order` samples; two more are a margin next to gaps and ends.
-            invalid = np.convolve(~known, np.ones(self.order + 3))[: len(known)] > 0
+            invalid = np.convolve(~is_known, np.ones(self.order + 3))[: len(is_known)] > 0
             invalid[: self.order + 2] = True
             invalid[len(invalid) - 2 :] = True
-            found.append(~invalid[self.order :])
-        return tuple(found)
+            masks.append(~invalid[self.order :])
+        return tuple(masks)
 
     def _rows(self, part: Part) -> FloatArray:
+        """(n, 1 + columns): the rows of one part, as `rows` returns them."""
         response, command = (decimate(samples, part.rate_hz, self.step) for samples in (part.response, part.command))
-        count = max(len(response) - self.order, 0)
-        first = np.diff(response, axis=0, prepend=response[:1])
-        second = np.diff(first, axis=0, prepend=first[:1])
+        row_count = max(len(response) - self.order, 0)
+        first_difference = np.diff(response, axis=0, prepend=response[:1])
+        second_difference = np.diff(first_difference, axis=0, prepend=first_difference[:1])
 
-        def lagged(samples: FloatArray, lag: int) -> FloatArray:
-            return samples[self.order - lag : self.order - lag + count]
+        def select_lag(samples: FloatArray, lag: int) -> FloatArray:
+            return samples[self.order - lag : self.order - lag + row_count]
 
-        responses = [lagged(second, lag) for lag in range(1, self.order - 1)]
-        commands = [lagged(command, lag) for lag in range(self.order + 1)]
-        predicted = lagged(second[:, [self.channel]], 0)
-        return np.hstack([predicted, lagged(response, 1), lagged(first, 1), *responses, *commands, np.ones((count, 1))])
+        response_columns = [select_lag(second_difference, lag) for lag in range(1, self.order - 1)]
+        command_columns = [select_lag(command, lag) for lag in range(self.order + 1)]
+        predicted = select_lag(second_difference[:, [self.channel]], 0)
+        return np.hstack(
+            [
+                predicted,
+                select_lag(response, 1),
+                select_lag(first_difference, 1),
+                *response_columns,
+                *command_columns,
+                np.ones((row_count, 1)),
+            ]
+        )
 
     def values(self, rows: FloatArray) -> FloatArray:
         """(n,): the response itself: its second difference, the value before, and the difference before."""
@@ -79,22 +91,25 @@ class AutoregressiveBase:
 
 
 def decimate(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:
-    """(n / step, k): every `step`-th sample, low-pass filtered to 0.4 times the new rate before (anti-aliasing)."""
+    """(n / step rounded up, k): every `step`-th sample, low-pass filtered to 0.4 times the new rate before
+    (anti-aliasing)."""
     return samples if step == 1 else low_pass_filter(samples, rate_hz, 0.4 * rate_hz / step)[::step]
 
 
-def likely_step(parts: Sequence[Part]) -> int:
+def choose_decimation_step(parts: Sequence[Part]) -> int:
     """Decimation step that keeps the band of the fastest response. This band ends where the cumulative power above the
     noise floor reaches the share `RESPONSE_BAND_SHARE`; the floor is the median power of the upper quarter of the
     spectrum."""
-    ends_hz = []
+    band_ends_hz = []
     for part in parts:
         line_hz = part.rate_hz / len(part.response)
         power = np.abs(np.fft.rfft(part.response - part.response.mean(axis=0), axis=0)) ** 2
         for column in power.T:
-            floor = float(np.median(column[3 * len(column) // 4 :]))
-            cumulative = np.cumsum(np.maximum(column - floor, 0.0))
-            if cumulative[-1] > 0:
-                ends_hz.append(int(np.searchsorted(cumulative, RESPONSE_BAND_SHARE * cumulative[-1])) * line_hz)
-    fastest_hz = max(ends_hz, default=parts[0].rate_hz / 2)
+            noise_floor = float(np.median(column[3 * len(column) // 4 :]))
+            cumulative_power = np.cumsum(np.maximum(column - noise_floor, 0.0))
+            if cumulative_power[-1] > 0:
+                band_ends_hz.append(
+                    int(np.searchsorted(cumulative_power, RESPONSE_BAND_SHARE * cumulative_power[-1])) * line_hz
+                )
+    fastest_hz = max(band_ends_hz, default=parts[0].rate_hz / 2)
     return max(int(parts[0].rate_hz / (RESPONSE_OVERSAMPLED * 2 * max(fastest_hz, 1e-9))), 1)

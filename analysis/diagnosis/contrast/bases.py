@@ -5,8 +5,8 @@ from contextlib import suppress
 
 import numpy as np
 
-from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
-from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase, likely_step
+from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
+from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase, choose_decimation_step
 from analysis.diagnosis.contrast.compared_base import FEWEST_ROWS, Base
 from analysis.diagnosis.contrast.force_base import force_base
 from analysis.diagnosis.contrast.part import Part
@@ -19,26 +19,30 @@ def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tupl
     """Force balances, one per axis, where they fit the clean set; then autoregressive models, one per response. Each
     list comes with the motions of both sets, which are empty where no motion was measured. faulty: may be empty."""
     recording = clean[0].recording
-    turning = recording.is_rotational
+    rotational = recording.is_rotational
     motions: tuple[Motion, ...] = ()
     with suppress(NoMotionError):
-        first = motions_of([part.to_observed() for part in clean])
-        more = motions_of([part.to_observed() for part in faulty], first[0].band_hz) if faulty else ()
-        motions = (*first, *more)
+        clean_motions = compute_motions([part.to_observed() for part in clean])
+        faulty_motions = (
+            compute_motions([part.to_observed() for part in faulty], clean_motions[0].band_hz) if faulty else ()
+        )
+        motions = (*clean_motions, *faulty_motions)
     forces: list[Base] = []
     if motions and np.isfinite(motions[0].band_hz):
         with suppress(np.linalg.LinAlgError, ValueError):
-            bases: list[Base] = [force_base(motions, axis, turning) for axis in range(len(recording.command.channels))]
+            bases: list[Base] = [
+                force_base(motions, axis, rotational) for axis in range(len(recording.command.channels))
+            ]
             forces = bases if all(compute_unexplained_share(base, clean) < BALANCE_HOLDS for base in bases) else []
     if forces:
         yield forces, motions
     fewest = min(sum(len(part.known) for part in side) for side in (clean, faulty) if side)
-    step = max(min(likely_step((*clean, *faulty)), fewest // (2 * FEWEST_ROWS)), 1)
+    step = max(min(choose_decimation_step((*clean, *faulty)), fewest // (2 * FEWEST_ROWS)), 1)
     count = len(recording.response.channels)
     yield [AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, step, count) for channel in range(count)], motions
 
 
-def move_alike(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
+def have_similar_motion(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
     """Whether the rms of each detrended response differs between the two sets by at most a factor `MOTIONS_APART`."""
     sizes = np.array(
         [np.sqrt(np.mean([_compute_detrended_mean_squares(part) for part in side], axis=0)) for side in (clean, faulty)]
@@ -48,9 +52,11 @@ def move_alike(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
 
 def _compute_detrended_mean_squares(part: Part) -> FloatArray:
     """(p,): mean squares of the responses about their least-squares lines."""
-    at = np.arange(len(part.response)) - (len(part.response) - 1) / 2
-    moved = part.response - part.response.mean(axis=0)
-    return np.asarray(np.mean((moved - at[:, None] * (at @ moved / max(float(at @ at), 1.0))) ** 2, axis=0))
+    times = np.arange(len(part.response)) - (len(part.response) - 1) / 2
+    centred = part.response - part.response.mean(axis=0)
+    return np.asarray(
+        np.mean((centred - times[:, None] * (times @ centred / max(float(times @ times), 1.0))) ** 2, axis=0)
+    )
 
 
 def compute_unexplained_share(base: Base, parts: tuple[Part, ...]) -> float:

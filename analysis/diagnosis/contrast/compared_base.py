@@ -1,4 +1,4 @@
-"""One base model compared on two sets of recordings: reference (clean) and possibly faulty.
+"""A base model fitted to two sets of recordings, clean and possibly faulty, for `try_faults` and `rank_faults`.
 
 A base predicts a signal y from regressors x, y(t) = x(t)' w + e(t); a row is (y, x). The errors are correlated in time:
 one autoregressive filter A(q) for both sets, fitted to their errors (Yule-Walker), makes them white. With s the rms of
@@ -7,8 +7,8 @@ errors up to a constant (Ljung, System Identification, 2nd ed., section 7.4), an
 
 A fault is tested by undoing it in the rows of one set. Where it lies in the predicted signal itself, undoing maps y to
 g(y), and the likelihood of the y that was recorded is that of g(y) times |g'| (change of variables). Therefore the
-errors are divided by |g'|: otherwise a map that shrinks the signal, and with it every error, would win
-(`_jacobian_correction`).
+errors are divided by |g'| (`_compute_error_factor`): otherwise a map that shrinks the signal, and with it every error,
+would have the highest likelihood.
 """
 
 from collections.abc import Sequence
@@ -19,13 +19,13 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
 
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
-from analysis.diagnosis.contrast.fault import EVERY, ColumnChange, Curve, Fault, Undo, Variant
+from analysis.diagnosis.contrast.fault import ALL_CHANNELS, ColumnChange, Curve, Fault, Undo, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
-from analysis.diagnosis.contrast.joint_products import Grams, Places, weights_of
+from analysis.diagnosis.contrast.joint_products import ColumnIndices, Grams, weights_of
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.contrast.sensor_base import SensorBase
 from analysis.diagnosis.data.correlated_residuals import compute_lagged_products
-from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LEAST_KEPT
+from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LEAST_GAPLESS_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
@@ -82,7 +82,7 @@ class ComparedBase:
     columns: FloatArray
     """(1 + columns,): rms of each column, by which the rows are divided before products are formed."""
     gap_reach: int
-    """Number of rows next to a gap that are left out; see `_reach_of_gaps`."""
+    """Number of rows next to a gap that are left out; see `_choose_gap_reach`."""
 
     @property
     def row_s(self) -> float:
@@ -90,22 +90,26 @@ class ComparedBase:
         base = self.base
         return 1 / base.rate_hz if isinstance(base, ForceBase) else base.step / self.clean.parts[0].rate_hz
 
-    def grams(self, side: RecordingSet, changed: Sequence[UndoneRows]) -> Grams:
-        """Products of a side's rows and of their changes by undone faults; see `Grams`."""
-        which = [_find_changed_columns(each.rows, side.rows) for each in changed]
-        joined = np.hstack([side.white, *(self._changes(side, *each) for each in zip(changed, which, strict=True))])
+    def compute_grams(self, side: RecordingSet, changed: Sequence[UndoneRows]) -> Grams:
+        """Gram matrices of a set's rows and of their changes by undone faults; see `Grams`. side: the set."""
+        changed_columns = [_find_changed_columns(undone.rows, side.rows) for undone in changed]
+        joint_rows = np.hstack(
+            [side.white, *(self._whiten_changes(side, *pair) for pair in zip(changed, changed_columns, strict=True))]
+        )
         return Grams(
-            np.array([block.T @ block for block in np.array_split(joined, CONTRAST_BLOCKS)]),
-            tuple(which),
+            np.array([block.T @ block for block in np.array_split(joint_rows, CONTRAST_BLOCKS)]),
+            tuple(changed_columns),
             len(self.columns),
         )
 
-    def _changes(self, side: RecordingSet, undone: UndoneRows, at: Places) -> FloatArray:
-        """(valid samples, k): the changes of the columns `at`, whitened."""
-        differences = [part[:, at] - plain[:, at] for part, plain in zip(undone.rows, side.rows, strict=True)]
-        white = _whiten(self.whitening, differences, side.masks) / (self.columns[at] * side.scale)
+    def _whiten_changes(self, side: RecordingSet, undone: UndoneRows, columns: ColumnIndices) -> FloatArray:
+        """(valid samples, k): the changes of the columns `columns`, whitened."""
+        differences = [
+            part[:, columns] - original[:, columns] for part, original in zip(undone.rows, side.rows, strict=True)
+        ]
+        white = _whiten(self.whitening, differences, side.masks) / (self.columns[columns] * side.scale)
         if undone.lost is not None:
-            white[np.concatenate([gone[mask] for gone, mask in zip(undone.lost, side.masks, strict=True)])] = 0.0
+            white[np.concatenate([lost[mask] for lost, mask in zip(undone.lost, side.masks, strict=True)])] = 0.0
         return np.asarray(white)
 
 
@@ -121,9 +125,9 @@ def apply_filter(impulse_response: FloatArray, samples: FloatArray) -> FloatArra
     return np.asarray(irfft(product, length, axis=0)[: len(samples)])
 
 
-def _find_changed_columns(rows: Sequence[FloatArray], plain: Sequence[FloatArray]) -> Places:
-    """Numbers of the columns in which the rows differ."""
-    largest = np.array([np.abs(a - b).max(axis=0) for a, b in zip(rows, plain, strict=True)])
+def _find_changed_columns(rows: Sequence[FloatArray], original: Sequence[FloatArray]) -> ColumnIndices:
+    """Indices of the columns in which the rows differ."""
+    largest = np.array([np.abs(a - b).max(axis=0) for a, b in zip(rows, original, strict=True)])
     return np.flatnonzero(largest.max(axis=0) > 0.0)
 
 
@@ -131,61 +135,61 @@ def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> C
     """Both sets as whitened and scaled rows of a base. Raises ValueError where a set has too few valid rows,
     numpy.linalg.LinAlgError where the base cannot be fitted."""
     if isinstance(base, AutoregressiveBase):
-        least = (base.order + 2 * REACH) * base.step
-        clean, faulty = ([part for part in parts if len(part.known) > least] for parts in (clean, faulty))
+        least_samples = (base.order + 2 * REACH) * base.step
+        clean, faulty = ([part for part in parts if len(part.known) > least_samples] for parts in (clean, faulty))
     rows = base.rows(clean), base.rows(faulty)
     valid = tuple(base.valid_samples(parts) for parts in (clean, faulty))
-    gap_reach = min(_reach_of_gaps(side) for side in valid)
-    masks = tuple(tuple(_keep_settled(mask, gap_reach) for mask in side) for side in valid)
+    gap_reach = min(_choose_gap_reach(side) for side in valid)
+    masks = tuple(tuple(_mark_interior(mask, gap_reach) for mask in side) for side in valid)
     fewest = max(FEWEST_ROWS, 2 * rows[0][0].shape[1])
     if any(sum(int(mask.sum()) for mask in side) < fewest for side in masks):
         raise ValueError("too few samples of one of the two sets remain for a comparison")
     all_rows = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
     columns = np.sqrt(np.mean(all_rows**2, axis=0))
     columns = np.where(columns > 0, columns, 1.0)
-    residuals = [_residuals(rows[side], masks[side], columns) for side in (0, 1)]
-    whitening = _whitening_filter([*residuals[0], *residuals[1]], [*masks[0], *masks[1]])
+    residuals = [_compute_residuals(rows[side], masks[side], columns) for side in (0, 1)]
+    whitening = _fit_whitening_filter([*residuals[0], *residuals[1]], [*masks[0], *masks[1]])
     sides = []
-    for parts, own, kept in zip((clean, faulty), rows, masks, strict=True):
-        white = _whiten(whitening, own, kept) / columns
-        scale = _white_error(white)
-        sides.append(RecordingSet(tuple(parts), own, kept, scale, white / scale))
+    for parts, side_rows, side_masks in zip((clean, faulty), rows, masks, strict=True):
+        white = _whiten(whitening, side_rows, side_masks) / columns
+        scale = _compute_white_error(white)
+        sides.append(RecordingSet(tuple(parts), side_rows, side_masks, scale, white / scale))
     return ComparedBase(base, sides[0], sides[1], whitening, columns, gap_reach)
 
 
-def _keep_settled(valid: Mask, gap_reach: int) -> Mask:
+def _mark_interior(valid: Mask, gap_reach: int) -> Mask:
     """Valid rows that neither the ends of a part nor gaps reach."""
     invalid = np.pad(~valid, gap_reach)
-    kept = np.array(np.convolve(invalid, np.ones(2 * gap_reach + 1), "valid") == 0)
-    places = np.flatnonzero(valid)
-    if len(places):
-        kept[: places[0] + REACH] = False
-        kept[max(places[-1] + 1 - REACH, 0) :] = False
-    return kept
+    settled = np.array(np.convolve(invalid, np.ones(2 * gap_reach + 1), "valid") == 0)
+    indices = np.flatnonzero(valid)
+    if len(indices):
+        settled[: indices[0] + REACH] = False
+        settled[max(indices[-1] + 1 - REACH, 0) :] = False
+    return settled
 
 
-def _reach_of_gaps(valid: Sequence[Mask]) -> int:
+def _choose_gap_reach(valid: Sequence[Mask]) -> int:
     """`REACH`; 0 where single losses are so frequent that most of a set's rows would be lost: interpolation over a
     sample or two is then good enough."""
-    whole, kept = (sum(int(_keep_settled(mask, reach).sum()) for mask in valid) for reach in (0, REACH))
-    return REACH if kept >= LEAST_KEPT * whole else 0
+    all_rows, settled_rows = (sum(int(_mark_interior(mask, reach).sum()) for mask in valid) for reach in (0, REACH))
+    return REACH if settled_rows >= LEAST_GAPLESS_SHARE * all_rows else 0
 
 
-def _residuals(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: FloatArray) -> list[FloatArray]:
+def _compute_residuals(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: FloatArray) -> list[FloatArray]:
     """Per part (kept,): errors of a base fitted to the masked rows by ordinary least squares, in units of y."""
     scaled = np.vstack([part[mask] for part, mask in zip(rows, masks, strict=True)]) / columns
     weights = weights_of(scaled.T @ scaled)
     return [part @ (weights / columns) * columns[0] for part in rows]
 
 
-def _white_error(white: FloatArray) -> float:
+def _compute_white_error(white: FloatArray) -> float:
     """Rms error of a base fitted to these whitened rows alone, over the rms of the predicted signal."""
     gram = white.T @ white / len(white)
     weights = weights_of(gram)
     return max(float(np.sqrt(max(float(weights @ gram @ weights), 0.0))), 1e-9)
 
 
-def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
+def _fit_whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
     """(k,): prediction-error filter of the autoregression of these errors, by the Yule-Walker equations; (1,) where all
     errors are zero."""
     masked = [np.where(mask, error, np.nan)[:, None] for error, mask in zip(errors, masks, strict=True)]
@@ -204,31 +208,29 @@ def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> Fl
     return np.asarray(np.concatenate([[1.0], -coefficients]))
 
 
-def rows_with_fault_undone(
-    compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant
-) -> list[UndoneRows]:
-    """Rows of a set with a fault of size 1 undone, for each size of the variant."""
+def undo_fault_in_rows(compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant) -> list[UndoneRows]:
+    """Rows of a set with a fault of size 1 undone, for each size parameter of the variant."""
     base = compared.base
     is_predicted = _is_predicted(base, fault)
     if is_predicted and variant.column_change is not None and isinstance(base, ForceBase):
-        return [_fault_in_prediction(base, side, variant.column_change)]
+        return [_add_fault_to_regressors(base, side, variant.column_change)]
     undone = [_undo_in_recordings(compared, side, undo) for undo in variant.undo]
     if not is_predicted:
         return undone
-    corrections = [_jacobian_correction(compared, side, fault, variant, each) for each in undone]
+    corrections = [_compute_error_factor(compared, side, fault, variant, undone_rows) for undone_rows in undone]
     return [
-        each if factor == 1.0 else replace(each, rows=tuple(factor * part for part in each.rows))
-        for each, factor in zip(undone, corrections, strict=True)
+        undone_rows if factor == 1.0 else replace(undone_rows, rows=tuple(factor * part for part in undone_rows.rows))
+        for undone_rows, factor in zip(undone, corrections, strict=True)
     ]
 
 
 def _is_predicted(base: Base, fault: Fault) -> bool:
-    """Whether the fault lies in the component that makes the signal which the base predicts."""
+    """Whether the fault lies in the actuator or sensor of the signal that the base predicts."""
     place, site = ("actuator", base.axis) if isinstance(base, ForceBase) else ("sensor", base.channel)
-    return fault.place == place and fault.site in (site, EVERY)
+    return fault.place == place and fault.site in (site, ALL_CHANNELS)
 
 
-def _fault_in_prediction(base: ForceBase, side: RecordingSet, change: ColumnChange) -> UndoneRows:
+def _add_fault_to_regressors(base: ForceBase, side: RecordingSet, change: ColumnChange) -> UndoneRows:
     """The rows with the fault added to the predictors, not taken out of the command: the predicted signal stays as
     recorded, so that no Jacobian is needed."""
     changed = (change(rows[:, 1:], base.rate_hz, part) for rows, part in zip(side.rows, side.parts, strict=True))
@@ -238,35 +240,42 @@ def _fault_in_prediction(base: ForceBase, side: RecordingSet, change: ColumnChan
 def _undo_in_recordings(compared: ComparedBase, side: RecordingSet, undo: Undo) -> UndoneRows:
     """The rows of a set's parts after undoing a fault in them."""
     undone = tuple(undo(part) for part in side.parts)
-    same_motion = all(after.response is before.response for after, before in zip(undone, side.parts, strict=True))
+    same_motion = all(
+        undone_part.response is original.response for undone_part, original in zip(undone, side.parts, strict=True)
+    )
     rows = compared.base.rows(undone, side.rows if same_motion else None)
-    same_known = all(after.known is before.known for after, before in zip(undone, side.parts, strict=True))
-    return UndoneRows(rows, None if same_known else _lost_rows(compared, side, undone))
+    has_same_known = all(
+        undone_part.known is original.known for undone_part, original in zip(undone, side.parts, strict=True)
+    )
+    return UndoneRows(rows, None if has_same_known else _find_lost_rows(compared, side, undone))
 
 
-def _lost_rows(compared: ComparedBase, side: RecordingSet, undone: Sequence[Part]) -> tuple[Mask, ...]:
+def _find_lost_rows(compared: ComparedBase, side: RecordingSet, undone: Sequence[Part]) -> tuple[Mask, ...]:
     """Per part: rows that were known, and that depend on samples which are unknown after undoing."""
     valid = compared.base.valid_samples(undone)
-    return tuple(mask & ~_keep_settled(now, compared.gap_reach) for mask, now in zip(side.masks, valid, strict=True))
+    return tuple(
+        mask & ~_mark_interior(valid_mask, compared.gap_reach)
+        for mask, valid_mask in zip(side.masks, valid, strict=True)
+    )
 
 
-def _jacobian_correction(
+def _compute_error_factor(
     compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant, undone: UndoneRows
 ) -> float:
-    """Factor 1 / |g'| on the errors where undoing the fault maps the predicted signal y to g(y); see the head of this
-    file. Interpolation alone lowers the errors of an autoregression by `variant.passed`, which is corrected here."""
+    """Factor 1 / |g'| on the errors where undoing the fault maps the predicted signal y to g(y); see the module's
+    docstring. Interpolation alone scales the errors of an autoregression by `variant.noise_factor`: divided out."""
     factor = variant.unit
     if variant.curve is not None:
-        factor *= _slope_correction(compared, side, variant.curve)
+        factor *= _correct_for_slope(compared, side, variant.curve)
     if isinstance(compared.base, AutoregressiveBase) and compared.base.step == 1:
-        factor /= variant.passed
-    return factor * _spread_ratio(side, undone.rows) if fault.place == "actuator" else factor
+        factor /= variant.noise_factor
+    return factor * _compute_spread_ratio(side, undone.rows) if fault.place == "actuator" else factor
 
 
-def _slope_correction(compared: ComparedBase, side: RecordingSet, curve: Curve) -> float:
+def _correct_for_slope(compared: ComparedBase, side: RecordingSet, curve: Curve) -> float:
     """Factor on the errors for a curve g, whose slope would scale them: the larger of 1 over the geometric mean of |g'|
-    (the Jacobian) and 1 over the factor by which g scales the errors of the set's own base. With one of them alone, a
-    curve would win that is flat where errors are large, or steep where the sets differ least."""
+    (the Jacobian) and 1 over the factor by which g scales the errors of the set's own base. Either factor alone would
+    favour a curve that is flat where errors are large, or steep where the sets differ least."""
     weights = weights_of(side.white.T @ side.white) * compared.columns[0] / compared.columns
     rows = np.concatenate([part[mask] for part, mask in zip(side.rows, side.masks, strict=True)])
     errors = rows @ weights
@@ -277,8 +286,10 @@ def _slope_correction(compared: ComparedBase, side: RecordingSet, curve: Curve) 
     return max(float(np.exp(-np.mean(np.log(slope)))), rms / float(np.sqrt(scaled)))
 
 
-def _spread_ratio(side: RecordingSet, rows: Sequence[FloatArray]) -> float:
+def _compute_spread_ratio(side: RecordingSet, rows: Sequence[FloatArray]) -> float:
     """Standard deviation of the predicted signal before undoing over that after it: a weaker actuator must not reduce
     all errors."""
-    before, after = (float(np.std(np.concatenate([part[:, 0] for part in each]))) for each in (side.rows, rows))
-    return before / after if after > 0 else 1.0
+    original_spread, undone_spread = (
+        float(np.std(np.concatenate([part[:, 0] for part in side_rows]))) for side_rows in (side.rows, rows)
+    )
+    return original_spread / undone_spread if undone_spread > 0 else 1.0

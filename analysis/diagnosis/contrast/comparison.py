@@ -25,17 +25,17 @@ class JudgedFault:
     """(blocks,): sums of squares with the fault undone, of the faulty set, then of the clean one."""
     gain: float
     """Error with the fault over the error with it undone, less 1."""
-    usual: float
-    """The largest gain between stretches of one set, less `typical`."""
-    typical: float
+    control_gain: float
+    """The largest gain between stretches of one set, less `median_control_gain`."""
+    median_control_gain: float
     """Median gain between stretches of one set: the gain due to the flexibility of the fault alone."""
     share: float
     """Share of the excess error that the fault explains; excess: see `Comparison.excess`."""
-    held_out: float
+    held_out_squares: float
     """Cross-validated sum of squares of the faulty set."""
     gain_low: float
-    """Lower confidence bound of the gain less `typical`, by bootstrap over blocks."""
-    apart: float
+    """Lower confidence bound of the gain less `median_control_gain`, by bootstrap over blocks."""
+    control_excess: float
     """The largest excess between stretches of one set, in the faulty one with the fault undone; see `Comparison`."""
 
 
@@ -45,20 +45,20 @@ class Comparison:
 
     faults: tuple[JudgedFault, ...]
     """The best first."""
-    plain: FloatArray
+    errors: FloatArray
     """(blocks,): sums of squares with nothing undone, as `JudgedFault.errors`."""
     samples: int
     """Number of samples: the sum of squares with separate bases, because errors are scaled to white noise with rms
     1."""
     faulty_samples: int
     """Number of samples of the faulty set."""
-    held_out: float
+    held_out_squares: float
     """Cross-validated sum of squares of the faulty set, with nothing undone."""
     faulty_share: float
     """Rms error of the faulty set with its own base, relative to the predicted quantity."""
-    usual: float
+    control_excess: float
     """The largest `excess` between stretches of one set."""
-    usual_clean: float
+    clean_control_excess: float
     """The largest `excess` between stretches of the clean set."""
     by_force: bool
     """Whether the bases of the device are force balances; else they are autoregressions."""
@@ -70,15 +70,17 @@ class Comparison:
     @property
     def excess(self) -> float:
         """Sum of squares of one base for both sets over that of separate bases, less 1; 0 = no difference."""
-        return float(self.plain.sum()) / self.samples - 1
+        return float(self.errors.sum()) / self.samples - 1
 
     @property
     def differ(self) -> bool:
         """Whether the two sets differ by more than stretches of one set do."""
-        return self.excess > max(SETS_AS_ONE, SETS_APART * self.usual)
+        return self.excess > max(SETS_AS_ONE, SETS_APART * self.control_excess)
 
     def differ_but_for(self, fault: JudgedFault) -> bool:
         """Whether the two sets differ by more than stretches of one set, with the fault undone between those of the
         faulty set, because an intermittent fault makes these differ too. A fault that no base absorbs raises all errors
         of the faulty set, and shows only in the lower bound of its gain; so the larger of both is compared."""
-        return max(self.excess, fault.gain_low) > max(SETS_AS_ONE, SETS_APART * max(self.usual_clean, fault.apart))
+        return max(self.excess, fault.gain_low) > max(
+            SETS_AS_ONE, SETS_APART * max(self.clean_control_excess, fault.control_excess)
+        )

@@ -21,7 +21,7 @@ ParametersOf = Callable[[FloatArray], dict[str, float]]
 """Maps sizes (sizes,) of a variant to the parameters of the effect, in SI units."""
 Curve = Callable[[FloatArray], FloatArray]
 """Maps readings (n,) to readings, sample by sample: a sensor's gain, saturation or nonlinearity."""
-EVERY = -1
+ALL_CHANNELS = -1
 """Site number of a fault of all channels."""
 
 
@@ -33,22 +33,22 @@ class Variant:
     """One function per size, each undoing a fault of size 1."""
     parameters_of: ParametersOf
     """Parameters of the fault from its sizes."""
-    least: float = -np.inf
-    most: float = np.inf
+    lower_bound: float = -np.inf
+    upper_bound: float = np.inf
     """Bounds of each size: a narrow range about 1 where undoing is not linear in the size."""
     unit: float = 1.0
     """Factor by which the errors of a faulty sensor are scaled: otherwise a gain that reduces every error would win."""
     curve: Curve | None = None
     """Map of single readings that undoes the fault, where there is one: its slope scales the errors, too."""
-    passed: float = 1.0
-    """Factor by which interpolation alone reduces the prediction errors: see `interpolation.noise_kept`."""
+    noise_factor: float = 1.0
+    """Factor by which interpolation alone reduces the prediction errors: see `interpolation.noise_gain`."""
     column_change: ColumnChange | None = None
     """Change of the predicted command by the fault, where known. Undoing a gain or a lag in the recorded command
     instead would also reduce errors that the fault did not cause."""
     grid_error: float = 0.0
     """Standard error of its parameter where the size is fixed: the distance to the next variant, in the parameter's
     unit."""
-    about: Callable[[float], "Variant"] | None = None
+    at_size: Callable[[float], "Variant"] | None = None
     """Maps a size to the variant that is linearised about it (that size becomes 1), where undoing is not linear."""
     exact: bool = False
     """Whether only size 1 undoes the fault: undoing half of a delay gives not half the delay but the mean of two
@@ -66,7 +66,7 @@ class Fault:
     axis: str
     """Name of the axis or channel; empty for a fault of all channels."""
     site: int
-    """Index of the axis or channel, or `EVERY`."""
+    """Index of the axis or channel, or `ALL_CHANNELS`."""
     variants: tuple[Variant, ...]
     simpler: tuple[str, ...] = ()
     """Faults that it contains as special cases."""
@@ -93,19 +93,19 @@ class Rows:
     lag_samples: int
     """Samples of the recordings over which a lag of the responses is inverted: one row of an autoregression."""
     late_s: tuple[float, ...]
-    """Delays in s from `likely_delays.likely_delays_s`."""
+    """Delays in s from `likely_delays.suggest_delays_s`."""
     late_step_s: float
     """Spacing of these delays in s."""
     clocks: tuple[ClockRate, ...]
-    """Rates from `likely_delays.likely_clock_rates`."""
+    """Rates from `likely_delays.suggest_clock_rates`."""
 
 
 def fix_size(variant: Variant, grid_error: float) -> Variant:
     """The variant at size 1 only, as for a delay over many oscillations, which cannot be scaled. grid_error: standard
     error of its parameter."""
-    return replace(variant, least=1.0, most=1.0, about=None, grid_error=grid_error)
+    return replace(variant, lower_bound=1.0, upper_bound=1.0, at_size=None, grid_error=grid_error)
 
 
-def proportional_parameter(name: str, of_one: float = 1.0) -> ParametersOf:
-    """A fault's parameter in proportion to its only size. of_one: the parameter at size 1."""
-    return lambda sizes: {name: of_one * float(sizes[0])}
+def proportional_parameter(name: str, value_at_one: float = 1.0) -> ParametersOf:
+    """A fault's parameter in proportion to its only size. value_at_one: the parameter at size 1."""
+    return lambda sizes: {name: value_at_one * float(sizes[0])}

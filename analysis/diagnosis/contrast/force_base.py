@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.law import Law, scales_of
 from analysis.diagnosis.balance.laws import cogging_law, laws_of, likely_pitches
-from analysis.diagnosis.balance.motion import Motion, band_pass, motions_of
+from analysis.diagnosis.balance.motion import Motion, band_pass, compute_motions
 from analysis.diagnosis.balance.regression import Regression, keep_laws, regression_of
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import BASE_LAW_GAIN, MOST_BASE_LAWS
@@ -35,30 +35,35 @@ class ForceBase:
     lowest_hz: float = 0.0
     """Lower end of the band (Hz), see `Motion`."""
 
-    def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
-        """Per part, (kept samples, 1 + columns): the force first. like: rows of parts with the same motion, whose
-        columns are reused, so that only the force is filtered again."""
-        if like is not None:
+    def rows(
+        self, parts: Sequence[Part], reusable_rows: tuple[FloatArray, ...] | None = None
+    ) -> tuple[FloatArray, ...]:
+        """Per part, (kept samples, 1 + columns): the force first. reusable_rows: rows of parts with the same motion,
+        whose columns are reused, so that only the force is filtered again."""
+        if reusable_rows is not None:
             commands = (
                 band_pass(part.command[:, [self.axis]], part.rate_hz, self.band_hz, self.lowest_hz) for part in parts
             )
             step = round(parts[0].rate_hz / self.rate_hz)
-            return tuple(np.hstack([target[::step], old[:, 1:]]) for target, old in zip(commands, like, strict=True))
-        motions = motions_of([part.to_observed() for part in parts], self.band_hz)
+            return tuple(
+                np.hstack([target[::step], old_rows[:, 1:]])
+                for target, old_rows in zip(commands, reusable_rows, strict=True)
+            )
+        motions = compute_motions([part.to_observed() for part in parts], self.band_hz)
         targets = [motion.decimate(motion.force[:, [self.axis]]) for motion in motions]
-        plain = regression_of(motions, self.axis, (), self.turns)
-        found = []
-        for target, motion, base in zip(targets, motions, plain.columns, strict=True):
-            more = [motion.decimate(law.columns(motion, law.numbers)) for law in self.laws]
-            found.append(np.hstack([target, base, *more]))
-        return tuple(found)
+        base_regression = regression_of(motions, self.axis, (), self.turns)
+        part_rows = []
+        for target, motion, base in zip(targets, motions, base_regression.columns, strict=True):
+            law_columns = [motion.decimate(law.columns(motion, law.numbers)) for law in self.laws]
+            part_rows.append(np.hstack([target, base, *law_columns]))
+        return tuple(part_rows)
 
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
         """Per part, mask of its rows (kept samples,): known samples more than a filter length from the part's ends."""
         return tuple(
             motion.valid_samples(part.known)
             for motion, part in zip(
-                motions_of([part.to_observed() for part in parts], self.band_hz), parts, strict=True
+                compute_motions([part.to_observed() for part in parts], self.band_hz), parts, strict=True
             )
         )
 
@@ -70,13 +75,13 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
     turns = any(scale.turns for scale in scales)
     regression = regression_of(motions, axis, list(laws_of(motions, rotational)), turns)
     residuals = regression.remainder(regression.columns_of(_select_laws(regression)))
-    more = [
+    cogging_laws = [
         cogging_law(channel, pitch, scale)
         for channel, scale in enumerate(scales)
         for pitch in likely_pitches(motions, residuals, channel, scale)
     ]
-    if more:
-        regression = regression_of(motions, axis, (*regression.laws, *more), turns)
+    if cogging_laws:
+        regression = regression_of(motions, axis, (*regression.laws, *cogging_laws), turns)
     return ForceBase(
         axis,
         keep_laws(regression, _select_laws(regression)).laws,
@@ -93,13 +98,13 @@ def _select_laws(regression: Regression) -> tuple[int, ...]:
     laws: tuple[int, ...] = ()
     error = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
     while len(laws) < MOST_BASE_LAWS:
-        tried = [
+        trials = [
             (float(regression.cross_validated_errors(regression.columns_of((*laws, number))).sum()), number)
             for number in range(len(regression.laws))
             if number not in laws
         ]
-        if not tried or min(tried)[0] > (1 - BASE_LAW_GAIN) * error:
+        if not trials or min(trials)[0] > (1 - BASE_LAW_GAIN) * error:
             break
-        error, best = min(tried)
+        error, best = min(trials)
         laws = (*laws, best)
     return laws

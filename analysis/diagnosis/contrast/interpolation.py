@@ -12,31 +12,31 @@ from scipy.interpolate import make_interp_spline
 
 from equalizer.signals.signal import FloatArray
 
-SMOOTH = 5
+SPLINE_DEGREE = 5
 """Degree of the splines. They act locally, whereas a phase shift of the spectrum rings at the ends of a signal, and
 attenuate high frequencies far less than linear interpolation."""
 FRACTIONS = np.linspace(0.0, 1.0, 41)
 """Fractions of a sample at which the factor is tabulated."""
 
 
-def resample(samples: FloatArray, at: FloatArray) -> FloatArray:
-    """Samples (n,) interpolated at times `at` (n,), in samples; held beyond the ends."""
-    spline = make_interp_spline(np.arange(len(samples)), samples, SMOOTH)
-    return np.asarray(spline(np.clip(at, 0, len(samples) - 1)))
+def resample(samples: FloatArray, times: FloatArray) -> FloatArray:
+    """Samples (n,) interpolated at times `times` (n,), in samples; held beyond the ends."""
+    spline = make_interp_spline(np.arange(len(samples)), samples, SPLINE_DEGREE)
+    return np.asarray(spline(np.clip(times, 0, len(samples) - 1)))
 
 
-def shift_samples(samples: FloatArray, by: float) -> FloatArray:
-    """Samples (n, k) delayed by `by` samples, a real number; continued beyond both ends as an odd function."""
-    room = int(np.ceil(abs(by))) + SMOOTH
-    wide = np.pad(samples, ((room, room), (0, 0)), mode="reflect", reflect_type="odd")
-    spline = make_interp_spline(np.arange(-room, len(samples) + room), wide, SMOOTH)
-    return np.asarray(spline(np.arange(len(samples)) - by))
+def shift_samples(samples: FloatArray, delay: float) -> FloatArray:
+    """Samples (n, k) delayed by `delay` samples, a real number; continued beyond both ends as an odd function."""
+    margin = int(np.ceil(abs(delay))) + SPLINE_DEGREE
+    padded = np.pad(samples, ((margin, margin), (0, 0)), mode="reflect", reflect_type="odd")
+    spline = make_interp_spline(np.arange(-margin, len(samples) + margin), padded, SPLINE_DEGREE)
+    return np.asarray(spline(np.arange(len(samples)) - delay))
 
 
-def noise_kept(at: FloatArray | float) -> float:
-    """Factor (at most about 1) by which interpolation at times `at`, in samples, multiplies one-step prediction errors:
+def noise_gain(times: FloatArray | float) -> float:
+    """Factor (at most about 1) by which interpolation at `times`, in samples, multiplies one-step prediction errors:
     the geometric mean of its gain over frequency (Kolmogorov's formula) and over the times."""
-    return float(np.exp(np.mean(np.interp(np.mod(at, 1.0), FRACTIONS, _log_gains()))))
+    return float(np.exp(np.mean(np.interp(np.mod(times, 1.0), FRACTIONS, _log_gains()))))
 
 
 @cache
@@ -44,5 +44,5 @@ def _log_gains() -> FloatArray:
     """Mean logarithm of the interpolation's gain over frequency, at each of `FRACTIONS`."""
     impulse = np.zeros((401, 1))
     impulse[200] = 1.0
-    gains = [np.abs(np.fft.rfft(shift_samples(impulse, by)[:, 0], 4096)) for by in FRACTIONS]
+    gains = [np.abs(np.fft.rfft(shift_samples(impulse, fraction)[:, 0], 4096)) for fraction in FRACTIONS]
     return np.array([np.mean(np.log(np.maximum(gain, 1e-6))) for gain in gains])

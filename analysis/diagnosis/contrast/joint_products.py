@@ -16,10 +16,10 @@ import numpy.typing as npt
 from analysis.diagnosis.contrast.fault import Variant
 from equalizer.signals.signal import FloatArray
 
-Places = npt.NDArray[np.intp]
+ColumnIndices = npt.NDArray[np.intp]
 RIDGE = 1e-9
 """Ridge relative to the mean power of the columns. By hand."""
-BLOWN_UP = 1e16
+LARGEST_PRODUCT = 1e16
 """Product of columns above which undoing a fault with bounded sizes counts as ill-conditioned. By hand."""
 ROUNDS = 3
 """Largest number of Gauss-Newton steps."""
@@ -31,7 +31,7 @@ class Grams:
 
     blocks: FloatArray
     """(blocks, k, k): the columns first, then their changes, size by size."""
-    changed_columns: tuple[Places, ...]
+    changed_columns: tuple[ColumnIndices, ...]
     """Per size, the columns that change."""
     width: int
     """Number of columns without the changes."""
@@ -39,34 +39,34 @@ class Grams:
     def is_well_conditioned(self, variant: Variant) -> bool:
         """Whether undoing the fault is well-conditioned. Unbounded sizes are in SI units (such as a mass of 1 kg on a
         device of 1 mg), so that their products may have any magnitude and are only tested to be finite."""
-        most = BLOWN_UP if np.isfinite(variant.most) else np.inf
-        return bool(np.isfinite(self.blocks).all() and np.abs(self.blocks).max(initial=0.0) < most)
+        limit = LARGEST_PRODUCT if np.isfinite(variant.upper_bound) else np.inf
+        return bool(np.isfinite(self.blocks).all() and np.abs(self.blocks).max(initial=0.0) < limit)
 
     def spread(self, sizes: FloatArray) -> FloatArray:
         """(width, k): the matrix that turns the products into those of the rows with faults of these sizes undone."""
-        found = np.zeros((self.width, self.blocks.shape[1]))
-        found[:, : self.width] = np.eye(self.width)
-        begin = self.width
-        for size, at in zip(sizes, self.changed_columns, strict=True):
-            found[at, begin + np.arange(len(at))] = size
-            begin += len(at)
-        return found
+        matrix = np.zeros((self.width, self.blocks.shape[1]))
+        matrix[:, : self.width] = np.eye(self.width)
+        first = self.width
+        for size, columns in zip(sizes, self.changed_columns, strict=True):
+            matrix[columns, first + np.arange(len(columns))] = size
+            first += len(columns)
+        return matrix
 
     def change(self, weights: FloatArray) -> FloatArray:
         """(sizes, k): the error's change with each size, as a sum of columns."""
-        found = np.zeros((len(self.changed_columns), self.blocks.shape[1]))
-        begin = self.width
-        for number, at in enumerate(self.changed_columns):
-            found[number, begin : begin + len(at)] = weights[at]
-            begin += len(at)
-        return found
+        matrix = np.zeros((len(self.changed_columns), self.blocks.shape[1]))
+        first = self.width
+        for number, columns in enumerate(self.changed_columns):
+            matrix[number, first : first + len(columns)] = weights[columns]
+            first += len(columns)
+        return matrix
 
     def undo_sizes(self, sizes: FloatArray) -> FloatArray:
         """(blocks, width, width): products of the rows with faults of these sizes undone."""
         spread = self.spread(sizes)
         return np.asarray(spread @ self.blocks @ spread.T)
 
-    def part(self, blocks: Sequence[int]) -> FloatArray:
+    def sum_blocks(self, blocks: Sequence[int]) -> FloatArray:
         """(k, k): sum of the products of these blocks."""
         return np.asarray(self.blocks[list(blocks)].sum(axis=0))
 
@@ -75,24 +75,24 @@ class Grams:
 class Pair:
     """Blocks of a compared base: those in which a fault is undone, and those that are left unchanged."""
 
-    with_it: Grams
-    at: tuple[int, ...]
-    """Indices in `with_it` of the blocks with the fault."""
-    without: tuple[FloatArray, ...]
+    undone: Grams
+    undone_blocks: tuple[int, ...]
+    """Indices in `undone` of the blocks with the fault."""
+    unchanged: tuple[FloatArray, ...]
     """Products (width, width) of the unchanged rows, one matrix per block."""
     may_grow: float = 1.0
     """Factor by which undoing the fault may raise the sum of squares of the first blocks' own base without penalty.
     Where the clean set has larger errors than the faulty one, a faulty sensor may have hidden errors."""
 
     @cached_property
-    def whole(self) -> FloatArray:
+    def undone_sum(self) -> FloatArray:
         """(k, k): products of the blocks with the fault."""
-        return self.with_it.part(self.at)
+        return self.undone.sum_blocks(self.undone_blocks)
 
     @cached_property
-    def plain(self) -> FloatArray:
+    def unchanged_sum(self) -> FloatArray:
         """(width, width): sum of the products of the unchanged blocks."""
-        return np.asarray(sum(self.without))
+        return np.asarray(sum(self.unchanged))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,11 +123,11 @@ def fit_sizes(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
             gradients += gradient
             grams += gram
         grams += 1e-9 * max(float(np.trace(grams)) / len(grams), 1e-300) * np.eye(len(grams))
-        moved = np.clip(sizes - np.linalg.solve(grams, gradients), variant.least, variant.most)
-        if np.allclose(moved, sizes, rtol=1e-6, atol=1e-12):
-            sizes = moved
+        updated = np.clip(sizes - np.linalg.solve(grams, gradients), variant.lower_bound, variant.upper_bound)
+        if np.allclose(updated, sizes, rtol=1e-6, atol=1e-12):
+            sizes = updated
             break
-        sizes = moved
+        sizes = updated
     return _fit_at(pairs, sizes)
 
 
@@ -142,14 +142,14 @@ def error_with_sizes(pairs: Sequence[Pair], sizes: FloatArray) -> float:
 
 def _find_starting_sizes(variant: Variant) -> FloatArray:
     count = len(variant.undo)
-    return np.ones(count) if variant.least > 0 else np.zeros(count)
+    return np.ones(count) if variant.lower_bound > 0 else np.zeros(count)
 
 
-def weights_of(plain: FloatArray) -> FloatArray:
+def weights_of(products: FloatArray) -> FloatArray:
     """(width,): 1, then minus the least-squares weights of the other columns: rows times this vector are residuals."""
-    gram, cross = plain[1:, 1:], plain[1:, 0]
-    found = np.linalg.solve(_add_ridge(gram), cross)
-    return np.concatenate([[1.0], -found])
+    gram, cross = products[1:, 1:], products[1:, 0]
+    weights = np.linalg.solve(_add_ridge(gram), cross)
+    return np.concatenate([[1.0], -weights])
 
 
 def error_of_own_fit(gram: FloatArray) -> float:
@@ -160,24 +160,24 @@ def error_of_own_fit(gram: FloatArray) -> float:
 
 def _joint_products(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Products with the fault (k, k), the matrix `Grams.spread`, and (width, width) those of all rows, fault undone."""
-    whole, spread = pair.whole, pair.with_it.spread(_pad_sizes(pair, sizes))
-    return whole, spread, np.asarray(spread @ whole @ spread.T + pair.plain)
+    undone_products, spread = pair.undone_sum, pair.undone.spread(_pad_sizes(pair, sizes))
+    return undone_products, spread, np.asarray(spread @ undone_products @ spread.T + pair.unchanged_sum)
 
 
 def _pad_sizes(pair: Pair, sizes: FloatArray) -> FloatArray:
-    return sizes if len(sizes) else np.zeros(len(pair.with_it.changed_columns))
+    return sizes if len(sizes) else np.zeros(len(pair.undone.changed_columns))
 
 
 def _newton_terms(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Half the gradient and half the Gauss-Newton Hessian of the error by the sizes, with the base's weights eliminated
     (variable projection)."""
-    whole, spread, joined = _joint_products(pair, sizes)
-    weights = weights_of(joined)
-    change = pair.with_it.change(weights)
-    slope = change @ whole @ (spread.T @ weights)
-    cross = change @ whole @ spread.T[:, 1:]
-    own = change @ whole @ change.T
-    return np.asarray(slope), np.asarray(own - cross @ np.linalg.solve(_add_ridge(joined[1:, 1:]), cross.T))
+    undone_products, spread, joint = _joint_products(pair, sizes)
+    weights = weights_of(joint)
+    change = pair.undone.change(weights)
+    slope = change @ undone_products @ (spread.T @ weights)
+    cross = change @ undone_products @ spread.T[:, 1:]
+    squares = change @ undone_products @ change.T
+    return np.asarray(slope), np.asarray(squares - cross @ np.linalg.solve(_add_ridge(joint[1:, 1:]), cross.T))
 
 
 def _add_ridge(gram: FloatArray) -> FloatArray:
@@ -186,29 +186,29 @@ def _add_ridge(gram: FloatArray) -> FloatArray:
 
 def _errors(pair: Pair, sizes: FloatArray) -> FloatArray:
     """(blocks with, then without): sums of squares, with weights fitted to all blocks with the fault undone."""
-    _, spread, joined = _joint_products(pair, sizes)
-    weights = weights_of(joined)
-    at = spread.T @ weights
-    blocks = pair.with_it.blocks[list(pair.at)]
-    with_it = np.einsum("i,bij,j->b", at, blocks, at) / _growth(pair, spread)
-    without = [float(weights @ plain @ weights) for plain in pair.without]
-    return np.asarray(np.maximum(np.concatenate([with_it, np.array(without)]), 0.0))
+    _, spread, joint = _joint_products(pair, sizes)
+    weights = weights_of(joint)
+    extended_weights = spread.T @ weights
+    blocks = pair.undone.blocks[list(pair.undone_blocks)]
+    undone_errors = np.einsum("i,bij,j->b", extended_weights, blocks, extended_weights) / _growth(pair, spread)
+    unchanged_errors = [float(weights @ products @ weights) for products in pair.unchanged]
+    return np.asarray(np.maximum(np.concatenate([undone_errors, np.array(unchanged_errors)]), 0.0))
 
 
 def _growth(pair: Pair, spread: FloatArray) -> float:
     """Factor by which undoing the fault raises the error of the blocks' own base, up to `may_grow`."""
     if pair.may_grow <= 1.0:
         return 1.0
-    plain = pair.whole[: pair.with_it.width, : pair.with_it.width]
-    grown = error_of_own_fit(spread @ pair.whole @ spread.T) / max(error_of_own_fit(plain), 1e-300)
-    return float(np.clip(grown, 1.0, pair.may_grow))
+    products = pair.undone_sum[: pair.undone.width, : pair.undone.width]
+    growth = error_of_own_fit(spread @ pair.undone_sum @ spread.T) / max(error_of_own_fit(products), 1e-300)
+    return float(np.clip(growth, 1.0, pair.may_grow))
 
 
-def held_out_error(pairs: Sequence[Pair], sizes: FloatArray, out: Sequence[int]) -> float:
+def held_out_error(pairs: Sequence[Pair], sizes: FloatArray, left_out: Sequence[int]) -> float:
     """Sum of squares of blocks that were left out, with sizes and base weights of the others."""
-    found = 0.0
+    error = 0.0
     for pair in pairs:
-        _, spread, joined = _joint_products(pair, sizes)
-        at = spread.T @ weights_of(joined)
-        found += max(float(at @ pair.with_it.part(out) @ at), 0.0)
-    return found
+        _, spread, joint = _joint_products(pair, sizes)
+        extended_weights = spread.T @ weights_of(joint)
+        error += max(float(extended_weights @ pair.undone.sum_blocks(left_out) @ extended_weights), 0.0)
+    return error

@@ -1,4 +1,4 @@
-"""Delays and clock rates of the faulty set that cross-correlations of responses and commands suggest.
+"""Delays and clock rates of the faulty recordings, suggested by cross-correlation, for the search of faults.
 
 With the weights of a base fitted to the clean set, errors are e = r - c, r from the responses and c from the commands.
 Where the delay spans many oscillations of the signal, the minimum of the error at the true delay is narrower than the
@@ -20,103 +20,116 @@ from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
 
 
-def likely_delays_s(compared_bases: Sequence[ComparedBase]) -> tuple[float, ...]:
+def suggest_delays_s(compared_bases: Sequence[ComparedBase]) -> tuple[float, ...]:
     """Delays in s of the faulty responses behind the commands: per base of the device, the delay by cross-correlation,
     if it is at least one row, and delays up to half a row from it."""
-    found = []
-    for compared in _bases_of_device(compared_bases):
-        late = _rows_late(compared)
-        found += [float(late + by) * compared.row_s for by in _offsets_around() if late]
-    return tuple(dict.fromkeys(found))
+    delays_s = []
+    for compared in _select_device_bases(compared_bases):
+        delay_rows = _estimate_delay_rows(compared)
+        delays_s += [float(delay_rows + offset) * compared.row_s for offset in _list_row_offsets() if delay_rows]
+    return tuple(dict.fromkeys(delays_s))
 
 
-def likely_clock_rates(compared_bases: Sequence[ComparedBase]) -> tuple[ClockRate, ...]:
+def suggest_clock_rates(compared_bases: Sequence[ComparedBase]) -> tuple[ClockRate, ...]:
     """Clock rates at which the delay grows over the faulty set: per base of the device, the most likely rate, if its
     delay at the end is at least one row, and rates whose delays differ from it by up to half a row there."""
-    found = []
-    for compared in _bases_of_device(compared_bases):
+    rates = []
+    for compared in _select_device_bases(compared_bases):
         for runs_on in (True, False) if any(part.start > 0 for part in compared.faulty.parts) else (True,):
-            rate, end = _likeliest_rate(compared, runs_on)
-            if abs(rate) * end >= 1:
-                found += [ClockRate(rate + by / end, LATE_STEP / end, runs_on) for by in _offsets_around()]
-    return tuple(found)
+            rate, last_time = _estimate_clock_rate(compared, runs_on)
+            if abs(rate) * last_time >= 1:
+                rates += [
+                    ClockRate(rate + offset / last_time, LATE_STEP / last_time, runs_on)
+                    for offset in _list_row_offsets()
+                ]
+    return tuple(rates)
 
 
-def _offsets_around() -> list[float]:
+def _list_row_offsets() -> list[float]:
     """Offsets in rows from a likely delay to those that are tried."""
-    return [float(by) for by in np.arange(-0.5, 0.51, LATE_STEP)]
+    return [float(offset) for offset in np.arange(-0.5, 0.51, LATE_STEP)]
 
 
-def _bases_of_device(compared_bases: Sequence[ComparedBase]) -> list[ComparedBase]:
+def _select_device_bases(compared_bases: Sequence[ComparedBase]) -> list[ComparedBase]:
+    """The bases with commands: all but those that compare sensors only."""
     return [compared for compared in compared_bases if not isinstance(compared.base, SensorBase)]
 
 
 def _split_errors(compared: ComparedBase, rows: FloatArray) -> FloatArray:
     """(n, 2): whitened contributions r of the responses and c of the commands to the errors r - c of a part's rows,
-    with the weights of the clean set; without `REACH` rows at either end."""
+    with the weights fitted to the clean set; without `REACH` rows at either end."""
     weights = weights_of(compared.clean.white.T @ compared.clean.white) / compared.columns
-    pushed = np.arange(len(weights)) == 0
+    is_command = np.arange(len(weights)) == 0
     if isinstance(compared.base, AutoregressiveBase):
-        pushed = compared.base.command_columns(len(weights))
-    return apply_filter(compared.whitening, rows @ np.column_stack([weights * ~pushed, -weights * pushed]))[
+        is_command = compared.base.command_columns(len(weights))
+    return apply_filter(compared.whitening, rows @ np.column_stack([weights * ~is_command, -weights * is_command]))[
         REACH:-REACH
     ]
 
 
-def _rows_late(compared: ComparedBase) -> float:
+def _estimate_delay_rows(compared: ComparedBase) -> float:
     """Rows by which the responses lag the commands in the longest part of the faulty set; 0 for less than one row."""
-    made = _split_errors(compared, max(compared.faulty.rows, key=len))
-    longest = len(made) // 4
-    if longest < 1:
+    contributions = _split_errors(compared, max(compared.faulty.rows, key=len))
+    max_lag = len(contributions) // 4
+    if max_lag < 1:
         return 0.0
-    late = lateness(made[:, [0]], made[:, [1]], longest)
-    return late if 1 <= late < longest else 0.0
+    delay = lateness(contributions[:, [0]], contributions[:, [1]], max_lag)
+    return delay if 1 <= delay < max_lag else 0.0
 
 
-def _likeliest_rate(compared: ComparedBase, runs_on: bool) -> tuple[float, float]:
+def _estimate_clock_rate(compared: ComparedBase, runs_on: bool) -> tuple[float, float]:
     """The relative clock rate along whose delays the cross-correlations of short blocks have the largest sum (a Radon
     transform of their peaks), and the time of the last block, in rows. The rate is 0 where the largest sum is at either
-    end of the range."""
+    end of the range. runs_on: whether the clock's time is counted from the beginning of the file; else of each part."""
     times, correlations = _correlate_blocks(compared, runs_on)
     if not correlations.size:
         return 0.0, 0.0
-    end, longest = float(times.max()), correlations.shape[1] // 2
-    rates = np.arange(-longest, longest + LATE_STEP, LATE_STEP) / end
+    last_time, max_lag = float(times.max()), correlations.shape[1] // 2
+    rates = np.arange(-max_lag, max_lag + LATE_STEP, LATE_STEP) / last_time
     # Readings of a clock that is fast by `rate` show at row t the value of t (1 + rate): they are early.
-    at = np.clip(longest - rates[:, None] * times, 0.0, 2 * longest - 1e-9)
-    whole = at.astype(np.intp)
-    block, beyond = np.arange(len(times)), at - whole
-    alike = np.sum((1 - beyond) * correlations[block, whole] + beyond * correlations[block, whole + 1], axis=1)
-    best = int(np.argmax(alike))
-    return (float(rates[best]) if 0 < best < len(rates) - 1 else 0.0), end
+    lags = np.clip(max_lag - rates[:, None] * times, 0.0, 2 * max_lag - 1e-9)
+    lower_lags = lags.astype(np.intp)
+    block, lag_fractions = np.arange(len(times)), lags - lower_lags
+    correlation_sums = np.sum(
+        (1 - lag_fractions) * correlations[block, lower_lags] + lag_fractions * correlations[block, lower_lags + 1],
+        axis=1,
+    )
+    best = int(np.argmax(correlation_sums))
+    return (float(rates[best]) if 0 < best < len(rates) - 1 else 0.0), last_time
 
 
 def _correlate_blocks(compared: ComparedBase, runs_on: bool) -> tuple[FloatArray, FloatArray]:
-    """Times of blocks (b,) in rows, and correlation coefficients at each lag (b, 2 longest + 1) between the
-    contribution of a block's responses and that of all commands of its part. Empty where all parts are too short."""
-    before = compared.base.order if isinstance(compared.base, AutoregressiveBase) else 0
+    """Times of blocks (b,) in rows, and correlation coefficients at each lag (b, 2 max_lag + 1) between the
+    contribution of a block's responses and that of all commands of its part. Empty where all parts are too short.
+    runs_on: as in `ClockRate`."""
+    history = compared.base.order if isinstance(compared.base, AutoregressiveBase) else 0
     starts = [
-        before + (part.start / (part.rate_hz * compared.row_s) if runs_on else 0.0) for part in compared.faulty.parts
+        history + (part.start / (part.rate_hz * compared.row_s) if runs_on else 0.0) for part in compared.faulty.parts
     ]
-    whole = sum(len(rows) for rows in compared.faulty.rows)
-    longest = int(
+    row_count = sum(len(rows) for rows in compared.faulty.rows)
+    max_lag = int(
         CLOCK_FASTEST * max(start + len(rows) for start, rows in zip(starts, compared.faulty.rows, strict=True))
     )
     times: list[float] = []
-    found: list[FloatArray] = []
+    coefficients: list[FloatArray] = []
     for start, rows in zip(starts, compared.faulty.rows, strict=True):
-        made = _split_errors(compared, rows)
-        if len(made) < CONTRAST_BLOCKS or longest < 1:
+        contributions = _split_errors(compared, rows)
+        if len(contributions) < CONTRAST_BLOCKS or max_lag < 1:
             continue
-        room = next_fast_len(len(made) + longest, True)
-        commands, size = rfft(made[:, 1], room).conj(), float(np.linalg.norm(made[:, 1]))
-        for block in np.array_split(np.arange(len(made)), max(round(CONTRAST_BLOCKS * len(rows) / whole), 1)):
-            responses = np.zeros(len(made))
-            responses[block] = made[block, 0]
-            alike = irfft(rfft(responses, room) * commands, room)
+        fft_length = next_fast_len(len(contributions) + max_lag, True)
+        command_spectrum, command_norm = (
+            rfft(contributions[:, 1], fft_length).conj(),
+            float(np.linalg.norm(contributions[:, 1])),
+        )
+        for block in np.array_split(
+            np.arange(len(contributions)), max(round(CONTRAST_BLOCKS * len(rows) / row_count), 1)
+        ):
+            responses = np.zeros(len(contributions))
+            responses[block] = contributions[block, 0]
+            correlation = irfft(rfft(responses, fft_length) * command_spectrum, fft_length)
             times.append(start + REACH + float(block.mean()))
-            found.append(
-                np.concatenate([alike[room - longest :], alike[: longest + 1]])
-                / max(size * float(np.linalg.norm(responses)), 1e-300)
+            coefficients.append(
+                np.concatenate([correlation[fft_length - max_lag :], correlation[: max_lag + 1]])
+                / max(command_norm * float(np.linalg.norm(responses)), 1e-300)
             )
-    return np.array(times), np.array(found)
+    return np.array(times), np.array(coefficients)

@@ -24,7 +24,7 @@ from equalizer.signals.signal import FloatArray
 
 Shape = Callable[[Motion], FloatArray]
 """Maps a part's motion to the force (n,) of a fault of size 1."""
-Along = Callable[[Part], Motion]
+MotionOf = Callable[[Part], Motion]
 """Maps a part to its measured motion."""
 WIDER = (1.0, 3.0, 8.0, 20.0)
 """Widths of the smoothed sign of dry friction, relative to the narrowest."""
@@ -42,7 +42,7 @@ class _Axis:
 
     number: int
     name: str
-    along: Along
+    motion_of: MotionOf
     channel: int
     """Channel of the motion."""
     middle: float
@@ -56,16 +56,18 @@ class _Axis:
         """A fault of the mechanism on this axis. simpler: faults that it contains as special cases."""
         return Fault(effect, "mechanism", self.name, self.number, tuple(variants), simpler)
 
-    def plain(self, effect: str, shape: Shape, number: str, least: float = 0.0) -> Fault:
-        """A fault with a single parameter, the factor of `shape`. number: its name, least: its lower bound."""
-        return self.fault(effect, [Variant((self.of(shape),), proportional_parameter(number), least=least)])
+    def single_parameter_fault(self, effect: str, shape: Shape, number: str, lower_bound: float = 0.0) -> Fault:
+        """A fault with a single parameter, the factor of `shape`. number: its name, lower_bound: its lower bound."""
+        return self.fault(
+            effect, [Variant((self.subtract(shape),), proportional_parameter(number), lower_bound=lower_bound)]
+        )
 
-    def of(self, shape: Shape) -> Undo:
+    def subtract(self, shape: Shape) -> Undo:
         """The function that subtracts the force from the command of this axis."""
 
         def undo(part: Part) -> Part:
             command = part.command.copy()
-            command[:, self.number] -= shape(self.along(part))
+            command[:, self.number] -= shape(self.motion_of(part))
             return replace(part, command=command)
 
         return undo
@@ -80,54 +82,63 @@ class _Axis:
 
 
 def mechanism_faults(
-    number: int, name: str, motions: Sequence[Motion], along: Along, rotational: bool
+    number: int, name: str, motions: Sequence[Motion], motion_of: MotionOf, rotational: bool
 ) -> Iterator[Fault]:
     """All faults of the mechanism along axis `number`. motions: of all compared parts, whose range the grids span.
-    along: makes the motion of a part. rotational: whether the axis turns; pitches of cogging are then within a turn."""
+    motion_of: gives the motion of a part. rotational: whether the axis turns; pitches of cogging are then at most
+    a turn."""
     channel = min(number, len(motions[0].channels) - 1)
     position = np.concatenate([motion.position[:, channel] for motion in motions])
     velocity = np.concatenate([motion.velocity[:, channel] for motion in motions])
     low, width = float(position.min()), max(float(np.ptp(position)), 1e-300)
-    way = min(width, 2 * np.pi) if rotational else width
+    period_range = min(width, 2 * np.pi) if rotational else width
     sharp = max(SHARP * float(np.sqrt(np.mean(velocity**2))), 1e-300)
-    axis = _Axis(number, name, along, channel, low + 0.5 * width, width, sharp)
-    yield axis.plain("added_mass", lambda m: m.acceleration[:, channel], "mass")
-    yield axis.plain("viscous_damping", axis.v, "damping")
-    yield axis.plain("quadratic_damping", lambda m: axis.v(m) * np.abs(axis.v(m)), "coefficient")
-    yield axis.plain("added_stiffness", axis.q, "stiffness", least=-np.inf)
-    yield axis.plain("hardening_stiffness", lambda m: axis.q(m) ** 3, "k3", least=-np.inf)
-    yield axis.fault("coulomb_friction", [_coulomb_friction(axis, wide * sharp) for wide in WIDER])
+    axis = _Axis(number, name, motion_of, channel, low + 0.5 * width, width, sharp)
+    yield axis.single_parameter_fault("added_mass", lambda m: m.acceleration[:, channel], "mass")
+    yield axis.single_parameter_fault("viscous_damping", axis.v, "damping")
+    yield axis.single_parameter_fault("quadratic_damping", lambda m: axis.v(m) * np.abs(axis.v(m)), "coefficient")
+    yield axis.single_parameter_fault("added_stiffness", axis.q, "stiffness", lower_bound=-np.inf)
+    yield axis.single_parameter_fault("hardening_stiffness", lambda m: axis.q(m) ** 3, "k3", lower_bound=-np.inf)
+    yield axis.fault("coulomb_friction", [_coulomb_friction(axis, width_factor * sharp) for width_factor in WIDER])
     yield axis.fault(
-        "asymmetric_friction", [_asymmetric_friction(axis, wide * sharp) for wide in WIDER], ("coulomb_friction",)
+        "asymmetric_friction",
+        [_asymmetric_friction(axis, width_factor * sharp) for width_factor in WIDER],
+        ("coulomb_friction",),
     )
     yield axis.fault(
         "presliding_hysteresis", [_make_presliding_variant(axis, give * width) for give in GIVES], ("coulomb_friction",)
     )
-    yield axis.fault("cogging", [_make_cogging_variant(axis, way / count) for count in RIPPLES])
+    yield axis.fault("cogging", [_make_cogging_variant(axis, period_range / count) for count in RIPPLES])
     yield axis.fault("end_stop", [stop for share in STOPS for stop in _stops(axis, share * width)])
 
 
-def _coulomb_friction(axis: _Axis, wide: float) -> Variant:
-    return Variant((axis.of(lambda m: smooth_sign(axis.v(m), wide)),), proportional_parameter("level"), least=0.0)
-
-
-def _asymmetric_friction(axis: _Axis, wide: float) -> Variant:
-    undo = (
-        axis.of(lambda m: np.maximum(smooth_sign(axis.v(m), wide), 0.0)),
-        axis.of(lambda m: np.minimum(smooth_sign(axis.v(m), wide), 0.0)),
+def _coulomb_friction(axis: _Axis, speed_width: float) -> Variant:
+    return Variant(
+        (axis.subtract(lambda m: smooth_sign(axis.v(m), speed_width)),),
+        proportional_parameter("level"),
+        lower_bound=0.0,
     )
-    return Variant(undo, lambda s: {"level_positive": float(s[0]), "level_negative": float(s[1])}, least=0.0)
 
 
-def _make_presliding_variant(axis: _Axis, give: float) -> Variant:
-    parameters_of: ParametersOf = lambda s: {"level": float(s[0]), "stiffness": float(s[0]) / give}  # noqa: E731
-    return Variant((axis.of(lambda m: bristle_bend(m.position[:, axis.channel], give)),), parameters_of, least=0.0)
+def _asymmetric_friction(axis: _Axis, speed_width: float) -> Variant:
+    undo = (
+        axis.subtract(lambda m: np.maximum(smooth_sign(axis.v(m), speed_width), 0.0)),
+        axis.subtract(lambda m: np.minimum(smooth_sign(axis.v(m), speed_width), 0.0)),
+    )
+    return Variant(undo, lambda s: {"level_positive": float(s[0]), "level_negative": float(s[1])}, lower_bound=0.0)
+
+
+def _make_presliding_variant(axis: _Axis, distance: float) -> Variant:
+    parameters_of: ParametersOf = lambda s: {"level": float(s[0]), "stiffness": float(s[0]) / distance}  # noqa: E731
+    return Variant(
+        (axis.subtract(lambda m: bristle_bend(m.position[:, axis.channel], distance)),), parameters_of, lower_bound=0.0
+    )
 
 
 def _make_cogging_variant(axis: _Axis, pitch: float) -> Variant:
     undo = (
-        axis.of(lambda m: np.sin(2 * np.pi * m.position[:, axis.channel] / pitch)),
-        axis.of(lambda m: np.cos(2 * np.pi * m.position[:, axis.channel] / pitch)),
+        axis.subtract(lambda m: np.sin(2 * np.pi * m.position[:, axis.channel] / pitch)),
+        axis.subtract(lambda m: np.cos(2 * np.pi * m.position[:, axis.channel] / pitch)),
     )
     # Opposite signs: the force in the catalogue acts on the moving mass, and the command must balance it.
     return Variant(undo, lambda s: {
@@ -137,18 +148,18 @@ def _make_cogging_variant(axis: _Axis, pitch: float) -> Variant:
 
 def _stops(axis: _Axis, reach: float) -> Iterator[Variant]:
     """End stops at both ends of the travel, and at each end alone. reach: distance from its middle, m or rad."""
-    both = axis.of(lambda m: np.sign(axis.q(m)) * np.maximum(np.abs(axis.q(m)) - reach, 0.0))
-    yield Variant((both,), _stop_parameters(axis.middle + reach, 1.0), least=0.0)
+    two_sided = axis.subtract(lambda m: np.sign(axis.q(m)) * np.maximum(np.abs(axis.q(m)) - reach, 0.0))
+    yield Variant((two_sided,), _stop_parameters(axis.middle + reach, 1.0), lower_bound=0.0)
     for side in (1.0, -1.0):
         yield _stop(axis, side, reach)
 
 
 def _stop(axis: _Axis, side: float, reach: float) -> Variant:
-    undo = axis.of(lambda m: side * np.maximum(side * axis.q(m) - reach, 0.0))
-    return Variant((undo,), _stop_parameters(axis.middle + side * reach, side), least=0.0)
+    undo = axis.subtract(lambda m: side * np.maximum(side * axis.q(m) - reach, 0.0))
+    return Variant((undo,), _stop_parameters(axis.middle + side * reach, side), lower_bound=0.0)
 
 
 def _stop_parameters(position: float, side: float) -> ParametersOf:
     """Parameters of an end stop; the side (1 or -1) is given only where the sign of the position does not imply it."""
-    beyond = {} if side * position > 0 else {"side": side}
-    return lambda s: {"position": position, "stiffness": float(s[0]), **beyond}
+    side_parameter = {} if side * position > 0 else {"side": side}
+    return lambda s: {"position": position, "stiffness": float(s[0]), **side_parameter}

@@ -30,13 +30,13 @@ class Part:
     """(n,): samples of response and position that were recorded, not interpolated."""
     start: int
     """Index of the part's first sample in its file, because drifts and clocks also run between the parts."""
-    whole: int
+    file_length: int
     """Number of samples of the file."""
 
     @property
     def elapsed_share(self) -> FloatArray:
         """(n,): elapsed share of the file's duration, 0 to 1."""
-        return np.linspace(self.start, self.start + len(self.known) - 1, len(self.known)) / max(self.whole - 1, 1)
+        return np.linspace(self.start, self.start + len(self.known) - 1, len(self.known)) / max(self.file_length - 1, 1)
 
     @property
     def rate_hz(self) -> float:
@@ -51,23 +51,23 @@ class Part:
             response=replace(self.recording.response, samples=self.response),
             position=_replace_samples(self.recording.position, self.position),
         )
-        none = np.zeros(len(self.known), dtype=np.bool_)
-        return Observed(recording, self.command, self.response, self.known, none, none)
+        no_samples = np.zeros(len(self.known), dtype=np.bool_)
+        return Observed(recording, self.command, self.response, self.known, no_samples, no_samples)
 
 
 def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
     """The parts of recordings, each from its first to its last known sample. Only the last `PART_MOST_SAMPLES` samples
     of a recording are used, and parts shorter than `PART_LEAST_SAMPLES` are left out."""
-    found: list[Part] = []
+    parts: list[Part] = []
     for recording in recordings:
         for start, stop in parts_of(recording):
-            begin = max(start, len(recording) - PART_MOST_SAMPLES)
-            if begin >= stop:
+            first = max(start, len(recording) - PART_MOST_SAMPLES)
+            if first >= stop:
                 continue
-            known = np.flatnonzero(_finite_samples(part_of(recording, begin, stop)))
-            if len(known) and known[-1] - known[0] + 1 >= PART_LEAST_SAMPLES:
-                found.append(_fill_part(recording, begin + int(known[0]), begin + int(known[-1]) + 1))
-    return tuple(found)
+            known_indices = np.flatnonzero(_finite_samples(part_of(recording, first, stop)))
+            if len(known_indices) and known_indices[-1] - known_indices[0] + 1 >= PART_LEAST_SAMPLES:
+                parts.append(_fill_part(recording, first + int(known_indices[0]), first + int(known_indices[-1]) + 1))
+    return tuple(parts)
 
 
 def _finite_samples(part: Recording) -> Mask:

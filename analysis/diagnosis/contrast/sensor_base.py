@@ -30,29 +30,33 @@ class SensorBase:
     step: int
     """Decimation after filtering: one of this many samples is kept."""
 
-    def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
+    def rows(
+        self, parts: Sequence[Part], reusable_rows: tuple[FloatArray, ...] | None = None
+    ) -> tuple[FloatArray, ...]:
         """Per part (kept, 1 + columns): the filtered reading; its regressors, which are the differentiated position
-        from `SENSOR_TAPS` rows before to as many after, and 1. like: not used."""
+        from `SENSOR_TAPS` rows before to as many after, and 1. reusable_rows: not used."""
         return tuple(self._rows(part) for part in parts)
 
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
         """Per part, mask of its rows: known samples that are more than one period of `band_hz` from the part's ends."""
-        found = []
+        masks = []
         for part in parts:
             edge = int(part.rate_hz / self.band_hz) + 1
-            inside = part.known.copy()
-            inside[:edge] = False
-            inside[max(len(inside) - edge, 0) :] = False
-            found.append(inside[:: self.step][SENSOR_TAPS:-SENSOR_TAPS])
-        return tuple(found)
+            valid = part.known.copy()
+            valid[:edge] = False
+            valid[max(len(valid) - edge, 0) :] = False
+            masks.append(valid[:: self.step][SENSOR_TAPS:-SENSOR_TAPS])
+        return tuple(masks)
 
     def _rows(self, part: Part) -> FloatArray:
         assert part.position is not None
-        read = low_pass_filter(part.response[:, [self.channel]], part.rate_hz, self.band_hz)[:: self.step]
-        moved = differentiate(part.position[:, [self.channel]], part.rate_hz, self.band_hz, self.times)[:: self.step]
-        count = len(read) - 2 * SENSOR_TAPS
-        near = [moved[shift : shift + count] for shift in range(2 * SENSOR_TAPS + 1)]
-        return np.hstack([read[SENSOR_TAPS : SENSOR_TAPS + count], *near, np.ones((count, 1))])
+        reading = low_pass_filter(part.response[:, [self.channel]], part.rate_hz, self.band_hz)[:: self.step]
+        differentiated = differentiate(part.position[:, [self.channel]], part.rate_hz, self.band_hz, self.times)[
+            :: self.step
+        ]
+        count = len(reading) - 2 * SENSOR_TAPS
+        neighbours = [differentiated[shift : shift + count] for shift in range(2 * SENSOR_TAPS + 1)]
+        return np.hstack([reading[SENSOR_TAPS : SENSOR_TAPS + count], *neighbours, np.ones((count, 1))])
 
 
 def sensor_bases(parts: Sequence[Part], band_hz: float, step: int) -> tuple[SensorBase, ...]:
@@ -64,9 +68,13 @@ def sensor_bases(parts: Sequence[Part], band_hz: float, step: int) -> tuple[Sens
     if parts[0].position.shape[1] != parts[0].response.shape[1]:
         return ()
     orders = [
-        (DERIVATIVE_OF_QUANTITY.get(read, -1), DERIVATIVE_OF_QUANTITY.get(moved, 9))
-        for read, moved in zip(recording.response.quantities, recording.position.quantities, strict=True)
+        (DERIVATIVE_OF_QUANTITY.get(response_order, -1), DERIVATIVE_OF_QUANTITY.get(position_order, 9))
+        for response_order, position_order in zip(
+            recording.response.quantities, recording.position.quantities, strict=True
+        )
     ]
     return tuple(
-        SensorBase(channel, read - moved, band_hz, step) for channel, (read, moved) in enumerate(orders) if read > moved
+        SensorBase(channel, response_order - position_order, band_hz, step)
+        for channel, (response_order, position_order) in enumerate(orders)
+        if response_order > position_order
     )

@@ -17,15 +17,15 @@ from itertools import pairwise
 import numpy as np
 
 from analysis.diagnosis.contrast.actuator_faults import (
-    AROUND,
-    BEGUN,
+    EARLIER_DRIFT_SHARES,
     GRID,
+    SIZE_RANGE,
     delays_to_try,
     drift_shape,
     median_frequency_hz,
 )
 from analysis.diagnosis.contrast.fault import (
-    EVERY,
+    ALL_CHANNELS,
     Curve,
     Fault,
     ParametersOf,
@@ -35,25 +35,25 @@ from analysis.diagnosis.contrast.fault import (
     fix_size,
     proportional_parameter,
 )
-from analysis.diagnosis.contrast.interpolation import noise_kept, resample, shift_samples
+from analysis.diagnosis.contrast.interpolation import noise_gain, resample, shift_samples
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import CLOCK_FASTEST, REVERSAL_OF_GAP
 from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
-Read = Callable[[FloatArray, float], FloatArray]
+ReadingChange = Callable[[FloatArray, float], FloatArray]
 """Function that removes a fault: readings of one channel (n,) and their rate (Hz) to readings without the fault."""
-WIDELY = (0.5, 1.6)
-"""Range of sizes, as `AROUND`, for faults that act nearly in proportion to their size."""
+WIDE_RANGE = (0.5, 1.6)
+"""Range of sizes, as `SIZE_RANGE`, for faults that act nearly in proportion to their size."""
 GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 1.4, 1.6, 2.0, 2.6)
 """Gains about which the fault is linearised; the fit of its size covers the gains between neighbours."""
 SHIFTS = (0.03, 0.1, 0.3, 0.7, 1.2)
 """Offsets and drifts that are tried, relative to the standard deviation of the channel."""
-BENT = (0.02, 0.06, 0.15, 0.3)
+NONLINEARITY_SHARES = (0.02, 0.06, 0.15, 0.3)
 """Nonlinearity errors at the largest reading, as a share of it."""
 PLAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 """Gaps of a backlash before the sensor, relative to the standard deviation of the channel."""
-LATE = (*np.geomspace(0.004, 0.2, GRID // 2).tolist(), *np.arange(0.35, 2.0, 0.15).tolist())
+CLOCK_DELAYS = (*np.geomspace(0.004, 0.2, GRID // 2).tolist(), *np.arange(0.35, 2.0, 0.15).tolist())
 """Delays of a clock at the end of the file that are tried, in periods of the median frequency: first a logarithmic
 grid, then steps of less than half a period."""
 IN_UNITS = ("sensor_offset", "sensor_drift")
@@ -74,10 +74,10 @@ class _Channel:
     """Largest magnitude of the readings."""
 
     def fault(self, effect: str, variants: Sequence[Variant], simpler: tuple[str, ...] = ()) -> Fault:
-        site = self.numbers[0] if self.name else EVERY
+        site = self.numbers[0] if self.name else ALL_CHANNELS
         return Fault(effect, "sensor", self.name, site, tuple(variants), simpler)
 
-    def of(self, read: Read) -> Undo:
+    def undo_by(self, read: ReadingChange) -> Undo:
         """The function that applies `read` to these channels of a part."""
 
         def undo(part: Part) -> Part:
@@ -92,30 +92,30 @@ class _Channel:
 def sensor_faults(number: int, name: str, parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
     """All faults of response channel `number`. parts: all compared ones, whose range the grids span. rows: spacing of
     the base's rows, and likely delays and clock rates."""
-    whole = np.concatenate([part.response[:, number] for part in parts])
-    channel = _Channel((number,), name, float(np.std(whole)) or 1.0, float(np.abs(whole).max(initial=0.0)) or 1.0)
+    readings = np.concatenate([part.response[:, number] for part in parts])
+    channel = _Channel((number,), name, float(np.std(readings)) or 1.0, float(np.abs(readings).max(initial=0.0)) or 1.0)
     longest = max(parts, key=lambda part: len(part.response))
     yield from _common_faults(channel, parts, longest.response[:, number], rows)
-    shares = [side * share for share in BENT for side in (1.0, -1.0)]
+    shares = [side * share for share in NONLINEARITY_SHARES for side in (1.0, -1.0)]
     yield channel.fault("sensor_nonlinearity", [_nonlinearity(channel, share, 3, "cubic") for share in shares])
     yield channel.fault("sensor_asymmetry", [_nonlinearity(channel, share, 2, "square") for share in shares])
     yield channel.fault("sensor_play", [_backlash(channel, share * channel.rms) for share in PLAYS])
-    for other in range(longest.response.shape[1]):
-        if other != number:
-            yield _cross_axis_sensitivity(channel, other)
+    for other_channel in range(longest.response.shape[1]):
+        if other_channel != number:
+            yield _cross_axis_sensitivity(channel, other_channel)
 
 
 def faults_of_all(parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
     """Faults that all channels share, as those of one supply, filter or logger. parts: as in `sensor_faults`."""
-    whole = np.vstack([part.response for part in parts])
-    sizes = np.std(whole, axis=0)
+    readings = np.vstack([part.response for part in parts])
+    sizes = np.std(readings, axis=0)
     largest = int(np.argmax(sizes))
-    top = float(np.abs(whole).max(initial=0.0)) or 1.0
-    channel = _Channel(tuple(range(whole.shape[1])), "", float(sizes[largest]) or 1.0, top)
+    peak = float(np.abs(readings).max(initial=0.0)) or 1.0
+    channel = _Channel(tuple(range(readings.shape[1])), "", float(sizes[largest]) or 1.0, peak)
     longest = max(parts, key=lambda part: len(part.response))
-    alike = len(set(longest.recording.response.units)) == 1
+    has_one_unit = len(set(longest.recording.response.units)) == 1
     for fault in _common_faults(channel, parts, longest.response[:, largest], rows):
-        if alike or fault.effect not in IN_UNITS:
+        if has_one_unit or fault.effect not in IN_UNITS:
             yield fault
 
 
@@ -126,7 +126,7 @@ def _common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray
     yield channel.fault("sensor_gain", [_gain(channel, gain) for gain in GAINS])
     shifts = [side * share * channel.rms for share in SHIFTS for side in (1.0, -1.0)]
     yield channel.fault("sensor_offset", [_offset(channel, shift) for shift in shifts])
-    drifts = [_drift(channel, shift, begun) for shift in shifts for begun in BEGUN]
+    drifts = [_drift(channel, shift, earlier_share) for shift in shifts for earlier_share in EARLIER_DRIFT_SHARES]
     yield replace(channel.fault("sensor_drift", drifts, ("sensor_offset",)), varies=True)
     yield channel.fault("logger_offset", [
         *(_logger_offset(channel, time_s, longest.rate_hz) for time_s in times),
@@ -135,15 +135,21 @@ def _common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray
     lags = [time_s for time_s in times if time_s * longest.rate_hz >= 0.1 * rows.lag_samples]
     yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz, rows.lag_samples) for time_s in lags])
     period = longest.rate_hz / median_frequency_hz(samples, longest.rate_hz)
-    rates = [side * late * period / longest.whole for late in LATE for side in (1.0, -1.0)]
+    rates = [side * delay * period / longest.file_length for delay in CLOCK_DELAYS for side in (1.0, -1.0)]
     runs_on = (True, False) if any(part.start > 0 for part in parts) else (True,)
-    clocks = [_clock_drift(channel, rate, on, parts) for rate in rates if abs(rate) < CLOCK_FASTEST for on in runs_on]
-    clocks += [fix_size(_clock_drift(channel, each.rate, each.runs_on, parts), 1e6 * each.step) for each in rows.clocks]
+    clocks = [
+        _clock_drift(channel, rate, run_on, parts) for rate in rates if abs(rate) < CLOCK_FASTEST for run_on in runs_on
+    ]
+    clocks += [
+        fix_size(_clock_drift(channel, clock.rate, clock.runs_on, parts), 1e6 * clock.step) for clock in rows.clocks
+    ]
     yield replace(channel.fault("clock_drift", clocks), varies=True)
 
 
 def _backlash(channel: _Channel, gap: float) -> Variant:
-    return Variant((channel.of(lambda y, rate: _undo_play(y, gap)),), proportional_parameter("gap", gap), *WIDELY)
+    return Variant(
+        (channel.undo_by(lambda y, rate: _undo_play(y, gap)),), proportional_parameter("gap", gap), *WIDE_RANGE
+    )
 
 
 def _undo_play(y: FloatArray, gap: float) -> FloatArray:
@@ -151,77 +157,88 @@ def _undo_play(y: FloatArray, gap: float) -> FloatArray:
     at an extreme of the reading, and has crossed the gap when the reading reverses. In between, the lead changes with
     the square of time."""
     side = np.sign(bristle_bend(y, REVERSAL_OF_GAP * gap))
-    ahead = 0.5 * side
-    turns = np.flatnonzero(side[1:] * side[:-1] < 0) + 1
-    for begin, turn in pairwise([0, *turns.tolist()]):
-        excursion = side[turn - 1] * y[begin:turn]
-        top = begin + int(np.argmax(excursion))
-        left = top + int(np.flatnonzero(excursion[top - begin :] > excursion.max() - REVERSAL_OF_GAP * gap)[-1])
-        crossed = (np.arange(top, turn) - top) / max(left - top, 1)
-        ahead[top:turn] = side[turn - 1] * (0.5 - np.minimum(crossed, 1.0) ** 2)
-    return np.asarray(y + gap * ahead)
+    lead = 0.5 * side
+    reversals = np.flatnonzero(side[1:] * side[:-1] < 0) + 1
+    for start, reversal in pairwise([0, *reversals.tolist()]):
+        excursion = side[reversal - 1] * y[start:reversal]
+        extreme = start + int(np.argmax(excursion))
+        end = extreme + int(np.flatnonzero(excursion[extreme - start :] > excursion.max() - REVERSAL_OF_GAP * gap)[-1])
+        crossed = (np.arange(extreme, reversal) - extreme) / max(end - extreme, 1)
+        lead[extreme:reversal] = side[reversal - 1] * (0.5 - np.minimum(crossed, 1.0) ** 2)
+    return np.asarray(y + gap * lead)
 
 
-def _cross_axis_sensitivity(channel: _Channel, other: int) -> Fault:
+def _cross_axis_sensitivity(channel: _Channel, other_channel: int) -> Fault:
     """Cross-talk: another channel's signal in this one."""
-    (own,) = channel.numbers
+    (own_channel,) = channel.numbers
 
     def undo(part: Part) -> Part:
         response = part.response.copy()
-        response[:, own] -= part.response[:, other]
+        response[:, own_channel] -= part.response[:, other_channel]
         return replace(part, response=response)
 
     return channel.fault("cross_axis_sensitivity", [Variant((undo,), proportional_parameter("from_next"))])
 
 
 def _gain(channel: _Channel, gain: float) -> Variant:
-    undo = channel.of(lambda y, rate: y / gain)
-    of_size: Callable[[float], float] = lambda size: 1 / (1 + size * (1 / gain - 1))  # noqa: E731
-    about = lambda size: _gain(channel, of_size(size))  # noqa: E731
-    return Variant((undo,), lambda s: {"gain": of_size(float(s[0]))}, *AROUND, gain, about=about)
+    undo = channel.undo_by(lambda y, rate: y / gain)
+    gain_at: Callable[[float], float] = lambda size: 1 / (1 + size * (1 / gain - 1))  # noqa: E731
+    at_size = lambda size: _gain(channel, gain_at(size))  # noqa: E731
+    return Variant((undo,), lambda s: {"gain": gain_at(float(s[0]))}, *SIZE_RANGE, gain, at_size=at_size)
 
 
 def _offset(channel: _Channel, shift: float) -> Variant:
-    return Variant((channel.of(lambda y, rate: y - shift),), proportional_parameter("offset", shift), *WIDELY)
+    return Variant((channel.undo_by(lambda y, rate: y - shift),), proportional_parameter("offset", shift), *WIDE_RANGE)
 
 
-def _drift(channel: _Channel, total: float, begun: float) -> Variant:
+def _drift(channel: _Channel, total: float, earlier_share: float) -> Variant:
     def undo(part: Part) -> Part:
         response = part.response.copy()
-        response[:, list(channel.numbers)] -= total * drift_shape(part, begun)[:, None]
+        response[:, list(channel.numbers)] -= total * drift_shape(part, earlier_share)[:, None]
         return replace(part, response=response)
 
-    return Variant((undo,), proportional_parameter("total", total), *WIDELY)
+    return Variant((undo,), proportional_parameter("total", total), *WIDE_RANGE)
 
 
 def _logger_offset(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
     def undo(part: Part) -> Part:
-        late = time_s * part.rate_hz
-        undone = channel.of(lambda y, rate: shift_samples(y[:, None], -late)[:, 0])(part)
-        return replace(undone, known=part.known & (np.arange(len(part.known)) < len(part.known) - late))
+        delay_samples = time_s * part.rate_hz
+        undone = channel.undo_by(lambda y, rate: shift_samples(y[:, None], -delay_samples)[:, 0])(part)
+        return replace(undone, known=part.known & (np.arange(len(part.known)) < len(part.known) - delay_samples))
 
-    about = lambda size: _logger_offset(channel, size * time_s, rate_hz)  # noqa: E731
-    passed = noise_kept(time_s * rate_hz)
-    return Variant((undo,), proportional_parameter("offset", time_s), *AROUND, passed=passed, about=about, exact=True)
+    at_size = lambda size: _logger_offset(channel, size * time_s, rate_hz)  # noqa: E731
+    noise_factor = noise_gain(time_s * rate_hz)
+    return Variant(
+        (undo,),
+        proportional_parameter("offset", time_s),
+        *SIZE_RANGE,
+        noise_factor=noise_factor,
+        at_size=at_size,
+        exact=True,
+    )
 
 
 def _lag(channel: _Channel, time_s: float, rate_hz: float, samples: int) -> Variant:
     """A first-order low pass, y += (1 - kept) (x - y) per `samples`, inverted exactly. An autoregression predicts a row
     from earlier rows alone, so that samples between rows must not enter here either. The low pass reduces one-step
     prediction errors by the geometric mean of its gain, 1 - kept (Kolmogorov's formula)."""
-    kept = float(np.exp(-samples / (time_s * rate_hz)))
-    undo = channel.of(lambda y, rate: (y - kept * np.concatenate([y[:1]] * samples + [y])[: len(y)]) / (1 - kept))
+    decay = float(np.exp(-samples / (time_s * rate_hz)))
+    undo = channel.undo_by(
+        lambda y, rate: (y - decay * np.concatenate([y[:1]] * samples + [y])[: len(y)]) / (1 - decay)
+    )
     parameters_of: ParametersOf = lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}  # noqa: E731
-    about = lambda size: _lag(channel, size * time_s, rate_hz, samples)  # noqa: E731
-    return Variant((undo,), parameters_of, *AROUND, 1 - kept, about=about)
+    at_size = lambda size: _lag(channel, size * time_s, rate_hz, samples)  # noqa: E731
+    return Variant((undo,), parameters_of, *SIZE_RANGE, 1 - decay, at_size=at_size)
 
 
 def _nonlinearity(channel: _Channel, share: float, power: int, number: str) -> Variant:
     top = channel.top
     curve: Curve = lambda y: _invert_power_law(y / top, share, power) * top  # noqa: E731
-    about = lambda size: _nonlinearity(channel, size * share, power, number)  # noqa: E731
+    at_size = lambda size: _nonlinearity(channel, size * share, power, number)  # noqa: E731
     parameters_of = proportional_parameter(number, share / top ** (power - 1))
-    return Variant((channel.of(lambda y, rate: curve(y)),), parameters_of, *WIDELY, curve=curve, about=about)
+    return Variant(
+        (channel.undo_by(lambda y, rate: curve(y)),), parameters_of, *WIDE_RANGE, curve=curve, at_size=at_size
+    )
 
 
 def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
@@ -234,22 +251,29 @@ def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
     return np.asarray(np.clip(x, -3.0, 3.0))
 
 
-def _clock_drift(channel: _Channel, late: float, runs_on: bool, parts: Sequence[Part]) -> Variant:
-    """Readings taken at t (1 + late), resampled to t. runs_on: t counts from the beginning of the file, else of
+def _clock_drift(channel: _Channel, rate_error: float, runs_on: bool, parts: Sequence[Part]) -> Variant:
+    """Readings taken at t (1 + rate_error), resampled to t. runs_on: t counts from the beginning of the file, else of
     each part."""
 
     def read_times(part: Part) -> FloatArray:
-        before = part.start if runs_on else 0
-        return np.asarray((before + np.arange(len(part.response))) / (1 + late) - before)
+        offset = part.start if runs_on else 0
+        return np.asarray((offset + np.arange(len(part.response))) / (1 + rate_error) - offset)
 
     def undo(part: Part) -> Part:
-        at = read_times(part)
-        undone = channel.of(lambda y, rate: resample(y, at))(part)
-        return replace(undone, known=part.known & (at >= 0) & (at <= len(at) - 1))
+        times = read_times(part)
+        undone = channel.undo_by(lambda y, rate: resample(y, times))(part)
+        return replace(undone, known=part.known & (times >= 0) & (times <= len(times) - 1))
 
-    about = lambda size: _clock_drift(channel, size * late, runs_on, parts)  # noqa: E731
-    passed = noise_kept(np.concatenate([read_times(part) for part in parts]))
-    return Variant((undo,), proportional_parameter("ppm", 1e6 * late), *AROUND, passed=passed, about=about, exact=True)
+    at_size = lambda size: _clock_drift(channel, size * rate_error, runs_on, parts)  # noqa: E731
+    noise_factor = noise_gain(np.concatenate([read_times(part) for part in parts]))
+    return Variant(
+        (undo,),
+        proportional_parameter("ppm", 1e6 * rate_error),
+        *SIZE_RANGE,
+        noise_factor=noise_factor,
+        at_size=at_size,
+        exact=True,
+    )
 
 
 ROTATIONS = (
@@ -263,9 +287,9 @@ ROTATIONS = (
 def sensor_misalignment() -> Fault:
     """A rotation of a three-axis sensor by small angles, to first order. Its three sizes are angles in rad."""
 
-    def of(turn: FloatArray) -> Undo:
+    def make_undo(turn: FloatArray) -> Undo:
         return lambda part: replace(part, response=part.response + part.response @ turn.T)
 
-    undo = tuple(of(np.array(turn)) for turn in ROTATIONS)
+    undo = tuple(make_undo(np.array(turn)) for turn in ROTATIONS)
     variant = Variant(undo, lambda s: {"degrees": float(np.degrees(np.linalg.norm(s)))})
-    return Fault("sensor_misalignment", "sensor", "", EVERY, (variant,))
+    return Fault("sensor_misalignment", "sensor", "", ALL_CHANNELS, (variant,))

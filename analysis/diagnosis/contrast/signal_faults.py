@@ -37,48 +37,52 @@ class SignalFault:
 def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
     """Mains hum that is in the faulty parts alone, with the amplitude and frequency (Hz) of its strongest channel; None
     where there is none."""
-    found = [
+    mains_lines = [
         (*mains_line, channel)
         for channel in range(faulty[0].response.shape[1])
         if (mains_line := _find_mains_line(faulty, clean, channel)) is not None
     ]
-    if not found:
+    if not mains_lines:
         return None
-    amplitude, frequency_hz, _ = max(found)
-    channels = tuple(channel for _, _, channel in found)
+    amplitude, frequency_hz, _ = max(mains_lines)
+    channels = tuple(channel for _, _, channel in mains_lines)
     return SignalFault("mains_hum", "sensor", channels, {"amplitude": amplitude, "frequency": frequency_hz})
 
 
 def find_sensor_noise(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
     """Added white noise, which has about the same power in the highest eighth of the spectrum as in the eighth above
     its middle; None where there is none."""
-    found: list[tuple[float, int]] = []
+    noisy_channels: list[tuple[float, int]] = []
     for channel in range(faulty[0].response.shape[1]):
-        here, usual = (
+        faulty_floors, clean_floors = (
             np.array(
                 [_noise_floors(part.response[:, channel], stretch) for part in parts for stretch in _stretches(part)]
             )
             for parts in (faulty, clean)
         )
-        if not len(here) or not len(usual):
+        if not len(faulty_floors) or not len(clean_floors):
             continue
-        new = np.median(here, axis=0) - np.median(usual, axis=0)
-        louder = bool(np.all(here.min(axis=0) > NOISE_LOUDER * usual.max(axis=0)))
-        if louder and 1 / NOISE_EVEN < new[0] / new[1] < NOISE_EVEN:
-            found.append((float(np.sqrt(new.mean())), channel))
-    if not found:
+        added = np.median(faulty_floors, axis=0) - np.median(clean_floors, axis=0)
+        is_louder = bool(np.all(faulty_floors.min(axis=0) > NOISE_LOUDER * clean_floors.max(axis=0)))
+        if is_louder and 1 / NOISE_EVEN < added[0] / added[1] < NOISE_EVEN:
+            noisy_channels.append((float(np.sqrt(added.mean())), channel))
+    if not noisy_channels:
         return None
-    return SignalFault("sensor_noise", "sensor", tuple(channel for _, channel in found), {"rms": max(found)[0]})
+    return SignalFault(
+        "sensor_noise", "sensor", tuple(channel for _, channel in noisy_channels), {"rms": max(noisy_channels)[0]}
+    )
 
 
 def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
     """A command whose values are multiples of a coarser step than those of the clean command; None where there is none.
     Clean commands with few different values, such as steps, are not used."""
     for channel in range(faulty[0].command.shape[1]):
-        here, usual = (np.concatenate([part.command[:, channel] for part in parts]) for parts in (faulty, clean))
-        step = lattice_step(here)
-        many = len(np.unique(usual)) > 2 * len(np.unique(here))
-        if many and step is not None and step > STEP_FACTOR * confirm_lattice_step(usual, step):
+        faulty_values, clean_values = (
+            np.concatenate([part.command[:, channel] for part in parts]) for parts in (faulty, clean)
+        )
+        step = lattice_step(faulty_values)
+        has_many_values = len(np.unique(clean_values)) > 2 * len(np.unique(faulty_values))
+        if has_many_values and step is not None and step > STEP_FACTOR * confirm_lattice_step(clean_values, step):
             return SignalFault("force_quantization", "actuator", (channel,), {"step": step})
     return None
 
@@ -92,14 +96,14 @@ def _stretches(part: Part) -> list[slice]:
 
 def _noise_floors(samples: FloatArray, stretch: slice) -> tuple[float, float]:
     """Variance of white noise, estimated in the highest eighth of the spectrum and in the one above its middle."""
-    own = samples[stretch]
-    window = np.hanning(len(own))
-    moved = own - np.linspace(own[0], own[-1], len(own))
-    power = np.abs(np.fft.rfft(moved * window)) ** 2 / float(np.sum(window**2))
+    stretch_samples = samples[stretch]
+    window = np.hanning(len(stretch_samples))
+    detrended = stretch_samples - np.linspace(stretch_samples[0], stretch_samples[-1], len(stretch_samples))
+    power = np.abs(np.fft.rfft(detrended * window)) ** 2 / float(np.sum(window**2))
     eighth = len(power) // 8
     # The median of a power with two degrees of freedom lies at log 2 of its mean.
-    last, middle = (float(np.median(power[-k * eighth : (1 - k) * eighth or None])) / np.log(2) for k in (1, 4))
-    return last, middle
+    highest, middle = (float(np.median(power[-k * eighth : (1 - k) * eighth or None])) / np.log(2) for k in (1, 4))
+    return highest, middle
 
 
 def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int) -> tuple[float, float] | None:
@@ -110,36 +114,36 @@ def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int
     for mains in MAINS_HZ:
         if longest.rate_hz < 2.5 * mains:
             continue
-        ratio, amplitude, at = _line_power_ratio(longest.response[:, channel], longest.rate_hz, mains)
-        usual = [_line_power_ratio(part.response[:, channel], part.rate_hz, mains)[0] for part in clean]
-        driven = [_line_power_ratio(column, longest.rate_hz, mains)[0] for column in longest.command.T]
+        ratio, amplitude, frequency_hz = _line_power_ratio(longest.response[:, channel], longest.rate_hz, mains)
+        clean_ratios = [_line_power_ratio(part.response[:, channel], part.rate_hz, mains)[0] for part in clean]
+        command_ratios = [_line_power_ratio(column, longest.rate_hz, mains)[0] for column in longest.command.T]
         if (
             ratio > LINE_STANDS_OUT
-            and ratio > LINE_IS_NEW * max([1.0, *usual, *driven])
+            and ratio > LINE_IS_NEW * max([1.0, *clean_ratios, *command_ratios])
             and (best is None or amplitude > best[0])
         ):
-            best = amplitude, at
+            best = amplitude, frequency_hz
     return best
 
 
 def _line_power_ratio(samples: FloatArray, rate_hz: float, mains: float) -> tuple[float, float, float]:
     """Power of the largest line near `mains` (Hz) over the median around it, its amplitude and its frequency (Hz)."""
     window = np.hanning(len(samples))
-    moved = samples - np.linspace(samples[0], samples[-1], len(samples))
-    power = np.abs(np.fft.rfft((moved - moved.mean()) * window)) ** 2
+    detrended = samples - np.linspace(samples[0], samples[-1], len(samples))
+    power = np.abs(np.fft.rfft((detrended - detrended.mean()) * window)) ** 2
     frequency = np.fft.rfftfreq(len(samples), 1 / rate_hz)
     resolution = rate_hz / len(samples)
-    near = np.abs(frequency - mains) <= max(MAINS_OFF_HZ, 1.5 * resolution)
-    around = (np.abs(frequency - mains) <= max(6.0, 24 * resolution)) & (
+    line_mask = np.abs(frequency - mains) <= max(MAINS_OFF_HZ, 1.5 * resolution)
+    background_mask = (np.abs(frequency - mains) <= max(6.0, 24 * resolution)) & (
         np.abs(frequency - mains) > max(2 * MAINS_OFF_HZ, 4 * resolution)
     )
-    if not near.any() or not around.any():
+    if not line_mask.any() or not background_mask.any():
         return 0.0, 0.0, mains
-    top = int(np.flatnonzero(near)[np.argmax(power[near])])
-    floor = max(float(np.median(power[around])), 1e-300)
+    top = int(np.flatnonzero(line_mask)[np.argmax(power[line_mask])])
+    floor = max(float(np.median(power[background_mask])), 1e-300)
     # Parseval over the main lobe of the Hann window, less the noise in it (its mean power is its median over log 2): so
     # the amplitude depends neither on where the tone lies between two lines, nor on the noise.
     lobe = power[max(top - 2, 1) : top + 3]
-    tone = max(float(lobe.sum()) - len(lobe) * floor / np.log(2), 0.0)
-    amplitude = 2 * float(np.sqrt(tone / (len(samples) * float(np.sum(window**2)))))
+    tone_power = max(float(lobe.sum()) - len(lobe) * floor / np.log(2), 0.0)
+    amplitude = 2 * float(np.sqrt(tone_power / (len(samples) * float(np.sum(window**2)))))
     return float(power[top]) / floor, amplitude, float(frequency[top])

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from analysis.diagnosis.contrast.compared_base import ComparedBase, rows_with_fault_undone
+from analysis.diagnosis.contrast.compared_base import ComparedBase, undo_fault_in_rows
 from analysis.diagnosis.contrast.fault import Fault, Variant, fix_size
 from analysis.diagnosis.contrast.joint_products import Fit, Pair, fit_sizes
 from analysis.diagnosis.settings import CONTRAST_BLOCKS, SIZE_IS_NEAR, UNDOING_ROUNDS
 from analysis.diagnosis.types import TimeBudget
 
-ALL = tuple(range(CONTRAST_BLOCKS))
+ALL_BLOCKS = tuple(range(CONTRAST_BLOCKS))
 """Numbers of all blocks into which the samples are divided for cross-validation."""
 VARIANTS_APPROACHED = 3
 """Of a fault that is valid at size 1 only: number of its variants that are linearised again, besides the best of all
@@ -39,7 +39,7 @@ class TriedVariant(NamedTuple):
 class TriedFaults:
     """Result of trying faults: each with its best variant and size, and the products without any fault undone."""
 
-    bare: list[Pair]
+    unchanged_pairs: list[Pair]
     """Per base, the products of both sets with nothing undone."""
     tried: list[TriedVariant]
     """The best variant of each fault that could be undone, in order of rising error."""
@@ -50,80 +50,95 @@ class TriedFaults:
 def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], time_left: TimeBudget) -> TriedFaults:
     """Try the faults in order, each on all bases together, until the time runs out. Faults of which no variant is
     well-conditioned are left out."""
-    clean = [compared.grams(compared.clean, []).blocks for compared in compared_bases]
-    bare = [
-        Pair(compared.grams(compared.faulty, []), ALL, tuple(own), (compared.clean.scale / compared.faulty.scale) ** 2)
-        for compared, own in zip(compared_bases, clean, strict=True)
+    clean = [compared.compute_grams(compared.clean, []).blocks for compared in compared_bases]
+    unchanged_pairs = [
+        Pair(
+            compared.compute_grams(compared.faulty, []),
+            ALL_BLOCKS,
+            tuple(clean_blocks),
+            (compared.clean.scale / compared.faulty.scale) ** 2,
+        )
+        for compared, clean_blocks in zip(compared_bases, clean, strict=True)
     ]
     best: list[TriedVariant] = []
     complete = False
     for fault in faults:
         if not time_left():
             break
-        tried = [found for variant in fault.variants if (found := _try_variant(bare, compared_bases, fault, variant))]
-        if tried:
-            best.append(_best_of(tried, bare, compared_bases))
+        trials = [
+            trial
+            for variant in fault.variants
+            if (trial := _try_variant(unchanged_pairs, compared_bases, fault, variant))
+        ]
+        if trials:
+            best.append(_best_of(trials, unchanged_pairs, compared_bases))
     else:
         complete = True
-    return TriedFaults(bare, sorted(best, key=_error_of), complete)
+    return TriedFaults(unchanged_pairs, sorted(best, key=_error_of), complete)
 
 
 def _try_variant(
-    bare: Sequence[Pair], compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant
+    unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant
 ) -> TriedVariant | None:
-    """Undo the fault by this variant and fit its sizes; None where undoing it is ill-conditioned. bare: per base, the
-    products without any fault undone."""
+    """Undo the fault by this variant and fit its sizes; None where undoing it is ill-conditioned. unchanged_pairs: per
+    base, the products without any fault undone."""
     pairs = [
         replace(
             pair,
-            with_it=compared.grams(compared.faulty, rows_with_fault_undone(compared, compared.faulty, fault, variant)),
+            undone=compared.compute_grams(
+                compared.faulty, undo_fault_in_rows(compared, compared.faulty, fault, variant)
+            ),
         )
-        for compared, pair in zip(compared_bases, bare, strict=True)
+        for compared, pair in zip(compared_bases, unchanged_pairs, strict=True)
     ]
-    well_conditioned = all(pair.with_it.is_well_conditioned(variant) for pair in pairs)
+    well_conditioned = all(pair.undone.is_well_conditioned(variant) for pair in pairs)
     return TriedVariant(fit_sizes(pairs, variant), fault, variant, pairs) if well_conditioned else None
 
 
-def _error_of(tried: TriedVariant) -> float:
+def _error_of(trial: TriedVariant) -> float:
     """Sum of squared errors with the fault undone; a sort key."""
-    return tried.fit.error
+    return trial.fit.error
 
 
 def _best_of(
-    tried: Sequence[TriedVariant], bare: Sequence[Pair], compared_bases: Sequence[ComparedBase]
+    trials: Sequence[TriedVariant], unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase]
 ) -> TriedVariant:
     """The variant with the smallest error, after linearisation about its size. Of a fault that is valid at size 1 only
     (`Variant.exact`), several are compared at size 1: at another size, a wrong variant may have the smallest error."""
-    first = min(tried, key=_error_of)
+    first = min(trials, key=_error_of)
     if not first.variant.exact:
-        return _approach(first, bare, compared_bases)
-    at_size_1 = sorted(tried, key=lambda each: _error_of(_fit_allowed_size(each)))[:VARIANTS_APPROACHED]
-    return min((_approach(each, bare, compared_bases) for each in (first, *at_size_1)), key=_error_of)
+        return _iterate_linearisation(first, unchanged_pairs, compared_bases)
+    at_size_1 = sorted(trials, key=lambda trial: _error_of(_fit_allowed_size(trial)))[:VARIANTS_APPROACHED]
+    return min(
+        (_iterate_linearisation(trial, unchanged_pairs, compared_bases) for trial in (first, *at_size_1)), key=_error_of
+    )
 
 
-def _approach(found: TriedVariant, bare: Sequence[Pair], compared_bases: Sequence[ComparedBase]) -> TriedVariant:
+def _iterate_linearisation(
+    current: TriedVariant, unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase]
+) -> TriedVariant:
     """The best fit of at most `UNDOING_ROUNDS` Gauss-Newton iterations. Each linearises the fault about the size that
     the last iteration found, until that size changes by a share of less than `SIZE_IS_NEAR`."""
-    best = _fit_allowed_size(found)
+    best = _fit_allowed_size(current)
     for _ in range(UNDOING_ROUNDS):
-        fit, fault, variant, _ = found
-        if variant.about is None or abs(float(fit.sizes[0]) - 1) < SIZE_IS_NEAR:
+        fit, fault, variant, _ = current
+        if variant.at_size is None or abs(float(fit.sizes[0]) - 1) < SIZE_IS_NEAR:
             break
-        again = _try_variant(bare, compared_bases, fault, variant.about(float(fit.sizes[0])))
-        if again is None:
+        relinearised = _try_variant(unchanged_pairs, compared_bases, fault, variant.at_size(float(fit.sizes[0])))
+        if relinearised is None:
             break
-        found, before = again, best
-        best = min(best, _fit_allowed_size(found), key=_error_of)
-        if best is before and not variant.exact:
+        current, previous_best = relinearised, best
+        best = min(best, _fit_allowed_size(current), key=_error_of)
+        if best is previous_best and not variant.exact:
             break
     return best
 
 
-def _fit_allowed_size(found: TriedVariant) -> TriedVariant:
+def _fit_allowed_size(trial: TriedVariant) -> TriedVariant:
     """The variant as fitted; with its size fixed at 1 where it is valid at size 1 only."""
-    _, fault, variant, pairs = found
+    _, fault, variant, pairs = trial
     if not variant.exact:
-        return found
+        return trial
     return TriedVariant(fit_sizes(pairs, restrict_sizes(variant)), fault, variant, pairs)
 
 

@@ -1,6 +1,6 @@
 """Recordings prepared for a diagnosis: checks, parts, roles of samples, and the measured motion.
 
-Data pass through `found_segments` (periodic segments), `force_constant` (commands as forces) -> `input_checks` (refuses
+Data pass through `find_segments` (periodic segments), `force_constant` (commands as forces) -> `input_checks` (refuses
 recordings that cannot be compared, also by `driven_response`) -> `observed_parts` (cuts recordings into parts at their
 gaps) -> `observed` (splits the samples into those to fit, to choose and to test by). `measured_motion` and
 `motion_smoother` give the motion, `spectral_lines` the lines of periodic recordings, `closed_loop` whether a controller

@@ -10,9 +10,9 @@ from analysis.diagnosis.settings import FED_BACK_SHARE, PREDICTED_SHARE
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray
 
-PAST = 6
+PAST_SAMPLES = 6
 """Number of past samples of each signal from which the command is predicted. By hand."""
-_LEAST = 200
+_LEAST_SAMPLES = 200
 """Fewest known samples for the test."""
 
 
@@ -21,8 +21,8 @@ def is_in_closed_loop(recording: Recording) -> bool:
     whether the responses up to each sample help to predict the command that is written just after (Granger 1969)."""
     command = recording.command.samples
     if recording.excitation is not None:
-        by_feedback = command - recording.excitation.samples
-        return bool(_rms(by_feedback) > FED_BACK_SHARE * _rms(command))
+        feedback = command - recording.excitation.samples
+        return bool(_rms(feedback) > FED_BACK_SHARE * _rms(command))
     if recording.hold is not Hold.ZERO_ORDER:
         # The command written just before a sample may already depend on the sample after it.
         return False
@@ -36,24 +36,27 @@ def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> boo
     if recording.position is not None:
         signals.append(recording.position.samples)
     measured = np.hstack(signals)
-    known = np.isfinite(measured).all(axis=1) & np.isfinite(command)
-    rows = np.arange(PAST, len(command))
-    rows = rows[np.all([known[rows - back] for back in range(PAST + 1)], axis=0)]
-    if len(rows) < _LEAST:
+    complete = np.isfinite(measured).all(axis=1) & np.isfinite(command)
+    rows = np.arange(PAST_SAMPLES, len(command))
+    rows = rows[np.all([complete[rows - lag] for lag in range(PAST_SAMPLES + 1)], axis=0)]
+    if len(rows) < _LEAST_SAMPLES:
         return False
-    own = np.column_stack([command[rows - back] for back in range(1, PAST + 1)] + [np.ones(len(rows))])
-    others = np.column_stack([measured[rows - back] for back in range(PAST)])
-    alone, helped = _residual_rms(command[rows], own), _residual_rms(command[rows], np.hstack([own, others]))
+    own_past = np.column_stack([command[rows - lag] for lag in range(1, PAST_SAMPLES + 1)] + [np.ones(len(rows))])
+    response_past = np.column_stack([measured[rows - lag] for lag in range(PAST_SAMPLES)])
+    own_past_rms, full_rms = (
+        _residual_rms(command[rows], own_past),
+        _residual_rms(command[rows], np.hstack([own_past, response_past])),
+    )
     # A smooth command is predicted by its own past alone, so that the test has no power.
-    return bool(alone > 1e-6 * _rms(command[:, None]) and helped < PREDICTED_SHARE * alone)
+    return bool(own_past_rms > 1e-6 * _rms(command[:, None]) and full_rms < PREDICTED_SHARE * own_past_rms)
 
 
-def _residual_rms(aim: FloatArray, by: FloatArray) -> float:
-    """Rms residual of the least-squares fit of `aim` (n,) by the columns of `by` (n, k)."""
-    scale = np.linalg.norm(by, axis=0)
-    columns = by / np.where(scale > 0, scale, 1.0)
-    found = np.linalg.lstsq(columns, aim, rcond=1e-12)[0]
-    return float(np.sqrt(np.mean((aim - columns @ found) ** 2)))
+def _residual_rms(target: FloatArray, regressors: FloatArray) -> float:
+    """Rms residual of the least-squares fit of `target` (n,) by the columns of `regressors` (n, k)."""
+    scale = np.linalg.norm(regressors, axis=0)
+    columns = regressors / np.where(scale > 0, scale, 1.0)
+    coefficients = np.linalg.lstsq(columns, target, rcond=1e-12)[0]
+    return float(np.sqrt(np.mean((target - columns @ coefficients) ** 2)))
 
 
 def _rms(samples: FloatArray) -> float:

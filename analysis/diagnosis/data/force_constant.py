@@ -24,10 +24,10 @@ def with_force_constant(recording: Recording, constants: Sequence[float]) -> tup
     """The recording with its commands as forces, and a sentence about it. constants: a single value for all commands or
     a value for each, in N or N m per unit of the command. Raises NoForceConstant where the motion has no SI unit, a
     command is a force already, or the constants are of a wrong number, zero or not finite."""
-    command, moved = recording.command, system_of(recording.command.units, recording.response.units).length
-    if moved not in CONVERTED:
+    command, length_unit = recording.command, system_of(recording.command.units, recording.response.units).length
+    if length_unit not in CONVERTED:
         raise NoForceConstant(
-            f"the motion is in {moved}: no force constant makes SI of it, so give its unit in the map"
+            f"the motion is in {length_unit}: no force constant makes SI of it, so give its unit in the map"
         )
     if any(unit in FORCES for unit in command.units):
         raise NoForceConstant(f"the command is a force already (in {command.units[0]}), so it has no force constant")
@@ -35,17 +35,21 @@ def with_force_constant(recording: Recording, constants: Sequence[float]) -> tup
         raise NoForceConstant(f"{len(constants)} force constants were given, for {len(command.channels)} commands")
     if not all(np.isfinite(constant) and constant for constant in constants):
         raise NoForceConstant("a force constant must be a number other than 0")
-    quantity, unit = CONVERTED[moved]
-    each = np.broadcast_to(np.asarray(constants, dtype=np.float64), (len(command.channels),))
+    quantity, unit = CONVERTED[length_unit]
+    factors = np.broadcast_to(np.asarray(constants, dtype=np.float64), (len(command.channels),))
 
     def convert(signal: Signal) -> Signal:
-        return replace(signal, samples=signal.samples * each, quantity=quantity, unit=unit)
+        return replace(signal, samples=signal.samples * factors, quantity=quantity, unit=unit)
 
-    own = recording.excitation
-    fits = own is not None and len(own.channels) == len(command.channels)
+    excitation = recording.excitation
+    fits = excitation is not None and len(excitation.channels) == len(command.channels)
     per = "" if command.units[0] == "1" else f" per {command.units[0]}"
     text = ", ".join(f"{constant:g}" for constant in constants)
     return (
-        replace(recording, command=convert(command), excitation=convert(own) if own is not None and fits else own),
+        replace(
+            recording,
+            command=convert(command),
+            excitation=convert(excitation) if excitation is not None and fits else excitation,
+        ),
         f"The commands were multiplied by the {quantity} constant that was stated, {text} {unit}{per}.",
     )

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from analysis.diagnosis.data.driven_response import response_significance
+from analysis.diagnosis.data.driven_response import compute_response_significance
 from analysis.diagnosis.data.observed_parts import samples_to_fit
 from analysis.diagnosis.data.recorded_conditions import weight_problems
 from analysis.diagnosis.settings import (
@@ -33,78 +33,88 @@ class NothingToDiagnose(ListedProblemsError):  # noqa: N818 - an answer that a u
     """The recordings cannot be diagnosed. `problems`: one sentence each, without a full stop."""
 
 
-def require_alike(
-    recordings: Sequence[Recording], names: Sequence[str], what_now: str = "diagnose them one at a time"
+def require_comparable(
+    recordings: Sequence[Recording], names: Sequence[str], remedy: str = "diagnose them one at a time"
 ) -> None:
     """Requires recordings with the same channels, units and rate. Raises NothingToDiagnose."""
     if not recordings:
         raise NothingToDiagnose(("there is no recording",))
-    first, problems = recordings[0], []
-    for other, name in zip(recordings[1:], names[1:], strict=True):
-        for what, expected, two in (
-            ("sample rate", f"{first.sample_rate_hz:g} Hz", f"{other.sample_rate_hz:g} Hz"),
-            ("command", channels_text(first.command), channels_text(other.command)),
-            ("response", channels_text(first.response), channels_text(other.response)),
+    reference, problems = recordings[0], []
+    for recording, name in zip(recordings[1:], names[1:], strict=True):
+        for property_name, expected, actual in (
+            ("sample rate", f"{reference.sample_rate_hz:g} Hz", f"{recording.sample_rate_hz:g} Hz"),
+            ("command", channels_text(reference.command), channels_text(recording.command)),
+            ("response", channels_text(reference.response), channels_text(recording.response)),
         ):
-            if expected != two:
-                problems.append(f"{name} has the {what} {two}, {names[0]} has {expected}; {what_now}")
+            if expected != actual:
+                problems.append(f"{name} has the {property_name} {actual}, {names[0]} has {expected}; {remedy}")
     if problems:
         raise NothingToDiagnose(tuple(problems))
 
 
-def require_something(recordings: Sequence[Recording], names: Sequence[str], short: bool = False) -> tuple[str, ...]:
-    """Requires a command without gaps, and responses that change and depend on it, for long enough. short: a slightly
-    short recording gives a returned sentence instead of a refusal. Raises NothingToDiagnose."""
+def require_usable_data(
+    recordings: Sequence[Recording], names: Sequence[str], allow_short: bool = False
+) -> tuple[str, ...]:
+    """Requires a command without gaps, and responses that change and depend on it, for long enough. allow_short: a
+    slightly short recording gives a returned sentence instead of a refusal. Raises NothingToDiagnose."""
     problems = [
-        problem for recording, name in zip(recordings, names, strict=True) for problem in _gaps(recording.command, name)
+        gap for recording, name in zip(recordings, names, strict=True) for gap in _find_gaps(recording.command, name)
     ]
     problems += [
         problem
         for recording, name in zip(recordings, names, strict=True)
-        for problem in _impossible_values(recording, name)
+        for problem in _find_impossible_values(recording, name)
     ]
-    problems += _constant_signals(recordings)
-    few: tuple[str, ...] = ()
+    problems += _find_constant_signals(recordings)
+    shortness: tuple[str, ...] = ()
     if not problems:
-        known = _count_answered_samples(recordings)
-        few = tuple(_shortness(recordings))
-        if known < LEAST_SAMPLES:
-            problems.append(f"{known} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
-        elif few and not short:
-            problems += few
+        answered_samples = _count_answered_samples(recordings)
+        shortness = tuple(_describe_shortness(recordings))
+        if answered_samples < LEAST_SAMPLES:
+            problems.append(
+                f"{answered_samples} samples are too short a recording; at least {LEAST_SAMPLES} are needed"
+            )
+        elif shortness and not allow_short:
+            problems += shortness
         elif (fitted := samples_to_fit(recordings)) < LEAST_SAMPLES_TO_FIT:
             problems.append(
                 f"only {fitted} samples that may be fitted have a response (and a position, if one was recorded); the "
                 "others are missing or have the role of a test"
             )
-        elif not few and (sure := response_significance(recordings)) is not None and sure < ANSWER_DEVIATIONS:
+        elif (
+            not shortness
+            and (significance := compute_response_significance(recordings)) is not None
+            and significance < ANSWER_DEVIATIONS
+        ):
             problems.append(
                 "the responses are not related to the commands: their coherence is no larger than that of noise, so "
                 "the recording is noise or of another device, or its command was not played"
             )
     if problems:
         raise NothingToDiagnose(tuple(problems))
-    return few
+    return shortness
 
 
 def is_too_short_to_name(recordings: Sequence[Recording]) -> bool:
     """Whether recordings are so short that other laws would explain them about as well."""
-    known = _count_answered_samples(recordings)
-    return known < SHORTEST_SAMPLES and known / recordings[0].sample_rate_hz < SHORTEST_S
+    answered_samples = _count_answered_samples(recordings)
+    return answered_samples < SHORTEST_SAMPLES and answered_samples / recordings[0].sample_rate_hz < SHORTEST_S
 
 
 def _count_answered_samples(recordings: Sequence[Recording]) -> int:
+    """Number of samples, over all recordings, in which no response is missing."""
     return sum(int(np.isfinite(recording.response.samples).all(axis=1).sum()) for recording in recordings)
 
 
-def _shortness(recordings: Sequence[Recording]) -> Iterator[str]:
+def _describe_shortness(recordings: Sequence[Recording]) -> Iterator[str]:
+    """A sentence for recordings with too few samples, or else with too few cycles of the command."""
     if is_too_short_to_name(recordings):
-        known = _count_answered_samples(recordings)
+        count = _count_answered_samples(recordings)
         yield (
-            f"{known} samples, {known / recordings[0].sample_rate_hz:.3g} s, are too short to identify physics; at "
+            f"{count} samples, {count / recordings[0].sample_rate_hz:.3g} s, are too short to identify physics; at "
             f"least {SHORTEST_S:g} s or {SHORTEST_SAMPLES} samples are needed, one part to fit and one to test"
         )
-    elif (cycles := sum(_command_cycles(recording) for recording in recordings)) < LEAST_CYCLES:
+    elif (cycles := sum(_count_command_cycles(recording) for recording in recordings)) < LEAST_CYCLES:
         yield (
             f"the recording holds about {cycles:.2g} cycles of the command, which is too short; at least "
             f"{LEAST_CYCLES:g} are needed, one part to fit and one to test"
@@ -115,75 +125,79 @@ def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> 
     """Requires recordings that differ: a duplicate would be tested by the data that it was fitted to. Raises
     NothingToDiagnose."""
     problems = [
-        f"{names[two]} holds the same samples as {names[first]}, and a recording counts once"
-        for first, two in combinations(range(len(recordings)), 2)
-        if np.array_equal(recordings[first].response.samples, recordings[two].response.samples, equal_nan=True)
-        and np.array_equal(recordings[first].command.samples, recordings[two].command.samples, equal_nan=True)
+        f"{names[second]} holds the same samples as {names[first]}, and a recording counts once"
+        for first, second in combinations(range(len(recordings)), 2)
+        if np.array_equal(recordings[first].response.samples, recordings[second].response.samples, equal_nan=True)
+        and np.array_equal(recordings[first].command.samples, recordings[second].command.samples, equal_nan=True)
     ]
     if problems:
         raise NothingToDiagnose(tuple(problems))
 
 
 def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) -> None:
-    """Requires a model that fits the recordings' device. recordings: alike. Raises NothingToDiagnose."""
+    """Requires a model that fits the recordings' device. recordings: with the same channels,
+    units and rate. Raises NothingToDiagnose."""
     first = recordings[0]
     names = [recording.device or f"recording {number}" for number, recording in enumerate(recordings, 1)]
     problems = (
-        *_unlike_channel_counts(model, first),
-        *_unlike_quantities(model, first),
-        *_impossible_model_values(model),
+        *_compare_channel_counts(model, first),
+        *_compare_quantities(model, first),
+        *_find_impossible_model_values(model),
     )
     problems = problems or weight_problems(model, recordings, names)
     if not problems:
         problems = (
             *_find_unconnected_channels(model, first),
-            *_instability(model, recordings),
-            *_too_fast_modes(model, first),
+            *_find_instability(model, recordings),
+            *_find_too_fast_modes(model, first),
             *_find_misplaced_effects(model, first),
         )
     if problems:
         raise NothingToDiagnose(problems)
 
 
-def _gaps(command: Signal, name: str) -> Iterator[str]:
-    missing = int((~np.isfinite(command.samples)).any(axis=1).sum())
-    if missing:
-        first = int(np.argmax((~np.isfinite(command.samples)).any(axis=1)))
+def _find_gaps(command: Signal, name: str) -> Iterator[str]:
+    """A sentence for a command with missing samples. name: of its recording."""
+    missing_count = int((~np.isfinite(command.samples)).any(axis=1).sum())
+    if missing_count:
+        first_missing = int(np.argmax((~np.isfinite(command.samples)).any(axis=1)))
         yield (
-            f"{name} has no command in {missing} samples (the first is {first}), so the command to the device is not "
-            "known there; cut the recording there, or let its import bridge them (gap_s of the clock)"
+            f"{name} has no command in {missing_count} samples (the first is {first_missing}), so the command to the "
+            "device is not known there; cut the recording there, or let its import bridge them (gap_s of the clock)"
         )
 
 
-def _impossible_values(recording: Recording, name: str) -> Iterator[str]:
+def _find_impossible_values(recording: Recording, name: str) -> Iterator[str]:
+    """A sentence for each channel with a magnitude above `LARGEST_VALUE`."""
     for side in ("command", "response", "position"):
         signal: Signal | None = getattr(recording, side)
         for channel in range(0 if signal is None else len(signal.channels)):
             assert signal is not None
-            size = float(np.nanmax(np.abs(signal.samples[:, channel]), initial=0.0))
-            if size > LARGEST_VALUE:
+            largest = float(np.nanmax(np.abs(signal.samples[:, channel]), initial=0.0))
+            if largest > LARGEST_VALUE:
                 yield (
-                    f"{name} holds values up to {size:.3g} {signal.units[channel]} in {side} "
+                    f"{name} holds values up to {largest:.3g} {signal.units[channel]} in {side} "
                     f"{signal.channels[channel]}, which no device reaches"
                 )
 
 
-def _constant_signals(recordings: Sequence[Recording]) -> Iterator[str]:
+def _find_constant_signals(recordings: Sequence[Recording]) -> Iterator[str]:
+    """Sentences for commands that are constant, responses that are constant or missing, and missing positions."""
     if all(np.ptp(recording.command.samples, axis=0).max(initial=0.0) == 0 for recording in recordings):
         yield (
             "the command never changes, so the device was not excited; a free motion, measured as positions or speeds "
             "over time, is diagnosed without a model"
         )
     for side in ("response", "position"):
-        signals = [found for recording in recordings if (found := getattr(recording, side)) is not None]
-        for name, empty in unusable_channels(signals):
-            if empty:
+        signals = [signal for recording in recordings if (signal := getattr(recording, side)) is not None]
+        for name, is_empty in unusable_channels(signals):
+            if is_empty:
                 yield f"{side} {name} contains only missing values"
             elif side == "response":
                 yield f"{side} {name} never changes: it was not connected, or nothing moved"
 
 
-def _command_cycles(recording: Recording) -> float:
+def _count_command_cycles(recording: Recording) -> float:
     """Number of cycles in the recording of the frequency below which most of the command's power lies, its mean
     removed."""
     power = (np.abs(np.fft.rfft(recording.command.samples, axis=0)) ** 2).sum(axis=1)
@@ -191,29 +205,29 @@ def _command_cycles(recording: Recording) -> float:
     return float(np.searchsorted(np.cumsum(power), CYCLES_SHARE * power.sum())) if power.any() else 0.0
 
 
-def _unlike_channel_counts(model: MechanicalModel, recording: Recording) -> Iterator[str]:
-    for side, own, channels in (
+def _compare_channel_counts(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    for side, expected, channels in (
         ("command", model.inputs, recording.command.channels),
         ("response", model.outputs, recording.response.channels),
     ):
-        if own != len(channels):
-            whose = "input" if side == "command" else "output"
+        if expected != len(channels):
+            port = "input" if side == "command" else "output"
             yield (
-                f"the model has {own} {whose}{'s' if own != 1 else ''}, but the recording has {len(channels)} "
+                f"the model has {expected} {port}{'s' if expected != 1 else ''}, but the recording has {len(channels)} "
                 f"{side} channel{'s' if len(channels) != 1 else ''} ({', '.join(channels)})"
             )
 
 
-def _unlike_quantities(model: MechanicalModel, recording: Recording) -> Iterator[str]:
-    other = [quantity for quantity in recording.response.quantities if quantity != model.quantity]
-    if other:
-        words = ", ".join(sorted(set(other)))
-        yield f"the model answers with {model.quantity}, but the recording's response is {words}"
-    turning = _is_rotational(recording)
-    if turning is not None and turning != model.rotational:
-        kinds = ("translational (kg, N, m)", "rotational (kg m^2, N m, rad)")
-        own, its = kinds[model.rotational], kinds[turning]
-        yield f"the model is {own}, but the recording is {its}: {channels_text(recording.response)}"
+def _compare_quantities(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    other_quantities = [quantity for quantity in recording.response.quantities if quantity != model.quantity]
+    if other_quantities:
+        quantity_names = ", ".join(sorted(set(other_quantities)))
+        yield f"the model answers with {model.quantity}, but the recording's response is {quantity_names}"
+    is_rotational = _is_rotational(recording)
+    if is_rotational is not None and is_rotational != model.rotational:
+        descriptions = ("translational (kg, N, m)", "rotational (kg m^2, N m, rad)")
+        model_kind, recording_kind = descriptions[model.rotational], descriptions[is_rotational]
+        yield f"the model is {model_kind}, but the recording is {recording_kind}: {channels_text(recording.response)}"
 
 
 def _is_rotational(recording: Recording) -> bool | None:
@@ -224,44 +238,47 @@ def _is_rotational(recording: Recording) -> bool | None:
     return False if any(unit.split("/")[0] == "m" for unit in units) else None
 
 
-def _impossible_model_values(model: MechanicalModel) -> Iterator[str]:
+def _find_impossible_model_values(model: MechanicalModel) -> Iterator[str]:
     for name in ("mass", "damping", "stiffness", "input", "output"):
-        size = float(np.abs(getattr(model, name)).max())
-        if size > LARGEST_VALUE:
-            yield f"the model's {name} contains {size:.3g}, which no device has"
-    if (lightest := float(np.linalg.eigvalsh(model.mass)[0])) < 1 / LARGEST_VALUE:
-        yield f"the model's lightest motion has a mass of {lightest:.3g}, which no device has"
+        largest = float(np.abs(getattr(model, name)).max())
+        if largest > LARGEST_VALUE:
+            yield f"the model's {name} contains {largest:.3g}, which no device has"
+    if (least_mass := float(np.linalg.eigvalsh(model.mass)[0])) < 1 / LARGEST_VALUE:
+        yield f"the model's lightest motion has a mass of {least_mass:.3g}, which no device has"
 
 
 def _find_unconnected_channels(model: MechanicalModel, recording: Recording) -> Iterator[str]:
-    """Inputs of the model that drive nothing, or the same motion as another, and outputs that measure nothing."""
+    """Sentences for inputs of the model that drive nothing, or the same motion as another, and outputs that measure
+    nothing."""
     idle = [name for name, column in zip(recording.command.channels, model.input.T, strict=True) if not column.any()]
     unconnected = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
     if idle:
         yield f"in the model's input matrix no coordinate is driven by {', '.join(idle)}"
-    elif (apart := int(np.linalg.matrix_rank(model.input))) < model.inputs:
+    elif (rank := int(np.linalg.matrix_rank(model.input))) < model.inputs:
         yield (
-            f"the model's {model.inputs} inputs drive only {apart} motion{'s' if apart != 1 else ''}, so they cannot "
+            f"the model's {model.inputs} inputs drive only {rank} motion{'s' if rank != 1 else ''}, so they cannot "
             "be distinguished; combine the commands that push the same motion into one"
         )
     if unconnected:
         yield f"in the model's output matrix no coordinate is measured by {', '.join(unconnected)}"
 
 
-def _instability(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
-    fastest = growth_rate(model)
+def _find_instability(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
+    """A sentence for a model whose motion would grow by more than exp(`MOST_GROWTH`) within the longest recording."""
+    growth_per_s = growth_rate(model)
     longest_s = max(len(recording) / recording.sample_rate_hz for recording in recordings)
-    if fastest * longest_s > MOST_GROWTH:
+    if growth_per_s * longest_s > MOST_GROWTH:
         yield (
-            f"the model is unstable: without a force its motion grows e-fold in {1 / fastest:.3g} s; damping and "
+            f"the model is unstable: without a force its motion grows e-fold in {1 / growth_per_s:.3g} s; damping and "
             "stiffness must not be negative"
         )
 
 
-def _too_fast_modes(model: MechanicalModel, recording: Recording) -> Iterator[str]:
-    """A slowest mode above half the sample rate: most likely the rate is stated a thousand times too low."""
-    swings_hz = np.abs(free_motion_rates(model).imag) / (2 * np.pi)
-    slowest_hz = min((float(swing_hz) for swing_hz in swings_hz if swing_hz > 0), default=0.0)
+def _find_too_fast_modes(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    """A sentence for a slowest mode above half the sample rate (Nyquist frequency): most likely the rate is stated a
+    thousand times too low."""
+    natural_hz = np.abs(free_motion_rates(model).imag) / (2 * np.pi)
+    slowest_hz = min((float(mode_hz) for mode_hz in natural_hz if mode_hz > 0), default=0.0)
     if slowest_hz > recording.sample_rate_hz / 2:
         yield (
             f"the model swings at {slowest_hz:.3g} Hz and faster, which cannot be seen at a rate of "
@@ -270,6 +287,7 @@ def _too_fast_modes(model: MechanicalModel, recording: Recording) -> Iterator[st
 
 
 def _find_misplaced_effects(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    """A sentence for an effect of the model at a place that the recorded device does not have."""
     try:
         place_recorded_effects(model, recording)
     except PlacingError as problem:

@@ -53,10 +53,10 @@ def choose_measured_motion(recording: Recording, model: MechanicalModel, floor: 
     if DERIVATIVE_OF_QUANTITY[model.quantity] == 0:
         return MeasuredMotion(samples, density)
     # The lowest line has one period per recording; below it, f is held there to avoid a division by zero.
-    slowest = np.maximum(floor.frequency_hz, rate_hz / len(recording))[:, None]
-    moved = np.zeros(samples.shape)
-    moved[1:] = np.cumsum(samples[1:] + samples[:-1], axis=0) / (2 * rate_hz)
-    return MeasuredMotion(moved, density / (2 * np.pi * slowest) ** 2)
+    limited_hz = np.maximum(floor.frequency_hz, rate_hz / len(recording))[:, None]
+    position = np.zeros(samples.shape)
+    position[1:] = np.cumsum(samples[1:] + samples[:-1], axis=0) / (2 * rate_hz)
+    return MeasuredMotion(position, density / (2 * np.pi * limited_hz) ** 2)
 
 
 def _has_position(recording: Recording, model: MechanicalModel) -> bool:
@@ -65,14 +65,14 @@ def _has_position(recording: Recording, model: MechanicalModel) -> bool:
 
 def fill_gaps(samples: FloatArray) -> FloatArray:
     """Samples (n, k), interpolated across gaps; zero where a channel has no finite sample."""
-    whole, places = np.array(samples, dtype=np.float64), np.arange(len(samples))
-    for column in whole.T:
-        known = np.isfinite(column)
-        if known.any() and not known.all():
-            column[:] = np.interp(places, places[known], column[known])
-        elif not known.any():
+    filled, indices = np.array(samples, dtype=np.float64), np.arange(len(samples))
+    for column in filled.T:
+        is_finite = np.isfinite(column)
+        if is_finite.any() and not is_finite.all():
+            column[:] = np.interp(indices, indices[is_finite], column[is_finite])
+        elif not is_finite.any():
             column[:] = 0.0
-    return whole
+    return filled
 
 
 def is_quasi_static(recording: Recording) -> bool:
@@ -98,7 +98,7 @@ def time_unit(recording: Recording) -> str:
 
 def is_driven(recordings: Sequence[Recording]) -> bool:
     """Whether any command changes, in a recording or between recordings; True where no command has a finite sample."""
-    commands = np.vstack([each.command.samples for each in recordings])
+    commands = np.vstack([recording.command.samples for recording in recordings])
     commands = commands[np.isfinite(commands).all(axis=1)]
     return len(commands) == 0 or bool(np.any(np.ptp(commands, axis=0) != 0))
 
@@ -106,9 +106,11 @@ def is_driven(recordings: Sequence[Recording]) -> bool:
 def as_force_driven(recording: Recording) -> Recording:
     """The recording with the measured force as the command, the imposed motion as the response, and `imposed` in its
     meta; a recording with a changing command is not changed."""
-    moves = set(recording.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
-    pushes = set(recording.response.quantities) <= _FORCES
-    if not (moves and pushes and len(recording.command.channels) >= len(recording.response.channels)):
+    is_motion_command = set(recording.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
+    is_force_response = set(recording.response.quantities) <= _FORCES
+    if not (
+        is_motion_command and is_force_response and len(recording.command.channels) >= len(recording.response.channels)
+    ):
         return recording
     return replace(
         recording,

@@ -17,15 +17,15 @@ from scipy.linalg import solve_discrete_are
 
 from analysis.diagnosis.data.observed import Observed
 from equalizer.effects.simulation.sensor_path import undo_low_pass
-from equalizer.plant.linear_simulation import LinearSteps, linear_steps
+from equalizer.plant.linear_simulation import LinearSteps, discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
-EXPECTED = 0.1
+EXPECTED_SHARE = 0.1
 """Rms change of a missing force within `CHANGES_S`, relative to the rms of the command. By hand."""
 CHANGES_S = 0.005
-"""Time in s in which a missing force may change by `EXPECTED`."""
-_LEAK = 1e-5
+"""Time in s in which a missing force may change by `EXPECTED_SHARE`."""
+_LEAK_SHARE = 1e-5
 """Share of the state that is forgotten per sample: without it, unobservable states have no steady-state filter."""
 _PROCESS_NOISE = 1e-12
 """Process noise of all states per sample, relative to their size: without it the Riccati equation has no stabilising
@@ -56,19 +56,19 @@ def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its p
     state = out[0].copy()
     for k in range(n):
         predicted[k] = state
-        known = True
+        complete = True
         for i in range(c):
-            known = known and not np.isnan(measured[k, i])
-        if known:
-            off = np.empty(c)
+            complete = complete and not np.isnan(measured[k, i])
+        if complete:
+            innovation = np.empty(c)
             for i in range(c):
                 total = measured[k, i]
                 for j in range(s):
                     total -= observation[i, j] * predicted[k, j]
-                off[i] = total
+                innovation[i] = total
             for j in range(s):
                 for i in range(c):
-                    state[j] += gain[j, i] * off[i]
+                    state[j] += gain[j, i] * innovation[i]
         out[k] = state
         for j in range(s):
             total = pushed[k, j]
@@ -103,14 +103,14 @@ def smooth_motion(model: MechanicalModel, record: Observed, forces: FloatArray, 
     included. unit: (c,), standard deviations of the measured channels. Raises numpy.linalg.LinAlgError where no filter
     exists."""
     rate_hz, m = record.recording.sample_rate_hz, model.inputs
-    steps, size = linear_steps(model, 1 / rate_hz), 2 * model.coordinates
+    steps, size = discretise_model(model, 1 / rate_hz), 2 * model.coordinates
     advance = np.eye(size + m)
     advance[:size, :size], advance[:size, size:] = steps.advance, steps.by_axis_force
-    advance *= 1 - _LEAK
+    advance *= 1 - _LEAK_SHARE
     observation, direct = _observation_matrices(steps, record.measured.shape[1])
-    expected = EXPECTED * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12
-    walk = np.concatenate([np.zeros(size), expected**2 / (CHANGES_S * rate_hz)])
-    gain, back = _smoother_gains(advance, observation / unit[:, None], walk, _state_sizes(steps, expected))
+    expected = EXPECTED_SHARE * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12
+    walk_variance = np.concatenate([np.zeros(size), expected**2 / (CHANGES_S * rate_hz)])
+    gain, back = _smoother_gains(advance, observation / unit[:, None], walk_variance, _state_sizes(steps, expected))
     gain = gain / unit[None, :]
     measured = _subtract_feedthrough(model, record, forces, direct)
     pushed = np.hstack([forces @ steps.by_axis_force.T, np.zeros((len(forces), m))])
@@ -127,8 +127,8 @@ def smooth_motion(model: MechanicalModel, record: Observed, forces: FloatArray, 
         np.ascontiguousarray(measured),
         out,
     )
-    moved = out[:, :size] @ steps.motion[: 2 * m].T
-    return SmoothedMotion(out[:, :size], moved[:, :m], moved[:, m:], out[:, size:])
+    axis_motion = out[:, :size] @ steps.motion[: 2 * m].T
+    return SmoothedMotion(out[:, :size], axis_motion[:, :m], axis_motion[:, m:], out[:, size:])
 
 
 def _observation_matrices(steps: LinearSteps, channels: int) -> tuple[FloatArray, FloatArray]:
@@ -143,9 +143,11 @@ def _subtract_feedthrough(
     model: MechanicalModel, record: Observed, forces: FloatArray, direct: FloatArray
 ) -> FloatArray:
     """(n, c): measured channels without the sensor's low pass, less the direct effect of the force just before."""
-    measured, p = np.array(record.measured), model.outputs
+    measured, responses = np.array(record.measured), model.outputs
     if model.sensor.bandwidth_hz > 0:
-        measured[:, :p] = undo_low_pass(measured[:, :p], record.recording.sample_rate_hz, model.sensor.bandwidth_hz)
+        measured[:, :responses] = undo_low_pass(
+            measured[:, :responses], record.recording.sample_rate_hz, model.sensor.bandwidth_hz
+        )
     measured[1:] -= forces[:-1] @ direct.T
     return measured
 
@@ -159,13 +161,13 @@ def _state_sizes(steps: LinearSteps, expected: FloatArray) -> FloatArray:
 
 
 def _smoother_gains(
-    advance: FloatArray, observation: FloatArray, walk: FloatArray, large: FloatArray
+    advance: FloatArray, observation: FloatArray, walk_variance: FloatArray, sizes: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Gains of the Kalman filter (s, c) and of the backward pass (s, s). observation: observation matrix of channels in
     units of their noise. Solved with all states scaled to about the same size."""
     eye = np.eye(len(observation))
-    scaled, observed = advance * large[None, :] / large[:, None], observation * large[None, :]
-    process_noise = np.diag(walk / large**2) + _PROCESS_NOISE * np.eye(len(advance))
+    scaled, observed = advance * sizes[None, :] / sizes[:, None], observation * sizes[None, :]
+    process_noise = np.diag(walk_variance / sizes**2) + _PROCESS_NOISE * np.eye(len(advance))
     try:
         predicted = _steady_covariance(scaled, observed, process_noise)
     except np.linalg.LinAlgError:  # states of very different sizes: by an ordered Schur form, which is slower
@@ -173,31 +175,37 @@ def _smoother_gains(
     gain = np.linalg.solve(observed @ predicted @ observed.T + eye, observed @ predicted).T
     if np.abs(np.linalg.eigvals(scaled - scaled @ gain @ observed)).max() >= 1:
         raise np.linalg.LinAlgError("a filter for the motion is not stable in floating point")
-    found = predicted - gain @ observed @ predicted
-    back = np.linalg.lstsq(predicted, scaled @ found, rcond=1e-13)[0].T
-    return gain * large[:, None], np.ascontiguousarray(back * large[:, None] / large[None, :])
+    filtered = predicted - gain @ observed @ predicted
+    back = np.linalg.lstsq(predicted, scaled @ filtered, rcond=1e-13)[0].T
+    return gain * sizes[:, None], np.ascontiguousarray(back * sizes[:, None] / sizes[None, :])
 
 
-def _covariance_by_schur_form(advance: FloatArray, observed: FloatArray, process_noise: FloatArray) -> FloatArray:
+def _covariance_by_schur_form(advance: FloatArray, observation: FloatArray, process_noise: FloatArray) -> FloatArray:
     """Steady prediction covariance by an ordered Schur form (SciPy), slower than by doubling. Raises
     numpy.linalg.LinAlgError."""
     try:
-        return np.asarray(solve_discrete_are(advance.T, observed.T, process_noise, np.eye(len(observed))))
+        return np.asarray(solve_discrete_are(advance.T, observation.T, process_noise, np.eye(len(observation))))
     except ValueError as problem:  # not finite
         raise np.linalg.LinAlgError(str(problem)) from problem
 
 
-def _steady_covariance(advance: FloatArray, observed: FloatArray, process_noise: FloatArray) -> FloatArray:
+def _steady_covariance(advance: FloatArray, observation: FloatArray, process_noise: FloatArray) -> FloatArray:
     """Steady prediction covariance by the doubling algorithm (Anderson 1978; noise of the channels is 1). Raises
     numpy.linalg.LinAlgError where it does not converge."""
-    along, information, found = advance.T, observed.T @ observed, process_noise
+    transition, information, covariance = advance.T, observation.T @ observation, process_noise
     for _ in range(_DOUBLINGS):
-        through = np.linalg.solve(np.eye(len(along)) + information @ found, np.hstack([along, information]))
-        onward, other = through[:, : len(along)], through[:, len(along) :]
-        more = along.T @ found @ onward
-        along, information, found = along @ onward, information + along @ other @ along.T, found + (more + more.T) / 2
-        if not np.isfinite(found).all():
+        solutions = np.linalg.solve(
+            np.eye(len(transition)) + information @ covariance, np.hstack([transition, information])
+        )
+        propagated, information_term = solutions[:, : len(transition)], solutions[:, len(transition) :]
+        increment = transition.T @ covariance @ propagated
+        transition, information, covariance = (
+            transition @ propagated,
+            information + transition @ information_term @ transition.T,
+            covariance + (increment + increment.T) / 2,
+        )
+        if not np.isfinite(covariance).all():
             break
-        if np.abs(more).max() <= 1e-10 * np.abs(found).max():
-            return np.asarray(found)
+        if np.abs(increment).max() <= 1e-10 * np.abs(covariance).max():
+            return np.asarray(covariance)
     raise np.linalg.LinAlgError("a filter for the motion does not converge")

@@ -1,4 +1,4 @@
-"""A recording ready for comparison with a model: its signals, and the split of its samples (`roles`) into three sets.
+"""A recording ready for comparison with a model: its signals, and its samples split into three sets (`split_samples`).
 
 The sets are those of statistical learning: training (`fit`: parameters are fitted to it), validation (`choose`: among
 explanations the best is chosen by it) and test (`test`: held out until the end, for an unbiased error).
@@ -40,16 +40,16 @@ class Observed:
     test: Mask
     """(n,): held-out samples, used only in the end."""
 
-    def unseal(self, opened: Mask) -> "Observed":
-        """Copy in which the held-out samples within the mask `opened` (n,) are no longer held out: of each stretch, two
+    def unseal(self, mask: Mask) -> "Observed":
+        """Copy in which the held-out samples within the mask `mask` (n,) are no longer held out: of each stretch, two
         thirds become fit samples, the last third validation samples."""
-        opened = opened & self.test
+        mask = mask & self.test
         fit, choose = self.fit.copy(), self.choose.copy()
-        for start, stop in runs_of(opened):
+        for start, stop in runs_of(mask):
             chosen = start + 2 * (stop - start) // 3
             fit[start:chosen] = True
             choose[chosen:stop] = True
-        return replace(self, fit=fit, choose=choose, test=self.test & ~opened)
+        return replace(self, fit=fit, choose=choose, test=self.test & ~mask)
 
     def longest_held_out(self) -> int:
         """Number of samples of the longest held-out stretch; 0 where nothing is held out."""
@@ -58,10 +58,10 @@ class Observed:
     def every_other_part(self, parts: int) -> Mask:
         """(n,): mask of the first, third, fifth … part of each held-out stretch, which is divided into `parts` equal
         parts."""
-        found = np.zeros(len(self.test), dtype=np.bool_)
+        mask = np.zeros(len(self.test), dtype=np.bool_)
         for start, stop in runs_of(self.test):
-            found[start:stop] = (np.arange(stop - start) * parts // (stop - start)) % 2 == 0
-        return found
+            mask[start:stop] = (np.arange(stop - start) * parts // (stop - start)) % 2 == 0
+        return mask
 
     def held_out_levels(self) -> list[tuple[Segment, float]]:
         """Each segment with held-out samples, and the largest magnitude of its commands."""
@@ -74,10 +74,10 @@ class Observed:
 
     def held_out_below(self, level: float) -> Mask:
         """(n,): mask of the held-out samples in segments whose commands stay below `level`."""
-        found = np.zeros(len(self.test), dtype=np.bool_)
+        mask = np.zeros(len(self.test), dtype=np.bool_)
         for segment, largest in self.held_out_levels():
-            found[segment.start : segment.stop] = largest < level
-        return found & self.test
+            mask[segment.start : segment.stop] = largest < level
+        return mask & self.test
 
     def fit_to_all(self) -> "Observed":
         """The record with fit and validation samples joined, and used for both: for explanations that are chosen by
@@ -94,10 +94,10 @@ class Observed:
 
 
 def observe(recording: Recording, responses: int) -> Observed:
-    """A recording as one part, with its samples divided by `roles`. responses: number of the model's outputs; a
+    """A recording as one part, with its samples divided by `split_samples`. responses: number of the model's outputs; a
     position with another number of channels is left out."""
-    measured, known = stack_measured_signals(recording, responses)
-    fit, choose, test = (mask & known for mask in roles(recording.segments, len(recording)))
+    measured, complete = stack_measured_signals(recording, responses)
+    fit, choose, test = (mask & complete for mask in split_samples(recording.segments, len(recording)))
     return Observed(recording, recording.command.samples, measured, fit, choose, test)
 
 
@@ -108,8 +108,8 @@ def stack_measured_signals(recording: Recording, responses: int) -> tuple[FloatA
     if recording.position is not None and recording.position.samples.shape[1] == responses:
         signals.append(recording.position.samples)
     measured = np.hstack(signals)
-    known: Mask = np.asarray(np.isfinite(measured).all(axis=1), dtype=np.bool_)
-    return measured, known
+    complete: Mask = np.asarray(np.isfinite(measured).all(axis=1), dtype=np.bool_)
+    return measured, complete
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,23 +132,25 @@ def _end_of_motion(samples: FloatArray) -> int:
     """Number of samples until the end of motion, at least half of them; all where the part does not come to rest before
     its last `LONGEST_TAIL`. The rest value is the median over that tail."""
     samples = samples[:, np.isfinite(samples).any(axis=0)]
-    last = int((1 - LONGEST_TAIL) * len(samples))
-    known: Mask = np.asarray(np.isfinite(samples).all(axis=1), dtype=np.bool_)
-    if not known[:last].any() or not known[last:].any():
+    tail_start = int((1 - LONGEST_TAIL) * len(samples))
+    complete: Mask = np.asarray(np.isfinite(samples).all(axis=1), dtype=np.bool_)
+    if not complete[:tail_start].any() or not complete[tail_start:].any():
         return len(samples)
-    away = np.abs(samples - np.median(samples[last:][known[last:]], axis=0)) > AT_REST * np.ptp(samples[known], axis=0)
-    moves = np.flatnonzero(away.any(axis=1))
-    if not len(moves) or moves[-1] >= last:
+    is_displaced = np.abs(samples - np.median(samples[tail_start:][complete[tail_start:]], axis=0)) > AT_REST * np.ptp(
+        samples[complete], axis=0
+    )
+    moving_samples = np.flatnonzero(is_displaced.any(axis=1))
+    if not len(moving_samples) or moving_samples[-1] >= tail_start:
         return len(samples)
     # A step response that settles at once would leave almost no samples to fit.
-    return max(int(moves[-1]) + 1, len(samples) // 2)
+    return max(int(moving_samples[-1]) + 1, len(samples) // 2)
 
 
-def roles(
-    segments: tuple[Segment, ...], length: int, tested: bool = False, spans: Sequence[Span] = ()
+def split_samples(
+    segments: tuple[Segment, ...], length: int, test_elsewhere: bool = False, spans: Sequence[Span] = ()
 ) -> tuple[Mask, Mask, Mask]:
-    """Masks (length,) of the fit, validation and test samples. tested: whether another recording is held out for the
-    test. spans: the recording's parts; empty = one part.
+    """Masks (length,) of the fit, validation and test samples. test_elsewhere: whether another recording is held out
+    for the test. spans: the recording's parts; empty = one part.
 
     Segments marked as test are held out. Without such marks, the last quarter of each segment is held out, in whole
     periods, so that every level is tested; where all segments have the same level, the last quarter of the time. Of the
@@ -160,32 +162,34 @@ def roles(
     force but no motion, is fitted.
     """
     if not segments:
-        return _roles_without_segments(spans or (Span(0, length, length),), length, tested)
-    inside = [s for s in segments if s.kind != "rest"]
-    test = _segment_mask([s for s in inside if s.role == "test"], length)
-    fitted = [s for s in inside if s.role == "fit"] or [s for s in inside if s.role != "test"]
+        return _roles_without_segments(spans or (Span(0, length, length),), length, test_elsewhere)
+    driven_segments = [s for s in segments if s.kind != "rest"]
+    test = _segment_mask([s for s in driven_segments if s.role == "test"], length)
+    fitted = [s for s in driven_segments if s.role == "fit"] or [s for s in driven_segments if s.role != "test"]
     fit = _segment_mask(fitted, length) if fitted else ~test
-    if inside and all(s.role == "test" for s in inside):
+    if driven_segments and all(s.role == "test" for s in driven_segments):
         fit[:] = False
-    elif not test.any() and not tested:
+    elif not test.any() and not test_elsewhere:
         test = _segment_ends(fitted, length)
         fit &= ~test
     choose = _middle_level(fitted, length) & fit
     if not choose.any():
-        places = np.flatnonzero(fit)
-        choose[places[int((1 - CHOOSE_SHARE) * len(places)) :]] = True
+        indices = np.flatnonzero(fit)
+        choose[indices[int((1 - CHOOSE_SHARE) * len(indices)) :]] = True
     return fit & ~choose, choose, test
 
 
-def _roles_without_segments(spans: Sequence[Span], length: int, tested: bool) -> tuple[Mask, Mask, Mask]:
-    """Masks (length,) of the fit, validation and test samples, by shares of each part's motion. tested: nothing is held
-    out."""
+def _roles_without_segments(spans: Sequence[Span], length: int, test_elsewhere: bool) -> tuple[Mask, Mask, Mask]:
+    """Masks (length,) of the fit, validation and test samples, by shares of each part's motion. test_elsewhere: nothing
+    is held out."""
     fit, choose, test = (np.zeros(length, dtype=np.bool_) for _ in range(3))
     for span in spans:
-        held_out = span.stop if tested else span.start + int((1 - TEST_SHARE) * (span.end_of_motion - span.start))
-        chosen = span.start + int((1 - CHOOSE_SHARE) * (held_out - span.start))
-        fit[span.start : span.stop], choose[chosen:held_out] = True, True
-        test[held_out : span.end_of_motion] = True
+        test_start = (
+            span.stop if test_elsewhere else span.start + int((1 - TEST_SHARE) * (span.end_of_motion - span.start))
+        )
+        choose_start = span.start + int((1 - CHOOSE_SHARE) * (test_start - span.start))
+        fit[span.start : span.stop], choose[choose_start:test_start] = True, True
+        test[test_start : span.end_of_motion] = True
     return fit & ~choose & ~test, choose, test
 
 
@@ -209,15 +213,17 @@ def _segment_ends(segments: list[Segment], length: int) -> Mask:
     last quarter of the time where there is one level or none."""
     mask = np.zeros(length, dtype=np.bool_)
     if len(_levels(segments)) < LEVELS_TO_STRATIFY:
-        places = np.flatnonzero(_segment_mask(segments, length)) if segments else np.arange(length)
-        mask[places[int((1 - TEST_SHARE) * len(places)) :]] = True
+        indices = np.flatnonzero(_segment_mask(segments, length)) if segments else np.arange(length)
+        mask[indices[int((1 - TEST_SHARE) * len(indices)) :]] = True
         return mask
     for segment in segments:
-        count = segment.stop - segment.start
-        kept = int((1 - TEST_SHARE) * count)
-        if segment.period and count >= 2 * segment.period:
-            kept = min(-(-kept // segment.period), count // segment.period - 1) * segment.period
-        mask[segment.start + kept : segment.stop] = True
+        length_of_segment = segment.stop - segment.start
+        fitted_length = int((1 - TEST_SHARE) * length_of_segment)
+        if segment.period and length_of_segment >= 2 * segment.period:
+            fitted_length = (
+                min(-(-fitted_length // segment.period), length_of_segment // segment.period - 1) * segment.period
+            )
+        mask[segment.start + fitted_length : segment.stop] = True
     return mask
 
 

@@ -1,7 +1,7 @@
 """Recordings cut into their parts (continuous stretches between gaps); each part is compared with the model by itself.
 
-The samples of each part are split into those to fit, to choose and to test by (`observed.roles`). Periods of a segment
-after the first `MOST_PERIODS` are used for the test only.
+The samples of each part are split into those to fit, to choose and to test by (`observed.split_samples`). Periods of a
+segment after the first `MOST_PERIODS` are used for the test only.
 """
 
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import Observed, find_moving_spans, roles, stack_measured_signals
+from analysis.diagnosis.data.observed import Observed, find_moving_spans, split_samples, stack_measured_signals
 from analysis.diagnosis.settings import CHOOSE_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
@@ -29,18 +29,18 @@ def observe_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obse
     marked = [segment.role for recording in recordings for segment in recording.segments]
     if marked and all(role == "test" for role in marked):
         recordings = [_clear_roles(recording) for recording in recordings]
-    tested = any(segment.role == "test" for recording in recordings for segment in recording.segments)
-    found: list[Observed] = []
+    has_test_segment = any(segment.role == "test" for recording in recordings for segment in recording.segments)
+    parts: list[Observed] = []
     for recording in recordings:
-        measured, known = stack_measured_signals(recording, responses)
+        measured, complete = stack_measured_signals(recording, responses)
         spans = find_moving_spans(recording.response.samples, parts_of(recording))
-        fit, choose, test = roles(recording.segments, len(recording), tested, spans)
-        masks = (*_without_repeats(fit & known, choose & known, ~_surplus_periods(recording)), test & known)
+        fit, choose, test = split_samples(recording.segments, len(recording), has_test_segment, spans)
+        masks = (*_without_repeats(fit & complete, choose & complete, ~_surplus_periods(recording)), test & complete)
         for start, stop in parts_of(recording):
-            cut: tuple[Mask, ...] = tuple(mask[start:stop] for mask in masks)
+            part_masks: tuple[Mask, ...] = tuple(mask[start:stop] for mask in masks)
             part = part_of(recording, start, stop)
-            found.append(Observed(part, part.command.samples, measured[start:stop], *cut))
-    return tuple(found)
+            parts.append(Observed(part, part.command.samples, measured[start:stop], *part_masks))
+    return tuple(parts)
 
 
 def samples_to_fit(recordings: Sequence[Recording]) -> int:
@@ -53,11 +53,11 @@ def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:
     used."""
     if (choose & new).any() or not (fit & new).any():
         return fit & new, choose & new
-    places = np.flatnonzero(fit & new)
-    last = places[int((1 - CHOOSE_SHARE) * len(places)) :]
-    chosen: Mask = np.zeros(len(fit), dtype=np.bool_)
-    chosen[last] = True
-    return fit & new & ~chosen, chosen
+    indices = np.flatnonzero(fit & new)
+    chosen_indices = indices[int((1 - CHOOSE_SHARE) * len(indices)) :]
+    chosen_mask: Mask = np.zeros(len(fit), dtype=np.bool_)
+    chosen_mask[chosen_indices] = True
+    return fit & new & ~chosen_mask, chosen_mask
 
 
 def _surplus_periods(recording: Recording) -> Mask:
@@ -71,14 +71,18 @@ def _surplus_periods(recording: Recording) -> Mask:
 
 def parts_of(recording: Recording) -> tuple[tuple[int, int], ...]:
     """Begin and end (exclusive) of each part, as sample indices; the whole recording where `meta` names no parts."""
-    named = recording.meta.get("parts")
+    stated_parts = recording.meta.get("parts")
     parts = [
         (int(stretch["start"]), int(stretch["stop"]))
-        for stretch in (named if isinstance(named, Sequence) and not isinstance(named, str) else ())
+        for stretch in (
+            stated_parts if isinstance(stated_parts, Sequence) and not isinstance(stated_parts, str) else ()
+        )
         if isinstance(stretch, dict) and "start" in stretch and "stop" in stretch
     ]
-    inside = [(start, stop) for start, stop in parts if start >= 0 and stop <= len(recording)]
-    return tuple(stretch for stretch in inside if stretch[1] - stretch[0] >= LEAST_SAMPLES) or ((0, len(recording)),)
+    parts_within = [(start, stop) for start, stop in parts if start >= 0 and stop <= len(recording)]
+    return tuple(stretch for stretch in parts_within if stretch[1] - stretch[0] >= LEAST_SAMPLES) or (
+        (0, len(recording)),
+    )
 
 
 def part_of(recording: Recording, start: int, stop: int) -> Recording:
@@ -118,9 +122,9 @@ def _clear_roles(recording: Recording) -> Recording:
 def names_of_parts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
     """Names of the parts in the order of `observe_parts`: the recording's name, with the part's number where there are
     several."""
-    found: list[str] = []
+    part_names: list[str] = []
     for number, recording in enumerate(recordings):
-        own = names[number] if number < len(names) else f"recording {number + 1}"
+        name = names[number] if number < len(names) else f"recording {number + 1}"
         count = len(parts_of(recording))
-        found += [own] if count == 1 else [f"{own}, part {part + 1}" for part in range(count)]
-    return tuple(found)
+        part_names += [name] if count == 1 else [f"{name}, part {part + 1}" for part in range(count)]
+    return tuple(part_names)

@@ -50,13 +50,15 @@ def effects_under_conditions(effects: Sequence[PlacedEffect], recording: Recordi
     signal = recording.condition
     if signal is None or all(placed.effect.with_conditions is None for placed in effects):
         return tuple(effects)
-    samples, found = fill_gaps(signal.samples), []
+    samples, adapted = fill_gaps(signal.samples), []
     for placed in effects:
-        acting = placed.effect.with_conditions
-        if acting is not None:
-            placed = replace(placed, effect=replace(placed.effect, acts=acting(samples, recording.sample_rate_hz)))
-        found.append(placed)
-    return tuple(found)
+        under_conditions = placed.effect.with_conditions
+        if under_conditions is not None:
+            placed = replace(
+                placed, effect=replace(placed.effect, action=under_conditions(samples, recording.sample_rate_hz))
+            )
+        adapted.append(placed)
+    return tuple(adapted)
 
 
 def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
@@ -64,21 +66,21 @@ def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel
     may have been reversed. For a free motion, whose command is a force per unit mass, the model with unit masses."""
     if is_read_as_free(recording):
         return replace(model, mass=np.eye(len(model.mass)))
-    channels, turned = recording.command.channels, recording.meta.get(REVERSED)
-    if not isinstance(turned, Sequence) or not set(turned) & set(channels):
+    channels, reversed_channels = recording.command.channels, recording.meta.get(REVERSED)
+    if not isinstance(reversed_channels, Sequence) or not set(reversed_channels) & set(channels):
         return model
-    signs = [-1.0 if channel in turned else 1.0 for channel in channels]
+    signs = [-1.0 if channel in reversed_channels else 1.0 for channel in channels]
     return with_reversed_commands(model, signs, channels, recording.response.channels)
 
 
 def weight_problems(model: MechanicalModel, recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
     """Errors in the stated weights of the recordings, as sentences without a full stop; empty where there are none."""
     key = _key(model)
-    other = ADDED_MASS if key == ADDED_INERTIA else ADDED_INERTIA
+    bad_key = ADDED_MASS if key == ADDED_INERTIA else ADDED_INERTIA
     problems = [
-        f"{name} says {other}, and the model's device {'turns' if model.rotational else 'moves straight'}: say {key}"
+        f"{name} says {bad_key}, and the model's device {'turns' if model.rotational else 'moves straight'}: say {key}"
         for recording, name in zip(recordings, names, strict=True)
-        if other in recording.meta
+        if bad_key in recording.meta
     ]
     problems += [
         f"{name} says {key} = {recording.meta[key]!r}, which must be a number from 0 on"

@@ -20,10 +20,10 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 Band = tuple[float, float]
 """Lower edge (Hz), included, and upper edge (Hz), excluded."""
-_SILENT = 3e-3
+_SILENT_SHARE = 3e-3
 """Largest amplitude of a silent line, relative to the strongest line of its input, or to a tenth of the strongest of
 all inputs if that is more. Chosen by hand."""
-_DRIVEN = 0.01
+_DRIVEN_SHARE = 0.01
 """Least power of a driven input, relative to the strongest. Chosen by hand."""
 _FEW_CHANGES = 16
 """Up to so many changes of a command do not show for how many samples it holds a value."""
@@ -53,30 +53,34 @@ class DetectionLines:
         return bool((self.odd | self.even | self.either).any())
 
 
-def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines | None:
+def detection_lines(excitation: ComplexArray, hold_samples: int = 1) -> DetectionLines | None:
     """Driven lines of a periodic excitation, and the silent ones on which distortion shows; None where nothing is
     driven.
 
-    excitation: (lines, inputs), spectrum of one period, line k in row k - 1. held: samples for which each value of the
-    command is held; above half of the rate at which it changes there are only images, which count as not driven.
+    excitation: (lines, inputs), spectrum of one period, line k in row k - 1. hold_samples: samples for which each value
+    of the command is held; above half of the rate at which it changes there are only images, which count as not driven.
     """
     size = np.abs(excitation)
-    size[(len(size) + 1) // held :] = 0
+    size[(len(size) + 1) // hold_samples :] = 0
     strongest = size.max()
     if strongest == 0:
         return None
-    driven = np.asarray((size > _SILENT * np.maximum(size.max(axis=0), 0.1 * strongest)).any(axis=1))
+    driven = np.asarray((size > _SILENT_SHARE * np.maximum(size.max(axis=0), 0.1 * strongest)).any(axis=1))
     numbers = np.arange(1, len(driven) + 1)
     step = int(np.gcd.reduce(numbers[driven]))
     lowest, highest = numbers[driven][[0, -1]]
-    silent = ~driven & (numbers >= lowest) & (numbers <= highest) & (numbers % step == 0)
+    silent_lines = ~driven & (numbers >= lowest) & (numbers <= highest) & (numbers % step == 0)
     multiple = numbers // step
     odd_only = bool((multiple[driven] % 2 == 1).all()) and highest > lowest
-    none = np.zeros(len(driven), dtype=np.bool_)
+    no_lines = np.zeros(len(driven), dtype=np.bool_)
     if not odd_only:
-        return DetectionLines(driven, none, none, np.asarray(silent), step)
+        return DetectionLines(driven, no_lines, no_lines, np.asarray(silent_lines), step)
     return DetectionLines(
-        driven, np.asarray(silent & (multiple % 2 == 1)), np.asarray(silent & (multiple % 2 == 0)), none, step
+        driven,
+        np.asarray(silent_lines & (multiple % 2 == 1)),
+        np.asarray(silent_lines & (multiple % 2 == 0)),
+        no_lines,
+        step,
     )
 
 
@@ -105,7 +109,7 @@ def find_driven_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[st
     strongest. An input that is only moved by feedback has less, where the excitation was recorded. power: (inputs,)."""
     if power.max(initial=0.0) == 0:
         return ()
-    return tuple(name for name, strength in zip(channels, power, strict=True) if strength > _DRIVEN * power.max())
+    return tuple(name for name, strength in zip(channels, power, strict=True) if strength > _DRIVEN_SHARE * power.max())
 
 
 def noncentral_f_sf(
@@ -120,12 +124,12 @@ def noncentral_f_sf(
     """
     degrees = 2 * np.asarray(lines, dtype=np.float64)
     shift = np.asarray(noncentrality, dtype=np.float64)
-    equal = (degrees + shift) * ((degrees + shift) / (degrees + 2 * shift))
+    equivalent = (degrees + shift) * ((degrees + shift) / (degrees + 2 * shift))
     scaled = np.asarray(ratio, dtype=np.float64) * degrees / (degrees + shift)
-    return np.asarray(fdtrc(equal, freedom, np.minimum(scaled, _LARGEST)), dtype=np.float64)
+    return np.asarray(fdtrc(equivalent, freedom, np.minimum(scaled, _LARGEST)), dtype=np.float64)
 
 
-def excess(power: FloatArray, noise: FloatArray, freedom: float) -> tuple[float, float, float]:
+def excess_power(power: FloatArray, noise: FloatArray, freedom: float) -> tuple[float, float, float]:
     """Summed power beyond noise, its detection limit (two standard errors of the noise), and the p-value.
 
     power: p (lines,), squared magnitudes. noise: s (lines,), their expectation without a signal, estimated with

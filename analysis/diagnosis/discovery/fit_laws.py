@@ -11,15 +11,25 @@ from typing import TypeVar
 
 import numpy as np
 
-from analysis.diagnosis.discovery.antisymmetric_pairs import as_pair, is_coupling, pair_starts, sum_squares_of_coupling
+from analysis.diagnosis.discovery.antisymmetric_pairs import (
+    convert_to_pair,
+    is_coupling,
+    list_pair_starts,
+    sum_squared_coupling_deviations,
+)
 from analysis.diagnosis.discovery.fit_sum import Sum
-from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum, laws_of
-from analysis.diagnosis.discovery.snap_exponents import is_whole_limit
+from analysis.diagnosis.discovery.law_of_sum import convert_sum_to_hypothesis, list_fitted_laws
+from analysis.diagnosis.discovery.snap_exponents import is_full_limit
 from analysis.diagnosis.errors.hypothesis import combine
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.parsimony import inseparable
-from analysis.diagnosis.search.search_context import FIRST_ROUNDS, FittedCandidate, SearchContext, sensitivity_at
+from analysis.diagnosis.search.parsimony import are_inseparable
+from analysis.diagnosis.search.search_context import (
+    FIRST_FIT_ROUNDS,
+    FittedCandidate,
+    SearchContext,
+    compute_sensitivity,
+)
 from analysis.diagnosis.search.time_budget import OutOfTimeError
 from analysis.diagnosis.settings import LAW_NEAR
 from analysis.diagnosis.types import TimeBudget
@@ -33,108 +43,114 @@ def fit_sums(
 ) -> tuple[tuple[FittedCandidate, Sum], ...]:
     """The sums fitted by output error. The best sum, and simpler sums that are inseparable from it, are fitted to
     convergence, the others for a few steps. When the time ends, those begun by then; empty where none can be fitted."""
-    known = within_time(lambda: sensitivity_at(context, base.deviations, base.hypothesis), None)
-    if known is None:
+    sensitivity = run_within_time(lambda: compute_sensitivity(context, base.deviations, base.hypothesis), None)
+    if sensitivity is None:
         return ()
-    first = partial(fit, context.measure, context.tuning, known=known, rounds=FIRST_ROUNDS, map_=context.map_)
+    fit_few_steps = partial(
+        fit, context.measure, context.tuning, jacobian=sensitivity, rounds=FIRST_FIT_ROUNDS, map_=context.map_
+    )
     fits = [
-        (within_time(partial(first, start), start), each)
-        for each in sums
+        (run_within_time(partial(fit_few_steps, start), start), term_sum)
+        for term_sum in sums
         if time_left()
-        for start in _make_starting_fits(context, base, each)
+        for start in _make_starting_fits(context, base, term_sum)
     ]
     fits.sort(key=lambda pair: pair[0].cost)
     if not fits or not np.isfinite(fits[0][0].cost):
         return ()
     best = fits[0]
     # Of the starts of a law, that with the lower cost may converge to the fit of the re-tuned model without the law.
-    ends = [_refine(context, start) for start, each in fits if each is best[1] and np.isfinite(start.cost)]
-    refined = [(context.candidate(min(ends, key=lambda end: end.cost)), best[1])]
-    others = {id(each): (start, each) for start, each in reversed(fits) if each is not best[1]}
-    rest = [
-        (context.candidate(_like_best(context, best, refined[0][0], pair)), pair[1])
-        for pair in sorted(others.values(), key=lambda pair: pair[0].cost)
+    converged = [_refine(context, start) for start, term_sum in fits if term_sum is best[1] and np.isfinite(start.cost)]
+    refined = [(context.candidate(min(converged, key=lambda end: end.cost)), best[1])]
+    other_fits = {id(term_sum): (start, term_sum) for start, term_sum in reversed(fits) if term_sum is not best[1]}
+    other_candidates = [
+        (context.candidate(_convert_to_pair(context, best, refined[0][0], pair)), pair[1])
+        for pair in sorted(other_fits.values(), key=lambda pair: pair[0].cost)
     ]
-    close = [
+    simpler_candidates = [
         pair
-        for pair in rest
+        for pair in other_candidates
         if time_left()
         and _count_parameters(pair) < _count_parameters(refined[0])
-        and inseparable(refined[0][0], pair[0])
+        and are_inseparable(refined[0][0], pair[0])
     ]
-    refined += [(context.candidate(_refine(context, candidate.fitted)), item) for candidate, item in close]
-    return (*refined, *(pair for pair in rest if pair not in close))
+    refined += [(context.candidate(_refine(context, candidate.fitted)), item) for candidate, item in simpler_candidates]
+    return (*refined, *(pair for pair in other_candidates if pair not in simpler_candidates))
 
 
-def _make_starting_fits(context: SearchContext, base: Fitted, each: Sum) -> list[Fitted]:
+def _make_starting_fits(context: SearchContext, base: Fitted, term_sum: Sum) -> list[Fitted]:
     """The sum added to the fit, with the model's own parameters unchanged or shifted as in the fit of the sum: the
     start with the lower cost. Where re-tuning without this law ended at a bound, also a start with the given
     parameters."""
     recording = context.measure.records[0].recording
     bound = context.tuning.bound
-    shifted = np.clip(base.deviations + each.model_shift, -bound, bound)
-    given = np.zeros_like(base.deviations)
+    shifted = np.clip(base.deviations + term_sum.model_shift, -bound, bound)
+    calibrated = np.zeros_like(base.deviations)
     at_bound = context.tuning.is_at_bound(base.deviations)
-    starts = (each,) if each.partner is None else pair_starts(each)
+    starts = (term_sum,) if term_sum.partner is None else list_pair_starts(term_sum)
     chosen: list[Fitted] = []
-    for several in ((base.deviations, shifted), *([(given,)] if at_bound else [])):
-        found: list[Fitted] = []
-        for start, deviations in product(starts, several):
-            whole = combine(base.hypothesis, hypothesis_of_sum(start, recording))
+    for deviation_sets in ((base.deviations, shifted), *([(calibrated,)] if at_bound else [])):
+        fits: list[Fitted] = []
+        for start, deviations in product(starts, deviation_sets):
+            hypothesis = combine(base.hypothesis, convert_sum_to_hypothesis(start, recording))
             try:
-                found.append(evaluate_fit(context.measure, context.tuning, deviations, whole))
+                fits.append(evaluate_fit(context.measure, context.tuning, deviations, hypothesis))
             except (MechanicalModelError, np.linalg.LinAlgError):
                 continue
-        chosen += [min(found, key=lambda start: start.cost)] if found else []
+        chosen += [min(fits, key=lambda start: start.cost)] if fits else []
     return chosen
 
 
-def _like_best(
-    context: SearchContext, best: tuple[Fitted, Sum], refined: FittedCandidate, other: tuple[Fitted, Sum]
+def _convert_to_pair(
+    context: SearchContext, best: tuple[Fitted, Sum], refined: FittedCandidate, other_fit: tuple[Fitted, Sum]
 ) -> Fitted:
     """The other fit; if it is a pair of which the best sum is a half, the refined best fit converted to that pair."""
-    single, pair = best[1], other[1]
+    single, pair = best[1], other_fit[1]
     if single.partner is not None or pair.partner is None or not is_coupling(single):
-        return other[0]
-    return as_pair(context.measure, context.tuning, (refined.fitted, single), pair) or other[0]
+        return other_fit[0]
+    return convert_to_pair(context.measure, context.tuning, (refined.fitted, single), pair) or other_fit[0]
 
 
-def put_plainest_first(
+def put_simplest_first(
     context: SearchContext, pairs: Sequence[tuple[FittedCandidate, Sum]]
 ) -> list[tuple[FittedCandidate, Sum]]:
     """The candidates by rising error, with the preferred one moved to the front: among those inseparable from the best,
     the one with the fewest parameters; among forces that are linear in another axis's motion, the one with the smallest
     change of the model's own coupled parameters."""
     ranked = sorted(pairs, key=lambda pair: pair[0].score.mean_log_error)
-    alike = [pair for pair in ranked if inseparable(ranked[0][0], pair[0])]
-    first = min(alike, key=_count_parameters)
+    equivalent = [pair for pair in ranked if are_inseparable(ranked[0][0], pair[0])]
+    first = min(equivalent, key=_count_parameters)
     if is_coupling(first[1]):
-        same = [pair for pair in alike if is_coupling(pair[1]) and _count_parameters(pair) == _count_parameters(first)]
-        first = min(same, key=lambda pair: sum_squares_of_coupling(context.tuning, pair[0].fitted))
+        equally_simple = [
+            pair for pair in equivalent if is_coupling(pair[1]) and _count_parameters(pair) == _count_parameters(first)
+        ]
+        first = min(equally_simple, key=lambda pair: sum_squared_coupling_deviations(context.tuning, pair[0].fitted))
     return [first, *(pair for pair in ranked if pair is not first)]
 
 
 def _count_parameters(pair: tuple[FittedCandidate, Sum]) -> int:
     """Number of free parameters of a sum. Exponents that are whole or half numbers are not counted, nor is the factor
     of a soft limit that is 1."""
-    candidate, of = pair
-    law = laws_of(candidate.fitted.hypothesis)[-1]
-    count = 0 if law is None else -int(is_whole_limit(law, LAW_NEAR))
-    for term in of.terms:
-        plain = [k for k in term.exponents if abs(2 * term.numbers[k] - round(2 * term.numbers[k])) < 2 * LAW_NEAR]
-        count += 1 + len(term.numbers) - len(plain)
+    candidate, term_sum = pair
+    law = list_fitted_laws(candidate.fitted.hypothesis)[-1]
+    count = 0 if law is None else -int(is_full_limit(law, LAW_NEAR))
+    for term in term_sum.terms:
+        simple_exponents = [
+            k for k in term.exponents if abs(2 * term.numbers[k] - round(2 * term.numbers[k])) < 2 * LAW_NEAR
+        ]
+        count += 1 + len(term.numbers) - len(simple_exponents)
     return count
 
 
 def _refine(context: SearchContext, start: Fitted) -> Fitted:
     """The fit continued to convergence; the start where the time ends before."""
-    return within_time(lambda: refine(context, start), start)
+    return run_within_time(lambda: refine(context, start), start)
 
 
-def within_time(work: Callable[[], T], begun: T) -> T:
-    """The result of `work`, or `begun` where the time ends during it: a stiff law may take a second per simulation, and
-    a fit simulates about a hundred times."""
+def run_within_time(work: Callable[[], T], fallback: T) -> T:
+    """The result of `work`, or `fallback` where the time ends during it: a stiff law may take a second per simulation,
+    and a fit simulates about a hundred times."""
     try:
         return work()
     except OutOfTimeError:
-        return begun
+        return fallback

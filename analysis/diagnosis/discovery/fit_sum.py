@@ -17,7 +17,7 @@ from analysis.diagnosis.discovery.screen_terms import Products, Solution, add_co
 from equalizer.laws.law import ActsOn
 from equalizer.signals.signal import FloatArray
 
-_MOVE, _MOVE_OF_LINE = 1e-3, 1e-5
+_STEP, _STEP_OF_FREQUENCY = 1e-3, 1e-5
 """Steps of the finite differences, absolute or relative (`_shift_parameter`). The factor of time, a frequency, has the
 smaller step, because a change of 0.1 % would shift the phase too far at the end of a recording."""
 _ROUNDS = 8
@@ -37,7 +37,7 @@ class Sum:
     """(terms,): factor of each term, in SI units."""
     cross_validated: float
     """Held-out squares over the noise's, per sample: 1 = noise alone."""
-    without: float
+    base_error: float
     """Held-out squares of the re-tuned model alone, in the same unit."""
     spread: float
     """Jackknife standard error of the first factor over the blocks, relative to it."""
@@ -50,18 +50,18 @@ class Sum:
     @property
     def variables(self) -> tuple[str, ...]:
         """Signals in the terms and in those of the partner, sorted."""
-        own = frozenset[str]().union(*(term.variables for term in self.terms))
-        return tuple(sorted(own.union(() if self.partner is None else self.partner.variables)))
+        names = frozenset[str]().union(*(term.variables for term in self.terms))
+        return tuple(sorted(names.union(() if self.partner is None else self.partner.variables)))
 
 
 def column_of(view: View, term: Term) -> FloatArray | None:
     """(s,): the term through the view's filter; None where it is not finite."""
     parts = []
-    for seen in view.records:
-        force = evaluate_shape(term.shape, term.numbers, seen.columns, seen.rate_hz)
+    for record in view.records:
+        force = evaluate_shape(term.shape, term.numbers, record.columns, record.rate_hz)
         if not np.isfinite(force).all():
             return None
-        parts.append(seen.column(force, view.output))
+        parts.append(record.column(force, view.output))
     return np.concatenate(parts)
 
 
@@ -69,37 +69,37 @@ def fit_sum(base: Products, terms: Sequence[Term]) -> Sum | None:
     """The sum with its parameters, factors and held-out errors. base: products of the model's parameters alone. None
     where the terms are not finite at their starting parameters."""
     view = base.view
-    at = _Point(tuple(terms), *_columns(view, terms))
-    if at.columns is None:
+    point = _Point(tuple(terms), *_columns(view, terms))
+    if point.columns is None:
         return None
-    best = _solve_columns(base, at.columns)
+    best = _solve_columns(base, point.columns)
     for _ in range(_ROUNDS if any(term.numbers for term in terms) else 0):
-        better = _gauss_newton_step(base, at, best)
-        if better is None:
+        improved = _gauss_newton_step(base, point, best)
+        if improved is None:
             break
-        gained = 1 - better[1].cost / best.cost
-        at, best = better
-        if gained < _CONVERGED:
+        decrease = 1 - improved[1].cost / best.cost
+        point, best = improved
+        if decrease < _CONVERGED:
             break
-    assert at.columns is not None
-    return _score_sum(base, at.terms, at.columns, best)
+    assert point.columns is not None
+    return _score_sum(base, point.terms, point.columns, best)
 
 
 def _score_sum(base: Products, terms: tuple[Term, ...], columns: Sequence[FloatArray], best: Solution) -> Sum:
     """The sum with cross-validated errors and the jackknife error of its first factor."""
     view = base.view
-    whole = add_columns(base, columns[1:])
-    held = cross_validate_terms(whole, columns[0][None, :])
-    alone = cross_validate_terms(base, columns[0][None, :])
+    base_and_others = add_columns(base, columns[1:])
+    joint_errors = cross_validate_terms(base_and_others, columns[0][None, :])
+    single_errors = cross_validate_terms(base, columns[0][None, :])
     size = view.noise * len(view.residual)
-    factors = held.factors[:, 0]
+    factors = joint_errors.factors[:, 0]
     spread = float(np.std(factors) * np.sqrt(len(factors) - 1) / max(abs(float(np.mean(factors))), 1e-300))
     return Sum(
         view.axis,
         terms,
         tuple(best.weights[len(view.parameter_columns) :].tolist()),
-        float(held.with_it.sum()) / size,
-        float(alone.without.sum()) / size,
+        float(joint_errors.term_squares.sum()) / size,
+        float(single_errors.base_squares.sum()) / size,
         spread,
         tuple(best.weights[: len(view.parameter_columns) - 1].tolist()),
         view.acts_on,
@@ -115,8 +115,8 @@ class _Point:
 
 
 def _columns(view: View, terms: Sequence[Term]) -> tuple[tuple[FloatArray, ...] | None]:
-    found = [column_of(view, term) for term in terms]
-    return (None if any(column is None for column in found) else tuple(c for c in found if c is not None),)
+    columns = [column_of(view, term) for term in terms]
+    return (None if any(column is None for column in columns) else tuple(c for c in columns if c is not None),)
 
 
 def _solve_columns(base: Products, columns: Sequence[FloatArray]) -> Solution:
@@ -124,53 +124,53 @@ def _solve_columns(base: Products, columns: Sequence[FloatArray]) -> Solution:
     return solve(add_columns(base, columns))
 
 
-def _gauss_newton_step(base: Products, at: _Point, best: Solution) -> tuple[_Point, Solution] | None:
+def _gauss_newton_step(base: Products, point: _Point, best: Solution) -> tuple[_Point, Solution] | None:
     """A Gauss-Newton step, shortened until the cost falls; None where it does not fall or nothing is nonlinear."""
     view, k = base.view, len(base.view.parameter_columns)
-    assert at.columns is not None
+    assert point.columns is not None
     factors = best.weights[k:]
-    moves, slopes = [], []
-    for number, term in enumerate(at.terms):
-        for place in range(len(term.numbers)):
-            move = _MOVE_OF_LINE if f"p{place}*t" in term.shape else _MOVE
-            column = column_of(view, _shift_parameter(term, place, move))
+    parameters, slopes = [], []
+    for number, term in enumerate(point.terms):
+        for parameter_index in range(len(term.numbers)):
+            shift = _STEP_OF_FREQUENCY if f"p{parameter_index}*t" in term.shape else _STEP
+            column = column_of(view, _shift_parameter(term, parameter_index, shift))
             if column is None:
                 return None
-            slopes.append(factors[number] * (column - at.columns[number]) / move)
-            moves.append((number, place))
-    if not moves:
+            slopes.append(factors[number] * (column - point.columns[number]) / shift)
+            parameters.append((number, parameter_index))
+    if not parameters:
         return None
     sizes = np.array([max(float(np.linalg.norm(slope)), 1e-300) for slope in slopes])
-    joint = add_columns(base, [*at.columns, *(slope / size for slope, size in zip(slopes, sizes, strict=True))])
-    found = solve(_damp_slopes(joint, len(slopes)))
-    step = np.clip(found.weights[-len(slopes) :] / sizes, -0.7, 0.7)
+    joint = add_columns(base, [*point.columns, *(slope / size for slope, size in zip(slopes, sizes, strict=True))])
+    damped = solve(_damp_slopes(joint, len(slopes)))
+    step = np.clip(damped.weights[-len(slopes) :] / sizes, -0.7, 0.7)
     for share in (1.0, 0.4, 0.15, 0.05):
-        terms = at.terms
-        for (number, place), move in zip(moves, step, strict=True):
-            moved = _shift_parameter(terms[number], place, share * float(move))
-            terms = (*terms[:number], moved, *terms[number + 1 :])
+        terms = point.terms
+        for (number, parameter_index), shift in zip(parameters, step, strict=True):
+            shifted_term = _shift_parameter(terms[number], parameter_index, share * float(shift))
+            terms = (*terms[:number], shifted_term, *terms[number + 1 :])
         columns = _columns(view, terms)[0]
         if columns is None:
             continue
-        there = _solve_columns(base, columns)
-        if there.cost < best.cost * (1 - 1e-6):
-            return _Point(terms, columns), there
+        candidate = _solve_columns(base, columns)
+        if candidate.cost < best.cost * (1 - 1e-6):
+            return _Point(terms, columns), candidate
     return None
 
 
 def _damp_slopes(joint: Products, count: int) -> Products:
     """Levenberg damping of the slopes (of norm 1), so that slopes nearly collinear with other columns make no step."""
     squares = joint.squares.copy()
-    places = np.arange(squares.shape[1] - count, squares.shape[1])
-    squares[:, places, places] += 1e-4 / len(squares)
+    slope_indices = np.arange(squares.shape[1] - count, squares.shape[1])
+    squares[:, slope_indices, slope_indices] += 1e-4 / len(squares)
     return replace(joint, squares=squares)
 
 
-def _shift_parameter(term: Term, place: int, move: float) -> Term:
-    """The term with the parameter at `place` moved within its bounds: exponents and angles by `move`, others by a
-    factor exp(move)."""
-    numbers, (low, high) = list(term.numbers), term.bounds[place]
-    here = numbers[place]
-    plain = place in term.exponents or place in term.turns
-    numbers[place] = min(max(here + move if plain else here * float(np.exp(move)), low), high)
+def _shift_parameter(term: Term, parameter_index: int, shift: float) -> Term:
+    """The term with a parameter moved within its bounds: exponents and angles by `shift`, others by a factor
+    exp(shift)."""
+    numbers, (low, high) = list(term.numbers), term.bounds[parameter_index]
+    value = numbers[parameter_index]
+    is_additive = parameter_index in term.exponents or parameter_index in term.angles
+    numbers[parameter_index] = min(max(value + shift if is_additive else value * float(np.exp(shift)), low), high)
     return replace(term, numbers=tuple(numbers))

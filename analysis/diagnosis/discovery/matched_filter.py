@@ -28,7 +28,7 @@ from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.settings import LAW_BLOCKS, LAW_POWER_KEPT, SETTLED_CONSTANTS
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.law import ActsOn
-from equalizer.plant.linear_simulation import linear_steps
+from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.band_limited import low_pass_gain
 from equalizer.signals.signal import ComplexArray, FloatArray
@@ -64,8 +64,8 @@ class FilteredRecord:
 
     def _filter_spectrum(self, spectrum: ComplexArray) -> FloatArray:
         """(kept samples, m + p): output of each filter. spectrum: (lines, c), of residuals."""
-        along = np.einsum("lcm,lc->lm", np.conj(self.force_response), spectrum) / self.strength
-        return self._select_blocks(np.hstack([along, spectrum[:, : len(self.reading_units)]]))
+        force_outputs = np.einsum("lcm,lc->lm", np.conj(self.force_response), spectrum) / self.strength
+        return self._select_blocks(np.hstack([force_outputs, spectrum[:, : len(self.reading_units)]]))
 
     def filter_forces(self, forces: FloatArray) -> FloatArray:
         """(kept samples, m + p): outputs for the residuals that forces (n, m), N, cause together. A force acts as in
@@ -119,37 +119,54 @@ class View:
     """Mean square of the noise in a filtered sample."""
 
 
-def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:
+def build_views(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:
     """One view per driven axis, then one per response channel (up to the three that the grammar has names for)."""
-    model, placed = tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
-    evidence = measure.evidence(model, placed, fitted.residuals)
-    seen = tuple(_filter_record(measure, record, own) for record, own in zip(measure.records, evidence, strict=True))
+    model, placed_effects = tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
+    evidence = measure.evidence(model, placed_effects, fitted.residuals)
+    filtered_records = tuple(
+        _filter_record(measure, record, record_evidence)
+        for record, record_evidence in zip(measure.records, evidence, strict=True)
+    )
     residual = np.concatenate(
-        [each.filter_residuals(_zero_missing(left)) for each, left in zip(seen, fitted.residuals, strict=True)]
+        [
+            filtered.filter_residuals(_zero_missing(record_residuals))
+            for filtered, record_residuals in zip(filtered_records, fitted.residuals, strict=True)
+        ]
     )
     columns = np.array(
-        [_parameter_columns(measure, tuning, fitted, seen, number) for number in range(len(fitted.deviations))]
+        [
+            _compute_parameter_columns(measure, tuning, fitted, filtered_records, number)
+            for number in range(len(fitted.deviations))
+        ]
     )
-    edges = _edges(seen)
+    edges = _compute_block_edges(filtered_records)
     to_calibration = np.append(-fitted.deviations, 0.0)
     views = []
     for output in range(min(residual.shape[1], model.inputs + len(AXES))):
         acts_on: ActsOn = "force" if output < model.inputs else "response"
         axis = output if output < model.inputs else output - model.inputs
-        constant = np.concatenate([each.column(np.ones(len(each.missing_force)), output) for each in seen])
+        constant = np.concatenate(
+            [filtered.column(np.ones(len(filtered.missing_force)), output) for filtered in filtered_records]
+        )
         tuned = np.vstack([columns[:, :, output].reshape(-1, len(residual)), constant])
-        noise = _noise(measure, seen, axis) if acts_on == "force" else float((measure.noise / measure.unit)[axis] ** 2)
-        views.append(View(output, acts_on, axis, seen, residual[:, output], tuned, to_calibration, edges, noise))
+        noise = (
+            _compute_noise(measure, filtered_records, axis)
+            if acts_on == "force"
+            else float((measure.noise / measure.unit)[axis] ** 2)
+        )
+        views.append(
+            View(output, acts_on, axis, filtered_records, residual[:, output], tuned, to_calibration, edges, noise)
+        )
     return tuple(views)
 
 
-def _zero_missing(left: FloatArray) -> FloatArray:
+def _zero_missing(residuals: FloatArray) -> FloatArray:
     """Residuals with 0 where a reading is missing."""
-    return np.where(np.isfinite(left), left, 0.0)
+    return np.where(np.isfinite(residuals), residuals, 0.0)
 
 
-def _parameter_columns(
-    measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, seen: Sequence[FilteredRecord], number: int
+def _compute_parameter_columns(
+    measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, filtered_records: Sequence[FilteredRecord], number: int
 ) -> FloatArray:
     """(s, m + p): change of all outputs by one standard deviation of one of the model's parameters, by its number. For
     mass, damping and stiffness it is that of their force along the measured motion, exact even for a wrong model; for
@@ -157,32 +174,39 @@ def _parameter_columns(
     m = tuning.model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     if number < 3 * len(pairs):
-        return np.concatenate([each.filter_forces(_parameter_force(each, tuning, pairs, number)) for each in seen])
-    base = measure.residuals(tuning.tune(fitted.deviations), ())
-    for move in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
-        there = fitted.deviations.copy()
-        there[number] += move
+        return np.concatenate(
+            [
+                filtered.filter_forces(_compute_parameter_force(filtered, tuning, pairs, number))
+                for filtered in filtered_records
+            ]
+        )
+    base_residuals = measure.residuals(tuning.tune(fitted.deviations), ())
+    for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
+        shifted_deviations = fitted.deviations.copy()
+        shifted_deviations[number] += step
         try:
-            moved = measure.residuals(tuning.tune(there), ())
+            shifted_residuals = measure.residuals(tuning.tune(shifted_deviations), ())
         except (MechanicalModelError, np.linalg.LinAlgError):
             continue
         change = [
-            each.filter_residuals(_zero_missing((before - after) / move))
-            for each, before, after in zip(seen, base, moved, strict=True)
+            filtered.filter_residuals(_zero_missing((base_record - shifted_record) / step))
+            for filtered, base_record, shifted_record in zip(
+                filtered_records, base_residuals, shifted_residuals, strict=True
+            )
         ]
         return np.concatenate(change)
-    kept = sum(part.stop - part.start for each in seen for part in each.block_slices)
-    return np.zeros((kept, m + len(seen[0].reading_units)))
+    sample_count = sum(part.stop - part.start for filtered in filtered_records for part in filtered.block_slices)
+    return np.zeros((sample_count, m + len(filtered_records[0].reading_units)))
 
 
-def _parameter_force(
+def _compute_parameter_force(
     record: FilteredRecord, tuning: Tuning, pairs: Sequence[tuple[int, int]], number: int
 ) -> FloatArray:
     """(n, m), N: external force equivalent to one standard deviation more of a mass, damping or stiffness entry."""
     order, (i, j) = number // len(pairs), pairs[number % len(pairs)]
     forces = np.zeros_like(record.missing_force)
-    for axis, other in {(i, j), (j, i)}:
-        name = AXES[other]
+    for axis, motion_axis in {(i, j), (j, i)}:
+        name = AXES[motion_axis]
         motion = (
             np.gradient(record.columns[f"v{name}"]) * record.rate_hz,
             record.columns[f"v{name}"],
@@ -200,38 +224,42 @@ def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) 
     power = np.cumsum(np.sum(np.abs(rfft(evidence.command, length, axis=0)) ** 2, axis=1))
     last = int(1.1 * np.searchsorted(power, LAW_POWER_KEPT * power[-1])) + 8
     last = min(next_fast_len(last, real=True) + 1, len(lines))
-    through = _force_response(measure, evidence, lines[:last])
-    strength = np.sqrt(np.sum(np.abs(through) ** 2, axis=1))
+    force_response = _compute_force_response(measure, evidence, lines[:last])
+    strength = np.sqrt(np.sum(np.abs(force_response) ** 2, axis=1))
     strength = np.maximum(strength, 1e-9 * strength.max(axis=0))
     share = 2 * (last - 1) / length
     # The response to a force near the record's end is not recorded to its end, so that the last samples are left out.
     end = n - min(_count_settling_samples(measure, evidence), n // 4)
-    kept = tuple(slice(int(a * share), int(min(b, end) * share)) for a, b in _blocks(record) if a < end)
+    block_slices = tuple(slice(int(a * share), int(min(b, end) * share)) for a, b in _list_blocks(record) if a < end)
     forces = isinstance(measure, PredictedForce)
     units = measure.unit[: 0 if forces else evidence.response.shape[1]]
-    return FilteredRecord(columns_of(evidence), evidence.axis_force, rate_hz, length, through, strength, units, kept)
+    return FilteredRecord(
+        columns_of(evidence), evidence.axis_force, rate_hz, length, force_response, strength, units, block_slices
+    )
 
 
-def _force_response(measure: ErrorMeasure, evidence: Evidence, lines: FloatArray) -> ComplexArray:
+def _compute_force_response(measure: ErrorMeasure, evidence: Evidence, lines: FloatArray) -> ComplexArray:
     """(lines, c, m), 1/N: see `FilteredRecord`. lines: frequencies, Hz."""
     if isinstance(measure, PredictedForce):
         m = evidence.command.shape[1]
-        within = low_pass_gain(lines, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
-        return np.asarray(-np.ones((len(lines), 1, 1)) * np.eye(m) * within / measure.unit[:, None], dtype=complex)
-    seen = axis_transfer(evidence.model, evidence.sample_rate_hz, lines)
+        band_gain = low_pass_gain(lines, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
+        return np.asarray(-np.ones((len(lines), 1, 1)) * np.eye(m) * band_gain / measure.unit[:, None], dtype=complex)
+    transfer = axis_transfer(evidence.model, evidence.sample_rate_hz, lines)
     c = len(measure.unit)
-    return np.asarray(np.concatenate([seen.response, seen.position], axis=1)[:, :c] / measure.unit[:, None])
+    return np.asarray(np.concatenate([transfer.response, transfer.position], axis=1)[:, :c] / measure.unit[:, None])
 
 
 def _count_settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
     """Samples until the response to a force has decayed (`SETTLED_CONSTANTS` of the slowest time constant)."""
     if isinstance(measure, PredictedForce):
         return 0
-    slowest = float(np.abs(np.linalg.eigvals(linear_steps(evidence.model, 1 / evidence.sample_rate_hz).advance)).max())
+    slowest = float(
+        np.abs(np.linalg.eigvals(discretise_model(evidence.model, 1 / evidence.sample_rate_hz).advance)).max()
+    )
     return int(SETTLED_CONSTANTS / -np.log(slowest)) if slowest < 1 else len(evidence.command)
 
 
-def _blocks(record: Observed) -> list[tuple[int, int]]:
+def _list_blocks(record: Observed) -> list[tuple[int, int]]:
     """Start and stop of the segments that are not held out; with fewer than `LAW_BLOCKS` of them, of as many equal
     parts of the samples."""
     used = record.fit | record.choose
@@ -242,22 +270,27 @@ def _blocks(record: Observed) -> list[tuple[int, int]]:
     ]
     if len(edges) >= LAW_BLOCKS:
         return edges
-    places = np.flatnonzero(used)
-    cuts = np.linspace(places[0], places[-1] + 1, LAW_BLOCKS + 1).astype(int).tolist() if len(places) else []
+    used_indices = np.flatnonzero(used)
+    cuts = (
+        np.linspace(used_indices[0], used_indices[-1] + 1, LAW_BLOCKS + 1).astype(int).tolist()
+        if len(used_indices)
+        else []
+    )
     return list(pairwise(cuts))
 
 
-def _edges(seen: Sequence[FilteredRecord]) -> tuple[int, ...]:
+def _compute_block_edges(filtered_records: Sequence[FilteredRecord]) -> tuple[int, ...]:
     """Edges of all blocks where the kept samples of the records follow one another."""
-    sizes = [part.stop - part.start for each in seen for part in each.block_slices]
+    sizes = [part.stop - part.start for filtered in filtered_records for part in filtered.block_slices]
     return tuple(np.cumsum([0, *sizes]).tolist())
 
 
-def _noise(measure: ErrorMeasure, seen: Sequence[FilteredRecord], axis: int) -> float:
+def _compute_noise(measure: ErrorMeasure, filtered_records: Sequence[FilteredRecord], axis: int) -> float:
     """Mean square of the noise in the output of an axis's matched filter."""
-    left = (measure.noise / measure.unit) ** 2
+    noise_power = (measure.noise / measure.unit) ** 2
     shares = [
-        np.sum(np.abs(each.force_response[:, :, axis]) ** 2 * left[None, :], axis=1) / each.strength[:, axis] ** 2
-        for each in seen
+        np.sum(np.abs(filtered.force_response[:, :, axis]) ** 2 * noise_power[None, :], axis=1)
+        / filtered.strength[:, axis] ** 2
+        for filtered in filtered_records
     ]
     return float(np.mean(np.concatenate(shares)))

@@ -29,7 +29,7 @@ class Products:
     """Normal equations of the k base columns, per block."""
 
     view: View
-    held: tuple[FloatArray, ...]
+    selected: tuple[FloatArray, ...]
     """(s,) each: columns of terms selected before; they follow the model's parameters and the constant."""
     squares: FloatArray
     """(blocks, k, k): X'X"""
@@ -54,7 +54,7 @@ class Products:
         return precision
 
     @property
-    def wanted(self) -> FloatArray:
+    def prior_right_side(self) -> FloatArray:
         """(k,): D w0, the prior's contribution to the right side of the normal equations."""
         offset = np.zeros(len(self.calibration))
         offset[: len(self.view.to_calibration)] = self.view.to_calibration
@@ -64,23 +64,23 @@ class Products:
     def limits(self) -> tuple[FloatArray, FloatArray]:
         """(k,) each: bounds of the weights; the model's parameters have those of re-tuning. If mass, damping and
         stiffness could vanish, a force that cancels the command would explain the whole residual."""
-        known, k = self.view.to_calibration, len(self.calibration)
-        tuned = len(known) - 1
+        offsets, k = self.view.to_calibration, len(self.calibration)
+        tuned = len(offsets) - 1
         low, high = np.full(k, -np.inf), np.full(k, np.inf)
-        low[:tuned], high[:tuned] = known[:tuned] - RETUNING_BOUND, known[:tuned] + RETUNING_BOUND
+        low[:tuned], high[:tuned] = offsets[:tuned] - RETUNING_BOUND, offsets[:tuned] + RETUNING_BOUND
         return low, high
 
     def cross(self, columns: FloatArray) -> FloatArray:
         """(blocks, k, terms): inner products of the base columns with those of terms. columns: (terms, s)"""
-        found = []
+        products = []
         for part in self.blocks:
-            those = columns[:, part].T
+            term_columns = columns[:, part].T
             rows = [
-                self.view.parameter_columns[:, part] @ those,
-                *((column[None, part] @ those) for column in self.held),
+                self.view.parameter_columns[:, part] @ term_columns,
+                *((column[None, part] @ term_columns) for column in self.selected),
             ]
-            found.append(np.vstack(rows))
-        return np.array(found)
+            products.append(np.vstack(rows))
+        return np.array(products)
 
 
 def products_of(view: View) -> Products:
@@ -99,93 +99,101 @@ def add_columns(base: Products, columns: Sequence[FloatArray]) -> Products:
     """The base with the columns of further terms appended. columns: (s,) each"""
     if not len(columns):
         return base
-    more, view = np.array(columns), base.view
-    cross = base.cross(more).transpose(0, 2, 1)
-    own = np.array([more[:, part] @ more[:, part].T for part in base.blocks])
-    seen = np.array([more[:, part] @ view.residual[part] for part in base.blocks])
+    added, view = np.array(columns), base.view
+    cross = base.cross(added).transpose(0, 2, 1)
+    added_squares = np.array([added[:, part] @ added[:, part].T for part in base.blocks])
+    added_with_residual = np.array([added[:, part] @ view.residual[part] for part in base.blocks])
     squares = np.concatenate(
-        [np.concatenate([base.squares, cross.transpose(0, 2, 1)], axis=2), np.concatenate([cross, own], axis=2)], axis=1
+        [
+            np.concatenate([base.squares, cross.transpose(0, 2, 1)], axis=2),
+            np.concatenate([cross, added_squares], axis=2),
+        ],
+        axis=1,
     )
-    return Products(view, (*base.held, *columns), squares, np.hstack([base.with_residual, seen]), base.power)
+    return Products(
+        view, (*base.selected, *columns), squares, np.hstack([base.with_residual, added_with_residual]), base.power
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TermErrors:
     """Cross-validated sums of squared errors of the base alone and with each single term added, per block."""
 
-    without: FloatArray
+    base_squares: FloatArray
     """(blocks,): held-out sum of squares of the base alone."""
-    with_it: FloatArray
+    term_squares: FloatArray
     """(blocks, terms): held-out sum of squares with each term."""
     factors: FloatArray
     """(blocks, terms): each term's factor, fitted to the other blocks."""
 
 
-def cross_validate_terms(of: Products, columns: FloatArray) -> TermErrors:
+def cross_validate_terms(base: Products, columns: FloatArray) -> TermErrors:
     """Held-out sums of squares with each term added to the base by itself, each block left out once. columns: (terms,
     s)"""
-    parts = of.blocks
-    cross = of.cross(columns)
-    own = np.array([np.einsum("ks,ks->k", columns[:, part], columns[:, part]) for part in parts])
-    seen = np.array([columns[:, part] @ of.view.residual[part] for part in parts])
-    without, with_it, factors = [], [], []
+    parts = base.blocks
+    cross = base.cross(columns)
+    term_powers = np.array([np.einsum("ks,ks->k", columns[:, part], columns[:, part]) for part in parts])
+    term_with_residual = np.array([columns[:, part] @ base.view.residual[part] for part in parts])
+    base_squares, term_squares, factors = [], [], []
     for number in range(len(parts)):
-        squares = of.squares.sum(axis=0) - of.squares[number] + np.diag(of.calibration)
-        right_side = of.with_residual.sum(axis=0) - of.with_residual[number] + of.wanted
-        other, size = cross.sum(axis=0) - cross[number], own.sum(axis=0) - own[number]
-        bordered = _border(squares, other, size)
-        right = np.column_stack([np.tile(right_side, (len(size), 1)), seen.sum(axis=0) - seen[number]])
-        low, high = (np.append(bound, side) for bound, side in zip(of.limits, (-np.inf, np.inf), strict=True))
-        solved = solve_within(bordered, right, low, high)
-        weights, factor = solved[:, :-1].T, solved[:, -1]
-        alone = solve_within(squares[None], right_side[None], *of.limits)[0]
-        without.append(_held_out_squares(of, number, alone[:, None])[0])
-        with_it.append(
-            _held_out_squares(of, number, weights)
-            - 2 * factor * seen[number]
+        squares = base.squares.sum(axis=0) - base.squares[number] + np.diag(base.calibration)
+        right_side = base.with_residual.sum(axis=0) - base.with_residual[number] + base.prior_right_side
+        base_products, size = cross.sum(axis=0) - cross[number], term_powers.sum(axis=0) - term_powers[number]
+        bordered = _border(squares, base_products, size)
+        right_sides = np.column_stack(
+            [np.tile(right_side, (len(size), 1)), term_with_residual.sum(axis=0) - term_with_residual[number]]
+        )
+        low, high = (np.append(bound, side) for bound, side in zip(base.limits, (-np.inf, np.inf), strict=True))
+        solutions = solve_bounded(bordered, right_sides, low, high)
+        weights, factor = solutions[:, :-1].T, solutions[:, -1]
+        base_weights = solve_bounded(squares[None], right_side[None], *base.limits)[0]
+        base_squares.append(_held_out_squares(base, number, base_weights[:, None])[0])
+        term_squares.append(
+            _held_out_squares(base, number, weights)
+            - 2 * factor * term_with_residual[number]
             + 2 * factor * np.einsum("kt,kt->t", weights, cross[number])
-            + factor**2 * own[number]
+            + factor**2 * term_powers[number]
         )
         factors.append(factor)
-    return TermErrors(np.array(without), np.array(with_it), np.array(factors))
+    return TermErrors(np.array(base_squares), np.array(term_squares), np.array(factors))
 
 
-def _border(squares: FloatArray, other: FloatArray, size: FloatArray) -> FloatArray:
+def _border(squares: FloatArray, base_products: FloatArray, size: FloatArray) -> FloatArray:
     """(terms, k + 1, k + 1): normal matrix of the base (k, k) bordered by each term. A term that is linearly dependent
-    on the base gets an infinite diagonal entry, and so the weight 0. other: (k, terms), products with the base; size:
-    (terms,), sums of squares."""
-    left = size - np.einsum("kt,kt->t", other, np.linalg.solve(squares, other))
+    on the base gets an infinite diagonal entry, and so the weight 0. base_products: (k, terms), products with the base;
+    size: (terms,), sums of squares."""
+    independent = size - np.einsum("kt,kt->t", base_products, np.linalg.solve(squares, base_products))
     k = len(squares)
     bordered = np.zeros((len(size), k + 1, k + 1))
     bordered[:, :k, :k] = squares
-    bordered[:, :k, k] = bordered[:, k, :k] = other.T
-    bordered[:, k, k] = np.where(left > _DEPENDENT * size, size, np.inf)
+    bordered[:, :k, k] = bordered[:, k, :k] = base_products.T
+    bordered[:, k, k] = np.where(independent > _DEPENDENT * size, size, np.inf)
     return bordered
 
 
-def solve_within(squares: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+def solve_bounded(squares: FloatArray, right_sides: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """(systems, k): least squares within bounds, from normal equations (systems, k, k) and right sides (systems, k), by
     an active set: weights that leave their bounds are fixed there, and the others solved for again. The weight of an
     infinite diagonal entry is 0."""
-    barred = np.isinf(np.einsum("tkk->tk", squares))
-    fixed, at = barred.copy(), np.zeros_like(right)
-    for _ in range(right.shape[1]):
-        system = np.where(fixed[:, :, None], np.eye(right.shape[1]), squares)
-        found = np.linalg.solve(system, np.where(fixed, at, right)[:, :, None])[:, :, 0]
-        outside = ((found < low) | (found > high)) & ~fixed
+    excluded = np.isinf(np.einsum("tkk->tk", squares))
+    fixed, fixed_values = excluded.copy(), np.zeros_like(right_sides)
+    for _ in range(right_sides.shape[1]):
+        system = np.where(fixed[:, :, None], np.eye(right_sides.shape[1]), squares)
+        weights = np.linalg.solve(system, np.where(fixed, fixed_values, right_sides)[:, :, None])[:, :, 0]
+        outside = ((weights < low) | (weights > high)) & ~fixed
         if not outside.any():
             break
-        at = np.where(outside, np.clip(found, low, high), at)
+        fixed_values = np.where(outside, np.clip(weights, low, high), fixed_values)
         fixed |= outside
-    return np.asarray(found)
+    return np.asarray(weights)
 
 
-def _held_out_squares(of: Products, number: int, weights: FloatArray) -> FloatArray:
+def _held_out_squares(base: Products, number: int, weights: FloatArray) -> FloatArray:
     """(terms,): |r|² - 2 w'X'r + w'X'X w of block `number`, for each column w of the weights (k, terms)."""
     return np.asarray(
-        of.power[number]
-        - 2 * of.with_residual[number] @ weights
-        + np.einsum("kt,kt->t", weights, of.squares[number] @ weights)
+        base.power[number]
+        - 2 * base.with_residual[number] @ weights
+        + np.einsum("kt,kt->t", weights, base.squares[number] @ weights)
     )
 
 
@@ -199,10 +207,12 @@ class Solution:
     """Residual sum of squares plus the prior's penalty."""
 
 
-def solve(of: Products) -> Solution:
+def solve(base: Products) -> Solution:
     """Weights and cost of the base columns, fitted to all blocks together."""
-    pulled, squares, seen = of.calibration, of.squares.sum(axis=0), of.with_residual.sum(axis=0)
-    weights = solve_within((squares + np.diag(pulled))[None], (seen + of.wanted)[None], *of.limits)[0]
-    own = weights[: len(of.view.to_calibration)] - of.view.to_calibration
-    left = float(of.power.sum() - 2 * seen @ weights + weights @ squares @ weights)
-    return Solution(weights, left + float(pulled[: len(own)] @ own**2))
+    precision, squares, with_residual = base.calibration, base.squares.sum(axis=0), base.with_residual.sum(axis=0)
+    weights = solve_bounded(
+        (squares + np.diag(precision))[None], (with_residual + base.prior_right_side)[None], *base.limits
+    )[0]
+    deviations = weights[: len(base.view.to_calibration)] - base.view.to_calibration
+    residual_squares = float(base.power.sum() - 2 * with_residual @ weights + weights @ squares @ weights)
+    return Solution(weights, residual_squares + float(precision[: len(deviations)] @ deviations**2))

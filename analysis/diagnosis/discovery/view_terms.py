@@ -15,10 +15,10 @@ from analysis.diagnosis.discovery.grammar import (
     Columns,
     Term,
     axes_of,
-    bent_terms,
     even_power,
     odd_power,
     periodic_terms,
+    soft_limit_terms,
     terms_of,
 )
 from analysis.diagnosis.discovery.matched_filter import View
@@ -26,12 +26,12 @@ from analysis.diagnosis.discovery.matched_filter import View
 
 def view_terms(view: View) -> tuple[Term, ...]:
     """All terms of a view. Spatial periods and frequencies of periodic terms are estimated from its first recording."""
-    seen = view.records[0]
+    record = view.records[0]
     if view.acts_on == "response":
-        return terms_of_readings(seen.columns, view.axis, len(seen.reading_units))
-    axes = axes_of(seen.columns, seen.missing_force.shape[1])
-    terms = terms_of(axes, view.axis, len(seen.missing_force) / seen.rate_hz, seen.rate_hz)
-    lines = periodic_terms(seen.columns, axes[view.axis], seen.missing_force[:, view.axis], seen.rate_hz)
+        return terms_of_readings(record.columns, view.axis, len(record.reading_units))
+    axes = axes_of(record.columns, record.missing_force.shape[1])
+    terms = terms_of(axes, view.axis, len(record.missing_force) / record.rate_hz, record.rate_hz)
+    lines = periodic_terms(record.columns, axes[view.axis], record.missing_force[:, view.axis], record.rate_hz)
     return (*terms, *lines)
 
 
@@ -39,33 +39,35 @@ def terms_of_readings(columns: Columns, channel: int, channels: int) -> tuple[Te
     """All terms for one channel of a response. columns: signals by name; channel: its index; channels: their number.
     Thresholds start at shares of the channel's largest reading."""
     names = [f"a{axis}" for axis in AXES[:channels]]
-    own, others = names[channel], [name for name in names if name != names[channel]]
-    size = max(float(np.abs(columns[own]).max()), 1e-12)
-    return (*_own_terms(own, size), *_cross_terms(own, others))
+    reading, other_readings = names[channel], [name for name in names if name != names[channel]]
+    size = max(float(np.abs(columns[reading]).max()), 1e-12)
+    return (*_own_terms(reading, size), *_cross_terms(reading, other_readings))
 
 
-def _own_terms(own: str, size: float) -> Iterator[Term]:
+def _own_terms(reading: str, size: float) -> Iterator[Term]:
     """Terms of one channel's own reading. size: its largest magnitude."""
-    yield Term(f"sign({own})")
+    yield Term(f"sign({reading})")
     for start in (0.5, 1.5, 2.0, 3.0, 5.0):
-        yield Term(odd_power(own, 0), (start,), (POWER,), (0,))
+        yield Term(odd_power(reading, 0), (start,), (POWER,), (0,))
     for start in (1.0, 2.0, 4.0):
-        yield Term(even_power(own, 0), (start,), (POWER,), (0,))
-    yield from bent_terms(own, size)
+        yield Term(even_power(reading, 0), (start,), (POWER,), (0,))
+    yield from soft_limit_terms(reading, size)
     for share in (0.2, 0.5, 0.8):
         edge = (share * size,), ((0.0, size),)
-        yield Term(f"maximum(abs({own}) - p0, 0)*sign({own})", *edge)
-        yield from (Term(f"maximum({side} - p0, 0)", *edge) for side in (own, f"(-{own})"))
-        yield Term(f"play({own}, p0)", (0.1 * share * size,), ((1e-4 * size, size),))
-    yield from (Term(shape) for shape in (f"{own}*t", "t"))
+        yield Term(f"maximum(abs({reading}) - p0, 0)*sign({reading})", *edge)
+        yield from (Term(f"maximum({side} - p0, 0)", *edge) for side in (reading, f"(-{reading})"))
+        yield Term(f"play({reading}, p0)", (0.1 * share * size,), ((1e-4 * size, size),))
+    yield from (Term(shape) for shape in (f"{reading}*t", "t"))
 
 
-def _cross_terms(own: str, others: list[str]) -> Iterator[Term]:
+def _cross_terms(a: str, other_readings: list[str]) -> Iterator[Term]:
     """Products and powers up to the third order that involve other channels of the response."""
-    for other in others:
+    for b in other_readings:
         shapes = (
-            f"{own}*{other}", f"{other}**2", f"{other}*abs({other})", f"abs({other})", f"{own}*abs({other})",
-            f"abs({own})*{other}", f"{own}*{other}**2", f"{own}**2*{other}", f"{other}**3",
+            f"{a}*{b}", f"{b}**2", f"{b}*abs({b})", f"abs({b})", f"{a}*abs({b})",
+            f"abs({a})*{b}", f"{a}*{b}**2", f"{a}**2*{b}", f"{b}**3",
         )  # fmt: skip
         yield from (Term(shape) for shape in shapes)
-    yield from (Term(f"{first}*{second}") for first, second in product(others, others) if first < second)
+    yield from (
+        Term(f"{first}*{second}") for first, second in product(other_readings, other_readings) if first < second
+    )

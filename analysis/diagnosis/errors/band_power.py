@@ -20,11 +20,11 @@ from equalizer.signals.spectral_density import spectral_density
 
 WINDOW_S, OCTAVES = 1.0, 0.5
 """Length of a Welch window in s, and width of a band in octaves."""
-LOWEST, HIGHEST = 2.0, 0.48
+LOWEST_LINE, HIGHEST_SHARE = 2.0, 0.48
 """Lower end of the lowest band in lines of a window (1 / WINDOW_S), and limit of the highest over the sample rate."""
-LONGEST_S, LEAST = 8.0, 256
+LONGEST_S, LEAST_SAMPLES = 8.0, 256
 """Longest stretch of a record without segments (s), and least number of samples of any stretch."""
-HEARD = 4.0
+LEAST_POWER_RATIO = 4.0
 """Least ratio of a band's power to that of the noise; bands below it are not compared."""
 PARTS = ("fit", "choose", "test")
 """Roles of samples, by the names of the masks of `Observed`."""
@@ -50,8 +50,8 @@ class BandPower:
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
-        """Per segment (rest left out) and role, the longest run of its samples, where that has `LEAST` or more. A
-        record without segments is divided into pieces of `LONGEST_S`."""
+        """Per segment (rest left out) and role, the longest run of its samples, where that has `LEAST_SAMPLES` or more.
+        A record without segments is divided into pieces of `LONGEST_S`."""
         return tuple(
             Stretch(number, first, last, part)
             for number, record in enumerate(self.measure.records)
@@ -62,28 +62,33 @@ class BandPower:
 
     @cached_property
     def measured(self) -> FloatArray:
-        """(stretches, bands, c): ln a of the measured signals; NaN where the power is below `HEARD` times the noise."""
+        """(stretches, bands, c): ln a of the measured signals; NaN where the power is below `LEAST_POWER_RATIO` times
+        the noise."""
         power = self._power([record.measured for record in self.measure.records])
         with np.errstate(divide="ignore"):
-            return np.where(power > HEARD * self._noise, 0.5 * np.log(power), np.nan)
+            return np.where(power > LEAST_POWER_RATIO * self._noise, 0.5 * np.log(power), np.nan)
 
     def predict(self, residuals: Residuals) -> FloatArray:
         """(stretches, bands, c): ln a of the predicted signals, with the noise's power added."""
         unit = self.measure.unit
-        predicted = [r.measured - left * unit for r, left in zip(self.measure.records, residuals, strict=True)]
+        predicted = [
+            record.measured - residual * unit for record, residual in zip(self.measure.records, residuals, strict=True)
+        ]
         return np.asarray(0.5 * np.log(self._power(predicted) + self._noise))
 
-    def misfits(self, off: FloatArray) -> FitScore:
-        """Rms per channel of differences `off` of ln a, (stretches, bands, c), by role; NaN without a compared band."""
-        known_errors = np.where(np.isnan(self.measured), np.nan, off)
-        return FitScore(*(_rms(known_errors[[stretch.part == part for stretch in self.stretches]]) for part in PARTS))
+    def misfits(self, log_errors: FloatArray) -> FitScore:
+        """Rms per channel of differences of ln a, (stretches, bands, c), by role; NaN without a compared band."""
+        compared_errors = np.where(np.isnan(self.measured), np.nan, log_errors)
+        return FitScore(
+            *(_rms(compared_errors[[stretch.part == part for stretch in self.stretches]]) for part in PARTS)
+        )
 
     @cached_property
     def _edges(self) -> FloatArray:
         """(bands + 1,), Hz: edges of the bands, at constant ratios."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
-        count = int(np.log2(HIGHEST * rate_hz * WINDOW_S / LOWEST) / OCTAVES)
-        return np.asarray(LOWEST / WINDOW_S * 2.0 ** (OCTAVES * np.arange(max(count, 1) + 1)))
+        count = int(np.log2(HIGHEST_SHARE * rate_hz * WINDOW_S / LOWEST_LINE) / OCTAVES)
+        return np.asarray(LOWEST_LINE / WINDOW_S * 2.0 ** (OCTAVES * np.arange(max(count, 1) + 1)))
 
     @property
     def _noise(self) -> FloatArray:
@@ -99,9 +104,9 @@ class BandPower:
         for row, stretch in zip(rows, self.stretches, strict=True):
             window = min(int(WINDOW_S * rate_hz), stretch.last - stretch.first)
             lines, density = spectral_density(predicted[stretch.record][stretch.first : stretch.last], rate_hz, window)
-            firsts = np.searchsorted(lines, self._edges)
-            for band, (low, high) in enumerate(pairwise(firsts)):
-                row[band] = density[low : max(high, low + 1)].mean(axis=0)
+            first_lines = np.searchsorted(lines, self._edges)
+            for band, (first_line, stop_line) in enumerate(pairwise(first_lines)):
+                row[band] = density[first_line : max(stop_line, first_line + 1)].mean(axis=0)
         return rows
 
     def _spans(self, number: int) -> list[tuple[int, int]]:
@@ -113,14 +118,14 @@ class BandPower:
 
 
 def _longest_run(mask: Mask, first: int, last: int) -> list[tuple[int, int]]:
-    """Start and stop of the longest run of masked samples between first and last; empty below `LEAST` samples."""
+    """Start and stop of the longest run of masked samples between first and last; empty below `LEAST_SAMPLES`."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask[first:last].astype(np.int8), [0]]))).reshape(-1, 2)
-    runs = [(first + int(a), first + int(b)) for a, b in edges if b - a >= LEAST]
+    runs = [(first + int(start), first + int(stop)) for start, stop in edges if stop - start >= LEAST_SAMPLES]
     return [max(runs, key=lambda run: run[1] - run[0])] if runs else []
 
 
-def _rms(off: FloatArray) -> FloatArray:
+def _rms(log_errors: FloatArray) -> FloatArray:
     """(c,): rms over stretches and bands, without NaN; NaN where all are NaN."""
-    count = np.sum(np.isfinite(off), axis=(0, 1))
+    count = np.sum(np.isfinite(log_errors), axis=(0, 1))
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(np.sqrt(np.nansum(off**2, axis=(0, 1)) / count))
+        return np.asarray(np.sqrt(np.nansum(log_errors**2, axis=(0, 1)) / count))

@@ -3,7 +3,7 @@
 With the differences e of ln a, measured less predicted (`band_power`), and deviations d of the model's own parameters,
 
     J = (sum of rho(e / s) + d'd) / N        s² = spread² + FLOOR²
-    rho(x) = x² for |x| <= k, else k (2 |x| - k)        k = TRUSTED
+    rho(x) = x² for |x| <= k, else k (2 |x| - k)        k = HUBER_THRESHOLD
 
 with Huber's loss rho (Huber, Ann. Math. Stat. 35:73, 1964) over the N fitted bands. Simulations of impacts are chaotic:
 the spread of ln a between simulations whose parameters differ by rounding sets the weights, and derivatives are central
@@ -22,45 +22,46 @@ from analysis.diagnosis.types import Mapper
 from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
-MOVES, WIDEST = (0.02, 0.2), 12.0
+STEP_LIMITS, STEP_RATIO = (0.02, 0.2), 12.0
 """Least and largest finite-difference step of a logarithmic parameter; and its ratio to `FreeParameter.move` between
 these limits."""
 LONGEST_STEP = 0.5
 """Largest Gauss-Newton step of a logarithmic parameter; for others it is two finite-difference steps."""
-MOST_BY_CHANCE = 0.8
+MOST_CHANCE_SHARE = 0.8
 """Largest share of a parameter's information that is attributed to the chaotic scatter of its finite differences."""
-LEAST_KNOWN = 1e-6
+LEAST_INFORMATION = 1e-6
 """Lower limit of the information on a combination of parameters to which the prediction is not sensitive."""
-SHARES = (1.0, 0.3, 0.1, 0.03)
+STEP_FACTORS = (1.0, 0.3, 0.1, 0.03)
 """Factors on a step that are tried in turn (line search)."""
 FLOOR = 0.04
 """Least standard deviation of ln a: no simulation of impacts predicts it better."""
-TRUSTED = 2.0
-"""Threshold k of Huber's loss, in standard deviations: more than the fitted effect may be missing."""
-RESTS = 1e-4
+HUBER_THRESHOLD = 2.0
+"""Threshold k of Huber's loss, in standard deviations. The loss is robust, because effects other than the fitted one
+may be missing."""
+CONVERGED_SHARE = 1e-4
 """Relative decrease of the cost below which the fit ends."""
 
 
 PERTURBATION = 1e-9
-"""Difference in the logarithm of a parameter between the simulations of an ensemble."""
+"""Difference in the coordinate of a parameter (mostly its logarithm) between the simulations of an ensemble."""
 
 
 def perturb(hypothesis: Hypothesis, number: int) -> Hypothesis:
-    """The hypothesis with its parameters moved by `number` times `PERTURBATION`, for a further simulation of chaotic
-    impacts."""
+    """The hypothesis with its coordinates moved by `number` times `PERTURBATION`: a further member of an ensemble of
+    simulations, which diverge because impacts are chaotic."""
     return replace(hypothesis, point=hypothesis.point + number * PERTURBATION)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
-    """The band powers that are compared, their weights, and the parameters that are fitted."""
+class BandPowerProblem:
+    """Least-squares problem: the band powers that are compared, their weights, and the parameters that are fitted."""
 
     power: BandPower
     tuning: Tuning
     map_: Mapper
     spread: float | FloatArray = 0.05
     """Standard deviation of ln a between simulations: (stretches, bands, c), or a single value."""
-    by_deviations: FloatArray | None = None
+    jacobian_by_deviations: FloatArray | None = None
     """(t, stretches, bands, c): derivatives of ln a by the model's own parameters; None = these are not fitted."""
     ensemble: int = 1
     """Ensemble size: simulations over which a prediction is averaged, from parameters that differ by PERTURBATION."""
@@ -69,12 +70,12 @@ class View:
         """(stretches, bands, c): mean prediction over the ensemble; NaN throughout where the model is invalid."""
         members = range(self.ensemble if len(hypothesis.point) else 1)
 
-        def member(number: int) -> FloatArray:
-            return self._member(deviations, perturb(hypothesis, number))
+        def simulate_member(number: int) -> FloatArray:
+            return self._predict_member(deviations, perturb(hypothesis, number))
 
-        return np.asarray(np.mean(list(self.map_(member, members)), axis=0))  # type: ignore[arg-type]
+        return np.asarray(np.mean(list(self.map_(simulate_member, members)), axis=0))  # type: ignore[arg-type]
 
-    def _member(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
+    def _predict_member(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
         """(stretches, bands, c): ln a of a single simulation; NaN for an invalid model."""
         try:
             model = self.tuning.tune(deviations)
@@ -85,9 +86,9 @@ class View:
     @property
     def weights(self) -> FloatArray:
         """(stretches, bands, c): 1 / s; 0 for held-out stretches and bands below the noise."""
-        fit = np.array([stretch.part != "test" for stretch in self.power.stretches], dtype=np.bool_)
-        known = np.isfinite(self.power.measured) & fit[:, None, None]
-        return np.asarray(np.where(known, 1 / np.hypot(self.spread, FLOOR), 0.0))
+        is_fitted = np.array([stretch.part != "test" for stretch in self.power.stretches], dtype=np.bool_)
+        is_compared = np.isfinite(self.power.measured) & is_fitted[:, None, None]
+        return np.asarray(np.where(is_compared, 1 / np.hypot(self.spread, FLOOR), 0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,127 +105,138 @@ class BandPowerFit:
     errors: FloatArray
     """(parameters,): standard errors of the point; empty before a step."""
 
-    def off(self, view: View) -> FloatArray:
+    def log_amplitude_ratio(self, problem: BandPowerProblem) -> FloatArray:
         """(stretches, bands, c): ln of the measured over the predicted amplitude; NaN below the noise."""
-        return np.asarray(view.power.measured - self.predicted)
+        return np.asarray(problem.power.measured - self.predicted)
 
 
-def evaluate_hypothesis(view: View, deviations: FloatArray, hypothesis: Hypothesis) -> BandPowerFit:
+def evaluate_hypothesis(problem: BandPowerProblem, deviations: FloatArray, hypothesis: Hypothesis) -> BandPowerFit:
     """Predicted band powers and their cost at given parameters, without fitting. The cost is infinite where a
     prediction is not finite."""
-    predicted = view.predict(deviations, hypothesis)
-    weights = view.weights
+    predicted = problem.predict(deviations, hypothesis)
+    weights = problem.weights
     if not np.isfinite(predicted[weights > 0]).all():
         return BandPowerFit(hypothesis, deviations, predicted, np.inf, np.zeros(0))
-    weighed = _weight(view, view.power.measured - predicted)
-    cost = (float(_huber(weighed).sum()) + float(deviations @ deviations)) / max(len(weighed), 1)
+    weighted_errors = _weight(problem, problem.power.measured - predicted)
+    cost = (float(_huber(weighted_errors).sum()) + float(deviations @ deviations)) / max(len(weighted_errors), 1)
     return BandPowerFit(hypothesis, deviations, predicted, cost, np.zeros(0))
 
 
-def fit_band_power(view: View, start: BandPowerFit, rounds: int) -> BandPowerFit:
+def fit_band_power(problem: BandPowerProblem, start: BandPowerFit, rounds: int) -> BandPowerFit:
     """The best fit within a number of Gauss-Newton steps; never worse than the start."""
     best = start
     for _ in range(rounds):
         if not np.isfinite(best.cost):
             return best
-        better = _gauss_newton_step(view, best)
-        gained = best.cost - better.cost
-        best = better if gained > 0 else replace(best, errors=better.errors)
-        if gained < RESTS * best.cost:
+        next_fit = _gauss_newton_step(problem, best)
+        cost_decrease = best.cost - next_fit.cost
+        best = next_fit if cost_decrease > 0 else replace(best, errors=next_fit.errors)
+        if cost_decrease < CONVERGED_SHARE * best.cost:
             break
     return best
 
 
-def hypothesis_columns(view: View, at: BandPowerFit) -> FloatArray:
+def differentiate_hypothesis(problem: BandPowerProblem, iterate: BandPowerFit) -> FloatArray:
     """(parameters, stretches, bands, c): derivatives of ln a by the hypothesis's coordinates (central differences)."""
-    parameters = at.hypothesis.parameters
-    jobs = [(number, way) for number in range(len(parameters)) for way in (1.0, -1.0)]
+    parameters = iterate.hypothesis.parameters
+    jobs = [(number, sign) for number in range(len(parameters)) for sign in (1.0, -1.0)]
 
-    def moved(job: tuple[int, float]) -> FloatArray:
-        number, way = job
-        point = at.hypothesis.point.copy()
-        point[number] += way * _move(parameters[number])
-        return view.predict(at.deviations, replace(at.hypothesis, point=point))
+    def predict_displaced(job: tuple[int, float]) -> FloatArray:
+        number, sign = job
+        point = iterate.hypothesis.point.copy()
+        point[number] += sign * _step(parameters[number])
+        return problem.predict(iterate.deviations, replace(iterate.hypothesis, point=point))
 
-    there: list[FloatArray] = list(view.map_(moved, jobs))  # type: ignore[arg-type]
+    predictions: list[FloatArray] = list(problem.map_(predict_displaced, jobs))  # type: ignore[arg-type]
     return np.array(
-        [(up - down) / (2 * _move(free)) for free, up, down in zip(parameters, there[::2], there[1::2], strict=True)]
-    ).reshape(len(parameters), *at.predicted.shape)
+        [
+            (forward - backward) / (2 * _step(parameter))
+            for parameter, forward, backward in zip(parameters, predictions[::2], predictions[1::2], strict=True)
+        ]
+    ).reshape(len(parameters), *iterate.predicted.shape)
 
 
-def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
+def _gauss_newton_step(problem: BandPowerProblem, iterate: BandPowerFit) -> BandPowerFit:
     """The fit after a bounded step with line search, with its standard errors; its cost may be higher than before."""
-    own = np.array([_weight(view, column) for column in hypothesis_columns(view, at)])
-    off = _weight(view, view.power.measured - at.predicted)
-    t = 0 if view.by_deviations is None else len(at.deviations)
-    known = [_weight(view, column) for column in (() if view.by_deviations is None else view.by_deviations)]
-    columns = np.vstack([*known, *own])
+    hypothesis_columns = np.array([_weight(problem, column) for column in differentiate_hypothesis(problem, iterate)])
+    errors = _weight(problem, problem.power.measured - iterate.predicted)
+    tuned_count = 0 if problem.jacobian_by_deviations is None else len(iterate.deviations)
+    model_columns = [
+        _weight(problem, column)
+        for column in (() if problem.jacobian_by_deviations is None else problem.jacobian_by_deviations)
+    ]
+    columns = np.vstack([*model_columns, *hypothesis_columns])
     columns[~np.isfinite(columns).all(axis=1)] = 0.0
-    trust = np.minimum(1.0, TRUSTED / np.maximum(np.abs(off), TRUSTED))
+    huber_weights = np.minimum(1.0, HUBER_THRESHOLD / np.maximum(np.abs(errors), HUBER_THRESHOLD))
     # Re-tuning within the calibration makes small changes, so a residual that stays large shows a missing effect: with
     # the model's own parameters in the fit, large residuals get less weight.
-    weighted = columns * (trust**3 if t else trust)
-    rhs = weighted @ off
-    products = weighted @ columns.T
-    if t:
-        rhs[:t] -= at.deviations
-        products[:t, :t] += np.eye(t)
-    products += 1e-9 * np.diag(np.maximum(np.diagonal(products), 1e-9))
-    low, high = _step_bounds(at, t)
-    step = solve_bounded_step(products, rhs, low, high)
-    there = at
-    for share in SHARES:
-        deviations = at.deviations + share * step[:t] if t else at.deviations
-        there = evaluate_hypothesis(
-            view, deviations, replace(at.hypothesis, point=at.hypothesis.point + share * step[t:])
+    weighted = columns * (huber_weights**3 if tuned_count else huber_weights)
+    rhs = weighted @ errors
+    information = weighted @ columns.T
+    if tuned_count:
+        rhs[:tuned_count] -= iterate.deviations
+        information[:tuned_count, :tuned_count] += np.eye(tuned_count)
+    information += 1e-9 * np.diag(np.maximum(np.diagonal(information), 1e-9))
+    low, high = _step_bounds(iterate, tuned_count)
+    step = solve_bounded_step(information, rhs, low, high)
+    next_fit = iterate
+    for factor in STEP_FACTORS:
+        deviations = iterate.deviations + factor * step[:tuned_count] if tuned_count else iterate.deviations
+        next_fit = evaluate_hypothesis(
+            problem,
+            deviations,
+            replace(iterate.hypothesis, point=iterate.hypothesis.point + factor * step[tuned_count:]),
         )
-        if there.cost < at.cost:
+        if next_fit.cost < iterate.cost:
             break
-    return replace(there, errors=_errors(view, at, products))
+    return replace(next_fit, errors=_estimate_errors(problem, iterate, information))
 
 
-def _errors(view: View, at: BandPowerFit, products: FloatArray) -> FloatArray:
+def _estimate_errors(problem: BandPowerProblem, iterate: BandPowerFit, information: FloatArray) -> FloatArray:
     """(parameters,): standard errors from the information matrix, reduced by the information due to chaotic scatter.
     Scatter adds to the diagonal only; subtracted there, it would make the matrix of correlated parameters indefinite,
     so rows and columns are scaled instead. This underestimates errors of strongly correlated parameters: twenty
     parameters of five simulated devices (seeds 7000 to 7004) were wrong by 1.09 standard errors (rms)."""
-    parameters = at.hypothesis.parameters
-    first = len(products) - len(parameters)
-    chance = _weight(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))
-    share = np.ones(len(products))
-    for k, free in enumerate(parameters, start=first):
-        by_chance = float(chance @ chance) / (2 * view.ensemble * _move(free) ** 2)
-        share[k] -= min(by_chance / max(float(products[k, k]), 1e-300), MOST_BY_CHANCE)
-    values, vectors = np.linalg.eigh(products * np.sqrt(np.outer(share, share)))
-    values = np.maximum(values, max(1e-9 * float(values[-1]), LEAST_KNOWN))
-    spread = (vectors**2 / values).sum(axis=1) * max(at.cost, 1.0)
-    return np.asarray(np.sqrt(spread[first:]))
+    parameters = iterate.hypothesis.parameters
+    first_parameter = len(information) - len(parameters)
+    scatter = _weight(problem, np.broadcast_to(np.asarray(problem.spread, dtype=np.float64), iterate.predicted.shape))
+    kept_share = np.ones(len(information))
+    for k, parameter in enumerate(parameters, start=first_parameter):
+        scatter_information = float(scatter @ scatter) / (2 * problem.ensemble * _step(parameter) ** 2)
+        kept_share[k] -= min(scatter_information / max(float(information[k, k]), 1e-300), MOST_CHANCE_SHARE)
+    values, vectors = np.linalg.eigh(information * np.sqrt(np.outer(kept_share, kept_share)))
+    values = np.maximum(values, max(1e-9 * float(values[-1]), LEAST_INFORMATION))
+    variances = (vectors**2 / values).sum(axis=1) * max(iterate.cost, 1.0)
+    return np.asarray(np.sqrt(variances[first_parameter:]))
 
 
-def _step_bounds(at: BandPowerFit, t: int) -> tuple[FloatArray, FloatArray]:
-    """Bounds of a step, (t + parameters,) each: the model's own parameters stay within 3 standard deviations."""
-    parameters = at.hypothesis.parameters
-    most = np.array([LONGEST_STEP if free.parameter.scale == "log" else 2 * _move(free) for free in parameters])
-    bounds = np.array([free.bounds for free in parameters]).reshape(-1, 2) - at.hypothesis.point[:, None]
-    low = np.concatenate([-3.0 - at.deviations[:t], np.clip(bounds[:, 0], -most, 0.0)])
-    high = np.concatenate([3.0 - at.deviations[:t], np.clip(bounds[:, 1], 0.0, most)])
+def _step_bounds(iterate: BandPowerFit, tuned_count: int) -> tuple[FloatArray, FloatArray]:
+    """Bounds of a step, (tuned_count + parameters,) each: the model's own parameters stay within 3 standard
+    deviations of their calibration."""
+    parameters = iterate.hypothesis.parameters
+    largest_steps = np.array(
+        [LONGEST_STEP if parameter.parameter.scale == "log" else 2 * _step(parameter) for parameter in parameters]
+    )
+    bounds = np.array([parameter.bounds for parameter in parameters]).reshape(-1, 2) - iterate.hypothesis.point[:, None]
+    low = np.concatenate([-3.0 - iterate.deviations[:tuned_count], np.clip(bounds[:, 0], -largest_steps, 0.0)])
+    high = np.concatenate([3.0 - iterate.deviations[:tuned_count], np.clip(bounds[:, 1], 0.0, largest_steps)])
     return low, high
 
 
-def _move(free: FreeParameter) -> float:
+def _step(parameter: FreeParameter) -> float:
     """Step of the finite differences, in the parameter's coordinate."""
-    if free.parameter.scale != "log":
-        return free.move
-    return float(np.clip(WIDEST * free.move, *MOVES))
+    if parameter.parameter.scale != "log":
+        return parameter.difference_step
+    return float(np.clip(STEP_RATIO * parameter.difference_step, *STEP_LIMITS))
 
 
-def _huber(off: FloatArray) -> FloatArray:
+def _huber(errors: FloatArray) -> FloatArray:
     """Huber's loss rho of the module's equation, element by element."""
-    size = np.abs(off)
-    return np.asarray(np.where(size <= TRUSTED, size**2, TRUSTED * (2 * size - TRUSTED)))
+    size = np.abs(errors)
+    return np.asarray(np.where(size <= HUBER_THRESHOLD, size**2, HUBER_THRESHOLD * (2 * size - HUBER_THRESHOLD)))
 
 
-def _weight(view: View, of: FloatArray) -> FloatArray:
+def _weight(problem: BandPowerProblem, values: FloatArray) -> FloatArray:
     """(N,): weighted values of (stretches, bands, c) in the fitted bands."""
-    weights = view.weights
-    return np.asarray((of * weights)[weights > 0])
+    weights = problem.weights
+    return np.asarray((values * weights)[weights > 0])

@@ -15,9 +15,9 @@ from analysis.diagnosis.data.observed import Observed, error_units
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.error_measure_rule import UNTIMED, Choice, choose_measure, samples_to_settle
+from analysis.diagnosis.errors.error_measure_rule import UNTIMED, Choice, choose_measure, count_samples_to_settle
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.noise.noise_floor import NoiseFloor, noise_floor
+from analysis.diagnosis.noise.noise_floor import NoiseFloor, estimate_noise_floor
 from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.diagnosis.settings import UNKNOWN_NOISE_SHARE
 from equalizer.effects.effect import PlacedEffect
@@ -31,7 +31,7 @@ Compared = Literal["auto", "motion", "force"]
 
 DITHER = 0.02
 """Rms noise over the step of a converter below which differences between repeats do not show the noise."""
-ORDERED = 0.45
+UNTIMED_BAND_SHARE = 0.45
 """End of the band relative to the sample rate, for samples without a time axis."""
 BY_FORCE = (
     "The force that the model needs along the measured motion is compared with the force that was applied: the "
@@ -61,40 +61,43 @@ class MeasureChoice:
 def measure_of(
     recordings: Sequence[Recording],
     model: MechanicalModel,
-    beside: Sequence[Recording] = (),
+    companions: Sequence[Recording] = (),
     compared: Compared = "auto",
 ) -> MeasureChoice:
-    """The error measure that the rule or `compared` selects. beside: further recordings that must suit the same measure
-    but are not part of it. Windows without an estimable state become a free simulation or, by the rule, forces."""
+    """The error measure that the rule or `compared` selects. companions: further recordings that must suit the same
+    measure but are not part of it. Windows without an estimable state become a free simulation or, by the rule,
+    forces."""
     if compared == "force":
         return measure_by_force(recordings, model, None)
-    records, others = (
-        tuple(_leave_out_beginning(record, model) for record in observe_parts(these, model.outputs)) if these else ()
-        for these in (recordings, beside)
+    records, companion_records = (
+        tuple(_leave_out_beginning(record, model) for record in observe_parts(group, model.outputs)) if group else ()
+        for group in (recordings, companions)
     )
-    floors = tuple(noise_floor(record.recording) for record in records)
+    floors = tuple(estimate_noise_floor(record.recording) for record in records)
     noise = _noise(floors, records)
     unit = error_units(np.vstack([record.measured for record in records]), noise)
-    choice = choose_measure((*records, *others), model)
+    choice = choose_measure((*records, *companion_records), model)
     if compared == "motion" and choice.measure == "predicted force":
         choice = Choice("windows", ASKED_MOTION)
-    known = place_recorded_effects(model, recordings[0])
-    remarks = (*((choice.why,) if choice.why else ()), *_of_known(known))
+    model_effects = place_recorded_effects(model, recordings[0])
+    remarks = (*((choice.reason,) if choice.reason else ()), *_remark_on_model_effects(model_effects))
     if choice.measure == "free simulation":
-        return MeasureChoice(FreeSimulation(records, unit, noise, known=known), floors, remarks)
+        return MeasureChoice(FreeSimulation(records, unit, noise, model_effects=model_effects), floors, remarks)
     if choice.measure == "windows":
         # Imported here, as in `_by_force`: most diagnoses compare a free simulation.
-        from analysis.diagnosis.errors.windows import windows_of
+        from analysis.diagnosis.errors.windows import build_windows
 
         try:
-            windows = replace(windows_of(records, model, (unit, noise)), known=known)
+            windows = replace(build_windows(records, model, (unit, noise)), model_effects=model_effects)
             return MeasureChoice(windows, floors, remarks)
         except np.linalg.LinAlgError:
             if compared == "motion" or not all(has_motion(record.recording, model) for record in records):
                 return MeasureChoice(
-                    FreeSimulation(records, unit, noise, known=known), floors, (NO_STATE, *_of_known(known))
+                    FreeSimulation(records, unit, noise, model_effects=model_effects),
+                    floors,
+                    (NO_STATE, *_remark_on_model_effects(model_effects)),
                 )
-    band_hz = ORDERED * recordings[0].sample_rate_hz if choice.why == UNTIMED else None
+    band_hz = UNTIMED_BAND_SHARE * recordings[0].sample_rate_hz if choice.reason == UNTIMED else None
     return _by_force(records, model, floors, remarks, band_hz)
 
 
@@ -102,9 +105,9 @@ def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, ba
     """The error measure by force without the rule. band_hz: forces are compared up to it; None = by the noise. The
     recordings must have a motion (`has_motion`)."""
     records = observe_parts(recordings, model.outputs)
-    known = place_recorded_effects(model, recordings[0])
-    floors = [noise_floor(record.recording) for record in records]
-    return _by_force(records, model, floors, (BY_FORCE, *_of_known(known)), band_hz)
+    model_effects = place_recorded_effects(model, recordings[0])
+    floors = [estimate_noise_floor(record.recording) for record in records]
+    return _by_force(records, model, floors, (BY_FORCE, *_remark_on_model_effects(model_effects)), band_hz)
 
 
 def _by_force(
@@ -117,37 +120,41 @@ def _by_force(
     """The error measure by force, with the end of its band among the remarks."""
     from analysis.diagnosis.forces.force_views import force_views
 
-    known = place_recorded_effects(model, records[0].recording)
+    model_effects = place_recorded_effects(model, records[0].recording)
     views = force_views(records, model, floors, band_hz)
     text = "" if UNTIMED in remarks else f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
-    return MeasureChoice(replace(views.measure, known=known), views.floors, tuple(filter(None, (*remarks, text))))
+    return MeasureChoice(
+        replace(views.measure, model_effects=model_effects), views.floors, tuple(filter(None, (*remarks, text)))
+    )
 
 
-def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:
+def _remark_on_model_effects(model_effects: Sequence[PlacedEffect]) -> tuple[str, ...]:
     """Remark on the effects that the model's file names; none without any."""
-    if not known:
+    if not model_effects:
         return ()
-    kinds = ", ".join(dict.fromkeys(noun_of(placed.effect.name) for placed in known))
+    kinds = ", ".join(dict.fromkeys(noun_of(placed.effect.name) for placed in model_effects))
     return (f"The given model contains these effects, which are part of every simulation: {kinds}.",)
 
 
 def _leave_out_beginning(record: Observed, model: MechanicalModel) -> Observed:
-    """The record with the samples of its initial motion given no role, where that decays soon (`samples_to_settle`)."""
-    after = samples_to_settle(record, model)
-    if not after:
+    """The record without roles for its initial motion, where that decays soon (`count_samples_to_settle`)."""
+    first_settled = count_samples_to_settle(record, model)
+    if not first_settled:
         return record
-    later = np.arange(len(record.command)) >= after
-    return replace(record, fit=record.fit & later, choose=record.choose & later, test=record.test & later)
+    is_settled = np.arange(len(record.command)) >= first_settled
+    return replace(
+        record, fit=record.fit & is_settled, choose=record.choose & is_settled, test=record.test & is_settled
+    )
 
 
 def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:
     """(c,): rms noise of each channel in the quietest recording; `UNKNOWN_NOISE_SHARE` of the signal where unknown."""
     count = records[0].measured.shape[1]
     rows = [
-        np.concatenate([_noise_before_rounding(f, record), f.position_rms if f.position_rms is not None else []])[
-            :count
-        ]
-        for f, record in zip(floors, records, strict=True)
+        np.concatenate(
+            [_noise_before_rounding(floor, record), floor.position_rms if floor.position_rms is not None else []]
+        )[:count]
+        for floor, record in zip(floors, records, strict=True)
     ]
     signal = np.sqrt(np.nanmean(np.vstack([record.measured for record in records]) ** 2, axis=0))
     quietest = np.fmin.reduce(rows)
@@ -159,8 +166,8 @@ def _noise_before_rounding(floor: NoiseFloor, record: Observed) -> FloatArray:
     an effect that the model may lack. Positions keep their rounding, which every encoder has. Noise that was not
     estimated from repeats is unchanged, because it cannot be separated from rounding."""
     noise = floor.response_rms
-    if floor.how != "repeats":
+    if floor.method != "repeats":
         return noise
     steps = np.array([rounding_step(record.measured[:, c]) for c in range(len(noise))])
-    left = np.asarray(np.sqrt(np.maximum(noise**2 - steps**2 / 12, 0.0)))
-    return np.where(left > DITHER * steps, left, noise)
+    unrounded_noise = np.asarray(np.sqrt(np.maximum(noise**2 - steps**2 / 12, 0.0)))
+    return np.where(unrounded_noise > DITHER * steps, unrounded_noise, noise)

@@ -1,4 +1,4 @@
-"""The rule by which the error measure of recordings and a model is chosen.
+"""The rule by which `choose_measure` selects the error measure for recordings and a model.
 
 Free simulation, from rest by the commands alone, is the strictest test, because no measurement corrects it. It is not
 suitable for
@@ -77,26 +77,29 @@ class Choice:
     """The error measure that the rule chooses, and why."""
 
     measure: Measure
-    why: str
+    reason: str
     """A sentence for the user; empty for a free simulation."""
 
 
 def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choice:
     """Select the measure by the rule in the module's docstring."""
     longest_s = max(len(record.command) / record.recording.sample_rate_hz for record in records)
-    holds, motion = is_self_stable(model, longest_s), all(has_motion(record.recording, model) for record in records)
-    if motion and any(is_quasi_static(record.recording) for record in records):
+    self_stable, motion_measured = (
+        is_self_stable(model, longest_s),
+        all(has_motion(record.recording, model) for record in records),
+    )
+    if motion_measured and any(is_quasi_static(record.recording) for record in records):
         return Choice("predicted force", UNTIMED)
     if any(record.recording.meta.get("imposed") for record in records):
         return Choice("predicted force", IMPOSED)
-    if not holds and any(is_in_closed_loop(record.recording) for record in records):
-        return Choice("predicted force", CLOSED_LOOP) if motion else Choice("windows", CLOSED_LOOP_WINDOWS)
-    if motion and is_unstable_within(model, WINDOW_S):
+    if not self_stable and any(is_in_closed_loop(record.recording) for record in records):
+        return Choice("predicted force", CLOSED_LOOP) if motion_measured else Choice("windows", CLOSED_LOOP_WINDOWS)
+    if motion_measured and is_unstable_within(model, WINDOW_S):
         return Choice("predicted force", UNSTABLE)
-    if not holds:
+    if not self_stable:
         return Choice("windows", DRIFTS)
     if any(
-        _begins_moving(record) and _count_settling_samples(record, model) > MOST_LEFT_OUT * len(record.command)
+        _begins_in_motion(record) and _count_settling_samples(record, model) > MOST_LEFT_OUT * len(record.command)
         for record in records
     ):
         return Choice("windows", NOT_AT_REST)
@@ -106,38 +109,42 @@ def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choic
 def is_self_stable(model: MechanicalModel, longest_s: float) -> bool:
     """Whether all free motion of the model decays well within a recording of `longest_s` seconds: the slowest time
     constant is less than `DIES_OUT_SHARE` of it."""
-    return _slowest_decay_rate(model) * DIES_OUT_SHARE * longest_s > 1
+    return _compute_slowest_decay_rate(model) * DIES_OUT_SHARE * longest_s > 1
 
 
-def samples_to_settle(record: Observed, model: MechanicalModel) -> int:
+def count_samples_to_settle(record: Observed, model: MechanicalModel) -> int:
     """Samples to leave out at the beginning of a record that begins in motion, until the motion has decayed; 0 where it
     begins at rest, or where they would be more than `MOST_LEFT_OUT` of the record."""
-    after = _count_settling_samples(record, model)
-    if after > MOST_LEFT_OUT * len(record.command) or not _begins_moving(record):
+    settling_samples = _count_settling_samples(record, model)
+    if settling_samples > MOST_LEFT_OUT * len(record.command) or not _begins_in_motion(record):
         return 0
-    return int(np.ceil(after))
+    return int(np.ceil(settling_samples))
 
 
 def _count_settling_samples(record: Observed, model: MechanicalModel) -> float:
     """Samples until the initial motion has decayed (`SETTLED_CONSTANTS` time constants); infinite if it never does."""
-    slowest = _slowest_decay_rate(model)
-    return SETTLED_CONSTANTS / slowest * record.recording.sample_rate_hz if slowest > 0 else np.inf
+    decay_rate = _compute_slowest_decay_rate(model)
+    return SETTLED_CONSTANTS / decay_rate * record.recording.sample_rate_hz if decay_rate > 0 else np.inf
 
 
-def _slowest_decay_rate(model: MechanicalModel) -> float:
+def _compute_slowest_decay_rate(model: MechanicalModel) -> float:
     """Decay rate of the slowest free motion, 1/s; negative where a motion grows."""
     return -float(free_motion_rates(model).real.max())
 
 
-def _begins_moving(record: Observed) -> bool:
+def _begins_in_motion(record: Observed) -> bool:
     """Whether a channel is away from zero and changes in the first `REST_S`, both relative to the whole record. An
     offset alone is no motion."""
-    first = max(int(REST_S * record.recording.sample_rate_hz), 4)
-    known = record.measured[np.isfinite(record.measured).all(axis=1)]
-    if len(known) < 4 * first:
+    block_length = max(int(REST_S * record.recording.sample_rate_hz), 4)
+    complete_samples = record.measured[np.isfinite(record.measured).all(axis=1)]
+    if len(complete_samples) < 4 * block_length:
         return False
-    means = known[: len(known) // first * first].reshape(-1, first, known.shape[1]).mean(axis=1)
+    means = (
+        complete_samples[: len(complete_samples) // block_length * block_length]
+        .reshape(-1, block_length, complete_samples.shape[1])
+        .mean(axis=1)
+    )
     changes = np.diff(means, axis=0)
-    away = np.abs(means[0]) > REST_SHARE * known.std(axis=0)
-    moves = np.abs(changes[0]) > REST_SHARE * np.sqrt(np.mean(changes**2, axis=0))
-    return bool(np.any(away & moves))
+    is_offset = np.abs(means[0]) > REST_SHARE * complete_samples.std(axis=0)
+    changes_fast = np.abs(changes[0]) > REST_SHARE * np.sqrt(np.mean(changes**2, axis=0))
+    return bool(np.any(is_offset & changes_fast))

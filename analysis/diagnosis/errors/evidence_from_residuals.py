@@ -13,7 +13,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
-EXPECTED = 0.1
+EXPECTED_FORCE_SHARE = 0.1
 """Expected rms of a missing force, relative to the rms of the command along the same axis: the prior of the
 deconvolution."""
 
@@ -22,18 +22,18 @@ def evidence_of(
     model: MechanicalModel,
     record: Observed,
     simulated: SimulationResult,
-    left: FloatArray,
+    residuals: FloatArray,
     scales: tuple[FloatArray, FloatArray],
 ) -> Evidence:
-    """The evidence of one record. simulated: with the driven axes' motion. left: (n, c), residuals in units of the
+    """The evidence of one record. simulated: with the driven axes' motion. residuals: (n, c), residuals in units of the
     first of `scales`; NaN for missing samples, which count as zero. scales: the error measure's unit and noise, (c,)
     each, in the channels' units."""
     unit, noise = scales
-    residuals = np.where(np.isfinite(left), left, 0.0)
+    filled_residuals = np.where(np.isfinite(residuals), residuals, 0.0)
     rate_hz, p = record.recording.sample_rate_hz, model.outputs
-    expected = EXPECTED * np.maximum(np.sqrt(np.mean(record.command**2, axis=0)), 1e-12)
-    missing = missing_force(model, residuals, unit, rate_hz, expected)
-    measured, predicted = without_gaps(record.measured, left * unit, simulated)
+    expected = EXPECTED_FORCE_SHARE * np.maximum(np.sqrt(np.mean(record.command**2, axis=0)), 1e-12)
+    missing = missing_force(model, filled_residuals, unit, rate_hz, expected)
+    measured, predicted = fill_gaps(record.measured, residuals * unit, simulated)
     has_position = measured.shape[1] > p
     return Evidence(
         model=model,
@@ -52,12 +52,12 @@ def evidence_of(
     )
 
 
-def without_gaps(
+def fill_gaps(
     measured: FloatArray, residuals: FloatArray, simulated: SimulationResult
 ) -> tuple[FloatArray, FloatArray]:
     """Measured and predicted signals, (n, c) each, without gaps: missing samples are replaced by the simulation in
     both, so that their difference is zero. residuals: (n, c), in the channels' units."""
-    known = np.isfinite(measured)
+    is_measured = np.isfinite(measured)
     predicted = np.hstack([simulated.response, simulated.position])[:, : measured.shape[1]]
-    predicted = np.where(known, measured - residuals, predicted)
-    return np.where(known, measured, predicted), predicted
+    predicted = np.where(is_measured, measured - residuals, predicted)
+    return np.where(is_measured, measured, predicted), predicted

@@ -1,7 +1,7 @@
 """Selects the segments of a record in which one axis is driven.
 
-The first fit of an effect with impacts uses only these segments: they contain the information about that axis, and cost
-less simulation time than the whole record (`search.impacts`).
+The first fit of an effect with impacts (`search.impacts`) uses only these segments: they contain the information about
+that axis, and their simulation takes less time than that of the whole record.
 """
 
 from dataclasses import replace
@@ -16,19 +16,22 @@ from equalizer.signals.recording import Segment
 EXCITED_SHARE = 0.5
 """Least rms command of the axis, relative to that of the strongest axis in a segment."""
 LONGEST_S = 6.0
-"""Longest part of a segment that is used (s)."""
+"""Longest part of a segment that is used (s); of a periodic segment at least one period."""
 
 
 def select_excited_segments(measure: FreeSimulation, axis: int) -> FreeSimulation:
-    """The measure on the segments that excite an axis, each simulated from rest; unchanged where there are none."""
-    parts = tuple(
+    """The error measure on the segments that excite an axis, each a record simulated from rest. Segments without
+    samples to fit or to choose by are left out; the measure is unchanged where no segment remains."""
+    segment_records = tuple(
         _cut_record(record, segment)
         for record in measure.records
         for segment in record.recording.segments
         if segment.kind != "rest" and segment.stop <= len(record.command) and _is_excited(record, segment, axis)
     )
-    kept = tuple(part for part in parts if (part.fit | part.choose).any())
-    return replace(measure, records=kept) if kept else measure
+    usable_records = tuple(
+        segment_record for segment_record in segment_records if (segment_record.fit | segment_record.choose).any()
+    )
+    return replace(measure, records=usable_records) if usable_records else measure
 
 
 def _is_excited(record: Observed, segment: Segment, axis: int) -> bool:
@@ -38,13 +41,14 @@ def _is_excited(record: Observed, segment: Segment, axis: int) -> bool:
 
 
 def _cut_record(record: Observed, segment: Segment) -> Observed:
-    """The record of a segment alone, at most `LONGEST_S` of it, rounded to whole periods where it has a period."""
-    longest = int(LONGEST_S * record.recording.sample_rate_hz)
+    """The record of the first `LONGEST_S` of a segment; of a periodic segment, of as many whole periods as fit in this
+    time, but at least one."""
+    max_samples = int(LONGEST_S * record.recording.sample_rate_hz)
     if segment.period:
-        longest = max(longest // segment.period, 1) * segment.period
-    first, last = segment.start, min(segment.stop, segment.start + longest)
-    kept = slice(first, last)
+        max_samples = max(max_samples // segment.period, 1) * segment.period
+    first, last = segment.start, min(segment.stop, segment.start + max_samples)
+    samples = slice(first, last)
     return Observed(
-        part_of(record.recording, first, last), record.command[kept], record.measured[kept],
-        record.fit[kept], record.choose[kept], record.test[kept],
+        part_of(record.recording, first, last), record.command[samples], record.measured[samples],
+        record.fit[samples], record.choose[samples], record.test[samples],
     )  # fmt: skip

@@ -37,9 +37,9 @@ class FitScore:
         negative log-likelihood with a free error variance per channel, so that no channel dominates the others."""
         return float(np.mean(np.log(np.maximum(self.fit, _TINY))) + np.mean(np.log(np.maximum(self.choose, _TINY))))
 
-    def larger(self, times: FloatArray) -> "FitScore":
-        """The score with its errors multiplied by `times`, (c,)."""
-        return FitScore(self.fit * times, self.choose * times, self.test * times)
+    def larger(self, factors: FloatArray) -> "FitScore":
+        """The score with its errors multiplied by `factors`, (c,)."""
+        return FitScore(self.fit * factors, self.choose * factors, self.test * factors)
 
 
 def fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FitScore:
@@ -61,25 +61,27 @@ def signal_rms(records: tuple[Observed, ...], masks: list[Mask]) -> FloatArray:
     normalised. Positions are taken relative to the mean of each record, because encoders start anywhere; forces, speeds
     and accelerations relative to the mean of all records, because recordings at different constant speeds differ only
     in their means."""
-    held = [(record, mask) for record, mask in zip(records, masks, strict=True) if mask.any()]
-    if not held:
+    used_records = [(record, mask) for record, mask in zip(records, masks, strict=True) if mask.any()]
+    if not used_records:
         return np.full(records[0].measured.shape[1], np.nan)
     signals = (records[0].recording.response, records[0].recording.position)
-    quantities = [word for signal in signals if signal is not None for word in signal.quantities]
-    places = [
-        word != "voltage" and DERIVATIVE_OF_QUANTITY.get(word) == 0
-        for word in quantities[: records[0].measured.shape[1]]
+    quantities = [quantity for signal in signals if signal is not None for quantity in signal.quantities]
+    is_position = [
+        quantity != "voltage" and DERIVATIVE_OF_QUANTITY.get(quantity) == 0
+        for quantity in quantities[: records[0].measured.shape[1]]
     ]
-    whole = np.nanmean(np.concatenate([record.measured[mask] for record, mask in held]), axis=0)
-    moved = [
-        record.measured[mask] - np.where(places, np.nanmean(record.measured[mask], axis=0), whole)
-        for record, mask in held
+    common_mean = np.nanmean(np.concatenate([record.measured[mask] for record, mask in used_records]), axis=0)
+    deviations = [
+        record.measured[mask] - np.where(is_position, np.nanmean(record.measured[mask], axis=0), common_mean)
+        for record, mask in used_records
     ]
-    return np.asarray(np.sqrt(np.mean(np.concatenate(moved) ** 2, axis=0)))
+    return np.asarray(np.sqrt(np.mean(np.concatenate(deviations) ** 2, axis=0)))
 
 
 def rms_over(records: tuple[Observed, ...], residuals: tuple[FloatArray, ...], masks: list[Mask]) -> FloatArray:
     """(c,): rms residual over the masked samples of all records; NaN where the masks are empty."""
-    squares = sum(np.einsum("nc,nc->c", each[mask], each[mask]) for each, mask in zip(residuals, masks, strict=True))
+    squares = sum(
+        np.einsum("nc,nc->c", residual[mask], residual[mask]) for residual, mask in zip(residuals, masks, strict=True)
+    )
     count = sum(int(mask.sum()) for mask in masks)
     return np.asarray(np.sqrt(squares / count)) if count else np.full(residuals[0].shape[1], np.nan)

@@ -23,8 +23,8 @@ from equalizer.effects.simulation.simulator import (
     SimulationResult,
     simulate_mechanism,
     simulate_response,
+    simulate_states_before,
     simulate_windows,
-    states_before,
 )
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -42,19 +42,19 @@ class FreeSimulation:
     noise: FloatArray
     """(c,): rms noise, in each channel's own unit, with the same floor added."""
     name: str = "free simulation"
-    known: tuple[PlacedEffect, ...] = ()
-    """Effects that the file of the model states; every simulation contains them."""
+    model_effects: tuple[PlacedEffect, ...] = ()
+    """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
     """Least error in units of the noise, to which smaller errors are set; 1 with a floor."""
-    coarser: int = 1
+    step_factor: int = 1
     """Factor by which the time steps of motion-dependent forces are lengthened."""
-    pieces: tuple[Restarts, ...] = ()
+    restarts: tuple[Restarts, ...] = ()
     """Per record, the samples at which its parts were joined, and the state in which each part begins; empty where no
     record consists of parts."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         """The measure on other records, of any length. Each counts as a single part: `pieces` is emptied."""
-        return replace(self, records=records, pieces=())
+        return replace(self, records=records, restarts=())
 
     def with_floor(self, rms: FloatArray) -> Self:
         """The measure with noise of this rms (c,) added in power, and 1 as its least error."""
@@ -62,8 +62,8 @@ class FreeSimulation:
 
     def shorten(self) -> "FreeSimulation":
         """The measure without the samples after the last to fit or to choose by, and without records that have none."""
-        kept = [record for record in self.records if (record.fit | record.choose).any()]
-        return replace(self, records=tuple(record.shorten() for record in kept))
+        used_records = [record for record in self.records if (record.fit | record.choose).any()]
+        return replace(self, records=tuple(record.shorten() for record in used_records))
 
     def can_observe(self, effect: Effect) -> bool:
         """True for every effect: each changes the simulated response or position."""
@@ -73,19 +73,27 @@ class FreeSimulation:
         """Per record (n, c): measured less simulated, in units of `unit`; NaN where a sample is missing."""
         with np.errstate(over="ignore", invalid="ignore"):  # A simulation of trial parameters may diverge.
             return tuple(
-                _subtract_prediction(record.measured, self._simulate(model, effects, record, simulate_response, joined))
+                _subtract_prediction(
+                    record.measured, self._simulate(model, effects, record, simulate_response, restarts)
+                )
                 / self.unit
-                for record, joined in zip(self.records, self.pieces or (None,) * len(self.records), strict=True)
+                for record, restarts in zip(self.records, self.restarts or (None,) * len(self.records), strict=True)
             )
 
-    def states_before(
-        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, at: npt.NDArray[np.int64]
+    def simulate_states_before(
+        self,
+        model: MechanicalModel,
+        effects: Sequence[PlacedEffect],
+        record: Observed,
+        sample_indices: npt.NDArray[np.int64],
     ) -> FloatArray:
         """States just before the samples `at` (k,) of a record: positions, then velocities (k, 2n)."""
         signals = record.recording
-        every = effects_under_conditions((*self.known, *effects), signals)
+        all_effects = effects_under_conditions((*self.model_effects, *effects), signals)
         model = add_carried_weight(model, signals)
-        return states_before(model, record.command, (signals.sample_rate_hz, signals.hold), every, at)
+        return simulate_states_before(
+            model, record.command, (signals.sample_rate_hz, signals.hold), all_effects, sample_indices
+        )
 
     def _simulate(
         self,
@@ -93,50 +101,51 @@ class FreeSimulation:
         effects: Sequence[PlacedEffect],
         record: Observed,
         simulate: Callable[..., SimulationResult],
-        joined: Restarts | None = None,
+        restarts: Restarts | None = None,
     ) -> SimulationResult:
         """One record simulated by the function `simulate`, or restarted at each part where parts were joined."""
         signals, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         measurement = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
         model = add_carried_weight(model, signals)
-        every = [
-            _coarsen(placed, self.coarser) for placed in effects_under_conditions((*self.known, *effects), signals)
+        all_effects = [
+            _lengthen_steps(placed_effect, self.step_factor)
+            for placed_effect in effects_under_conditions((*self.model_effects, *effects), signals)
         ]
-        if joined is not None:
-            sampled = signals.sample_rate_hz, signals.hold
-            return simulate_windows(model, record.command, sampled, every, measurement, joined)
-        return simulate(model, record.command, signals.sample_rate_hz, every, signals.hold, measurement)
+        if restarts is not None:
+            sampling = signals.sample_rate_hz, signals.hold
+            return simulate_windows(model, record.command, sampling, all_effects, measurement, restarts)
+        return simulate(model, record.command, signals.sample_rate_hz, all_effects, signals.hold, measurement)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
         """Per record, the motion and missing force from which starting values are estimated. residuals: of the same
         model and effects."""
-        found = []
-        for record, left in zip(self.records, residuals, strict=True):
+        evidence_by_record = []
+        for record, residual in zip(self.records, residuals, strict=True):
             simulated = self._simulate(model, effects, record, simulate_mechanism)
-            loaded = add_carried_weight(model, record.recording)
-            found.append(evidence_of(loaded, record, simulated, left, (self.unit, self.noise)))
-        return tuple(found)
+            loaded_model = add_carried_weight(model, record.recording)
+            evidence_by_record.append(evidence_of(loaded_model, record, simulated, residual, (self.unit, self.noise)))
+        return tuple(evidence_by_record)
 
 
-def _coarsen(placed: PlacedEffect, times: int) -> PlacedEffect:
-    """The effect with time steps about `times` times longer, at least one step per sample; other effects than
+def _lengthen_steps(placed_effect: PlacedEffect, factor: int) -> PlacedEffect:
+    """The effect with time steps about `factor` times longer, at least one step per sample; other effects than
     motion-dependent forces unchanged."""
-    acts = placed.effect.acts
-    if times == 1 or not isinstance(acts, (AxisForce, JointForce)):
-        return placed
-    longer = replace(acts, steps=-(-acts.steps // times))
-    return replace(placed, effect=replace(placed.effect, acts=longer))
+    action = placed_effect.effect.action
+    if factor == 1 or not isinstance(action, (AxisForce, JointForce)):
+        return placed_effect
+    coarser_action = replace(action, steps=-(-action.steps // factor))
+    return replace(placed_effect, effect=replace(placed_effect.effect, action=coarser_action))
 
 
 def _subtract_prediction(measured: FloatArray, simulated: SimulationResult) -> FloatArray:
     """(n, c): measured less simulated signals, in the channels' units: the response, then the position if measured."""
-    p, rest = simulated.response.shape[1], measured.copy()
-    rest[:, :p] -= simulated.response
-    rest[:, p:] -= simulated.position[:, : rest.shape[1] - p]
-    return rest
+    p, difference = simulated.response.shape[1], measured.copy()
+    difference[:, :p] -= simulated.response
+    difference[:, p:] -= simulated.position[:, : difference.shape[1] - p]
+    return difference
 
 
 def predict_channels(simulated: SimulationResult, count: int) -> FloatArray:

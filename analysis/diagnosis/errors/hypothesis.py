@@ -51,11 +51,11 @@ class FreeParameter:
     def coordinate(self, value: float) -> float:
         """The coordinate of a value (SI): its logarithm on a log scale, else the value over `unit`."""
         p = self.parameter
-        inside = min(max(value, p.lower), p.upper)
-        return float(np.log(inside)) if p.scale == "log" else inside / self.unit
+        clipped = min(max(value, p.lower), p.upper)
+        return float(np.log(clipped)) if p.scale == "log" else clipped / self.unit
 
     @property
-    def move(self) -> float:
+    def difference_step(self) -> float:
         """Step of finite differences, in the coordinate: 1 on a linear scale, else the parameter's own step."""
         return 1.0 if self.parameter.scale == "linear" else self.parameter.step
 
@@ -87,15 +87,15 @@ class Hypothesis:
         groups = [claim.effect.parameters for claim in self.claims for _ in range(claim.groups)]
         return tuple(
             FreeParameter(p, _unit(p, start))
-            for of, start in zip(groups, self.starts, strict=True)
-            for p in of
+            for group, start in zip(groups, self.starts, strict=True)
+            for p in group
             if not p.fixed
         )
 
     def list_placed_effects(self, point: FloatArray | None = None) -> tuple[PlacedEffect, ...]:
         """The effects with their values, one per claim and group, as a simulation takes them. point: (k,) coordinates;
         None = the hypothesis's own."""
-        left = list(self.parameters)
+        free_parameters = list(self.parameters)
         coordinates = list(self.point if point is None else point)
         effects: list[PlacedEffect] = []
         starts = iter(self.starts)
@@ -104,12 +104,12 @@ class Hypothesis:
                 values = dict(next(starts))
                 for p in claim.effect.parameters:
                     if not p.fixed:
-                        values[p.name] = left.pop(0).value(float(coordinates.pop(0)))
+                        values[p.name] = free_parameters.pop(0).value(float(coordinates.pop(0)))
                 sites = (claim.sites[group],) if claim.spread == "each" else claim.sites
                 effects.append(PlacedEffect(claim.effect, sites, values))
         return tuple(effects)
 
-    def of_claim(self, number: int) -> tuple[PlacedEffect, ...]:
+    def list_effects_of(self, number: int) -> tuple[PlacedEffect, ...]:
         """The placed effects of one claim."""
         first = sum(claim.groups for claim in self.claims[:number])
         return self.list_placed_effects()[first : first + self.claims[number].groups]
@@ -117,63 +117,70 @@ class Hypothesis:
 
 def has_motion_forces(hypothesis: Hypothesis) -> bool:
     """Whether the hypothesis contains a force that depends on the motion."""
-    return any(isinstance(claim.effect.acts, (AxisForce, JointForce)) for claim in hypothesis.claims)
+    return any(isinstance(claim.effect.action, (AxisForce, JointForce)) for claim in hypothesis.claims)
 
 
-def without_claim(whole: Hypothesis, number: int) -> Hypothesis:
+def remove_claim(hypothesis: Hypothesis, number: int) -> Hypothesis:
     """The hypothesis without the claim of this number, and without the claim's starts and parameters."""
-    first = sum(claim.groups for claim in whole.claims[:number])
-    last = first + whole.claims[number].groups
-    sizes = [sum(not p.fixed for p in claim.effect.parameters) * claim.groups for claim in whole.claims]
-    begin = sum(sizes[:number])
+    group_start = sum(claim.groups for claim in hypothesis.claims[:number])
+    group_stop = group_start + hypothesis.claims[number].groups
+    coordinate_counts = [
+        sum(not p.fixed for p in claim.effect.parameters) * claim.groups for claim in hypothesis.claims
+    ]
+    coordinate_start = sum(coordinate_counts[:number])
     return Hypothesis(
-        whole.claims[:number] + whole.claims[number + 1 :],
-        whole.starts[:first] + whole.starts[last:],
-        np.delete(whole.point, slice(begin, begin + sizes[number])),
+        hypothesis.claims[:number] + hypothesis.claims[number + 1 :],
+        hypothesis.starts[:group_start] + hypothesis.starts[group_stop:],
+        np.delete(hypothesis.point, slice(coordinate_start, coordinate_start + coordinate_counts[number])),
     )
 
 
-def move_point(hypothesis: Hypothesis, step: FloatArray, straight: bool) -> Hypothesis:
-    """The hypothesis with its coordinates moved by a step (k,). straight: logarithmic coordinates move by ln(1 + step),
-    so that values change in proportion to the step, and drop to a tenth at least. Where a parameter of the model
+def move_point(hypothesis: Hypothesis, step: FloatArray, along_values: bool) -> Hypothesis:
+    """The hypothesis with its coordinates moved by a step (k,). along_values: logarithmic coordinates move by ln(1 +
+    step), so that values change in proportion to the step, and drop to a tenth at least. Where a parameter of the model
     compensates for that of the effect (two masses), the cost has a valley that is straight in the values only."""
-    if not straight:
+    if not along_values:
         return replace(hypothesis, point=hypothesis.point + step)
     logarithmic = np.array([free.parameter.scale == "log" for free in hypothesis.parameters], dtype=np.bool_)
-    by = np.where(logarithmic, np.log1p(np.maximum(step, -0.9)), step)
+    increments = np.where(logarithmic, np.log1p(np.maximum(step, -0.9)), step)
     low, high = np.array([free.bounds for free in hypothesis.parameters]).reshape(-1, 2).T
-    return replace(hypothesis, point=np.clip(hypothesis.point + by, low, high))
+    return replace(hypothesis, point=np.clip(hypothesis.point + increments, low, high))
 
 
 def hypothesis_of_claim(claim: Claim, values: Sequence[Values]) -> Hypothesis:
     """A hypothesis of one claim. values: one set per group."""
-    free = [(p, of_group) for of_group in values for p in claim.effect.parameters if not p.fixed]
-    point = np.array([FreeParameter(p, _unit(p, of_group)).coordinate(of_group[p.name]) for p, of_group in free])
-    return Hypothesis((claim,), tuple(dict(of_group) for of_group in values), point)
+    free_parameters = [(p, group_values) for group_values in values for p in claim.effect.parameters if not p.fixed]
+    point = np.array(
+        [
+            FreeParameter(p, _unit(p, group_values)).coordinate(group_values[p.name])
+            for p, group_values in free_parameters
+        ]
+    )
+    return Hypothesis((claim,), tuple(dict(group_values) for group_values in values), point)
 
 
-def combine(first: Hypothesis, other: Hypothesis) -> Hypothesis:
-    """A hypothesis with the claims of both; those of the first come first."""
+def combine(leading: Hypothesis, added: Hypothesis) -> Hypothesis:
+    """A hypothesis with the claims of both; those of `leading` come first."""
     return Hypothesis(
-        first.claims + other.claims, first.starts + other.starts, np.concatenate([first.point, other.point])
+        leading.claims + added.claims, leading.starts + added.starts, np.concatenate([leading.point, added.point])
     )
 
 
-NOTHING = Hypothesis((), (), np.zeros(0))
+NO_EFFECTS = Hypothesis((), (), np.zeros(0))
 """The hypothesis without effects: the model alone."""
 
 
-def similar_hypotheses(whole: Hypothesis) -> Iterator[Hypothesis]:
+def generate_near_equivalents(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """Variants of the hypothesis in which one effect at a time has other values with almost the same response
-    (`Effect.alike`)."""
-    parameters, begin = whole.parameters, 0
-    for placed in whole.list_placed_effects():
-        end = begin + sum(not p.fixed for p in placed.effect.parameters)
-        for other in placed.effect.alike(placed.values):
-            point = whole.point.copy()
-            point[begin:end] = [free.coordinate(other[free.parameter.name]) for free in parameters[begin:end]]
-            yield replace(whole, point=point)
-        begin = end
+    (`Effect.near_equivalents`)."""
+    parameters, start = hypothesis.parameters, 0
+    for placed in hypothesis.list_placed_effects():
+        stop = start + sum(not p.fixed for p in placed.effect.parameters)
+        for alternative in placed.effect.near_equivalents(placed.values):
+            point = hypothesis.point.copy()
+            point[start:stop] = [free.coordinate(alternative[free.parameter.name]) for free in parameters[start:stop]]
+            yield replace(hypothesis, point=point)
+        start = stop
 
 
 def _unit(p: Parameter, start: Values) -> float:

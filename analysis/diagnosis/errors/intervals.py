@@ -2,8 +2,9 @@
 
 Final fit (`finish_fit`): a search stops at a relative change of the cost, which with 10^5 samples may leave a parameter
 several standard errors from the minimum. Gauss-Newton steps therefore continue until the sum of squares falls by less
-than `FINISHED`. Sensitivities are central differences: parameters with the same effect on the prediction (an added mass
-and the model's own) must have proportional columns; curvature in one-sided differences would seem to separate them.
+than `CONVERGED_DECREASE`. Sensitivities are central differences: parameters with the same effect on the prediction (an
+added mass and the model's own) must have proportional columns; curvature in one-sided differences would seem to
+separate them.
 
 Random errors (`standard_errors`): sandwich estimate of Huber (1967) and White (1980), with scores summed over stretches
 longer than the residuals' correlation time. Under periodic excitation model errors repeat: the same stretch of all
@@ -37,17 +38,17 @@ Places = npt.NDArray[np.int64]
 
 STRETCH_S = 0.5
 """Length (s) of the stretches over which scores are summed: longer than the residuals' correlation time."""
-AT_AN_END = 1e-6
+BOUND_TOLERANCE = 1e-6
 """Distance of a coordinate from its bound at or below which it counts as at the bound."""
-FINISHED = 0.01
+CONVERGED_DECREASE = 0.01
 """Fall of the sum of squares, in noise variances, that ends a fit: the minimum is then within a tenth of a standard
 error."""
-FINISHING = ((1e-13, True), (1e-13, False), (1e-9, True), (1e-3, False), (0.1, False))
+FINAL_DAMPINGS = ((1e-13, True), (1e-13, False), (1e-9, True), (1e-3, False), (0.1, False))
 """Dampings of the final steps (see `DAMPINGS`), smaller than in a search: in a direction that the data do not
 determine, the prior of the calibration must decide, not the damping."""
-MOST_ROUNDS, STEPS = 4, 3
+LARGEST_ROUNDS, STEPS_PER_ROUND = 4, 3
 """Largest number of rounds, each with a newly computed sensitivity, and of Gauss-Newton steps per round."""
-FINER_LINEAR, FINER = 0.02, 0.2
+STEP_FACTOR_LINEAR, STEP_FACTOR = 0.02, 0.2
 """Steps of the central differences, relative to those of a search. Linear simulation: short, because curvature is the
 only error. Other effects, with thresholds or forces that are solved for: longer, because a short step would magnify the
 numerical errors of the simulation."""
@@ -58,31 +59,31 @@ def sensitivity_to_all(
 ) -> Sensitivity:
     """Sensitivity (t + parameters, samples) to the model's parameters, then to the hypothesis's parameters, by central
     differences; one-sided at a bound and where the other side gives no valid model, zero where neither does."""
-    t, placed = len(deviations), hypothesis.list_placed_effects()
-    linear = all(isinstance(each.effect.acts, Structure) for each in placed)
-    finer = FINER_LINEAR if linear else FINER
+    t, placed_effects = len(deviations), hypothesis.list_placed_effects()
+    linear = all(isinstance(placed_effect.effect.action, Structure) for placed_effect in placed_effects)
+    step_factor = STEP_FACTOR_LINEAR if linear else STEP_FACTOR
 
-    def moved(number: int, by: float) -> FloatArray | None:
-        at, point = deviations.copy(), hypothesis.point.copy()
-        (at if number < t else point)[number if number < t else number - t] += by
+    def residuals_at(number: int, step: float) -> FloatArray | None:
+        displaced, point = deviations.copy(), hypothesis.point.copy()
+        (displaced if number < t else point)[number if number < t else number - t] += step
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                left = residuals_to_fit(
-                    measure, measure.residuals(tuning.tune(at), hypothesis.list_placed_effects(point))
+                residuals = residuals_to_fit(
+                    measure, measure.residuals(tuning.tune(displaced), hypothesis.list_placed_effects(point))
                 )
         except (MechanicalModelError, np.linalg.LinAlgError):
             return None
-        return left if np.isfinite(left).all() else None
+        return residuals if np.isfinite(residuals).all() else None
 
     def column(number: int) -> FloatArray:
-        sides = [(by, moved(number, by)) for by in _both_ways(hypothesis, number - t, finer)]
-        valid = [(by, left) for by, left in sides if left is not None]
-        if len(valid) == 1 and (here := moved(number, 0.0)) is not None:
-            valid.append((0.0, here))
+        sides = [(step, residuals_at(number, step)) for step in _bounded_steps(hypothesis, number - t, step_factor)]
+        valid = [(step, residuals) for step, residuals in sides if residuals is not None]
+        if len(valid) == 1 and (unchanged := residuals_at(number, 0.0)) is not None:
+            valid.append((0.0, unchanged))
         if len(valid) < 2 or valid[0][0] == valid[1][0]:
             return np.zeros(samples)
-        (low, before), (high, after) = valid
-        return np.asarray((before - after) / (high - low))
+        (first_step, first_residuals), (second_step, second_residuals) = valid
+        return np.asarray((first_residuals - second_residuals) / (second_step - first_step))
 
     samples = sum(int(record.fit.sum()) * record.measured.shape[1] for record in measure.records)
     count = t + len(hypothesis.parameters)
@@ -90,14 +91,14 @@ def sensitivity_to_all(
     return Sensitivity(deviations, columns, columns @ columns.T)
 
 
-def _both_ways(hypothesis: Hypothesis, number: int, finer: float) -> tuple[float, float]:
+def _bounded_steps(hypothesis: Hypothesis, number: int, step_factor: float) -> tuple[float, float]:
     """Steps down and up within the bounds. number: index among the hypothesis's parameters; below 0: a parameter of the
     model."""
     if number < 0:
-        return -finer * DIFFERENCE_STEP, finer * DIFFERENCE_STEP
-    (low, high), at = hypothesis.parameters[number].bounds, hypothesis.point[number]
-    step = finer * hypothesis.parameters[number].move
-    return max(-step, low - at), min(step, high - at)
+        return -step_factor * DIFFERENCE_STEP, step_factor * DIFFERENCE_STEP
+    (low, high), coordinate = hypothesis.parameters[number].bounds, hypothesis.point[number]
+    step = step_factor * hypothesis.parameters[number].difference_step
+    return max(-step, low - coordinate), min(step, high - coordinate)
 
 
 def finish_fit(
@@ -108,78 +109,80 @@ def finish_fit(
     time_left: TimeBudget,
 ) -> tuple[Fitted, Sensitivity]:
     """The fit at its minimum, and the sensitivity to all its parameters there. sensitivity_of: as `sensitivity_to_all`;
-    called once, and again after each round that lowered the sum of squares by `FINISHED` or more, even where no time
-    is left for further steps."""
-    known, samples = sensitivity_of(fitted), len(residuals_to_fit(measure, fitted.residuals))
-    for _ in range(MOST_ROUNDS):
-        begun = fitted.cost
-        for _ in range(STEPS):
-            better = take_step(measure, tuning, fitted, _normal_equations(measure, fitted, known), FINISHING)
-            if better is None:
+    called once, and again after each round that lowered the sum of squares by `CONVERGED_DECREASE` or more, even where
+    no time is left for further steps."""
+    jacobian, samples = sensitivity_of(fitted), len(residuals_to_fit(measure, fitted.residuals))
+    for _ in range(LARGEST_ROUNDS):
+        round_start_cost = fitted.cost
+        for _ in range(STEPS_PER_ROUND):
+            next_fit = take_step(measure, tuning, fitted, _normal_equations(measure, fitted, jacobian), FINAL_DAMPINGS)
+            if next_fit is None:
                 break
-            gained, fitted = samples * (fitted.cost - better.cost), better
-            if gained < FINISHED:
+            decrease, fitted = samples * (fitted.cost - next_fit.cost), next_fit
+            if decrease < CONVERGED_DECREASE:
                 break
-        if not samples * (begun - fitted.cost) >= FINISHED:  # also where both costs are infinite (NaN)
+        if (
+            not samples * (round_start_cost - fitted.cost) >= CONVERGED_DECREASE
+        ):  # also where both costs are infinite (NaN)
             break
-        known = sensitivity_of(fitted)
+        jacobian = sensitivity_of(fitted)
         if not time_left():
             break
-    return fitted, known
+    return fitted, jacobian
 
 
-def _normal_equations(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> tuple[FloatArray, FloatArray]:
+def _normal_equations(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> tuple[FloatArray, FloatArray]:
     """Normal matrix and right side of a Gauss-Newton step in all parameters, with the calibration as prior."""
-    rhs, t = known.on(residuals_to_fit(measure, fitted.residuals)), len(fitted.deviations)
+    rhs, t = jacobian.multiply(residuals_to_fit(measure, fitted.residuals)), len(fitted.deviations)
     rhs[:t] -= fitted.deviations
-    return _with_calibration(known.squares, t), rhs
+    return _with_calibration(jacobian.gram, t), rhs
 
 
 def _with_calibration(squares: FloatArray, t: int) -> FloatArray:
     """Normal matrix with the prior of the calibration: one observation of each of the model's t parameters, with a
     standard deviation of 1 in its coordinate."""
-    whole = squares.copy()
-    whole[:t, :t] += np.eye(t)
-    return whole
+    normal_matrix = squares.copy()
+    normal_matrix[:t, :t] += np.eye(t)
+    return normal_matrix
 
 
-def standard_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> FloatArray:
+def standard_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray:
     """(t + parameters,): standard errors of the deviations and of the hypothesis's point; 0 for parameters at a bound.
-    known: sensitivity to all parameters (`sensitivity_to_all`).
+    jacobian: sensitivity to all parameters (`sensitivity_to_all`).
 
     Scores sum to zero at the minimum, so that few clusters underestimate the variance. The larger of two estimates is
     returned: with all periods of a segment in common clusters, and with separate ones."""
     t, free = len(fitted.deviations), _free(fitted)
     errors = residuals_to_fit(measure, fitted.residuals)
-    information = _with_calibration(known.squares * np.outer(free, free), t)
+    information = _with_calibration(jacobian.gram * np.outer(free, free), t)
     scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
     variances = []
-    for folded in (False, True):
-        scores = _scores(measure, known, errors, folded) * free[:, None]
+    for pool_periods in (False, True):
+        scores = _scores(measure, jacobian, errors, pool_periods) * free[:, None]
         variances.append(np.diagonal(inverse @ _with_calibration(scores @ scores.T, t) @ inverse))
     return np.asarray(np.sqrt(np.maximum(np.max(variances, axis=0), 0.0)))
 
 
-def segment_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> FloatArray | None:
-    """(t + parameters,): jackknife standard errors over segments; None where there is a single segment. known: as in
+def segment_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray | None:
+    """(t + parameters,): jackknife standard errors over segments; None where there is a single segment. jacobian: as in
     `standard_errors`."""
     errors, free = residuals_to_fit(measure, fitted.residuals), _free(fitted)
     products, scores = [], []
     for begin, end in _segments(measure):
-        moves = known.over(begin, end) * free[:, None]
-        products.append(moves @ moves.T)
-        scores.append(moves @ errors[begin:end])
+        segment_columns = jacobian.select_samples(begin, end) * free[:, None]
+        products.append(segment_columns @ segment_columns.T)
+        scores.append(segment_columns @ errors[begin:end])
     if len(products) < 2:
         return None
-    whole = _with_calibration(np.sum(products, axis=0), len(fitted.deviations))
-    scale = np.sqrt(np.maximum(np.diagonal(whole), np.finfo(float).tiny))
-    left_out = []
-    for part, rhs in zip(products, scores, strict=True):
-        rest = (whole - part) / np.outer(scale, scale)
-        left_out.append(np.linalg.pinv(rest, rcond=1e-12, hermitian=True) @ (rhs / scale) / scale)
-    moved, count = np.array(left_out), len(left_out)
-    return np.asarray(np.sqrt((count - 1) / count * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)))
+    normal_matrix = _with_calibration(np.sum(products, axis=0), len(fitted.deviations))
+    scale = np.sqrt(np.maximum(np.diagonal(normal_matrix), np.finfo(float).tiny))
+    omission_steps = []
+    for segment_matrix, rhs in zip(products, scores, strict=True):
+        remaining_matrix = (normal_matrix - segment_matrix) / np.outer(scale, scale)
+        omission_steps.append(np.linalg.pinv(remaining_matrix, rcond=1e-12, hermitian=True) @ (rhs / scale) / scale)
+    steps, count = np.array(omission_steps), len(omission_steps)
+    return np.asarray(np.sqrt((count - 1) / count * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0)))
 
 
 def _segments(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
@@ -196,35 +199,40 @@ def _segments(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
 
 def _free(fitted: Fitted) -> Mask:
     """(t + parameters,): whether a parameter is away from its bounds; always true for the model's parameters."""
-    point, ends = fitted.hypothesis.point, [free.bounds for free in fitted.hypothesis.parameters]
-    away = [not np.isclose(at, of, rtol=0.0, atol=AT_AN_END).any() for at, of in zip(point, ends, strict=True)]
-    return np.array([True] * len(fitted.deviations) + away, dtype=np.bool_)
+    point, bounds = fitted.hypothesis.point, [free.bounds for free in fitted.hypothesis.parameters]
+    is_interior = [
+        not np.isclose(coordinate, limits, rtol=0.0, atol=BOUND_TOLERANCE).any()
+        for coordinate, limits in zip(point, bounds, strict=True)
+    ]
+    return np.array([True] * len(fitted.deviations) + is_interior, dtype=np.bool_)
 
 
-def _scores(measure: ErrorMeasure, known: Sensitivity, errors: FloatArray, folded: bool) -> FloatArray:
-    """(t + parameters, clusters): score of each parameter (column times residual), summed per cluster. folded: as
+def _scores(measure: ErrorMeasure, jacobian: Sensitivity, errors: FloatArray, pool_periods: bool) -> FloatArray:
+    """(t + parameters, clusters): score of each parameter (column times residual), summed per cluster. pool_periods: as
     in `_clusters`."""
     sums: list[FloatArray] = []
     first = 0
     for record in measure.records:
-        width, clusters = record.measured.shape[1], _clusters(record, folded)[record.fit]
-        by_cluster = np.zeros((int(clusters.max(initial=-1)) + 1, len(known.columns)))
+        width, clusters = record.measured.shape[1], _clusters(record, pool_periods)[record.fit]
+        by_cluster = np.zeros((int(clusters.max(initial=-1)) + 1, len(jacobian.columns)))
         edges = [0, *(np.flatnonzero(np.diff(clusters)) + 1).tolist(), len(clusters)]
         for begin, end in pairwise(edges):
             if end > begin:
                 part = slice(first + width * begin, first + width * end)
-                by_cluster[clusters[begin]] += known.over(part.start, part.stop) @ errors[part]
+                by_cluster[clusters[begin]] += jacobian.select_samples(part.start, part.stop) @ errors[part]
         first += width * len(clusters)
         sums.append(by_cluster)
     return np.concatenate(sums).T
 
 
-def _clusters(record: Observed, folded: bool) -> Places:
-    """(n,): number of the cluster of each sample: stretches of `STRETCH_S`. folded: the same stretch of all periods of
-    a segment is one cluster."""
+def _clusters(record: Observed, pool_periods: bool) -> Places:
+    """(n,): number of the cluster of each sample: stretches of `STRETCH_S`. pool_periods: the same stretch of all
+    periods of a segment is one cluster."""
     width = max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
-    place = np.arange(len(record.fit))
-    for periods in find_settled_periods(record.recording) if folded else ():
-        inside = slice(periods.segment.start, min(periods.segment.stop, len(place)))
-        place[inside] = periods.segment.start + (place[inside] - periods.segment.start) % periods.length
-    return np.asarray(np.unique(place // width, return_inverse=True)[1])
+    position = np.arange(len(record.fit))
+    for periods in find_settled_periods(record.recording) if pool_periods else ():
+        segment_samples = slice(periods.segment.start, min(periods.segment.stop, len(position)))
+        position[segment_samples] = (
+            periods.segment.start + (position[segment_samples] - periods.segment.start) % periods.length
+        )
+    return np.asarray(np.unique(position // width, return_inverse=True)[1])

@@ -33,7 +33,7 @@ from equalizer.signals.signal import FloatArray
 DIFFERENCE_STEP = 0.1
 """Step of the finite differences for the model's parameters, in standard deviations of the calibration."""
 Dampings = Sequence[tuple[float, bool]]
-"""Per trial, the share of the normal matrix's diagonal that is added, and the argument `straight` of `move_point`."""
+"""Per trial, the share of the normal matrix's diagonal that is added, and `along_values` of `move_point`."""
 DAMPINGS: Dampings = ((1e-9, False), (1e-3, False), (0.1, False), (3.0, False))
 LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
 """Largest step of an effect's parameter, by its scale: a factor of e; ten times its starting value; unlimited."""
@@ -43,16 +43,16 @@ LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
 class Sensitivity:
     """Jacobian of the prediction at the residuals to fit ("samples" below): of the model's, or of all t parameters."""
 
-    at: FloatArray
+    base_deviations: FloatArray
     """(t,): deviations (standard deviations of the calibration) at which it was computed."""
     columns: FloatArray
     """(t, samples): change of the prediction per standard deviation, in units of the noise: -de/dd."""
-    squares: FloatArray
+    gram: FloatArray
     """(t, t): Gram matrix of the columns."""
     repeated: npt.NDArray[np.int64] | None = None
     """Where columns contain one period of each segment: per sample to fit, index of its sample in the columns."""
 
-    def on(self, errors: FloatArray) -> FloatArray:
+    def multiply(self, errors: FloatArray) -> FloatArray:
         """(t,) or (t, k): products of the columns with errors on the samples to fit, (samples,) or (k, samples)."""
         rows = np.atleast_2d(errors)
         if self.repeated is not None:
@@ -60,16 +60,16 @@ class Sensitivity:
         products = self.columns @ rows.T
         return products if errors.ndim > 1 else products[:, 0]
 
-    def over(self, first: int, last: int) -> FloatArray:
+    def select_samples(self, first: int, last: int) -> FloatArray:
         """(t, last - first): columns on the residuals `first` to `last`, ordered by instant, then by channel; both
         limits are multiples of the number of channels."""
         if self.repeated is None:
             return self.columns[:, first:last]
         t, c = len(self.columns), self._channels
-        where = self.repeated[first // c : last // c]
-        if len(where) and (np.diff(where) == 1).all():
-            return self.columns[:, c * where[0] : c * (where[-1] + 1)]
-        return self.columns.reshape(t, -1, c)[:, where].reshape(t, -1)
+        sample_indices = self.repeated[first // c : last // c]
+        if len(sample_indices) and (np.diff(sample_indices) == 1).all():
+            return self.columns[:, c * sample_indices[0] : c * (sample_indices[-1] + 1)]
+        return self.columns.reshape(t, -1, c)[:, sample_indices].reshape(t, -1)
 
     @property
     def _channels(self) -> int:
@@ -79,9 +79,9 @@ class Sensitivity:
     def _sum_periods(self, errors: FloatArray) -> FloatArray:
         """Errors summed over the periods of each segment. errors: (samples,), channel after channel at each instant."""
         assert self.repeated is not None
-        each = errors.reshape(len(self.repeated), -1)
-        short = self.columns.shape[1] // each.shape[1]
-        summed = np.stack([np.bincount(self.repeated, channel, short) for channel in each.T], axis=1)
+        by_channel = errors.reshape(len(self.repeated), -1)
+        period_samples = self.columns.shape[1] // by_channel.shape[1]
+        summed = np.stack([np.bincount(self.repeated, channel, period_samples) for channel in by_channel.T], axis=1)
         return np.asarray(summed.ravel())
 
 
@@ -100,67 +100,68 @@ class Fitted:
 
 def residuals_to_fit(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FloatArray:
     """(samples,): the residuals of the samples to fit, of all records and channels in one row."""
-    parts = [each[record.fit].ravel() for each, record in zip(residuals, measure.records, strict=True)]
+    parts = [residual[record.fit].ravel() for residual, record in zip(residuals, measure.records, strict=True)]
     return np.concatenate(parts)
 
 
 def sensitivity(
     measure: ErrorMeasure,
     tuning: Tuning,
-    at: FloatArray,
+    deviations: FloatArray,
     hypothesis: Hypothesis,
     map_: object = map,
-    beside: tuple[FloatArray, Sequence[int]] | None = None,
+    known_columns: tuple[FloatArray, Sequence[int]] | None = None,
 ) -> Sensitivity:
     """Sensitivity to the model's own parameters by finite differences. map_: `map`, or a parallel equivalent.
-    beside: known columns (t, samples), and the indices of those that must be computed; None = all."""
-    base = residuals_to_fit(measure, measure.residuals(tuning.tune(at), hypothesis.list_placed_effects()))
+    known_columns: columns (t, samples), and the indices of those that must be computed; None = all."""
+    base = residuals_to_fit(measure, measure.residuals(tuning.tune(deviations), hypothesis.list_placed_effects()))
 
-    def moved(number: int) -> FloatArray:
-        for move in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
-            there = at.copy()
-            there[number] += move
+    def difference_column(number: int) -> FloatArray:
+        for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
+            displaced = deviations.copy()
+            displaced[number] += step
             try:
                 with np.errstate(over="ignore", invalid="ignore"):
                     change = base - residuals_to_fit(
-                        measure, measure.residuals(tuning.tune(there), hypothesis.list_placed_effects())
+                        measure, measure.residuals(tuning.tune(displaced), hypothesis.list_placed_effects())
                     )
             except (MechanicalModelError, np.linalg.LinAlgError):
                 continue
             if np.isfinite(change).all():
-                return np.divide(change, move, out=change)
+                return np.divide(change, step, out=change)
         # Neither direction gives a valid model: the parameter stays fixed.
         return np.zeros(len(base))
 
     columns, numbers = (
-        (np.zeros((len(at), len(base))), range(len(at))) if beside is None else (beside[0].copy(), beside[1])
+        (np.zeros((len(deviations), len(base))), range(len(deviations)))
+        if known_columns is None
+        else (known_columns[0].copy(), known_columns[1])
     )
-    for number, column in zip(numbers, map_(moved, numbers), strict=True):  # type: ignore[operator]
+    for number, column in zip(numbers, map_(difference_column, numbers), strict=True):  # type: ignore[operator]
         columns[number] = column
-    return Sensitivity(at, columns, columns @ columns.T)
+    return Sensitivity(deviations, columns, columns @ columns.T)
 
 
 def fit(
-    measure: ErrorMeasure, tuning: Tuning, start: Fitted, known: Sensitivity, rounds: int, map_: object = map
+    measure: ErrorMeasure, tuning: Tuning, start: Fitted, jacobian: Sensitivity, rounds: int, map_: object = map
 ) -> Fitted:
-    """The best fit within a number of Gauss-Newton steps; never worse than the start. known: sensitivity to the model's
-    parameters, computed at a point nearby. map_: as for `sensitivity`."""
+    """The best fit within a number of Gauss-Newton steps; never worse than the start. jacobian: sensitivity to the
+    model's parameters, computed at a point nearby. map_: as for `sensitivity`."""
     best = start
     for _ in range(rounds):
-        better = _gauss_newton_step(measure, tuning, best, known, map_)
-        if better is None:
+        next_fit = _gauss_newton_step(measure, tuning, best, jacobian, map_)
+        if next_fit is None:
             return best
-        gained = best.cost - better.cost
-        best = better
-        if gained < 1e-4 * best.cost:
+        cost_decrease = best.cost - next_fit.cost
+        best = next_fit
+        if cost_decrease < 1e-4 * best.cost:
             break
     return best
 
 
-def expect_gain(gained: float, before: float) -> float:
-    """Reduction of the cost expected of the next fit, after `gained` by the last fit and `before` by the fit before it:
-    reductions shrink about geometrically."""
-    return gained * min(gained / before, 1.0) if before > 0 else gained
+def expect_gain(last_decrease: float, previous_decrease: float) -> float:
+    """Expected decrease of the cost by the next fit, from those by the last two: they shrink about geometrically."""
+    return last_decrease * min(last_decrease / previous_decrease, 1.0) if previous_decrease > 0 else last_decrease
 
 
 def evaluate_fit(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis) -> Fitted:
@@ -176,71 +177,71 @@ def _cost(errors: FloatArray, deviations: FloatArray) -> float:
 
 
 def _gauss_newton_step(
-    measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensitivity, map_: object
+    measure: ErrorMeasure, tuning: Tuning, iterate: Fitted, jacobian: Sensitivity, map_: object
 ) -> Fitted | None:
     """The fit after one step; None where no step lowers the cost, or a derivative is not finite."""
-    errors = residuals_to_fit(measure, from_.residuals)
-    own = hypothesis_sensitivity(measure, tuning, from_, errors, map_)
-    t = len(from_.deviations)
+    errors = residuals_to_fit(measure, iterate.residuals)
+    effect_columns = hypothesis_sensitivity(measure, tuning, iterate, errors, map_)
+    t = len(iterate.deviations)
     with np.errstate(over="ignore", invalid="ignore"):
-        cross = known.on(own)
-        products = np.block([[known.squares + np.eye(t), cross], [cross.T, own @ own.T]])
-        rhs = np.concatenate([known.on(errors) - from_.deviations, own @ errors])
+        cross = jacobian.multiply(effect_columns)
+        products = np.block([[jacobian.gram + np.eye(t), cross], [cross.T, effect_columns @ effect_columns.T]])
+        rhs = np.concatenate([jacobian.multiply(errors) - iterate.deviations, effect_columns @ errors])
     if not (np.isfinite(products).all() and np.isfinite(rhs).all()):
         # A parameter made the simulation diverge.
         return None
-    return take_step(measure, tuning, from_, (products, rhs))
+    return take_step(measure, tuning, iterate, (products, rhs))
 
 
 def take_step(
     measure: ErrorMeasure,
     tuning: Tuning,
-    from_: Fitted,
+    iterate: Fitted,
     system: tuple[FloatArray, FloatArray],
     dampings: Dampings = DAMPINGS,
 ) -> Fitted | None:
     """The fit after a damped Gauss-Newton step within the bounds; None where no damping lowers the cost. system: normal
     matrix and right side, of the model's parameters, then the hypothesis's."""
-    t = len(from_.deviations)
-    now = np.concatenate([from_.deviations, from_.hypothesis.point])
-    low, high = (bound - now for bound in _bounds(from_.hypothesis, tuning))
-    longest = _longest(from_.hypothesis)
-    low[t:], high[t:] = np.maximum(low[t:], -longest), np.minimum(high[t:], longest)
-    found, impossible = _first_better(measure, tuning, from_, system, (low, high), dampings)
-    if found is None and impossible:
+    t = len(iterate.deviations)
+    unknowns = np.concatenate([iterate.deviations, iterate.hypothesis.point])
+    low, high = (bound - unknowns for bound in _bounds(iterate.hypothesis, tuning))
+    largest_steps = _largest_steps(iterate.hypothesis)
+    low[t:], high[t:] = np.maximum(low[t:], -largest_steps), np.minimum(high[t:], largest_steps)
+    next_fit, impossible = _search_damping(measure, tuning, iterate, system, (low, high), dampings)
+    if next_fit is None and impossible:
         # A mass whose best value is negative must not stop the other parameters: it stays fixed.
-        masses = [place for place, name in enumerate(tuning.names) if name.startswith("mass")]
-        low[masses] = high[masses] = 0.0
-        found, _ = _first_better(measure, tuning, from_, system, (low, high), dampings)
-    return found
+        mass_indices = [index for index, name in enumerate(tuning.names) if name.startswith("mass")]
+        low[mass_indices] = high[mass_indices] = 0.0
+        next_fit, _ = _search_damping(measure, tuning, iterate, system, (low, high), dampings)
+    return next_fit
 
 
-def _first_better(
+def _search_damping(
     measure: ErrorMeasure,
     tuning: Tuning,
-    from_: Fitted,
+    iterate: Fitted,
     system: tuple[FloatArray, FloatArray],
     bounds: tuple[FloatArray, FloatArray],
     dampings: Dampings,
 ) -> tuple[Fitted | None, bool]:
     """The fit after the first of ever shorter steps that lowers the cost, None where none does; and whether any step
     led to an invalid mechanical model. system: normal matrix and right side."""
-    (products, rhs), t, impossible = system, len(from_.deviations), False
+    (products, rhs), t, impossible = system, len(iterate.deviations), False
     # Steps that make the model less stable are refused, unless it is unstable already.
-    grows = is_unstable_within(tuning.tune(from_.deviations), _longest_s(measure))
-    for damping, straight in dampings:
+    already_unstable = is_unstable_within(tuning.tune(iterate.deviations), _longest_s(measure))
+    for damping, along_values in dampings:
         step = solve_bounded_step(products + damping * np.diag(np.diagonal(products)), rhs, *bounds)
-        there = move_point(from_.hypothesis, step[t:], straight)
+        trial_hypothesis = move_point(iterate.hypothesis, step[t:], along_values)
         try:
-            model = tuning.tune(from_.deviations + step[:t])
-            if not grows and is_unstable_within(model, _longest_s(measure)):
+            model = tuning.tune(iterate.deviations + step[:t])
+            if not already_unstable and is_unstable_within(model, _longest_s(measure)):
                 continue
-            tried = evaluate_fit(measure, tuning, from_.deviations + step[:t], there)
+            trial = evaluate_fit(measure, tuning, iterate.deviations + step[:t], trial_hypothesis)
         except (MechanicalModelError, np.linalg.LinAlgError):
             impossible = True
             continue
-        if tried.cost < from_.cost * (1 - 1e-9):
-            return tried, impossible
+        if trial.cost < iterate.cost * (1 - 1e-9):
+            return trial, impossible
     return None, impossible
 
 
@@ -249,49 +250,48 @@ def _longest_s(measure: ErrorMeasure) -> float:
 
 
 def hypothesis_sensitivity(
-    measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray, map_: object = map
+    measure: ErrorMeasure, tuning: Tuning, iterate: Fitted, errors: FloatArray, map_: object = map
 ) -> FloatArray:
-    """(parameters, samples): change of the prediction per unit of each coordinate of the hypothesis, -de/dp. errors:
-    residuals to fit at `from_`."""
-    model: MechanicalModel = tuning.tune(from_.deviations)
-    moves = [free.move for free in from_.hypothesis.parameters]
+    """(parameters, samples): -de/dp, change of the prediction per coordinate. errors: residuals to fit at `iterate`."""
+    model: MechanicalModel = tuning.tune(iterate.deviations)
+    steps = [free.difference_step for free in iterate.hypothesis.parameters]
 
-    def moved(number: int) -> FloatArray:
-        point, move = from_.hypothesis.point.copy(), moves[number]
-        point[number] += move
+    def difference_column(number: int) -> FloatArray:
+        point, step = iterate.hypothesis.point.copy(), steps[number]
+        point[number] += step
         with np.errstate(over="ignore", invalid="ignore"):
-            there = measure.residuals(model, from_.hypothesis.list_placed_effects(point))
-            change = errors - residuals_to_fit(measure, there)
-            return np.divide(change, move, out=change)
+            residuals = measure.residuals(model, iterate.hypothesis.list_placed_effects(point))
+            change = errors - residuals_to_fit(measure, residuals)
+            return np.divide(change, step, out=change)
 
-    columns = list(map_(moved, range(len(moves))))  # type: ignore[operator]
-    return np.array(columns).reshape(len(moves), len(errors))
+    columns = list(map_(difference_column, range(len(steps))))  # type: ignore[operator]
+    return np.array(columns).reshape(len(steps), len(errors))
 
 
 def _bounds(hypothesis: Hypothesis, tuning: Tuning) -> tuple[FloatArray, FloatArray]:
-    own = np.array([free.bounds for free in hypothesis.parameters]).reshape(-1, 2)
-    widest = np.full(len(tuning.names), tuning.bound)
-    return np.concatenate([-widest, own[:, 0]]), np.concatenate([widest, own[:, 1]])
+    limits = np.array([free.bounds for free in hypothesis.parameters]).reshape(-1, 2)
+    largest = np.full(len(tuning.names), tuning.bound)
+    return np.concatenate([-largest, limits[:, 0]]), np.concatenate([largest, limits[:, 1]])
 
 
-def _longest(hypothesis: Hypothesis) -> FloatArray:
+def _largest_steps(hypothesis: Hypothesis) -> FloatArray:
     return np.array([LARGEST_STEPS[free.parameter.scale] for free in hypothesis.parameters])
 
 
 def solve_bounded_step(products: FloatArray, rhs: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Least-squares step (t,) within bounds: parameters that would leave their range are fixed at its end (active set).
     products, rhs: matrix (t, t) and right-hand side (t,) of the normal equations."""
-    step, held = np.zeros(len(rhs)), np.zeros(len(rhs), dtype=bool)
+    step, is_fixed = np.zeros(len(rhs)), np.zeros(len(rhs), dtype=bool)
     for _ in range(2 * len(rhs) + 2):
-        free = ~held
-        wanted = step.copy()
-        rest = rhs[free] - products[np.ix_(free, held)] @ step[held]
-        wanted[free] = np.linalg.lstsq(products[np.ix_(free, free)], rest, rcond=1e-14)[0]
-        out = free & ((wanted < low) | (wanted > high))
-        if not out.any():
-            return wanted
-        step[out] = np.clip(wanted[out], low[out], high[out])
-        held |= out
+        is_free = ~is_fixed
+        free_step = step.copy()
+        reduced_rhs = rhs[is_free] - products[np.ix_(is_free, is_fixed)] @ step[is_fixed]
+        free_step[is_free] = np.linalg.lstsq(products[np.ix_(is_free, is_free)], reduced_rhs, rcond=1e-14)[0]
+        is_outside = is_free & ((free_step < low) | (free_step > high))
+        if not is_outside.any():
+            return free_step
+        step[is_outside] = np.clip(free_step[is_outside], low[is_outside], high[is_outside])
+        is_fixed |= is_outside
     return np.clip(step, low, high)
 
 

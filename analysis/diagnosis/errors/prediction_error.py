@@ -48,12 +48,12 @@ def prediction_error(recording: Recording, model: MechanicalModel, part: Part) -
     the gain factor is fitted to the other samples."""
     measure = measure_of((recording,), model).measure
     measured, predicted, tested, fitted = [], [], [], []
-    for record, left in zip(measure.records, measure.residuals(model, ()), strict=True):
-        known = np.isfinite(record.measured).all(axis=1)
+    for record, residual in zip(measure.records, measure.residuals(model, ()), strict=True):
+        is_complete = np.isfinite(record.measured).all(axis=1)
         measured.append(record.measured)
-        predicted.append(record.measured - left * measure.unit)
-        tested.append((record.test if part == "test" else record.test | record.fit | record.choose) & known)
-        fitted.append((record.fit | record.choose) & known)
+        predicted.append(record.measured - residual * measure.unit)
+        tested.append((record.test if part == "test" else record.test | record.fit | record.choose) & is_complete)
+        fitted.append((record.fit | record.choose) & is_complete)
     # y: measured, f: predicted, (n, c) each.
     y, f = np.vstack(measured), np.vstack(predicted)
     test, fit = np.concatenate(tested), np.concatenate(fitted)
@@ -90,5 +90,5 @@ def _normalised_rms(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
         return None
     with np.errstate(over="ignore", invalid="ignore"):
         size = np.maximum(np.std(y[mask], axis=0), np.finfo(float).tiny)
-        whole = float(np.sqrt(np.mean(np.mean((y - f)[mask] ** 2, axis=0) / size**2)))
-    return whole if np.isfinite(whole) else None
+        mean_error = float(np.sqrt(np.mean(np.mean((y - f)[mask] ** 2, axis=0) / size**2)))
+    return mean_error if np.isfinite(mean_error) else None

@@ -73,8 +73,8 @@ class Tuning:
         """Whether damping and stiffness stay physical with these deviations (parameters,): positive semidefinite, or no
         more indefinite than in the given model. With the wider bound a parameter may vanish or change its sign. Raises
         as `tune`."""
-        tuned, given = self.tune(deviations), self.model
-        return _is_as_definite(tuned.damping, given.damping) and _is_as_definite(tuned.stiffness, given.stiffness)
+        tuned, original = self.tune(deviations), self.model
+        return _is_as_definite(tuned.damping, original.damping) and _is_as_definite(tuned.stiffness, original.stiffness)
 
     def values(self, deviations: FloatArray) -> FloatArray:
         """(parameters,): deviations, in standard deviations, as changes of the parameters, SI or relative."""
@@ -89,18 +89,18 @@ def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     axes = [f"{input_channels[i]}{'' if i == j else ' ' + input_channels[j]}" for i, j in pairs]
     modes = range(len(split.frequency_hz))
-    names = [f"{what} {axis}" for what in ("mass", "damping", "stiffness") for axis in axes]
+    names = [f"{quantity} {axis}" for quantity in ("mass", "damping", "stiffness") for axis in axes]
     names += [
-        f"{what} of the mode at {split.frequency_hz[k]:.3g} Hz"
-        for what in ("frequency", "mass", "damping")
+        f"{quantity} of the mode at {split.frequency_hz[k]:.3g} Hz"
+        for quantity in ("frequency", "mass", "damping")
         for k in modes
     ]
     tolerance = model.tolerance or UNSTATED
     relative = UNSTATED.modes if tolerance.modes is None else tolerance.modes
     assert relative is not None
     grounded = [
-        _read_stated_deviation(stated, matrix[:m, :m])
-        for stated, matrix in (
+        _read_stated_deviation(stated_deviation, matrix[:m, :m])
+        for stated_deviation, matrix in (
             (tolerance.mass_kg, split.mass),
             (tolerance.damping_n_s_per_m, split.damping),
             (tolerance.stiffness_n_per_m, split.stiffness),
@@ -108,7 +108,7 @@ def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning
     ]
     deviation = np.concatenate(
         [np.full(len(pairs), deviation) for deviation in grounded]
-        + [np.full(len(modes), relative * more) for more in (1.0, 1.0, DAMPING_PER_MODES)]
+        + [np.full(len(modes), relative * factor) for factor in (1.0, 1.0, DAMPING_PER_MODES)]
     )
     units = [matrix_unit(part, model.system) for part in MATRIX_UNITS]
     return Tuning(
@@ -120,10 +120,10 @@ def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning
     )
 
 
-def _is_as_definite(matrix: FloatArray, given: FloatArray) -> bool:
-    """Whether the smallest eigenvalue of the symmetric part is not negative, or no smaller than that of `given`."""
-    least, before = (float(eigvalsh((each + each.T) / 2)[0]) for each in (matrix, given))
-    return least >= min(before, 0.0) - ROUNDING * float(np.abs(given).max())
+def _is_as_definite(matrix: FloatArray, original: FloatArray) -> bool:
+    """Whether the smallest eigenvalue of the symmetric part is not negative, or no smaller than that of `original`."""
+    smallest, original_smallest = (float(eigvalsh((square + square.T) / 2)[0]) for square in (matrix, original))
+    return smallest >= min(original_smallest, 0.0) - ROUNDING * float(np.abs(original).max())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,11 +139,11 @@ class _Split:
     """(modes,): natural frequencies with the driven axes held."""
 
 
-def _read_stated_deviation(stated: float | None, grounded: FloatArray) -> float:
+def _read_stated_deviation(deviation: float | None, grounded: FloatArray) -> float:
     """One standard deviation of the entries of a block (m, m) at the driven axes: as stated, else `UNSTATED_SHARE` of
     the largest diagonal entry; above 0 even where the block is 0."""
-    if stated is not None:
-        return stated
+    if deviation is not None:
+        return deviation
     return UNSTATED_SHARE * float(np.abs(np.diagonal(grounded)).max()) or UNSTATED_SHARE
 
 
@@ -151,19 +151,22 @@ def _split(model: MechanicalModel) -> _Split:
     """The model in Craig-Bampton coordinates: constraint modes (static shapes) of the driven axes, then fixed-interface
     modes."""
     driven = driven_axes(model)
-    inner = null_space(driven.T)
+    interior_basis = null_space(driven.T)
     m = driven.shape[1]
     # Dual basis of the driven axes, so that a force along one axis moves that axis alone.
     axes = driven @ np.linalg.inv(driven.T @ driven)
     basis = axes
     frequency = np.zeros(0)
-    if inner.shape[1]:
-        inner_stiffness, inner_mass = inner.T @ model.stiffness @ inner, inner.T @ model.mass @ inner
-        eigenvalues, shapes = eigh((inner_stiffness + inner_stiffness.T) / 2, inner_mass)
+    if interior_basis.shape[1]:
+        interior_stiffness, interior_mass = (
+            interior_basis.T @ model.stiffness @ interior_basis,
+            interior_basis.T @ model.mass @ interior_basis,
+        )
+        eigenvalues, shapes = eigh((interior_stiffness + interior_stiffness.T) / 2, interior_mass)
         frequency = np.sqrt(np.maximum(eigenvalues, 0.0)) / (2 * np.pi)
         # Static deflection of the inner coordinates with the axes, so that axes and modes share no stiffness.
-        static = -np.linalg.lstsq(inner_stiffness, inner.T @ model.stiffness @ axes, rcond=None)[0]
-        basis = np.hstack([axes + inner @ static, inner @ shapes])
+        static = -np.linalg.lstsq(interior_stiffness, interior_basis.T @ model.stiffness @ axes, rcond=None)[0]
+        basis = np.hstack([axes + interior_basis @ static, interior_basis @ shapes])
     mass, damping, stiffness = (
         np.asarray(basis.T @ matrix @ basis) for matrix in (model.mass, model.damping, model.stiffness)
     )

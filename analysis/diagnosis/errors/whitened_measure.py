@@ -1,4 +1,4 @@
-"""Error measure with prewhitened residuals, and its whitening filter.
+"""Error measure with prewhitened residuals, and its whitening filter. Used by `learn_model_error`.
 
 The whitened residual is the one-step prediction error of an AR(p) model of the residual r that a re-tuned model leaves
 on reference recordings,
@@ -33,7 +33,7 @@ from equalizer.signals.signal import FloatArray
 MOST_LAGS, SAMPLES_PER_LAG = 64, 50
 """Largest order p of the autoregression, and least samples per lag: with fewer, the coefficients are mostly noise.
 Both were set by hand."""
-FLAT = 1e-4
+WHITE_SHARE = 1e-4
 """White noise added to the residual before the fit, as a share of its power: no frequency weighs more than 1 / FLAT
 times what it would in a flat spectrum of this power, and the Toeplitz matrix stays well conditioned."""
 
@@ -52,30 +52,34 @@ class WhiteningFilter:
 
     def apply(self, residual: FloatArray) -> FloatArray:
         """(n, c): the residual (n, c) through the causal filter; unknown samples count as 0 and stay NaN."""
-        known = np.isfinite(residual)
-        filled = np.where(known, residual, 0.0)
+        is_known = np.isfinite(residual)
+        padded_residual = np.where(is_known, residual, 0.0)
         # Padded by the filter's length, so that the circular convolution of the FFT is a linear one.
-        padded = next_fast_len(len(residual) + self.lags, True)
-        filtered = irfft(rfft(filled, padded, axis=0) * rfft(self.coefficients, padded, axis=0), padded, axis=0)
-        return np.where(known, filtered[: len(residual)], np.nan)
+        padded_length = next_fast_len(len(residual) + self.lags, True)
+        filtered = irfft(
+            rfft(padded_residual, padded_length, axis=0) * rfft(self.coefficients, padded_length, axis=0),
+            padded_length,
+            axis=0,
+        )
+        return np.where(is_known, filtered[: len(residual)], np.nan)
 
     def has_full_history(self, residual: FloatArray) -> Mask:
         """(n,): mask of the samples of a residual (n, c) for which all samples that the filter uses are known."""
         unknown = np.concatenate([np.ones(self.lags), ~np.isfinite(residual).all(axis=1)])
-        until = np.concatenate([[0.0], np.cumsum(unknown)])
-        return np.asarray(until[self.lags + 1 :] == until[: len(residual)], dtype=np.bool_)
+        unknown_before = np.concatenate([[0.0], np.cumsum(unknown)])
+        return np.asarray(unknown_before[self.lags + 1 :] == unknown_before[: len(residual)], dtype=np.bool_)
 
 
-def whitening_filter(residuals: Sequence[FloatArray], least: FloatArray) -> WhiteningFilter:
+def fit_whitening_filter(residuals: Sequence[FloatArray], white_noise_rms: FloatArray) -> WhiteningFilter:
     """Autoregression fitted to residuals by Yule-Walker, channel by channel. residuals: (n, c) each, NaN where not
-    known. least: (c,), rms of white noise in the residuals' unit, which bounds the spectrum from below."""
+    known. white_noise_rms: (c,), rms of white noise in the residuals' unit, which bounds the spectrum from below."""
     count = sum(int(np.isfinite(residual).all(axis=1).sum()) for residual in residuals)
     lags = int(np.clip(count // SAMPLES_PER_LAG, 1, MOST_LAGS))
     autocovariance: FloatArray = np.sum(
         [compute_lagged_products(residual, lags) for residual in residuals], axis=0
     ) / max(count, 1)
-    autocovariance[0] = autocovariance[0] * (1 + FLAT) + least**2
-    coefficients = np.zeros((lags + 1, len(least)))
+    autocovariance[0] = autocovariance[0] * (1 + WHITE_SHARE) + white_noise_rms**2
+    coefficients = np.zeros((lags + 1, len(white_noise_rms)))
     coefficients[0] = 1.0
     for c, row in enumerate(autocovariance.T):
         coefficients[1:, c] = -solve_toeplitz(row[:-1], row[1:])
@@ -87,7 +91,7 @@ class WhitenedMeasure:
     """An error measure (`ErrorMeasure`) of whitened residuals. Samples count only where all samples that the filter
     uses are known."""
 
-    plain: ErrorMeasure
+    base_measure: ErrorMeasure
     whitening: WhiteningFilter
     unit: FloatArray
     """(c,): divisor of the whitened residuals, in each channel's own unit: the noise, with a floor added in
@@ -99,43 +103,45 @@ class WhitenedMeasure:
 
     @property
     def name(self) -> str:
-        return self.plain.name
+        return self.base_measure.name
 
     @property
     def records(self) -> tuple[Observed, ...]:
-        return self.plain.records
+        return self.base_measure.records
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
-        return replace(self, plain=self.plain.with_records(records))
+        return replace(self, base_measure=self.base_measure.with_records(records))
 
     def with_floor(self, rms: FloatArray) -> Self:
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shorten(self) -> Self:
-        return replace(self, plain=self.plain.shorten())
+        return replace(self, base_measure=self.base_measure.shorten())
 
     def can_observe(self, effect: Effect) -> bool:
-        return self.plain.can_observe(effect)
+        return self.base_measure.can_observe(effect)
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        plain = self.plain.residuals(model, effects)
+        base_residuals = self.base_measure.residuals(model, effects)
         # The filter was fitted to residuals in the channels' units, those of the plain measure are in units of noise.
-        return tuple(self.whitening.apply(residual * self.plain.unit) / self.unit for residual in plain)
+        return tuple(self.whitening.apply(residual * self.base_measure.unit) / self.unit for residual in base_residuals)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
         """Evidence from the residuals before whitening: estimators of starting values need time series."""
-        return self.plain.evidence(model, effects, self.plain.residuals(model, effects))
+        return self.base_measure.evidence(model, effects, self.base_measure.residuals(model, effects))
 
 
-def whiten_measure(plain: ErrorMeasure, whitening: WhiteningFilter, noise: FloatArray) -> WhitenedMeasure:
+def whiten_measure(base_measure: ErrorMeasure, whitening: WhiteningFilter, noise: FloatArray) -> WhitenedMeasure:
     """The measure with whitened residuals. noise: (c,), see `WhitenedMeasure`."""
-    records = tuple(_leave_out_warm_up(record, whitening) for record in plain.records)
-    return WhitenedMeasure(plain.with_records(records), whitening, noise, noise)
+    records = tuple(_leave_out_warm_up(record, whitening) for record in base_measure.records)
+    return WhitenedMeasure(base_measure.with_records(records), whitening, noise, noise)
 
 
 def _leave_out_warm_up(record: Observed, whitening: WhiteningFilter) -> Observed:
     """The record without roles for samples whose filter output depends on unknown samples."""
-    full = whitening.has_full_history(record.measured)
-    return replace(record, fit=record.fit & full, choose=record.choose & full, test=record.test & full)
+    has_history = whitening.has_full_history(record.measured)
+    return replace(
+        record, fit=record.fit & has_history, choose=record.choose & has_history, test=record.test & has_history
+    )

@@ -2,7 +2,7 @@
 
 For plants without a restoring force, whose free simulation would drift. The estimated state is not exact, so that the
 residuals of each window are projected on the complement of its free motions from other initial states (least squares):
-only the error that no initial state explains counts.
+only the error that no initial state explains counts. Chosen by `choose_measure`.
 """
 
 from collections.abc import Sequence
@@ -15,23 +15,23 @@ from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motio
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
 from analysis.diagnosis.errors.error_measure_rule import WINDOW_S
-from analysis.diagnosis.errors.evidence_from_residuals import without_gaps
+from analysis.diagnosis.errors.evidence_from_residuals import fill_gaps
 from analysis.diagnosis.errors.free_simulation import predict_channels
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
-from equalizer.effects.simulation.along_motion import actuator_force
-from equalizer.effects.simulation.bodies import Restarts, bodies_of
+from equalizer.effects.simulation.bodies import Restarts, build_bodies
+from equalizer.effects.simulation.forces_along_motion import actuator_force
 from equalizer.effects.simulation.sensor_path import low_pass
 from equalizer.effects.simulation.simulator import Measurement, SimulationResult, simulate_windows
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.plant.linear_simulation import linear_steps
+from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
-_UNSEEN = 1e-9
+_LEAST_SINGULAR_SHARE = 1e-9
 """Least singular value of the free motions, over the largest, for which a direction of the state is fitted."""
 
 
-STATES = 10.0
+READINGS_PER_STATE = 10.0
 """Least readings of a window per fitted state: the fit then absorbs a tenth of the power of random errors at most."""
 
 
@@ -49,7 +49,7 @@ class Windows:
     """(c,): rms noise, in each channel's own unit."""
     window_s: float = WINDOW_S
     """Length of a window (s)."""
-    known: tuple[PlacedEffect, ...] = ()
+    model_effects: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
     """Least error in units of the noise: smaller errors are set to it; 1 with a floor."""
@@ -65,27 +65,32 @@ class Windows:
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shorten(self) -> "Windows":
-        kept = [
+        used_records = [
             (record.shorten(), states)
             for record, states in zip(self.records, self.states, strict=True)
             if (record.fit | record.choose).any()
         ]
-        return replace(self, records=tuple(record for record, _ in kept), states=tuple(states for _, states in kept))
+        return replace(
+            self,
+            records=tuple(record for record, _ in used_records),
+            states=tuple(states for _, states in used_records),
+        )
 
     def can_observe(self, effect: Effect) -> bool:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        every = (*self.known, *effects)
+        all_effects = (*self.model_effects, *effects)
         return tuple(
-            self._simulate_from_states(model, every, *pair)[1] for pair in zip(self.records, self.states, strict=True)
+            self._simulate_from_states(model, all_effects, *pair)[1]
+            for pair in zip(self.records, self.states, strict=True)
         )
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
         return tuple(
-            self._evidence(model, (*self.known, *effects), record, states)
+            self._gather_evidence(model, (*self.model_effects, *effects), record, states)
             for record, states in zip(self.records, self.states, strict=True)
         )
 
@@ -96,7 +101,7 @@ class Windows:
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
-        length = samples_of(self.window_s, recording.sample_rate_hz)
+        length = count_window_samples(self.window_s, recording.sample_rate_hz)
         simulated = simulate_windows(
             model,
             record.command,
@@ -107,12 +112,12 @@ class Windows:
         )
         with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
             residual = (record.measured - predict_channels(simulated, record.measured.shape[1])) / self.unit
-        structure = bodies_of(
-            model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
+        structure = build_bodies(
+            model, [effect for effect in effects if isinstance(effect.effect.action, Structure)]
         ).structure
-        return simulated, self._without_states(structure, residual, recording.sample_rate_hz, length)
+        return simulated, self._remove_state_errors(structure, residual, recording.sample_rate_hz, length)
 
-    def _without_states(
+    def _remove_state_errors(
         self, structure: MechanicalModel, residual: FloatArray, sample_rate_hz: float, length: int
     ) -> FloatArray:
         """(n, c): residuals without their projection on the free motions from other initial states, window by
@@ -120,39 +125,40 @@ class Windows:
         n, c = residual.shape
         # A fit may try an unstable model, whose free motion overflows: its residuals are returned as they are.
         with np.errstate(over="ignore", invalid="ignore"):
-            free = _free_motion(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
-            finite = np.isfinite(residual).all() and np.isfinite(np.sum(free**2))
+            free_motion = _compute_free_motion(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
+            finite = np.isfinite(residual).all() and np.isfinite(np.sum(free_motion**2))
         if not finite:
             return residual
-        whole = n // length * length
-        found = residual.copy()
-        if whole:
-            found[:whole] = _project_out(
-                residual[:whole].reshape(-1, length * c), free.reshape(length * c, -1)
+        full_windows_end = n // length * length
+        projected = residual.copy()
+        if full_windows_end:
+            projected[:full_windows_end] = _project_out(
+                residual[:full_windows_end].reshape(-1, length * c), free_motion.reshape(length * c, -1)
             ).reshape(-1, c)
-        if n > whole:
-            found[whole:] = _project_out(
-                residual[whole:].reshape(1, -1), free[: n - whole].reshape((n - whole) * c, -1)
+        if n > full_windows_end:
+            projected[full_windows_end:] = _project_out(
+                residual[full_windows_end:].reshape(1, -1),
+                free_motion[: n - full_windows_end].reshape((n - full_windows_end) * c, -1),
             ).reshape(-1, c)
-        return found
+        return projected
 
-    def _evidence(
+    def _gather_evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
     ) -> Evidence:
         simulated, residual = self._simulate_from_states(model, effects, record, states)
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
-        entered = actuator_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
-        found = smooth_motion(model, record, entered + simulated.axis_force, self.unit)
-        measured, predicted = without_gaps(record.measured, residual * self.unit, simulated)
+        actuator_forces = actuator_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
+        motion = smooth_motion(model, record, actuator_forces + simulated.axis_force, self.unit)
+        measured, predicted = fill_gaps(record.measured, residual * self.unit, simulated)
         has_position = measured.shape[1] > p
         return Evidence(
             model=model,
             sample_rate_hz=recording.sample_rate_hz,
             command=record.command,
-            axis_position=found.axis_position,
-            axis_velocity=found.axis_velocity,
-            axis_force=found.missing_force,
+            axis_position=motion.axis_position,
+            axis_velocity=motion.axis_velocity,
+            axis_force=motion.missing_force,
             response=measured[:, :p],
             predicted=predicted[:, :p],
             noise=self.noise[:p],
@@ -163,32 +169,34 @@ class Windows:
         )
 
 
-def windows_of(
+def build_windows(
     records: tuple[Observed, ...], model: MechanicalModel, scales: tuple[FloatArray, FloatArray], window_s: float = 1.0
 ) -> Windows:
     """The measure with each window's initial state estimated by a smoother. scales: unit and noise, (c,) each.
     window_s: shortest window, lengthened where it has too few readings for its states. Raises numpy.linalg.LinAlgError
     where the motion cannot be estimated."""
     unit, noise = scales
-    fitted = 2 * len(model.mass) / records[0].measured.shape[1]
-    window_s = max(window_s, STATES * fitted / records[0].recording.sample_rate_hz)
+    states_per_channel = 2 * len(model.mass) / records[0].measured.shape[1]
+    window_s = max(window_s, READINGS_PER_STATE * states_per_channel / records[0].recording.sample_rate_hz)
     states = []
     for record in records:
         rate_hz = record.recording.sample_rate_hz
-        entered = actuator_force(model, record.command, rate_hz, (), record.recording.hold)
-        motion: SmoothedMotion = smooth_motion(add_carried_weight(model, record.recording), record, entered, unit)
-        states.append(motion.states[:: samples_of(window_s, rate_hz)])
+        actuator_forces = actuator_force(model, record.command, rate_hz, (), record.recording.hold)
+        motion: SmoothedMotion = smooth_motion(
+            add_carried_weight(model, record.recording), record, actuator_forces, unit
+        )
+        states.append(motion.states[:: count_window_samples(window_s, rate_hz)])
     return Windows(records, tuple(states), unit, noise, window_s)
 
 
-def samples_of(window_s: float, sample_rate_hz: float) -> int:
+def count_window_samples(window_s: float, sample_rate_hz: float) -> int:
     """Length of a window in samples, at least 1."""
     return max(round(window_s * sample_rate_hz), 1)
 
 
-def _free_motion(structure: MechanicalModel, sample_rate_hz: float, length: int, count: int) -> FloatArray:
+def _compute_free_motion(structure: MechanicalModel, sample_rate_hz: float, length: int, count: int) -> FloatArray:
     """(length, c, 2n): free response of the channels to each unit initial state."""
-    steps = linear_steps(structure, 1 / sample_rate_hz)
+    steps = discretise_model(structure, 1 / sample_rate_hz)
     states = np.empty((length, *steps.advance.shape))
     states[0] = np.eye(len(steps.advance))
     for k in range(1, length):
@@ -198,9 +206,10 @@ def _free_motion(structure: MechanicalModel, sample_rate_hz: float, length: int,
     return np.asarray(outputs[:, :, :count].transpose(0, 2, 1))
 
 
-def _project_out(residual: FloatArray, free: FloatArray) -> FloatArray:
-    """(windows, samples): residuals without their least-squares projection on the columns of `free`, (samples, k)."""
-    size = np.linalg.norm(free, axis=0)
-    along, sizes, _ = np.linalg.svd(free / np.where(size > 0, size, 1.0), full_matrices=False)
-    along = along[:, sizes > _UNSEEN * max(float(sizes[0]), np.finfo(float).tiny)]
-    return np.asarray(residual - (residual @ along) @ along.T)
+def _project_out(residual: FloatArray, free_motion: FloatArray) -> FloatArray:
+    """(windows, samples): residuals without their least-squares projection on the columns of `free_motion`, (samples,
+    k)."""
+    size = np.linalg.norm(free_motion, axis=0)
+    basis, singular_values, _ = np.linalg.svd(free_motion / np.where(size > 0, size, 1.0), full_matrices=False)
+    basis = basis[:, singular_values > _LEAST_SINGULAR_SHARE * max(float(singular_values[0]), np.finfo(float).tiny)]
+    return np.asarray(residual - (residual @ basis) @ basis.T)

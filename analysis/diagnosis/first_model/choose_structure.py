@@ -14,7 +14,7 @@ from analysis.diagnosis.first_model.model_structures import (
     StructureFit,
     StructureRefused,
     balance_recordings,
-    choose_plainest,
+    choose_simplest,
     fit_modal_structure,
     fit_structure,
 )
@@ -39,7 +39,7 @@ class TriedStructure:
     kind: Kind
     error: float | None
     """Root-mean-square error relative to the signal; None where it was refused."""
-    why_not: str
+    refusal: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,110 +53,119 @@ class Choice:
 
 
 def choose_structure(
-    recordings: Sequence[Recording], wanted: Kind | None, on_progress: Callable[[float], None]
+    recordings: Sequence[Recording], requested_kind: Kind | None, on_progress: Callable[[float], None]
 ) -> Choice:
-    """The fitted structure with the reason for it. wanted: None = the best. Raises StructureRefused."""
+    """The fitted structure with the reason for it. requested_kind: None = the best. Raises StructureRefused."""
     try:
-        given: BalancedRecordings | None = balance_recordings(recordings)
-        why = ""
+        balanced: BalancedRecordings | None = balance_recordings(recordings)
+        no_balance_reason = ""
     except NoMotionError as problem:
-        given, why = None, str(problem)
-    if wanted is not None:
-        by_force = given is not None and wanted != "two-mode"
+        balanced, no_balance_reason = None, str(problem)
+    if requested_kind is not None:
+        by_force = balanced is not None and requested_kind != "two-mode"
         fit = (
-            fit_structure(given, wanted) if by_force and given else fit_modal_structure(recordings, wanted, on_progress)
+            fit_structure(balanced, requested_kind)
+            if by_force and balanced
+            else fit_modal_structure(recordings, requested_kind, on_progress)
         )
         return Choice(
-            fit, (TriedStructure(fit.kind, fit.error, ""),), "The structure was requested.", remains(given, fit)
+            fit,
+            (TriedStructure(fit.kind, fit.error, ""),),
+            "The structure was requested.",
+            describe_remaining_error(balanced, fit),
         )
-    fits, tried = _fit_structures(given, recordings, on_progress)
+    fits, trials = _fit_structures(balanced, recordings, on_progress)
     if not fits:
-        raise StructureRefused("; ".join(f"{item.kind}: {item.why_not}" for item in tried))
-    if given is None:
-        ordered = sorted(fits, key=lambda each: each.model.coordinates)
+        raise StructureRefused("; ".join(f"{item.kind}: {item.refusal}" for item in trials))
+    if balanced is None:
+        ordered = sorted(fits, key=lambda fitted: fitted.model.coordinates)
         best = ordered[-1] if ordered[-1].error < (1 - MODES_GAIN) * ordered[0].error else ordered[0]
-        text = f"Structures were compared by the held-out error of a free simulation, because {why}."
-        return Choice(best, tried, text, remains(None, best))
-    best = choose_plainest(fits)
+        text = f"Structures were compared by the held-out error of a free simulation, because {no_balance_reason}."
+        return Choice(best, trials, text, describe_remaining_error(None, best))
+    best = choose_simplest(fits)
     reason = (
         f"{best.kind} is the structure of fewest parameters; no structure with more parameters lowers its "
         f"cross-validated error power significantly (by more than {100 * RICHER_STRUCTURE_GAIN:.0f} %)."
     )
-    return _with_modes(Choice(best, tried, reason, remains(given, best)), recordings, on_progress)
+    return _with_modes(Choice(best, trials, reason, describe_remaining_error(balanced, best)), recordings, on_progress)
 
 
-def remains(given: BalancedRecordings | None, fit: StructureFit) -> str:
+def describe_remaining_error(balanced: BalancedRecordings | None, fit: StructureFit) -> str:
     """A sentence on the model's error, and what it depends on."""
-    left = f"{100 * fit.error:.3g} % of the {fit.compared}"
-    if given is None or fit.joint is None or given.untimed:
-        return f"An error of {left} remains."
-    motions = given.regressions[0].motions
-    left_over = [rows[m.valid_samples(m.fit)] for rows, m in zip(fit.joint.remainders, motions, strict=True)]
+    error_text = f"{100 * fit.error:.3g} % of the {fit.compared}"
+    if balanced is None or fit.joint is None or balanced.untimed:
+        return f"An error of {error_text} remains."
+    motions = balanced.regressions[0].motions
+    remainders = [rows[m.valid_samples(m.fit)] for rows, m in zip(fit.joint.remainders, motions, strict=True)]
     shares = {
-        name: _share([m.decimate(shape(m))[m.valid_samples(m.fit)] for m in motions], left_over)
+        name: _share([m.decimate(shape(m))[m.valid_samples(m.fit)] for m in motions], remainders)
         for name, shape in SHAPES.items()
     }
     name, share = max(shares.items(), key=lambda item: item[1])
     if share < REMAINDER_REPORTED:
-        return f"An error of {left} remains; it depends on neither speed nor position."
-    return f"An error of {left} remains; {100 * share:.0f} % of its power is explained by {name}."
+        return f"An error of {error_text} remains; it depends on neither speed nor position."
+    return f"An error of {error_text} remains; {100 * share:.0f} % of its power is explained by {name}."
 
 
-def _share(columns: Sequence[FloatArray], left: Sequence[FloatArray]) -> float:
+def _share(columns: Sequence[FloatArray], remainders: Sequence[FloatArray]) -> float:
     """Squared correlation of columns with the remainder, the largest over the axes."""
-    x, y = np.vstack(columns), np.vstack(left)
+    x, y = np.vstack(columns), np.vstack(remainders)
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)
     size = np.maximum((x**2).sum(axis=0) * (y**2).sum(axis=0), 1e-300)
     return float(((x * y).sum(axis=0) ** 2 / size).max())
 
 
 def _fit_structures(
-    given: BalancedRecordings | None, recordings: Sequence[Recording], on_progress: Callable[[float], None]
+    balanced: BalancedRecordings | None, recordings: Sequence[Recording], on_progress: Callable[[float], None]
 ) -> tuple[list[StructureFit], tuple[TriedStructure, ...]]:
-    """Fit every structure that the recordings allow. given: for force balances; None where only spectra can be
+    """Fit every structure that the recordings allow. balanced: for force balances; None where only spectra can be
     fitted."""
-    kinds: tuple[Kind, ...] = ("mass-spring", "two-mode") if given is None else ("massless", "motor", "mass-spring")
-    kinds = ("motor", "mass-spring") if given is not None and given.free else kinds
-    fits, tried = [], []
+    kinds: tuple[Kind, ...] = ("mass-spring", "two-mode") if balanced is None else ("massless", "motor", "mass-spring")
+    kinds = ("motor", "mass-spring") if balanced is not None and balanced.free else kinds
+    fits, trials = [], []
     for kind in kinds:
         try:
-            fit = fit_modal_structure(recordings, kind, on_progress) if given is None else fit_structure(given, kind)
+            fit = (
+                fit_modal_structure(recordings, kind, on_progress)
+                if balanced is None
+                else fit_structure(balanced, kind)
+            )
         except StructureRefused as refusal:
-            tried.append(TriedStructure(kind, None, str(refusal)))
+            trials.append(TriedStructure(kind, None, str(refusal)))
             continue
         fits.append(fit)
-        tried.append(TriedStructure(kind, fit.error, ""))
-    return fits, tuple(tried)
+        trials.append(TriedStructure(kind, fit.error, ""))
+    return fits, tuple(trials)
 
 
-def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Callable[[float], None]) -> Choice:
+def _with_modes(choice: Choice, recordings: Sequence[Recording], on_progress: Callable[[float], None]) -> Choice:
     """The choice; a structure with two modes in its place where that leaves less, by `MODES_GAIN`, in a free simulation
     of held-out samples."""
-    if plain.fit.kind != "mass-spring":
-        return plain
+    if choice.fit.kind != "mass-spring":
+        return choice
     if any(is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
-        why = "it is fitted to spectra, which a controller or an imposed motion biases"
-        return _with_tried(plain, TriedStructure("two-mode", None, why))
+        reason = "it is fitted to spectra, which a controller or an imposed motion biases"
+        return _with_tried(choice, TriedStructure("two-mode", None, reason))
     try:
-        other = fit_modal_structure(recordings, "two-mode", on_progress)
+        modal_fit = fit_modal_structure(recordings, "two-mode", on_progress)
     except StructureRefused as refusal:
-        return _with_tried(plain, TriedStructure("two-mode", None, str(refusal)))
+        return _with_tried(choice, TriedStructure("two-mode", None, str(refusal)))
     fit, test = split_fit_and_test(recordings)
-    lines = [found for part in test or fit if (found := segment_lines(*part)) is not None]
+    lines = [segment for part in test or fit if (segment := segment_lines(*part)) is not None]
     ends = [float(bound(line.frequency_hz[line.excited])) for line in lines for bound in (np.min, np.max)]
     errors = [
         float(simulation_errors(model, lines, (min(ends), max(ends)))[0][-1])
-        for model in (plain.fit.model, other.model)
+        for model in (choice.fit.model, modal_fit.model)
     ]
     text = (
         f"In a free simulation the error of mass-spring is {100 * errors[0]:.3g} %, that of two-mode "
         f"{100 * errors[1]:.3g} %."
     )
     if errors[1] < (1 - MODES_GAIN) * errors[0]:
-        tried = (*plain.tried, TriedStructure("two-mode", other.error, ""))
-        return Choice(other, tried, text, remains(None, other))
-    return _with_tried(plain, TriedStructure("two-mode", other.error, "modes lower the error too little"), text)
+        trials = (*choice.tried, TriedStructure("two-mode", modal_fit.error, ""))
+        return Choice(modal_fit, trials, text, describe_remaining_error(None, modal_fit))
+    return _with_tried(choice, TriedStructure("two-mode", modal_fit.error, "modes lower the error too little"), text)
 
 
-def _with_tried(plain: Choice, tried: TriedStructure, text: str = "") -> Choice:
-    return Choice(plain.fit, (*plain.tried, tried), f"{plain.reason} {text}".rstrip(), plain.remains)
+def _with_tried(choice: Choice, trial: TriedStructure, text: str = "") -> Choice:
+    return Choice(choice.fit, (*choice.tried, trial), f"{choice.reason} {text}".rstrip(), choice.remains)

@@ -19,16 +19,16 @@ from analysis.diagnosis.data.recorded_conditions import has_carried_weight
 from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.model_from_balance import plain_model
 from analysis.diagnosis.first_model.model_structures import (
-    HELD_FIXED,
+    FIXED_SHARE,
     Kind,
     StructureRefused,
     balance_recordings,
     fit_structure,
 )
-from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
+from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, should_use_rigid_model
 from analysis.diagnosis.settings import LEAST_MODEL_ANSWER
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
-from analysis.wording import as_sentence
+from analysis.wording import format_sentence
 from equalizer.effects.simulation.simulator import simulate_response
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
@@ -68,16 +68,16 @@ def first_model_of(
     _require_no_weight(recordings)
     on_progress("testing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(without), time_left, map_)
-    free = is_read_as_free(recordings[0])
+    is_free = is_read_as_free(recordings[0])
     if (
-        not free
+        not is_free
         and any(map(is_quasi_static, recordings))
-        and (still := _plain_structure(recordings, "massless")) is not None
+        and (static_model := _plain_structure(recordings, "massless")) is not None
     ):
-        return FirstModel(still, (UNTIMED_REMARK,), balances)
+        return FirstModel(static_model, (UNTIMED_REMARK,), balances)
     model = plain_model(balances, recordings[0], "fitted to these recordings")
-    if free and (held := model or _free_model(recordings)) is not None:
-        return FirstModel(_hold_mass(held), (FREE_REMARK,), balances)
+    if is_free and (free_model := model or _free_model(recordings)) is not None:
+        return FirstModel(_hold_mass(free_model), (FREE_REMARK,), balances)
     if model is not None:
         return FirstModel(model, (BALANCE_REMARK,), balances)
     on_progress("fitting a linear model, as none was given", 0.5)
@@ -88,9 +88,9 @@ def first_model_of(
 
 
 def _hold_mass(model: MechanicalModel) -> MechanicalModel:
-    """The model with a mass tolerance so small (`HELD_FIXED`) that re-tuning does not change the mass."""
+    """The model with a mass tolerance so small (`FIXED_SHARE`) that re-tuning does not change the mass."""
     assert model.tolerance is not None
-    return replace(model, tolerance=replace(model.tolerance, mass_kg=HELD_FIXED * float(np.abs(model.mass).max())))
+    return replace(model, tolerance=replace(model.tolerance, mass_kg=FIXED_SHARE * float(np.abs(model.mass).max())))
 
 
 def _free_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
@@ -109,32 +109,32 @@ def _plain_structure(recordings: Sequence[Recording], kind: Kind) -> MechanicalM
 
 
 def fit_first_linear_model(
-    recordings: Sequence[Recording], on_progress: Callable[[float], None], whose: str = "these recordings"
+    recordings: Sequence[Recording], on_progress: Callable[[float], None], source: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
-    """A linear model fitted by forces or spectra, with remarks. whose: the recordings in words. Raises
+    """A linear model fitted by forces or spectra, with remarks. source: the recordings in words. Raises
     NothingToDiagnose where no model can be fitted."""
     _require_no_weight(recordings)
-    if wants_rigid_model(recordings) and (rigid := _rigid_model(recordings, whose)) is not None:
+    if should_use_rigid_model(recordings) and (rigid := _rigid_model(recordings, source)) is not None:
         return rigid, (RIGID_REMARK,)
     try:
-        fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {whose}")
-        if not any(_answers(fit.model, recording) for recording in recordings):
+        fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {source}")
+        if not any(_responds_to_commands(fit.model, recording) for recording in recordings):
             raise MechanicalFitRefused("the model that fits best hardly responds to the commands")
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
-        if (rigid := _rigid_model(recordings, whose)) is not None:
+        if (rigid := _rigid_model(recordings, source)) is not None:
             return rigid, (RIGID_REMARK,)
         raise NothingToDiagnose((f"no model was given, and none can be fitted: {refusal}",)) from refusal
     tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on held-out data"
     text = (
-        f"No model was given. A linear model was fitted to {whose} first, with an error of {100 * fit.error:.1f} "
+        f"No model was given. A linear model was fitted to {source} first, with an error of {100 * fit.error:.1f} "
         f"%{tested}, and its masses, dampers and springs may change by much more than that. Physics that its "
         "parameters can represent, such as friction at one level as damping, is part of this model and is therefore "
         "not named."
     )
-    return widen_tolerance(fit.model), (text, *(as_sentence(remark) for remark in fit.remarks))
+    return widen_tolerance(fit.model), (text, *(format_sentence(remark) for remark in fit.remarks))
 
 
-def _answers(model: MechanicalModel, recording: Recording) -> bool:
+def _responds_to_commands(model: MechanicalModel, recording: Recording) -> bool:
     """Whether the commands move the model at all. Where the response depends on them less than on the initial state, as
     on an axis that friction holds, the fitted masses and springs grow without bound."""
     simulated = simulate_response(
@@ -155,11 +155,11 @@ def _require_no_weight(recordings: Sequence[Recording]) -> None:
         )
 
 
-def _rigid_model(recordings: Sequence[Recording], whose: str) -> MechanicalModel | None:
+def _rigid_model(recordings: Sequence[Recording], source: str) -> MechanicalModel | None:
     """A rigid body per command; None where the recordings do not determine it."""
     if not can_be_rigid(recordings):
         return None
     try:
-        return rigid_model(recordings, f"fitted to {whose}")
+        return rigid_model(recordings, f"fitted to {source}")
     except (MechanicalModelError, np.linalg.LinAlgError):
         return None

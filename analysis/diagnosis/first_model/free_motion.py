@@ -25,9 +25,9 @@ from equalizer.signals.signal import FloatArray, Signal
 def is_free_motion(recordings: Sequence[Recording]) -> bool:
     """Whether no command ever changes, and positions or velocities were measured over time."""
     orders = {DERIVATIVE_OF_QUANTITY.get(quantity, 2) for quantity in recordings[0].response.quantities}
-    turning = {unit.startswith("rad") for unit in recordings[0].response.units}
-    alike = len(orders) == 1 and len(turning) == 1
-    return not is_driven(recordings) and alike and max(orders) < 2 and not any(map(is_quasi_static, recordings))
+    rotational = {unit.startswith("rad") for unit in recordings[0].response.units}
+    is_uniform = len(orders) == 1 and len(rotational) == 1
+    return not is_driven(recordings) and is_uniform and max(orders) < 2 and not any(map(is_quasi_static, recordings))
 
 
 def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], str]:
@@ -37,43 +37,54 @@ def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, 
         return tuple(recordings), ""
     response = recordings[0].response
     order, rate_hz = DERIVATIVE_OF_QUANTITY[response.quantities[0]], response.sample_rate_hz
-    moved = [fill_gaps(each.response.samples) for each in recordings]
+    motions = [fill_gaps(recording.response.samples) for recording in recordings]
     # The motion is discontinuous between two parts.
-    parts = [parts_of(each) for each in recordings]
-    cut = [samples[start:stop] for samples, those in zip(moved, parts, strict=True) for start, stop in those]
-    band_hz = band_end_hz(cut, rate_hz, order)
-    turning = response.units[0].startswith("rad")
-    found = []
-    for each, samples, those in zip(recordings, moved, parts, strict=True):
+    parts = [parts_of(recording) for recording in recordings]
+    part_samples = [
+        samples[start:stop]
+        for samples, recording_parts in zip(motions, parts, strict=True)
+        for start, stop in recording_parts
+    ]
+    band_hz = band_end_hz(part_samples, rate_hz, order)
+    is_rotational = response.units[0].startswith("rad")
+    converted = []
+    for recording, samples, recording_parts in zip(recordings, motions, parts, strict=True):
         force = np.zeros_like(samples)
-        for start, stop in those:
+        for start, stop in recording_parts:
             force[start:stop] = -differentiate(samples[start:stop], rate_hz, band_hz, 2 - order)
-        quantity, unit = ("torque", "N m") if turning else ("force", "N")
+        quantity, unit = ("torque", "N m") if is_rotational else ("force", "N")
         command = Signal(force, rate_hz, quantity, unit, response.channels)
-        stated = any(segment.role for segment in each.segments) or len({s.amplitude for s in each.segments}) > 1
-        segments = each.segments if stated else _levels(each, samples)
-        meta = {**each.meta, "imposed": FREE}
-        found.append(replace(each, command=command, excitation=None, segments=segments, meta=meta))
-    what = "inertia (1 kg m^2)" if turning else "mass (1 kg)"
-    return tuple(found), (
+        has_levels = (
+            any(segment.role for segment in recording.segments) or len({s.amplitude for s in recording.segments}) > 1
+        )
+        segments = recording.segments if has_levels else _levels(recording, samples)
+        meta = {**recording.meta, "imposed": FREE}
+        converted.append(replace(recording, command=command, excitation=None, segments=segments, meta=meta))
+    unit_mass = "inertia (1 kg m^2)" if is_rotational else "mass (1 kg)"
+    return tuple(converted), (
         "No command changes: the motion is free and determines forces only relative to the mass. All forces are per "
-        f"unit {what}."
+        f"unit {unit_mass}."
     )
 
 
 def _levels(recording: Recording, samples: FloatArray) -> tuple[Segment, ...]:
     """Segments of at least `DECAY_LEAST_CYCLES` cycles each, with their amplitude: a decaying motion passes through all
     levels, and every level should be among the samples to fit and to test by. samples: (n, p)."""
-    found = []
+    segments = []
     for span in find_moving_spans(samples, parts_of(recording)):
-        moving = samples[span.start : span.end_of_motion]
-        away = moving[:, int(np.argmax(np.ptp(moving, axis=0)))]
-        rest = float(np.median(samples[span.start : span.stop, int(np.argmax(np.ptp(moving, axis=0)))]))
-        cycles = np.count_nonzero(np.diff(np.signbit(away - rest))) / 2
+        motion = samples[span.start : span.end_of_motion]
+        displacement = motion[:, int(np.argmax(np.ptp(motion, axis=0)))]
+        rest_position = float(np.median(samples[span.start : span.stop, int(np.argmax(np.ptp(motion, axis=0)))]))
+        cycles = np.count_nonzero(np.diff(np.signbit(displacement - rest_position))) / 2
         count = int(np.clip(cycles / DECAY_LEAST_CYCLES, 1, DECAY_MOST_LEVELS))
         edges = np.linspace(span.start, span.end_of_motion, count + 1).astype(int)
         for start, stop in pairwise(edges.tolist()):
-            found.append(
-                Segment(start, stop, "free", float(np.abs(away[start - span.start : stop - span.start] - rest).max()))
+            segments.append(
+                Segment(
+                    start,
+                    stop,
+                    "free",
+                    float(np.abs(displacement[start - span.start : stop - span.start] - rest_position).max()),
+                )
             )
-    return tuple(found)
+    return tuple(segments)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.motion import NoMotionError, motions_of
+from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import regression_of
 from analysis.diagnosis.data.measured_motion import is_driven
 from analysis.diagnosis.data.observed_parts import observe_parts
@@ -22,7 +22,7 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 from equalizer.signals.units import UNSTATED
 
-KNOWN = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) - {"voltage"}
+BALANCE_QUANTITIES = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) - {"voltage"}
 """Quantities that a force balance can use. A voltage is a sensor's reading of an unknown quantity."""
 
 
@@ -31,23 +31,25 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
     empty sentence, where a quantity was stated or none can be assumed. recordings: alike in channels, units and
     rate."""
     first = recordings[0]
-    if set(first.response.quantities) & KNOWN:
+    if set(first.response.quantities) & BALANCE_QUANTITIES:
         return recordings, ""
-    if named := _quantities_in_names(first):
-        return tuple(_with_quantity(each, named) for each in recordings), _sentence_of_names(first, named)
+    if quantities_in_names := _quantities_in_names(first):
+        return tuple(_with_quantity(recording, quantities_in_names) for recording in recordings), _sentence_of_names(
+            first, quantities_in_names
+        )
     if not is_driven(recordings):
         if set(first.response.units) != {UNSTATED}:
             return recordings, ""
-        return tuple(_with_quantity(each, "position") for each in recordings), (
+        return tuple(_with_quantity(recording, "position") for recording in recordings), (
             f"The recording does not state what {conjoin(list(first.response.channels))} measures; it was taken for a "
             "position that moves freely; if it is a speed, state that in the map (quantity)."
         )
-    moved = set(first.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
-    quantity = "force" if moved else _likely_quantity(recordings)
+    is_imposed_motion = set(first.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
+    quantity = "force" if is_imposed_motion else _likely_quantity(recordings)
     if quantity == "position" and set(first.response.quantities) == {"voltage"}:
         return recordings, ""
     names = conjoin(list(first.response.channels))
-    return tuple(_with_quantity(each, quantity) for each in recordings), (
+    return tuple(_with_quantity(recording, quantity) for recording in recordings), (
         f"The recording does not state what {names} measures; it was taken for a {quantity}, as its time series "
         "suggests; if it is another quantity, state that in the map (quantity)."
     )
@@ -58,46 +60,46 @@ def _quantities_in_names(recording: Recording) -> tuple[str, ...]:
     from equalizer.signals.quantity_words import quantity_in  # only where a quantity is missing
 
     response = recording.response
-    found = [
-        named if unit == UNSTATED and (named := quantity_in(name)) in KNOWN else quantity
+    quantities = [
+        inferred if unit == UNSTATED and (inferred := quantity_in(name)) in BALANCE_QUANTITIES else quantity
         for name, unit, quantity in zip(response.channels, response.units, response.quantities, strict=True)
     ]
-    return tuple(found) if set(found) & KNOWN else ()
+    return tuple(quantities) if set(quantities) & BALANCE_QUANTITIES else ()
 
 
 def _sentence_of_names(recording: Recording, quantities: Sequence[str]) -> str:
     """Sentence on the quantities that were taken from names, with the way to correct them."""
-    taken = [
+    phrases = [
         f"{name} was taken for {'an' if quantity.startswith('a') else 'a'} {quantity}"
         for name, quantity in zip(recording.response.channels, quantities, strict=True)
-        if quantity in KNOWN
+        if quantity in BALANCE_QUANTITIES
     ]
-    return f"From the name alone, {conjoin(taken)}; if it is another quantity, state that in the map (quantity)."
+    return f"From the name alone, {conjoin(phrases)}; if it is another quantity, state that in the map (quantity)."
 
 
 def _likely_quantity(recordings: Sequence[Recording]) -> str:
     """Quantity of the first response by the force balance of the first command (see above); a position where the
     balance cannot be computed."""
     count = len(recordings[0].response.channels)
-    taken = [replace(_with_quantity(each, "position"), position=None) for each in recordings]
+    as_positions = [replace(_with_quantity(recording, "position"), position=None) for recording in recordings]
     try:
-        motions = motions_of(observe_parts(taken, count))
+        motions = compute_motions(observe_parts(as_positions, count))
         regression = regression_of(motions, 0, (), turns=False)
     except (NoMotionError, np.linalg.LinAlgError):
         return "position"
-    whole = regression.columns_of(())
+    all_columns = regression.columns_of(())
     power = max(sum(block.signal for block in regression.fit), 1e-300)
     if not np.isfinite(motions[0].band_hz):
         return "position"
 
     def error_without(columns: Sequence[int]) -> float:
         """Increase of the cross-validated error without these columns, relative to the power."""
-        without = regression.cross_validated_errors([k for k in whole if k not in columns])
-        return float((without - regression.cross_validated_errors(whole)).sum()) / power
+        errors_without = regression.cross_validated_errors([k for k in all_columns if k not in columns])
+        return float((errors_without - regression.cross_validated_errors(all_columns)).sum()) / power
 
     d = len(motions[0].channels)
-    second_derivative, itself = error_without(range(d)), error_without(range(2 * d, 3 * d))
-    return "velocity" if second_derivative < DERIVATIVE_NEEDED <= itself else "position"
+    derivative_needed, response_needed = error_without(range(d)), error_without(range(2 * d, 3 * d))
+    return "velocity" if derivative_needed < DERIVATIVE_NEEDED <= response_needed else "position"
 
 
 def _with_quantity(recording: Recording, quantity: str | tuple[str, ...]) -> Recording:

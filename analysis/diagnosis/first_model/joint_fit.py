@@ -70,24 +70,30 @@ def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> Joint
     determine them."""
     shape = _parametrisation(regressions[0], parts)
     powers = [max(signal_power(regression.fit), 1e-300) for regression in regressions]
-    own = _products([regression.fit for regression in regressions], shape, powers)
-    whole = np.sum([each[0] for each in own], axis=0), np.sum([each[1] for each in own], axis=0)
-    found, spread = _solve(whole), _standard_errors(own, whole)
+    block_equations = _products([regression.fit for regression in regressions], shape, powers)
+    normal_equations = (
+        np.sum([equations[0] for equations in block_equations], axis=0),
+        np.sum([equations[1] for equations in block_equations], axis=0),
+    )
+    parameters, spread = _solve(normal_equations), _standard_errors(block_equations, normal_equations)
     fit = [regression.fit for regression in regressions]
-    crossed = [_solve((whole[0] - gram, whole[1] - cross)) for gram, cross in own]
-    folds = _errors(fit, shape, crossed)
+    fold_parameters = [
+        _solve((normal_equations[0] - gram, normal_equations[1] - cross)) for gram, cross in block_equations
+    ]
+    folds = _errors(fit, shape, fold_parameters)
     test = [regression.test for regression in regressions]
-    tested = len(test[0]) >= LEAST_TEST_BLOCKS and any(map(held_out_moves, regressions))
-    held = _errors(test, shape, [found] * len(test[0])) if tested else folds
-    sizes = np.array([max(signal_power(blocks), 1e-300) for blocks in (test if tested else fit)])
-    folded = (folds / np.array(powers)).mean(axis=1)
-    matrices, deviations = (_matrices(regressions[0], shape, values) for values in (found, spread))
-    reach = float(stdtrit(max(len(own) - 1, 1), 0.975))
+    has_test = len(test[0]) >= LEAST_TEST_BLOCKS and any(map(held_out_moves, regressions))
+    test_errors = _errors(test, shape, [parameters] * len(test[0])) if has_test else folds
+    sizes = np.array([max(signal_power(blocks), 1e-300) for blocks in (test if has_test else fit)])
+    fold_errors = (folds / np.array(powers)).mean(axis=1)
+    matrices, deviations = (_matrices(regressions[0], shape, values) for values in (parameters, spread))
+    t_factor = float(stdtrit(max(len(block_equations) - 1, 1), 0.975))
     biases = {part: ACCELERATION_NOISE_SHARE * np.abs(matrices[part]) for part in PARTS}
-    halves = {part: np.hypot(reach * deviations[part], biases[part]) for part in PARTS}
+    halves = {part: np.hypot(t_factor * deviations[part], biases[part]) for part in PARTS}
     return JointFit(
-        matrices, halves, {part: float(np.diagonal(deviations[part]).max()) for part in PARTS}, folded,
-        float(np.sqrt(folded.sum())), np.sqrt(held.sum(axis=0) / sizes), _remainders(regressions, shape, found),
+        matrices, halves, {part: float(np.diagonal(deviations[part]).max()) for part in PARTS}, fold_errors,
+        float(np.sqrt(fold_errors.sum())), np.sqrt(test_errors.sum(axis=0) / sizes),
+        _remainders(regressions, shape, parameters),
     )  # fmt: skip
 
 
@@ -99,9 +105,9 @@ def _parametrisation(regression: Regression, parts: Sequence[Part]) -> _Parametr
     for axis in range(axes):
         row = np.zeros((len(columns), len(entries) + axes))
         for number, (part, i, k) in enumerate(entries):
-            begin = list(parts).index(part) * axes
+            first_row = list(parts).index(part) * axes
             if axis in (i, k):
-                row[begin + (k if axis == i else i), number] = 1.0
+                row[first_row + (k if axis == i else i), number] = 1.0
         row[-1, len(entries) + axis] = 1.0
         rows.append(regression.scale[columns][:, None] * row)
     return _Parametrisation(columns, tuple(rows), entries)
@@ -111,15 +117,15 @@ def _products(
     blocks: Sequence[Sequence[Block]], shape: _Parametrisation, powers: Sequence[float]
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Normal equations of the joint parameters, per block. powers: of each axis's force."""
-    found = []
-    for each in zip(*blocks, strict=True):
+    equations = []
+    for axis_blocks in zip(*blocks, strict=True):
         count = shape.rows[0].shape[1]
         gram, cross = np.zeros((count, count)), np.zeros(count)
-        for block, row, power in zip(each, shape.rows, powers, strict=True):
-            own = block_products(block, shape.columns)
-            gram, cross = gram + row.T @ own[0] @ row / power, cross + row.T @ own[1] / power
-        found.append((gram, cross))
-    return found
+        for block, row, power in zip(axis_blocks, shape.rows, powers, strict=True):
+            products = block_products(block, shape.columns)
+            gram, cross = gram + row.T @ products[0] @ row / power, cross + row.T @ products[1] / power
+        equations.append((gram, cross))
+    return equations
 
 
 def _solve(products: tuple[FloatArray, FloatArray]) -> FloatArray:
@@ -128,15 +134,17 @@ def _solve(products: tuple[FloatArray, FloatArray]) -> FloatArray:
     return np.asarray(np.linalg.solve(products[0] / np.outer(size, size), products[1] / size) / size)
 
 
-def _standard_errors(own: Sequence[tuple[FloatArray, FloatArray]], whole: tuple[FloatArray, FloatArray]) -> FloatArray:
+def _standard_errors(
+    block_equations: Sequence[tuple[FloatArray, FloatArray]], normal_equations: tuple[FloatArray, FloatArray]
+) -> FloatArray:
     """(parameters,): sandwich standard errors, the root of the diagonal of G^-1 (sum of s s') G^-1 b / (b - 1), with
     the normal matrix G, and the gradient s of each of the b blocks."""
-    found = _solve(whole)
-    size = np.sqrt(np.maximum(np.diagonal(whole[0]), 1e-300))
-    inverse = np.linalg.inv(whole[0] / np.outer(size, size)) / np.outer(size, size)
-    scores = np.array([cross - gram @ found for gram, cross in own])
-    wide = len(own) / max(len(own) - 1, 1)
-    return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ (wide * scores.T @ scores) @ inverse), 0.0)))
+    parameters = _solve(normal_equations)
+    size = np.sqrt(np.maximum(np.diagonal(normal_equations[0]), 1e-300))
+    inverse = np.linalg.inv(normal_equations[0] / np.outer(size, size)) / np.outer(size, size)
+    scores = np.array([cross - gram @ parameters for gram, cross in block_equations])
+    correction = len(block_equations) / max(len(block_equations) - 1, 1)
+    return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ (correction * scores.T @ scores) @ inverse), 0.0)))
 
 
 def _errors(blocks: Sequence[Sequence[Block]], shape: _Parametrisation, numbers: Sequence[FloatArray]) -> FloatArray:
@@ -145,9 +153,9 @@ def _errors(blocks: Sequence[Sequence[Block]], shape: _Parametrisation, numbers:
         [
             [
                 compute_squared_error(block_products(block, shape.columns), row @ weights, block.power)
-                for block, row in zip(each, shape.rows, strict=True)
+                for block, row in zip(axis_blocks, shape.rows, strict=True)
             ]
-            for each, weights in zip(zip(*blocks, strict=True), numbers, strict=True)
+            for axis_blocks, weights in zip(zip(*blocks, strict=True), numbers, strict=True)
         ]
     )
 
@@ -155,22 +163,22 @@ def _errors(blocks: Sequence[Sequence[Block]], shape: _Parametrisation, numbers:
 def _matrices(regression: Regression, shape: _Parametrisation, values: FloatArray) -> dict[Part, FloatArray]:
     """The symmetric matrices (d, d) that hold the values of the parameters."""
     axes = len(regression.motions[0].channels)
-    found = {part: np.zeros((axes, axes)) for part in PARTS}
+    matrices = {part: np.zeros((axes, axes)) for part in PARTS}
     for (part, i, k), value in zip(shape.entries, values, strict=False):
-        found[part][i, k] = found[part][k, i] = value
-    return found
+        matrices[part][i, k] = matrices[part][k, i] = value
+    return matrices
 
 
 def _remainders(
-    regressions: Sequence[Regression], shape: _Parametrisation, found: FloatArray
+    regressions: Sequence[Regression], shape: _Parametrisation, parameters: FloatArray
 ) -> tuple[FloatArray, ...]:
     """See `JointFit.remainders`."""
-    weights = [row @ found / regressions[0].scale[shape.columns] for row in shape.rows]
+    weights = [row @ parameters / regressions[0].scale[shape.columns] for row in shape.rows]
     return tuple(
         np.column_stack(
             [
-                regression.force[number] - regression.columns[number][:, shape.columns] @ own
-                for regression, own in zip(regressions, weights, strict=True)
+                regression.force[number] - regression.columns[number][:, shape.columns] @ axis_weights
+                for regression, axis_weights in zip(regressions, weights, strict=True)
             ]
         )
         for number in range(len(regressions[0].motions))

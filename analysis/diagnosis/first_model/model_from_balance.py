@@ -27,24 +27,27 @@ def first_model(balances: Sequence[Balance], recording: Recording, name: str) ->
     count = len(balances)
     if count > len(regressions[0].motions[0].channels) or count != len(recording.response.channels):
         return None
-    places = [regression.beside.own for regression in regressions]
-    plain, full = (
-        [_numbers(balance, laws, places) for balance, laws in zip(balances, kinds, strict=True)]
+    driven_channels = [regression.base_terms.driven_channel for regression in regressions]
+    without_laws, with_laws = (
+        [_matrix_rows(balance, laws, driven_channels) for balance, laws in zip(balances, kinds, strict=True)]
         for kinds in (
             [()] * count,
             [tuple(law.place for law in balance.named if law.place >= 0) for balance in balances],
         )
     )
-    matrices = [np.array([row[part] for row in plain]) for part in range(3)]
-    beside = [np.array([row[part] for row in full]) for part in range(3)]
-    mass, damping, stiffness = ((each + each.T) / 2 for each in matrices)
-    floor = MASSLESS_SHARE * _rms(np.vstack([each.force for each in regressions[0].motions]))
-    moved = [np.gradient(each.velocity[:, places], 1 / each.rate_hz, axis=0) for each in regressions[0].motions]
-    floor = floor / np.maximum(_rms(np.vstack(moved)), 1e-300)
+    matrices = [np.array([row[part] for row in without_laws]) for part in range(3)]
+    matrices_with_laws = [np.array([row[part] for row in with_laws]) for part in range(3)]
+    mass, damping, stiffness = ((matrix + matrix.T) / 2 for matrix in matrices)
+    floor = MASSLESS_SHARE * _rms(np.vstack([motion.force for motion in regressions[0].motions]))
+    accelerations = [
+        np.gradient(motion.velocity[:, driven_channels], 1 / motion.rate_hz, axis=0)
+        for motion in regressions[0].motions
+    ]
+    floor = floor / np.maximum(_rms(np.vstack(accelerations)), 1e-300)
     mass = mass + np.diag(np.maximum(floor - np.diagonal(mass), 0.0))
     spread = [
-        float(np.max(np.abs(given - full)) / 2 + FOUND_NUMBERS_OPEN * np.abs(given).max())
-        for given, full in zip((mass, damping, stiffness), beside, strict=True)
+        float(np.max(np.abs(base_entry - with_laws)) / 2 + FOUND_NUMBERS_OPEN * np.abs(base_entry).max())
+        for base_entry, with_laws in zip((mass, damping, stiffness), matrices_with_laws, strict=True)
     ]
     return MechanicalModel(
         name,
@@ -63,7 +66,7 @@ def first_model(balances: Sequence[Balance], recording: Recording, name: str) ->
 def _common_delay_s(balances: Sequence[Balance]) -> float:
     """The delay (s) that all commands share. 0 where their delays differ, because a model has a single delay, and where
     the recordings are reduced, because the reduction already removes the delay."""
-    delays = {balance.search.regression.beside.delay_s for balance in balances}
+    delays = {balance.search.regression.base_terms.delay_s for balance in balances}
     return delays.pop() if len(delays) == 1 and not is_reduced(balances) else 0.0
 
 
@@ -78,42 +81,49 @@ def plain_model(balances: Sequence[Balance], recording: Recording, name: str) ->
         return None
 
 
-def share_within(balances: Sequence[Balance], band_hz: float) -> float:
+def law_power_share_in_band(balances: Sequence[Balance], band_hz: float) -> float:
     """Share of the power of a named law's force at frequencies up to `band_hz`; the smallest over the named laws of the
     motion, 1 without any."""
     shares = [1.0]
     for balance in balances:
         regression = balance.search.regression
         laws = [law.place for law in balance.named if law.place >= 0]
-        weights, begin = regression.weights(regression.columns_of(laws)), regression.base
+        weights, first = regression.weights(regression.columns_of(laws)), regression.base
         for place in (regression.places[law] for law in laws):
-            own = weights[begin : begin + place.stop - place.start]
-            begin += len(own)
+            law_weights = weights[first : first + place.stop - place.start]
+            first += len(law_weights)
             shares.append(
-                _mean_force([rows[:, place] @ own for rows in regression.columns], regression.motions, band_hz)
+                _power_share_in_band(
+                    [rows[:, place] @ law_weights for rows in regression.columns], regression.motions, band_hz
+                )
             )
     return min(shares)
 
 
-def _mean_force(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
+def _power_share_in_band(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
     """Share of the forces' power at frequencies up to `band_hz`. forces: (kept samples,) per motion. The mean over all
     recordings is subtracted, not that of each: where each recording moves in one direction only, the friction differs
     between recordings at frequency zero."""
-    within, whole, mean = 0.0, 1e-300, float(np.mean(np.concatenate(forces)))
+    power_in_band, total_power, mean = 0.0, 1e-300, float(np.mean(np.concatenate(forces)))
     for force, motion in zip(forces, motions, strict=True):
         power = np.abs(np.fft.rfft(force - mean)) ** 2
         frequency_hz = np.fft.rfftfreq(len(force), motion.step / motion.rate_hz)
-        within, whole = within + float(power[frequency_hz <= band_hz].sum()), whole + float(power.sum())
-    return within / whole
+        power_in_band, total_power = (
+            power_in_band + float(power[frequency_hz <= band_hz].sum()),
+            total_power + float(power.sum()),
+        )
+    return power_in_band / total_power
 
 
-def _numbers(balance: Balance, laws: Sequence[int], places: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _matrix_rows(
+    balance: Balance, laws: Sequence[int], driven_channels: Sequence[int]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rows of the mass, damping and stiffness matrices of one balance, fitted together with these laws. places:
     channels of the driven motions. A row that the balance does not fit is zero."""
     regression = balance.search.regression
     weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
     d = len(regression.motions[0].channels)
-    rows = [*weights.reshape(-1, d)[:, list(places)], np.zeros(len(places))]
+    rows = [*weights.reshape(-1, d)[:, list(driven_channels)], np.zeros(len(driven_channels))]
     return rows[0], rows[1], rows[2]
 
 

@@ -12,13 +12,13 @@ from typing import Literal, get_args
 import numpy as np
 
 from analysis.diagnosis.balance.law import scales_of
-from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
+from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.data.measured_motion import is_read_as_free, time_unit
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, joint_fit, regressions_of
 from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRUCTURE_ERRORS, RICHER_STRUCTURE_GAIN
-from analysis.wording import as_sentence
+from analysis.wording import format_sentence
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
 from equalizer.identification.mechanical.open_tolerance import widen_tolerance
@@ -39,11 +39,11 @@ PARTS_OF: dict[Kind, tuple[Part, ...]] = {
     "gravity": PARTS,
 }
 """Matrices that the force balance fits, by structure; "two-mode" is fitted to spectra only."""
-HELD_FIXED = 1e-6
+FIXED_SHARE = 1e-6
 """Without a time axis: factor on the least mass, and standard deviation that is stated for mass and damping."""
-NAME = "first model, {}"
+NAME_TEMPLATE = "first model, {}"
 """Name of the fitted model, to be filled in with its structure."""
-FORCE, MOTION = "force along the measured motion", "free simulation"
+MEASURED_FORCE, SIMULATED_MOTION = "force along the measured motion", "free simulation"
 """Signals that held-out errors refer to, for `StructureFit.compared`."""
 
 
@@ -58,7 +58,7 @@ class ParameterEstimate:
     name: str
     unit: str
     value: float
-    half: float | None
+    half_width: float | None
     """Half width of the 95 % interval; None where it is not known."""
 
 
@@ -106,7 +106,7 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
     """Prepare the force balance of all axes. Raises NoMotionError where only accelerations were measured, a command has
     no measured motion of its own, or no sample is usable."""
     first = recordings[0]
-    motions = motions_of(observe_parts(recordings, len(first.response.channels)))
+    motions = compute_motions(observe_parts(recordings, len(first.response.channels)))
     count = len(first.command.channels)
     if motions[0].order == 2:
         raise NoMotionError("only accelerations were measured")
@@ -121,30 +121,30 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
     )
 
 
-def fit_structure(given: BalancedRecordings, kind: Kind) -> StructureFit:
+def fit_structure(balanced: BalancedRecordings, kind: Kind) -> StructureFit:
     """Fit a structure by the force balance. Raises StructureRefused where it does not suit the recordings, the motion
     does not determine its parameters, or a mass or damping comes out negative."""
-    _refuse(given, kind)
-    parts: tuple[Part, ...] = ("stiffness",) if given.untimed else PARTS_OF[kind]
-    if given.free:
+    _require_suitable(balanced, kind)
+    parts: tuple[Part, ...] = ("stiffness",) if balanced.untimed else PARTS_OF[kind]
+    if balanced.free:
         parts = tuple(part for part in parts if part != "mass")
     try:
-        fit = joint_fit(given.regressions, parts)
-        model = _model(given, fit, kind)
+        fit = joint_fit(balanced.regressions, parts)
+        model = _build_model(balanced, fit, kind)
     except np.linalg.LinAlgError as problem:
         raise StructureRefused("the motion does not determine its parameters separately") from problem
     except MechanicalModelError as problem:
         raise StructureRefused(f"its parameters do not form a possible mechanism: {problem}") from problem
-    names = given.recording.command.channels
+    names = balanced.recording.command.channels
     return StructureFit(
         kind,
         model,
-        _parameter_estimates(given, fit, (model.system, parts)),
+        _list_parameters(balanced, fit, (model.system, parts)),
         tuple(fit.held_out.tolist()),
         names,
-        FORCE,
+        MEASURED_FORCE,
         fit,
-        _remarks(given, kind),
+        _write_remarks(balanced, kind),
     )
 
 
@@ -158,64 +158,64 @@ def fit_modal_structure(
     axes = len(recordings[0].command.channels)
     settings = MechanicalFitSettings(most_modes=axes if kind == "two-mode" else 0)
     try:
-        fit = fit_mechanical_model(recordings, settings, on_progress, NAME.format(kind))
+        fit = fit_mechanical_model(recordings, settings, on_progress, NAME_TEMPLATE.format(kind))
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as problem:
         raise StructureRefused(str(problem)) from problem
     if kind == "two-mode" and fit.model.coordinates == axes:
         raise StructureRefused("a mode on an axis does not lower the error on held-out lines")
-    errors = tuple(each.fit if each.held_out is None else each.held_out for each in fit.errors)
-    remarks = tuple(as_sentence(remark) for remark in fit.remarks)
+    errors = tuple(error.fit if error.held_out is None else error.held_out for error in fit.errors)
+    remarks = tuple(format_sentence(remark) for remark in fit.remarks)
     channels = recordings[0].response.channels
     first = recordings[0]
     model = with_units_of(widen_tolerance(fit.model), first.command.units, first.response.units)
     return StructureFit(
         kind,
         model,
-        _modal_parameters(replace(fit.model, units=model.units), first),
+        _list_modal_parameters(replace(fit.model, units=model.units), first),
         errors,
         channels,
-        MOTION,
+        SIMULATED_MOTION,
         None,
         remarks,
     )
 
 
-def choose_plainest(fits: Sequence[StructureFit]) -> StructureFit:
+def choose_simplest(fits: Sequence[StructureFit]) -> StructureFit:
     """Return the fit by force balance with the fewest parameters that no richer fit beats. A richer fit wins where its
     cross-validated error power is lower by more than `RICHER_STRUCTURE_GAIN` of the plainer fit's, more than
     `RICHER_STRUCTURE_ERRORS` standard errors over the folds, and more than `MODEL_FLOOR`²."""
     ordered = sorted(fits, key=lambda fit: (len(fit.parameters), fit.error))
     best = ordered[0]
-    for other in ordered[1:]:
-        assert best.joint is not None and other.joint is not None
-        gains = best.joint.folds - other.joint.folds
+    for richer in ordered[1:]:
+        assert best.joint is not None and richer.joint is not None
+        gains = best.joint.folds - richer.joint.folds
         spread = float(np.std(gains, ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
-        least = max(RICHER_STRUCTURE_GAIN * float(best.joint.folds.sum()), RICHER_STRUCTURE_ERRORS * spread)
-        if gains.sum() > max(least, MODEL_FLOOR**2):
-            best = other
+        least_gain = max(RICHER_STRUCTURE_GAIN * float(best.joint.folds.sum()), RICHER_STRUCTURE_ERRORS * spread)
+        if gains.sum() > max(least_gain, MODEL_FLOOR**2):
+            best = richer
     return best
 
 
-def _refuse(given: BalancedRecordings, kind: Kind) -> None:
+def _require_suitable(balanced: BalancedRecordings, kind: Kind) -> None:
     """Raise StructureRefused where the force balance of these recordings cannot determine the structure."""
-    if given.untimed and kind != "massless":
+    if balanced.untimed and kind != "massless":
         raise StructureRefused("no time is known, hence no speeds or accelerations: only massless can be fitted")
     if kind == "two-mode":
         raise StructureRefused("it is fitted to spectra")
-    if given.free and kind == "massless":
+    if balanced.free and kind == "massless":
         raise StructureRefused("a body in free motion has a mass")
-    if given.turns and kind != "motor":
+    if balanced.turns and kind != "motor":
         raise StructureRefused("the shaft makes whole turns, so no spring holds it: only motor can be fitted")
-    if kind == "gravity" and not given.rotational:
+    if kind == "gravity" and not balanced.rotational:
         raise StructureRefused("along a line the weight is a constant force, not a spring: use gravity for pendulums")
 
 
-def _model(given: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalModel:
+def _build_model(balanced: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalModel:
     """The fitted matrices as a mechanical model, their standard errors as its tolerance. Raises MechanicalModelError
     where a mass or damping is negative."""
     mass, damping, stiffness = (fit.matrices[part] for part in PARTS)
-    if kind == "massless" or given.free:
-        mass = np.diag(_least_mass(given.regressions[0].motions)) * (HELD_FIXED if given.untimed else 1.0)
+    if kind == "massless" or balanced.free:
+        mass = np.diag(_find_least_mass(balanced.regressions[0].motions)) * (FIXED_SHARE if balanced.untimed else 1.0)
     problems = tuple(
         f"the {name} is negative ({matrix.diagonal().min():.3g})"
         for name, matrix in (("mass", mass), ("damping", damping))
@@ -227,35 +227,35 @@ def _model(given: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalMo
     if np.linalg.eigvalsh(damping)[0] < 0:
         damping = np.diag(np.diagonal(damping))
     eye = np.eye(len(mass))
-    own = [fit.deviations[part] or None for part in PARTS]
-    recording = given.recording
+    deviations = [fit.deviations[part] or None for part in PARTS]
+    recording = balanced.recording
     model = MechanicalModel(
-        NAME.format(kind), given.recording.response.quantities[0], mass, damping, stiffness, eye, eye,
-        tolerance=Tolerance(own[0], own[1], own[2], None), rotational=given.rotational,
+        NAME_TEMPLATE.format(kind), balanced.recording.response.quantities[0], mass, damping, stiffness, eye, eye,
+        tolerance=Tolerance(deviations[0], deviations[1], deviations[2], None), rotational=balanced.rotational,
     )  # fmt: skip
-    wide = widen_tolerance(model)
-    assert wide.tolerance is not None
-    sizes = wide.tolerance
-    stated = Tolerance(sizes.mass_kg, sizes.damping_n_s_per_m or None, sizes.stiffness_n_per_m or None, None)
-    if given.untimed:
-        stated = Tolerance(HELD_FIXED, HELD_FIXED, sizes.stiffness_n_per_m, None)
+    widened = widen_tolerance(model)
+    assert widened.tolerance is not None
+    sizes = widened.tolerance
+    tolerance = Tolerance(sizes.mass_kg, sizes.damping_n_s_per_m or None, sizes.stiffness_n_per_m or None, None)
+    if balanced.untimed:
+        tolerance = Tolerance(FIXED_SHARE, FIXED_SHARE, sizes.stiffness_n_per_m, None)
     units = recording.command.units, recording.response.units
-    return with_units_of(replace(wide, tolerance=stated), *units, time_unit(recording))
+    return with_units_of(replace(widened, tolerance=tolerance), *units, time_unit(recording))
 
 
-def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _find_least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """(d,), force over acceleration: masses whose inertial force is `MASSLESS_SHARE` of the measured force (standard
     deviations). A simulation needs a mass, even where the recordings show none."""
     force = np.vstack([motion.force for motion in motions]).std(axis=0)
-    moved = np.vstack([np.gradient(motion.velocity, 1 / motion.rate_hz, axis=0) for motion in motions]).std(axis=0)
-    return np.asarray(MASSLESS_SHARE * force / np.maximum(moved, 1e-300))
+    accel = np.vstack([np.gradient(motion.velocity, 1 / motion.rate_hz, axis=0) for motion in motions]).std(axis=0)
+    return np.asarray(MASSLESS_SHARE * force / np.maximum(accel, 1e-300))
 
 
-def _parameter_estimates(
-    given: BalancedRecordings, fit: JointFit, units_and_parts: tuple[UnitSystem, Sequence[Part]]
+def _list_parameters(
+    balanced: BalancedRecordings, fit: JointFit, units_and_parts: tuple[UnitSystem, Sequence[Part]]
 ) -> tuple[ParameterEstimate, ...]:
     """Diagonal elements of the fitted matrices, with their 95 % intervals."""
-    names, (system, parts) = given.recording.command.channels, units_and_parts
+    names, (system, parts) = balanced.recording.command.channels, units_and_parts
     return tuple(
         ParameterEstimate(f"{part} {name}", matrix_unit(part, system), float(fit.matrices[part][k, k]),
                float(fit.halves[part][k, k]))
@@ -264,29 +264,29 @@ def _parameter_estimates(
     )  # fmt: skip
 
 
-def _modal_parameters(model: MechanicalModel, recording: Recording) -> tuple[ParameterEstimate, ...]:
+def _list_modal_parameters(model: MechanicalModel, recording: Recording) -> tuple[ParameterEstimate, ...]:
     """Mass, damping and stiffness along each driven axis, with 95 % intervals from the model's tolerance (1.96 standard
     deviations); then, for a model with modes, all natural frequencies (Hz)."""
-    along, found = driven_axes(model), []
-    own = model.tolerance or Tolerance()
-    spread = (own.mass_kg, own.damping_n_s_per_m, own.stiffness_n_per_m)
-    for part, matrix, each in zip(PARTS, (model.mass, model.damping, model.stiffness), spread, strict=True):
-        values = np.einsum("ni,nk,ki->i", along, matrix, along)
+    axes, estimates = driven_axes(model), []
+    tolerance = model.tolerance or Tolerance()
+    spread = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
+    for part, matrix, std in zip(PARTS, (model.mass, model.damping, model.stiffness), spread, strict=True):
+        values = np.einsum("ni,nk,ki->i", axes, matrix, axes)
         for name, value in zip(recording.command.channels, values.tolist(), strict=True):
-            found.append(
-                ParameterEstimate(f"{part} {name}", matrix_unit(part, model.system), value, each and 1.96 * each)
+            estimates.append(
+                ParameterEstimate(f"{part} {name}", matrix_unit(part, model.system), value, std and 1.96 * std)
             )
-    inner = model.coordinates - model.inputs
-    if inner > 0:
+    mode_count = model.coordinates - model.inputs
+    if mode_count > 0:
         squares = np.linalg.eigvals(np.linalg.solve(model.mass, model.stiffness)).real
-        swing = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
-        found += [
-            ParameterEstimate(f"mode {k}", "Hz", hz, None) for k, hz in enumerate(sorted(swing.tolist()), start=1)
+        modes_hz = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+        estimates += [
+            ParameterEstimate(f"mode {k}", "Hz", hz, None) for k, hz in enumerate(sorted(modes_hz.tolist()), start=1)
         ]
-    return tuple(found)
+    return tuple(estimates)
 
 
-def _remarks(given: BalancedRecordings, kind: Kind) -> tuple[str, ...]:
+def _write_remarks(balanced: BalancedRecordings, kind: Kind) -> tuple[str, ...]:
     """Sentences on what the parameters of a structure mean."""
     if kind == "gravity":
         return (
@@ -294,6 +294,6 @@ def _remarks(given: BalancedRecordings, kind: Kind) -> tuple[str, ...]:
             "position, negative above the pivot; at large angles the effect gravity_torque describes it.",
         )
     if kind == "massless":
-        timed = "" if not given.untimed else " No time is known: samples are numbered, and damping is not fitted."
-        return (f"The mass in the file is a lower bound for simulations; the forces do not determine it.{timed}",)
+        note = "" if not balanced.untimed else " No time is known: samples are numbered, and damping is not fitted."
+        return (f"The mass in the file is a lower bound for simulations; the forces do not determine it.{note}",)
     return ()

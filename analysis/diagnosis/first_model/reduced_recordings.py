@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.motion import Motion, motion_signal
+from analysis.diagnosis.balance.motion import Motion, find_motion_signal
 from analysis.diagnosis.data.observed_parts import parts_of
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -22,37 +22,39 @@ def is_reduced(balances: Sequence[Balance]) -> bool:
     """Whether commands must be reduced: a balance has linear terms beyond one body per command, or integrated motions,
     and every named law is a column of the regression (a law of the command acts on the whole command, not on a
     part)."""
-    if not all(each.has_column for balance in balances for each in balance.named):
+    if not all(law.has_column for balance in balances for law in balance.named):
         return False
     motion = balances[0].search.regression.motions[0]
     if len(motion.channels) > len(balances) or motion.order == 2:
         return True
-    return any(balance.linear_laws or balance.search.regression.beside.delay_s for balance in balances)
+    return any(balance.linear_laws or balance.search.regression.base_terms.delay_s for balance in balances)
 
 
 def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
     """The recordings with reduced commands and the driven motions as response. recordings: those of the balances."""
-    found, begin = [], 0
+    reduced, first_part = [], 0
     for recording in recordings:
         parts = parts_of(recording)
-        found.append(_reduce(recording, parts, balances, begin))
-        begin += len(parts)
-    return tuple(found)
+        reduced.append(_reduce(recording, parts, balances, first_part))
+        first_part += len(parts)
+    return tuple(reduced)
 
 
 def _reduce(
-    recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], begin: int
+    recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], first_part: int
 ) -> Recording:
-    """A reduced recording. parts: start and stop of its parts. begin: number of its first part among all motions."""
+    """A reduced recording. parts: start and stop of each. first_part: index of its first part among all motions."""
     command = recording.command.samples.copy()
     for axis, balance in enumerate(balances):
         regression = balance.search.regression
-        for number, (start, stop) in enumerate(parts, begin):
+        for number, (start, stop) in enumerate(parts, first_part):
             motion = regression.motions[number]
-            left = motion.force[:, axis] - _force_beside(balance, motion)
+            remaining_force = motion.force[:, axis] - _other_linear_force(balance, motion)
             # Below the band of an integrated motion there is no motion to balance the force.
-            command[start:stop, axis] = motion.band_pass(left[:, None])[:, 0] if motion.order == 2 else left
-    response, integrated = _driven_motions(recording, parts, balances, begin)
+            command[start:stop, axis] = (
+                motion.band_pass(remaining_force[:, None])[:, 0] if motion.order == 2 else remaining_force
+            )
+    response, integrated = _driven_motions(recording, parts, balances, first_part)
     return replace(
         recording,
         command=replace(recording.command, samples=command),
@@ -64,37 +66,43 @@ def _reduce(
     )
 
 
-def _force_beside(balance: Balance, motion: Motion) -> FloatArray:
+def _other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
     """(n,), N (N m): linear force of the balance without the driven motion's own mass, damping and stiffness. The named
     laws are part of the regression, but not of this force."""
     regression, d = balance.search.regression, len(motion.channels)
-    linear = [each.place for each in balance.laws if each.law.linear]
-    weights = regression.weights(regression.columns_of([*linear, *(each.place for each in balance.named)]))
+    linear = [judged_law.place for judged_law in balance.laws if judged_law.law.linear]
+    weights = regression.weights(regression.columns_of([*linear, *(judged_law.place for judged_law in balance.named)]))
     # The constant force of the base stays in the command, for the later fit.
     weights = np.delete(weights, regression.base - 1)
     motion_columns = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // d]
-    whole = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in balance.linear_laws)])
-    others = d > motion.force.shape[1]
-    kept = [k >= regression.matrices or (others and k % d != regression.beside.own) for k in range(whole.shape[1])]
-    return np.asarray(whole[:, kept] @ weights[: whole.shape[1]][kept])
+    columns = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in balance.linear_laws)])
+    has_other_motions = d > motion.force.shape[1]
+    is_subtracted = [
+        k >= regression.matrices or (has_other_motions and k % d != regression.base_terms.driven_channel)
+        for k in range(columns.shape[1])
+    ]
+    return np.asarray(columns[:, is_subtracted] @ weights[: columns.shape[1]][is_subtracted])
 
 
 def _driven_motions(
-    recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], begin: int
+    recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], first_part: int
 ) -> tuple[Signal, bool]:
     """The driven motions, and whether they are integrals of measured accelerations."""
     regression = balances[0].search.regression
-    measured = motion_signal(recording)
+    measured = find_motion_signal(recording)
     assert measured is not None
     d = len(regression.motions[0].channels)
-    places = [
-        k if d <= len(balances) else balances[k].search.regression.beside.own for k in range(min(d, len(balances)))
+    driven_channels = [
+        k if d <= len(balances) else balances[k].search.regression.base_terms.driven_channel
+        for k in range(min(d, len(balances)))
     ]
     samples, order = measured.samples.copy(), regression.motions[0].order
     quantities, units = measured.quantities, measured.units
     if order == 2:
-        for number, (start, stop) in enumerate(parts, begin):
+        for number, (start, stop) in enumerate(parts, first_part):
             samples[start:stop] = regression.motions[number].position
         units = tuple(system_of(recording.command.units, (unit,)).length for unit in units)
         quantities = tuple("angle" if unit == "rad" else "position" for unit in units)
-    return replace(measured, samples=samples, quantity=quantities, unit=units).select_channels(places), order == 2
+    return replace(measured, samples=samples, quantity=quantities, unit=units).select_channels(
+        driven_channels
+    ), order == 2

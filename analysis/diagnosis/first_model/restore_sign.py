@@ -31,16 +31,16 @@ def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
     (`SIGNED_SPEED_FITS`, `SIGNED_SPEED_BETTER`)."""
     if any(not _is_unsigned_speed(recording) for recording in recordings):
         return recordings, ""
-    found = []
+    restored = []
     for recording in recordings:
         amount = recording.response.samples[:, 0]
-        signed, left = _find_signs(recording.command.samples[:, 0], amount)
-        plain = _compute_unexplained_share(recording.command.samples[:, 0], amount)
-        if left > 1 - SIGNED_SPEED_FITS or left > SIGNED_SPEED_BETTER * plain:
+        signed, unexplained = _find_signs(recording.command.samples[:, 0], amount)
+        unsigned_unexplained = _compute_unexplained_share(recording.command.samples[:, 0], amount)
+        if unexplained > 1 - SIGNED_SPEED_FITS or unexplained > SIGNED_SPEED_BETTER * unsigned_unexplained:
             return recordings, ""
-        found.append(replace(recording, response=replace(recording.response, samples=signed[:, None])))
+        restored.append(replace(recording, response=replace(recording.response, samples=signed[:, None])))
     name = recordings[0].response.channels[0]
-    return tuple(found), (
+    return tuple(restored), (
         f"{name} is never negative though the command pushes both ways: its sensor measures the absolute value only, "
         "so the sign was restored from the command."
     )
@@ -51,15 +51,18 @@ def _is_unsigned_speed(recording: Recording) -> bool:
     response, command = recording.response, recording.command
     if len(response.channels) != 1 or len(command.channels) != 1 or recording.position is not None:
         return False
-    speed, pushed = response.samples[:, 0], command.samples[:, 0]
+    speed, force = response.samples[:, 0], command.samples[:, 0]
     if DERIVATIVE_OF_QUANTITY.get(response.quantities[0]) not in (1, 0) or not np.isfinite(speed).all():
         return False
     rms = float(np.sqrt(np.mean(speed**2)))
-    power = float(np.sum(pushed**2))
-    ways = [float(np.sum(pushed[pushed * sign > 0] ** 2)) for sign in (1, -1)]
-    touches = float(np.quantile(speed, 0.05)) < REVERSAL_NEAR_ZERO * rms
+    power = float(np.sum(force**2))
+    sign_powers = [float(np.sum(force[force * sign > 0] ** 2)) for sign in (1, -1)]
+    reaches_zero = float(np.quantile(speed, 0.05)) < REVERSAL_NEAR_ZERO * rms
     return (
-        rms > 0 and float(speed.min()) > -UNSIGNED_BELOW_ZERO * rms and touches and min(ways) > PUSHED_BOTH_WAYS * power
+        rms > 0
+        and float(speed.min()) > -UNSIGNED_BELOW_ZERO * rms
+        and reaches_zero
+        and min(sign_powers) > PUSHED_BOTH_WAYS * power
     )
 
 
@@ -67,8 +70,8 @@ def _find_signs(command: FloatArray, amount: FloatArray) -> tuple[FloatArray, fl
     """The signed speed (n,), and the share of its power that the filter does not predict."""
     rows = _rows(command)
     stretches = _stretches(amount)
-    late = np.concatenate([[0.0], np.cumsum(command)])
-    recent = [late[k + 1] - late[max(k + 1 - TAPS // 4, 0)] for k in range(len(command))]
+    cumulative = np.concatenate([[0.0], np.cumsum(command)])
+    recent = [cumulative[k + 1] - cumulative[max(k + 1 - TAPS // 4, 0)] for k in range(len(command))]
     best = _with_signs(amount, np.array(recent), stretches)
     for _ in range(ROUNDS):
         signed = _with_signs(amount, _predict_speed(rows, best), stretches)
@@ -100,15 +103,15 @@ def _predict_speed(rows: FloatArray, speed: FloatArray) -> FloatArray:
 def _stretches(amount: FloatArray) -> list[slice]:
     """Stretches between local minima of the magnitude below `REVERSAL_NEAR_ZERO` of its rms."""
     low = REVERSAL_NEAR_ZERO * float(np.sqrt(np.mean(amount**2)))
-    inner = (amount[1:-1] <= amount[:-2]) & (amount[1:-1] <= amount[2:]) & (amount[1:-1] < low)
-    ends = [0, *(np.flatnonzero(inner) + 1).tolist(), len(amount)]
-    return [slice(begin, end) for begin, end in itertools.pairwise(ends) if end > begin]
+    is_minimum = (amount[1:-1] <= amount[:-2]) & (amount[1:-1] <= amount[2:]) & (amount[1:-1] < low)
+    ends = [0, *(np.flatnonzero(is_minimum) + 1).tolist(), len(amount)]
+    return [slice(start, end) for start, end in itertools.pairwise(ends) if end > start]
 
 
 def _with_signs(amount: FloatArray, predicted: FloatArray, stretches: list[slice]) -> FloatArray:
     """(n,): the magnitude, negative in each stretch in which its product with the predicted speed is negative."""
-    found = amount.copy()
+    signed = amount.copy()
     for part in stretches:
         if float(amount[part] @ predicted[part]) < 0:
-            found[part] = -amount[part]
-    return found
+            signed[part] = -amount[part]
+    return signed

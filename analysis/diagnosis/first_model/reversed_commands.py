@@ -3,8 +3,8 @@ or amplifier.
 
 A passive device has no negative mass and no negative damping. The force of each axis, F = m a + d v + k x, is therefore
 balanced with both signs of the command, with m >= 0 and d >= 0 in either. The sign is reversed where that lowers the
-cross-validated error by more than `REVERSED_SIGN_GAIN`, and significantly (`is_better`). A spring alone does not
-determine the sign, because k may have either. The reversed commands are listed in the recording's `meta`; a model is
+cross-validated error by more than `REVERSED_SIGN_GAIN` and `improves_significantly`. A spring alone does not determine
+the sign, because k may have either. The reversed commands are listed in the recording's `meta`; a model is
 written for the commands as they were recorded (`recorded_conditions`).
 """
 
@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
+from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import regression_of
-from analysis.diagnosis.balance.structures import Structure, is_better
+from analysis.diagnosis.balance.structures import Structure, improves_significantly
 from analysis.diagnosis.data.measured_motion import all_as_force_driven, is_read_as_free
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.data.recorded_conditions import REVERSED
@@ -34,22 +34,24 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
     driven = all_as_force_driven(recordings)
     count = len(driven[0].command.channels)
     try:
-        motions = motions_of(observe_parts(driven, len(driven[0].response.channels)))
+        motions = compute_motions(observe_parts(driven, len(driven[0].response.channels)))
         if len(motions[0].channels) != count:
             return recordings, ""
-        against = [axis for axis in range(count) if _is_reversed(motions, axis)]
+        reversed_axes = [axis for axis in range(count) if _is_reversed(motions, axis)]
     except (NoMotionError, np.linalg.LinAlgError):
         return recordings, ""
-    if not against:
+    if not reversed_axes:
         return recordings, ""
-    names = [driven[0].command.channels[axis] for axis in against]
+    names = [driven[0].command.channels[axis] for axis in reversed_axes]
     imposed = driven[0] is not recordings[0]
     sign = np.ones(count)
-    sign[against] = -1.0
+    sign[reversed_axes] = -1.0
     verb = "is" if len(names) == 1 else "are"
     note = {REVERSED: names}
-    turned = tuple(_reverse(replace(each, meta={**each.meta, **note}), imposed, sign) for each in recordings)
-    return turned, (
+    reversed_recordings = tuple(
+        _reverse(replace(recording, meta={**recording.meta, **note}), imposed, sign) for recording in recordings
+    )
+    return reversed_recordings, (
         f"{conjoin(names)} {verb} counted against the motion: as recorded, the device would deliver work instead of "
         "absorbing it. The sign was reversed; a saved model has this sign in its input matrix. If the device really "
         "is a source of work, give a model with the recorded sign."
@@ -58,12 +60,17 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
 
 def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:
     """Whether the force balance of an axis has a clearly smaller cross-validated error with the force negated."""
-    plain, turned = (
-        regression_of([replace(each, force=sign * each.force) for each in motions], axis, (), turns=False)
+    recorded, negated = (
+        regression_of([replace(motion, force=sign * motion.force) for motion in motions], axis, (), turns=False)
         for sign in (1.0, -1.0)
     )
-    first, other = (Structure((), each.cross_validated_errors(each.columns_of(()))) for each in (plain, turned))
-    return other.error < (1 - REVERSED_SIGN_GAIN) * first.error and is_better(first, other)
+    recorded_structure, negated_structure = (
+        Structure((), regression.cross_validated_errors(regression.columns_of(())))
+        for regression in (recorded, negated)
+    )
+    return negated_structure.error < (1 - REVERSED_SIGN_GAIN) * recorded_structure.error and improves_significantly(
+        recorded_structure, negated_structure
+    )
 
 
 def _reverse(recording: Recording, imposed: bool, sign: FloatArray) -> Recording:

@@ -17,10 +17,10 @@ from analysis.diagnosis.data.measured_motion import MeasuredMotion, choose_measu
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.forces.inverse_dynamics import band_motion
 from analysis.diagnosis.forces.inverse_response import inverse_response
-from analysis.diagnosis.forces.predicted_force import PredictedForce, edge_samples
+from analysis.diagnosis.forces.predicted_force import PredictedForce, count_edge_samples
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from equalizer.effects.simulation.along_motion import actuator_force
+from equalizer.effects.simulation.forces_along_motion import actuator_force
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import filter_low_pass, low_pass_gain
 from equalizer.signals.signal import FloatArray, Signal
@@ -114,11 +114,16 @@ def _view(record: Observed, force: FloatArray, band_hz: float) -> Observed:
     filtered = filter_low_pass(force, rate_hz, band_hz, late_s=0.5 / rate_hz)
     signal = Signal(filtered, rate_hz, command.quantity, command.unit, command.channels)
     view = replace(recording, response=signal, position=None)
-    edge = min(edge_samples(rate_hz, band_hz), len(filtered) // 8)
-    inside = np.zeros(len(filtered), dtype=np.bool_)
-    inside[edge : len(filtered) - edge] = True
+    edge = min(count_edge_samples(rate_hz, band_hz), len(filtered) // 8)
+    undistorted = np.zeros(len(filtered), dtype=np.bool_)
+    undistorted[edge : len(filtered) - edge] = True
     return Observed(
-        view, record.command, signal.samples, record.fit & inside, record.choose & inside, record.test & inside
+        view,
+        record.command,
+        signal.samples,
+        record.fit & undistorted,
+        record.choose & undistorted,
+        record.test & undistorted,
     )
 
 
@@ -131,4 +136,4 @@ def _floor(model: MechanicalModel, motion: MeasuredMotion, floor: NoiseFloor, ba
     density = np.einsum("lij,lj->li", gain, np.where(np.isfinite(motion.noise), motion.noise, assumed))
     freedom = np.full(m, float(np.max(floor.response.freedom, initial=1.0)))
     noise = ChannelNoise(np.sqrt(density.mean(axis=0)), density, freedom, np.zeros(m))
-    return NoiseFloor(floor.how, frequency_hz, noise, None, floor.remarks)
+    return NoiseFloor(floor.method, frequency_hz, noise, None, floor.remarks)

@@ -40,9 +40,9 @@ class BandMotion:
     sample_rate_hz: float
     band_hz: float
     """Frequency at which the low pass has a gain of 1/2."""
-    at: tuple[FloatArray, FloatArray, FloatArray]
+    at_samples: tuple[FloatArray, FloatArray, FloatArray]
     """(n, m) each: position, velocity and acceleration at each sample."""
-    around: tuple[FloatArray, FloatArray, FloatArray]
+    around_samples: tuple[FloatArray, FloatArray, FloatArray]
     """(n, m) each: their means over one sample period around each sample."""
 
 
@@ -55,14 +55,14 @@ def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> 
         wave = 2j * np.pi * frequency_hz
         mean = np.sinc(frequency_hz / sample_rate_hz)
         rows = [shape * wave**order for shape in (1.0, mean) for order in range(3)]
-        within = low_pass_gain(frequency_hz, band_hz) * np.array(rows)
-        return np.asarray(np.einsum("rl,ij->lrij", within, np.eye(m)).reshape(len(frequency_hz), 6 * m, m))
+        band_gain = low_pass_gain(frequency_hz, band_hz) * np.array(rows)
+        return np.asarray(np.einsum("rl,ij->lrij", band_gain, np.eye(m)).reshape(len(frequency_hz), 6 * m, m))
 
-    found = filter_by_gain(position, sample_rate_hz, gain).reshape(len(position), 6, m)
+    filtered = filter_by_gain(position, sample_rate_hz, gain).reshape(len(position), 6, m)
     slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
-    found[:, [0, 3]] += end_to_end_line(position)[:, None]
-    found[:, [1, 4]] += slope
-    x, v, a, mean_x, mean_v, mean_a = (np.ascontiguousarray(found[:, k]) for k in range(6))
+    filtered[:, [0, 3]] += end_to_end_line(position)[:, None]
+    filtered[:, [1, 4]] += slope
+    x, v, a, mean_x, mean_v, mean_a = (np.ascontiguousarray(filtered[:, k]) for k in range(6))
     return BandMotion(position, sample_rate_hz, band_hz, (x, v, a), (mean_x, mean_v, mean_a))
 
 
@@ -76,15 +76,15 @@ def compute_required_force(model: MechanicalModel, motion: BandMotion) -> Requir
     m, inverse_at = model.inputs, fast_inverse_response(model, len(position), sample_rate_hz / 2)
 
     def gain(frequency_hz: FloatArray) -> ComplexArray:
-        within = low_pass_gain(frequency_hz, motion.band_hz)[:, None, None]
+        band_gain = low_pass_gain(frequency_hz, motion.band_hz)[:, None, None]
         inverse = inverse_at(frequency_hz)
         inverse[:, :m] *= np.sinc(frequency_hz / sample_rate_hz)[:, None, None]
         wave = 2j * np.pi * frequency_hz[:, None, None]
         axes = inverse[:, m:]
-        return np.asarray(within * np.concatenate([inverse[:, :m], axes, wave * axes, wave**2 * axes], axis=1))
+        return np.asarray(band_gain * np.concatenate([inverse[:, :m], axes, wave * axes, wave**2 * axes], axis=1))
 
-    found = filter_by_gain(position, sample_rate_hz, gain) + _force_along_line(model, position, sample_rate_hz)
-    return RequiredForce(*(found[:, part * m : (part + 1) * m] for part in range(4)))
+    filtered = filter_by_gain(position, sample_rate_hz, gain) + _force_along_line(model, position, sample_rate_hz)
+    return RequiredForce(*(filtered[:, part * m : (part + 1) * m] for part in range(4)))
 
 
 def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
@@ -96,12 +96,12 @@ def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> Requir
     force = sum(
         (
             derivative @ (to_commands @ matrix @ to_coordinates).T
-            for derivative, matrix in zip(motion.around, matrices, strict=True)
+            for derivative, matrix in zip(motion.around_samples, matrices, strict=True)
         ),
         np.zeros_like(motion.position),
     )
     to_axes = (driven_axes(model).T @ to_coordinates).T
-    return RequiredForce(force, *(derivative @ to_axes for derivative in motion.at))
+    return RequiredForce(force, *(derivative @ to_axes for derivative in motion.at_samples))
 
 
 def _force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
@@ -111,8 +111,8 @@ def _force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_
     m = model.inputs
     line = end_to_end_line(position)
     slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
-    still = inverse_response(model, np.array([0.0, _NEARLY_STILL_HZ]))
-    static, rate = still[0].real, still[1].imag / (2 * np.pi * _NEARLY_STILL_HZ)
+    near_static = inverse_response(model, np.array([0.0, _NEARLY_STILL_HZ]))
+    static, rate = near_static[0].real, near_static[1].imag / (2 * np.pi * _NEARLY_STILL_HZ)
     force_and_position = line @ static.T + slope @ rate.T
     velocity = np.broadcast_to(slope @ static[m:].T, (len(line), m))
     return np.hstack([force_and_position, velocity, np.zeros((len(line), m))])

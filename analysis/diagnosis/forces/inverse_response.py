@@ -42,8 +42,10 @@ def inverse_response(model: MechanicalModel, frequency_hz: FloatArray) -> Comple
     system[:, :n, n:] = -model.input
     system[:, n:, :n] = model.output[:m]
     unit_outputs = np.concatenate([np.zeros((n, m)), np.eye(m)])
-    solved = np.linalg.solve(system, np.broadcast_to(unit_outputs.astype(np.complex128), (len(frequency_hz), n + m, m)))
-    return np.concatenate([solved[:, n:], driven_axes(model).T @ solved[:, :n]], axis=1)
+    solutions = np.linalg.solve(
+        system, np.broadcast_to(unit_outputs.astype(np.complex128), (len(frequency_hz), n + m, m))
+    )
+    return np.concatenate([solutions[:, n:], driven_axes(model).T @ solutions[:, :n]], axis=1)
 
 
 def fast_inverse_response(
@@ -59,7 +61,7 @@ def fast_inverse_response(
 def _fit_partial_fractions(model: MechanicalModel, highest_hz: float) -> Callable[[FloatArray], ComplexArray] | None:
     """The inverse as a partial fraction expansion fitted to a few lines; None where its error between them is too
     large."""
-    poles = zeros_of(model, 2 * np.pi * POLE_LIMIT * highest_hz)
+    poles = transmission_zeros(model, 2 * np.pi * POLE_LIMIT * highest_hz)
     lines_hz, unit, m = _lines_to_fit(poles, highest_hz), 2 * np.pi * highest_hz, model.inputs
     exact, basis = inverse_response(model, lines_hz), _basis_functions(lines_hz, poles, unit)
     # Forces and positions are fitted separately, and each line is scaled: entries differ by many orders of magnitude.
@@ -71,11 +73,11 @@ def _fit_partial_fractions(model: MechanicalModel, highest_hz: float) -> Callabl
     coefficients = np.hstack([forces, positions])
 
     def evaluate(frequency_hz: FloatArray) -> ComplexArray:
-        found: ComplexArray = (_basis_functions(frequency_hz, poles, unit) @ coefficients).reshape(-1, 2 * m, m)
-        slow = frequency_hz < lines_hz[0]
-        if slow.any():
-            found[slow] = inverse_response(model, frequency_hz[slow])
-        return found
+        response: ComplexArray = (_basis_functions(frequency_hz, poles, unit) @ coefficients).reshape(-1, 2 * m, m)
+        below_lines = frequency_hz < lines_hz[0]
+        if below_lines.any():
+            response[below_lines] = inverse_response(model, frequency_hz[below_lines])
+        return response
 
     return evaluate
 
@@ -87,37 +89,41 @@ def _fit_coefficients(basis: ComplexArray, exact: ComplexArray) -> ComplexArray 
     basis, exact = basis / size, exact / size
     # Columns scaled to equal norm, so that units do not matter.
     unit = np.linalg.norm(basis[::2], axis=0)
-    found = np.linalg.lstsq(basis[::2] / unit, exact[::2], rcond=1e-14)[0] / unit[:, None]
-    return found if np.all(np.abs(basis[1::2] @ found - exact[1::2]) <= FIT_TOLERANCE) else None
+    coefficients = np.linalg.lstsq(basis[::2] / unit, exact[::2], rcond=1e-14)[0] / unit[:, None]
+    return coefficients if np.all(np.abs(basis[1::2] @ coefficients - exact[1::2]) <= FIT_TOLERANCE) else None
 
 
-def zeros_of(model: MechanicalModel, largest: float) -> ComplexArray:
+def transmission_zeros(model: MechanicalModel, largest: float) -> ComplexArray:
     """(k,), rad/s: transmission zeros with non-negative imaginary part."""
     n, m = model.coordinates, model.inputs
-    left, right = np.zeros((2 * n + m, 2 * n + m)), np.zeros((2 * n + m, 2 * n + m))
-    left[:n, n : 2 * n] = np.eye(n)
-    left[n : 2 * n, :n], left[n : 2 * n, n : 2 * n] = -model.stiffness, -model.damping
-    left[n : 2 * n, 2 * n :], left[2 * n :, :n] = model.input, model.output[:m]
-    right[:n, :n], right[n : 2 * n, n : 2 * n] = np.eye(n), model.mass
-    above, below = scipy.linalg.eigvals(left, right, homogeneous_eigvals=True)
-    near = np.abs(above) < largest * np.abs(below)
-    found = above[near] / below[near]
-    return np.asarray(found[found.imag >= 0])
+    system_matrix, mass_matrix = np.zeros((2 * n + m, 2 * n + m)), np.zeros((2 * n + m, 2 * n + m))
+    system_matrix[:n, n : 2 * n] = np.eye(n)
+    system_matrix[n : 2 * n, :n], system_matrix[n : 2 * n, n : 2 * n] = -model.stiffness, -model.damping
+    system_matrix[n : 2 * n, 2 * n :], system_matrix[2 * n :, :n] = model.input, model.output[:m]
+    mass_matrix[:n, :n], mass_matrix[n : 2 * n, n : 2 * n] = np.eye(n), model.mass
+    numerators, denominators = scipy.linalg.eigvals(system_matrix, mass_matrix, homogeneous_eigvals=True)
+    within_limit = np.abs(numerators) < largest * np.abs(denominators)
+    zeros = numerators[within_limit] / denominators[within_limit]
+    return np.asarray(zeros[zeros.imag >= 0])
 
 
 def _lines_to_fit(poles: ComplexArray, highest_hz: float) -> FloatArray:
     """(lines,), Hz, rising: over the whole range and about each resonance."""
     width = np.maximum(np.abs(poles.real), 1e-6 * np.abs(poles))
-    about = (np.abs(poles.imag)[:, None] + width[:, None] * HALF_WIDTHS).ravel() / (2 * np.pi)
+    near_poles = (np.abs(poles.imag)[:, None] + width[:, None] * HALF_WIDTHS).ravel() / (2 * np.pi)
     # Halved steps: fitted and test lines alternate.
-    whole = np.geomspace(1e-4 * highest_hz, highest_hz, LINES_OVER_RANGE)
-    even = np.linspace(0.0, highest_hz, LINES_OVER_RANGE)
-    return np.unique(np.clip(np.concatenate([about, 1.01 * about, whole, even]), 1e-6 * highest_hz, highest_hz))
+    log_spaced = np.geomspace(1e-4 * highest_hz, highest_hz, LINES_OVER_RANGE)
+    evenly_spaced = np.linspace(0.0, highest_hz, LINES_OVER_RANGE)
+    return np.unique(
+        np.clip(
+            np.concatenate([near_poles, 1.01 * near_poles, log_spaced, evenly_spaced]), 1e-6 * highest_hz, highest_hz
+        )
+    )
 
 
 def _basis_functions(frequency_hz: FloatArray, poles: ComplexArray, unit: float) -> ComplexArray:
     """(lines, functions): powers of s, and a resonance for each pole and its mirror image."""
     s = 2j * np.pi * frequency_hz[:, None] / unit
     powers = s ** np.arange(HIGHEST_POWER + 1)
-    both = [1 / (s - poles / unit), 1 / (s - np.conj(poles[poles.imag > 0]) / unit)]
-    return np.asarray(np.concatenate([powers, *both], axis=1))
+    resonances = [1 / (s - poles / unit), 1 / (s - np.conj(poles[poles.imag > 0]) / unit)]
+    return np.asarray(np.concatenate([powers, *resonances], axis=1))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from equalizer.plant.linear_simulation import linear_steps
+from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
@@ -44,16 +44,16 @@ def missing_force(
     n, c = residuals.shape
     length = next_fast_len(n + int(_SETTLING_S * sample_rate_hz), real=True)
     transfer = axis_transfer(model, sample_rate_hz, rfftfreq(length, 1 / sample_rate_hz))
-    through = np.concatenate([transfer.response, transfer.position], axis=1)[:, :c] / unit[:c, None]
+    channel_transfer = np.concatenate([transfer.response, transfer.position], axis=1)[:, :c] / unit[:c, None]
     spectrum = rfft(residuals, length, axis=0)
-    adjoint = np.conj(np.swapaxes(through, 1, 2))
-    normal = adjoint @ through + np.diag(1 / expected_n**2)
+    adjoint = np.conj(np.swapaxes(channel_transfer, 1, 2))
+    normal = adjoint @ channel_transfer + np.diag(1 / expected_n**2)
     force = np.linalg.solve(normal, adjoint @ spectrum[:, :, None])
-    back = [
+    time_series = [
         irfft(part[:, :, 0], length, axis=0)[:n]
         for part in (force, transfer.axis_position @ force, transfer.axis_velocity @ force)
     ]
-    return MissingForce(*back)
+    return MissingForce(*time_series)
 
 
 _WELL_CONDITIONED = 1e8
@@ -78,7 +78,7 @@ class AxisTransfer:
 def axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: FloatArray) -> AxisTransfer:
     """Transfer functions of the linear mechanism, without effects and actuator; the sensor's low-pass acts on the
     response. frequency_hz: (lines,)."""
-    steps = linear_steps(model, 1 / sample_rate_hz)
+    steps = discretise_model(model, 1 / sample_rate_hz)
     m, p = model.inputs, model.outputs
     z = np.exp(2j * np.pi * frequency_hz / sample_rate_hz)
     rows = np.vstack([steps.motion[: 2 * m], steps.response, steps.position])
@@ -95,7 +95,9 @@ def _frequency_response(A: FloatArray, B: FloatArray, C: FloatArray, z: ComplexA
     """C (zI - A)^-1 B, (lines, rows, inputs); by the eigenvectors of A where they are well conditioned. z: (lines,)."""
     poles, shapes = np.linalg.eig(A)
     if np.linalg.cond(shapes) < _WELL_CONDITIONED:
-        left, right = C @ shapes, np.linalg.solve(shapes, B.astype(complex))
-        return np.asarray(np.einsum("rs,ls,sm->lrm", left, 1 / (z[:, None] - poles), right, optimize=True))
+        output_modes, input_modes = C @ shapes, np.linalg.solve(shapes, B.astype(complex))
+        return np.asarray(
+            np.einsum("rs,ls,sm->lrm", output_modes, 1 / (z[:, None] - poles), input_modes, optimize=True)
+        )
     resolvent = z[:, None, None] * np.eye(len(A)) - A
     return np.asarray(C @ np.linalg.solve(resolvent, np.broadcast_to(B.astype(complex), (len(z), *B.shape))))

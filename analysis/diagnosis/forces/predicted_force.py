@@ -16,17 +16,17 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
 from analysis.diagnosis.forces.inverse_dynamics import BandMotion, RequiredForce, band_motion, compute_required_force
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
-from equalizer.effects.simulation.along_motion import actuator_force, force_along
-from equalizer.effects.simulation.bodies import bodies_of
+from equalizer.effects.simulation.bodies import build_bodies
+from equalizer.effects.simulation.forces_along_motion import actuator_force, effect_forces_along_motion
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import filter_low_pass
 from equalizer.signals.signal import FloatArray
 
-EDGE = 0.5
+EDGE_PERIODS = 0.5
 """Length of the distorted edge at either end of a record, in periods of the band's end."""
-_Found = TypeVar("_Found")
-WEAKEST = 1e-3
+_Result = TypeVar("_Result")
+LEAST_ACTUATOR_SHARE = 1e-3
 """Least ratio of an actuator's rms force to its rms command by which errors are rescaled (see `_balance`)."""
 
 
@@ -46,11 +46,11 @@ class PredictedForce:
     band_hz: float
     """End of the band in which forces are compared."""
     name: str = "predicted force"
-    known: tuple[PlacedEffect, ...] = ()
+    model_effects: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
     """Least error in units of the noise: smaller errors are set to it; 1 with a floor."""
-    remembered: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
+    cache: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
     """Cache of the last inputs and result by kind and record, because many laws are tested on the same model and
     command."""
 
@@ -61,107 +61,121 @@ class PredictedForce:
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shorten(self) -> "PredictedForce":
-        kept = [
+        pairs = [
             (self._shorten_record(record), motion)
             for record, motion in zip(self.records, self.motions, strict=True)
             if (record.fit | record.choose).any()
         ]
-        records = tuple(record for record, _ in kept)
-        motions = tuple(self._cut_motion(motion, len(record.command)) for record, motion in kept)
+        records = tuple(record for record, _ in pairs)
+        motions = tuple(self._cut_motion(motion, len(record.command)) for record, motion in pairs)
         return replace(self, records=records, motions=motions)
 
     def _cut_motion(self, motion: BandMotion, count: int) -> BandMotion:
-        whole = motion.position
-        return motion if count == len(whole) else band_motion(whole[:count], motion.sample_rate_hz, self.band_hz)
+        position = motion.position
+        return motion if count == len(position) else band_motion(position[:count], motion.sample_rate_hz, self.band_hz)
 
     def _shorten_record(self, record: Observed) -> Observed:
         """The record cut after the last sample to fit or to choose by, less the edge that the filter distorts."""
-        cut, edge = record.shorten(), edge_samples(record.recording.sample_rate_hz, self.band_hz)
-        inside = np.arange(len(cut.command)) < len(cut.command) - edge
-        return replace(cut, fit=cut.fit & inside, choose=cut.choose & inside)
+        cut, edge = record.shorten(), count_edge_samples(record.recording.sample_rate_hz, self.band_hz)
+        undistorted = np.arange(len(cut.command)) < len(cut.command) - edge
+        return replace(cut, fit=cut.fit & undistorted, choose=cut.choose & undistorted)
 
     def can_observe(self, effect: Effect) -> bool:
         """Whether the effect changes forces. Effects of sensors do not, because the reading is used as the motion."""
-        return isinstance(effect.acts, (Structure, AxisForce, OnCommand))
+        return isinstance(effect.action, (Structure, AxisForce, OnCommand))
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         return tuple(
-            self._balance(model, (*self.known, *effects), number).residual / self.unit
-            for number in range(len(self.records))
+            self._balance_forces(model, (*self.model_effects, *effects), index).residual / self.unit
+            for index in range(len(self.records))
         )
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        return tuple(self._evidence(model, (*self.known, *effects), number) for number in range(len(self.records)))
+        return tuple(
+            self._gather_evidence(model, (*self.model_effects, *effects), index) for index in range(len(self.records))
+        )
 
-    def _balance(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_Balance":
+    def _balance_forces(self, model: MechanicalModel, effects: Sequence[PlacedEffect], index: int) -> "_Balance":
         """The force balance of a record. Its residual is scaled by the actuator's rms command over rms force: a smaller
         actuator gain would otherwise reduce every error."""
-        record, motion = self.records[number], self.motions[number]
+        record, motion = self.records[index], self.motions[index]
         rate_hz = record.recording.sample_rate_hz
         model = add_carried_weight(model, record.recording)
-        structure = bodies_of(
-            model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
+        structure = build_bodies(
+            model, [effect for effect in effects if isinstance(effect.effect.action, Structure)]
         ).structure
-        required = self._remember(
-            "required", number, (structure, motion), lambda: compute_required_force(structure, motion)
+        required = self._compute_cached(
+            "required", index, (structure, motion), lambda: compute_required_force(structure, motion)
         )
-        applied = self._actuator_force(model, effects, number)
+        applied = self._compute_actuator_force(model, effects, index)
         next_force = np.concatenate([required.force[1:], required.force[-1:]])
         axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration
-        unbalanced = applied.within - (required.force + next_force) / 2
+        unbalanced = applied.band_force - (required.force + next_force) / 2
         effects = effects_under_conditions(effects, record.recording)
-        added = force_along(structure, effects, axis_motion, (record.command, unbalanced), rate_hz)
+        effect_force = effect_forces_along_motion(
+            structure, effects, axis_motion, (record.command, unbalanced), rate_hz
+        )
         # Both are means over the step that begins at a sample; the required force is the mean around the sample.
-        total = applied.around
-        if added.any():
-            total = total + filter_low_pass(added, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
+        total = applied.centred_force
+        if effect_force.any():
+            total = total + filter_low_pass(effect_force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
         # Scaled back by the actuator's gain: a weaker actuator must not make every error smaller.
         strength = _rms(record.command)
-        rescale = strength / np.maximum(_rms(applied.force), WEAKEST * strength + np.finfo(float).tiny)
+        rescale = strength / np.maximum(_rms(applied.force), LEAST_ACTUATOR_SHARE * strength + np.finfo(float).tiny)
         return _Balance(required, (total - required.force) * rescale, total)
 
-    def _actuator_force(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_ActuatorForce":
+    def _compute_actuator_force(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], index: int
+    ) -> "_ActuatorForce":
         """The force of the actuators of a record, cached where no effect changes the command."""
-        record = self.records[number]
+        record = self.records[index]
         rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
-        changed = [effect for effect in effects if isinstance(effect.effect.acts, OnCommand)]
+        command_effects = [effect for effect in effects if isinstance(effect.effect.action, OnCommand)]
 
-        def found() -> _ActuatorForce:
-            force = actuator_force(model, record.command, rate_hz, changed, hold)
-            late = filter_low_pass(force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
-            return _ActuatorForce(force, filter_low_pass(force, rate_hz, self.band_hz), late)
+        def compute() -> _ActuatorForce:
+            force = actuator_force(model, record.command, rate_hz, command_effects, hold)
+            centred = filter_low_pass(force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
+            return _ActuatorForce(force, filter_low_pass(force, rate_hz, self.band_hz), centred)
 
-        return found() if changed else self._remember("applied", number, (model.actuator, record.command), found)
+        return (
+            compute()
+            if command_effects
+            else self._compute_cached("applied", index, (model.actuator, record.command), compute)
+        )
 
-    def _remember(self, what: str, number: int, of: tuple[object, ...], find: Callable[[], _Found]) -> _Found:
+    def _compute_cached(
+        self, kind: str, index: int, inputs: tuple[object, ...], compute: Callable[[], _Result]
+    ) -> _Result:
         """The cached result where the inputs are the very same objects, else a new one."""
-        known = self.remembered.get((what, number))
-        if known is None or any(each is not other for each, other in zip(known[0], of, strict=True)):
-            known = of, find()
-            self.remembered[what, number] = known
-        return cast(_Found, known[1])
+        cached = self.cache.get((kind, index))
+        if cached is None or any(
+            cached_input is not current_input for cached_input, current_input in zip(cached[0], inputs, strict=True)
+        ):
+            cached = inputs, compute()
+            self.cache[kind, index] = cached
+        return cast(_Result, cached[1])
 
-    def _evidence(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> Evidence:
-        record, found = self.records[number], self._balance(model, effects, number)
+    def _gather_evidence(self, model: MechanicalModel, effects: Sequence[PlacedEffect], index: int) -> Evidence:
+        record, balance = self.records[index], self._balance_forces(model, effects, index)
         return Evidence(
             model=add_carried_weight(model, record.recording),
             sample_rate_hz=record.recording.sample_rate_hz,
             command=record.command,
-            axis_position=found.required.axis_position,
-            axis_velocity=found.required.axis_velocity,
-            axis_force=-found.residual,
-            response=found.required.force,
-            predicted=found.total,
+            axis_position=balance.required.axis_position,
+            axis_velocity=balance.required.axis_velocity,
+            axis_force=-balance.residual,
+            response=balance.required.force,
+            predicted=balance.total,
             noise=self.noise,
             used=(record.fit | record.choose).astype(np.float64),
         )
 
 
-def edge_samples(sample_rate_hz: float, band_hz: float) -> int:
+def count_edge_samples(sample_rate_hz: float, band_hz: float) -> int:
     """Number of samples at either end of a record that the band's filter distorts."""
-    return int(EDGE * sample_rate_hz / band_hz)
+    return int(EDGE_PERIODS * sample_rate_hz / band_hz)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,8 +184,8 @@ class _ActuatorForce:
     the band, the mean around the sample."""
 
     force: FloatArray
-    within: FloatArray
-    around: FloatArray
+    band_force: FloatArray
+    centred_force: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

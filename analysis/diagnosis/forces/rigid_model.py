@@ -17,7 +17,7 @@ from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.forces.force_views import force_views
 from analysis.diagnosis.forces.inverse_dynamics import compute_required_force
 from analysis.diagnosis.forces.predicted_force import PredictedForce
-from analysis.diagnosis.noise.noise_floor import noise_floor
+from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
 from analysis.diagnosis.settings import MASSLESS_SHARE, RIGID_MASS_SHARE, RIGID_SHARE, SPRING_SHARE
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
@@ -27,7 +27,7 @@ _ROUNDS = 2
 """Number of fits: the band in which forces are compared depends on the model, so the fit is repeated with the first."""
 
 
-def wants_rigid_model(recordings: Sequence[Recording]) -> bool:
+def should_use_rigid_model(recordings: Sequence[Recording]) -> bool:
     """Whether a rigid model is preferred: a controller made the commands, or a motion was imposed."""
     return can_be_rigid(recordings) and any(
         is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings
@@ -46,7 +46,7 @@ def rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
     records = observe_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
         raise MechanicalModelError(("neither positions nor velocities were measured",))
-    floors = [noise_floor(record.recording) for record in records]
+    floors = [estimate_noise_floor(record.recording) for record in records]
     for _ in range(_ROUNDS):
         model = _fit_to_forces(model, force_views(records, model, floors).measure)
     return model
@@ -69,7 +69,7 @@ def _unit_masses(recording: Recording, name: str) -> MechanicalModel:
 
 def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:
     """The model with fitted matrices, made passive, and with their tolerances."""
-    rows, aims = [], []
+    rows, targets = [], []
     for record, motion in zip(measure.records, measure.motions, strict=True):
         motion_and_force = compute_required_force(model, motion)
         used = record.fit | record.choose
@@ -80,23 +80,25 @@ def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> Mechanica
             np.ones((len(used), 1)),
         )
         rows.append(np.hstack(columns)[used])
-        aims.append(record.measured[used])
-    shapes, aim, m = np.vstack(rows), np.vstack(aims), model.inputs
-    whole, left = _least_squares(shapes, aim)
-    loose, left_loose = _least_squares(np.delete(shapes, range(2 * m, 3 * m), axis=1), aim)
-    sprung = left < (1 - SPRING_SHARE) * left_loose
-    mass, damping = ((matrix + matrix.T) / 2 for matrix in (whole if sprung else loose)[: 2 * m].reshape(2, m, m))
-    mass = mass + np.diag(np.maximum(_least_mass(shapes[:, :m], aim) - np.diagonal(mass), 0.0))
-    stiffness = (whole[2 * m : 3 * m] + whole[2 * m : 3 * m].T) / 2 if sprung else np.zeros((m, m))
+        targets.append(record.measured[used])
+    shapes, target, m = np.vstack(rows), np.vstack(targets), model.inputs
+    full_fit, full_error = _least_squares(shapes, target)
+    springless_fit, springless_error = _least_squares(np.delete(shapes, range(2 * m, 3 * m), axis=1), target)
+    has_springs = full_error < (1 - SPRING_SHARE) * springless_error
+    mass, damping = (
+        (matrix + matrix.T) / 2 for matrix in (full_fit if has_springs else springless_fit)[: 2 * m].reshape(2, m, m)
+    )
+    mass = mass + np.diag(np.maximum(_least_mass(shapes[:, :m], target) - np.diagonal(mass), 0.0))
+    stiffness = (full_fit[2 * m : 3 * m] + full_fit[2 * m : 3 * m].T) / 2 if has_springs else np.zeros((m, m))
     # Negative damping or stiffness is set to zero: a linear model must be passive, and the diagnosis looks for the
     # cause.
     damping = damping if np.linalg.eigvalsh(damping)[0] >= 0 else np.diag(np.maximum(np.diagonal(damping), 0.0))
     stiffness = stiffness if np.linalg.eigvalsh(stiffness)[0] >= 0 else np.zeros((m, m))
     largest = [float(np.abs(np.diagonal(matrix)).max()) for matrix in (mass, damping, stiffness)]
-    open_ = Tolerance(
+    tolerance = Tolerance(
         RIGID_MASS_SHARE * largest[0], RIGID_SHARE * largest[1] or None, RIGID_SHARE * largest[2] or None, None
     )
-    return replace(model, mass=mass, damping=damping, stiffness=stiffness, tolerance=open_)
+    return replace(model, mass=mass, damping=damping, stiffness=stiffness, tolerance=tolerance)
 
 
 def _least_mass(acceleration: FloatArray, force: FloatArray) -> FloatArray:
@@ -104,8 +106,8 @@ def _least_mass(acceleration: FloatArray, force: FloatArray) -> FloatArray:
     return np.asarray(MASSLESS_SHARE * force.std(axis=0) / np.maximum(acceleration.std(axis=0), 1e-300))
 
 
-def _least_squares(shapes: FloatArray, aim: FloatArray) -> tuple[FloatArray, float]:
+def _least_squares(shapes: FloatArray, target: FloatArray) -> tuple[FloatArray, float]:
     """(k, m): coefficients; and the mean square of the residual."""
     size = np.maximum(np.linalg.norm(shapes, axis=0), np.finfo(float).tiny)
-    found = np.linalg.lstsq(shapes / size, aim, rcond=None)[0] / size[:, None]
-    return np.asarray(found), float(np.mean((aim - shapes @ found) ** 2))
+    coefficients = np.linalg.lstsq(shapes / size, target, rcond=None)[0] / size[:, None]
+    return np.asarray(coefficients), float(np.mean((target - shapes @ coefficients) ** 2))

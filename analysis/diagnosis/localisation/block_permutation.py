@@ -48,21 +48,21 @@ def correlation_time(series: FloatArray) -> float:
 
 def shuffle_blocks(strata: IntArray, block: int, random: np.random.Generator) -> IntArray:
     """Indices (n,) of a random exchange of blocks within each stratum. Blocks are cut from a random offset on, the
-    stratum taken as a ring; the rest that fills no block stays at its end. strata: (n,), label of each sample's
+    stratum taken as a ring; the remainder that fills no block stays at its end. strata: (n,), label of each sample's
     stratum, contiguous. block: length in samples."""
-    every, order = np.arange(len(strata)), np.empty(len(strata), dtype=np.int64)
+    indices, order = np.arange(len(strata)), np.empty(len(strata), dtype=np.int64)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(strata)) + 1, [len(strata)]])
     for start, stop in pairwise(edges.tolist()):
         length = stop - start
         size = max(1, min(block, length // _LEAST_BLOCKS))
-        cut = stop - int(random.integers(length))
-        rotated = np.concatenate([every[cut:stop], every[start:cut]])
+        offset = stop - int(random.integers(length))
+        rotated = np.concatenate([indices[offset:stop], indices[start:offset]])
         blocks = length // size
-        whole = blocks * size
-        order[start : start + whole].reshape(blocks, size)[:] = rotated[:whole].reshape(blocks, size)[
+        blocks_length = blocks * size
+        order[start : start + blocks_length].reshape(blocks, size)[:] = rotated[:blocks_length].reshape(blocks, size)[
             random.permutation(blocks)
         ]
-        order[start + whole : stop] = rotated[whole:]
+        order[start + blocks_length : stop] = rotated[blocks_length:]
     return order
 
 
@@ -81,10 +81,12 @@ def permutation_p_values(
     """p-values (tests,) of the observed statistics, counted or from the fitted gamma tail (see the module). statistics:
     from indices (n,) to statistics (tests,), larger where the null hypothesis is less likely, not negative."""
     observed = statistics(np.arange(len(strata)))
-    chance = np.array([statistics(shuffle_blocks(strata, block, random)) for _ in range(permutations)])
-    mean, variance = chance.mean(axis=0), np.maximum(chance.var(axis=0, ddof=1), np.finfo(np.float64).tiny)
-    p_values = gammaincc(mean**2 / variance, observed * mean / variance)
+    permuted = np.array([statistics(shuffle_blocks(strata, block, random)) for _ in range(permutations)])
+    mean, variance = permuted.mean(axis=0), np.maximum(permuted.var(axis=0, ddof=1), np.finfo(np.float64).tiny)
+    tail_p_values = gammaincc(mean**2 / variance, observed * mean / variance)
     # Where enough permutations had a larger statistic, their share is used instead of the fitted tail.
-    counted = (np.sum(chance >= observed, axis=0) + 1) / (permutations + 1)
-    chosen = np.where(counted > _LEAST_EXCEEDED / (permutations + 1), counted, np.maximum(p_values, SMALLEST))
-    return np.asarray(chosen, dtype=np.float64)
+    counted_p_values = (np.sum(permuted >= observed, axis=0) + 1) / (permutations + 1)
+    combined_p_values = np.where(
+        counted_p_values > _LEAST_EXCEEDED / (permutations + 1), counted_p_values, np.maximum(tail_p_values, SMALLEST)
+    )
+    return np.asarray(combined_p_values, dtype=np.float64)

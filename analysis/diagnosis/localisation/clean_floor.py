@@ -37,11 +37,11 @@ class CleanFloor:
     def share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
         """Share of a cell. Where clean recordings never drove this input, the largest share of the same channel and
         octave; 0 without any."""
-        own = self.shares.get((output, quantity, input, band_hz))
-        if own is not None:
-            return own
-        beside = [s for (o, q, _, b), s in self.shares.items() if (o, q, b) == (output, quantity, band_hz)]
-        return max(beside, default=0.0)
+        cell_share = self.shares.get((output, quantity, input, band_hz))
+        if cell_share is not None:
+            return cell_share
+        channel_shares = [s for (o, q, _, b), s in self.shares.items() if (o, q, b) == (output, quantity, band_hz)]
+        return max(channel_shares, default=0.0)
 
 
 def clean_floor_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:

@@ -31,7 +31,7 @@ from analysis.diagnosis.data.spectral_lines import (
     Band,
     DetectionLines,
     detection_lines,
-    excess,
+    excess_power,
     hold_length,
     lines_in_band,
     octaves_between,
@@ -102,13 +102,17 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
 
     floor: the recording's noise; where it is not known, no cell is evaluated and a remark says so.
     """
-    if not floor.known:
+    if not floor.is_known:
         return Distortions((), ("The noise is not known, so distortion cannot be distinguished from it.",))
-    found = find_settled_periods(recording)
+    settled_periods = find_settled_periods(recording)
     excitation = instrument_signal(recording)
-    held = hold_length(excitation)
-    lines = [detection_lines(period_spectra(excitation, period).mean(axis=0), held) for period in found]
-    periods = [(period, detecting) for period, detecting in zip(found, lines, strict=True) if detecting is not None]
+    hold_samples = hold_length(excitation)
+    lines = [
+        detection_lines(period_spectra(excitation, period).mean(axis=0), hold_samples) for period in settled_periods
+    ]
+    periods = [
+        (period, detection) for period, detection in zip(settled_periods, lines, strict=True) if detection is not None
+    ]
     if not periods:
         return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be distinguished.",))
     signals = [(recording.response, floor.response)]
@@ -148,49 +152,52 @@ def _cells(spectrum: SegmentSpectrum, signal: Signal) -> list[Distortion]:
     cells = []
     octaves = octaves_between(lowest, highest)
     for band in dict.fromkeys(((octaves[0][0], octaves[-1][1]), *octaves)):
-        inside = lines_in_band(spectrum.frequency_hz, band)
-        if (inside & spectrum.lines.driven).any():
-            for number, name in enumerate(signal.channels):
-                cell = _Cell(name, signal.quantities[number], spectrum.input, spectrum.amplitude, band)
-                cells += _kinds(spectrum, number, inside, cell, band == (octaves[0][0], octaves[-1][1]))
+        in_band = lines_in_band(spectrum.frequency_hz, band)
+        if (in_band & spectrum.lines.driven).any():
+            for index, name in enumerate(signal.channels):
+                cell = _Cell(name, signal.quantities[index], spectrum.input, spectrum.amplitude, band)
+                cells += _kinds(spectrum, index, in_band, cell, band == (octaves[0][0], octaves[-1][1]))
     return cells
 
 
-def _kinds(spectrum: SegmentSpectrum, channel: int, inside: Mask, cell: _Cell, whole: bool) -> list[Distortion]:
-    """All kinds of distortion in one cell. inside: (lines,), the lines of its band. whole: the whole driven band."""
+def _kinds(spectrum: SegmentSpectrum, channel: int, in_band: Mask, cell: _Cell, whole_band: bool) -> list[Distortion]:
+    """All kinds of distortion in one cell. in_band: (lines,), the lines of its band. whole_band: the whole driven
+    band."""
     power, error = np.abs(spectrum.mean[:, channel]) ** 2, spectrum.error[:, channel]
-    signal_rms = float(np.sqrt(2 * np.sum(power[inside & spectrum.lines.driven])))
-    found: list[tuple[Kind, tuple[float, float, float], float, int]] = []
-    for kind, chosen, reached in _detection_masks(spectrum, inside):
+    signal_rms = float(np.sqrt(2 * np.sum(power[in_band & spectrum.lines.driven])))
+    results: list[tuple[Kind, tuple[float, float, float], float, int]] = []
+    for kind, is_detection, reached_lines in _detection_masks(spectrum, in_band):
         # Each line's noise has a real and an imaginary part in each of count - 1 differences between periods.
-        freedom = float(2 * max(spectrum.count - 1, 1) * chosen.sum())
-        beyond = excess(power[chosen], error[chosen], freedom)
-        found.append((kind, beyond, reached / chosen.sum(), int(chosen.sum())))
+        freedom = float(2 * max(spectrum.count - 1, 1) * is_detection.sum())
+        distortion_power = excess_power(power[is_detection], error[is_detection], freedom)
+        results.append((kind, distortion_power, reached_lines / is_detection.sum(), int(is_detection.sum())))
     if spectrum.count > 1:
         # Each line has count - 1 independent differences between periods, whose mean square is `spread`; the sum over
         # them is divided by count - 1 again below.
-        spreads = np.repeat(spectrum.spread[inside, channel], spectrum.count - 1)
-        beyond = excess(
+        spreads = np.repeat(spectrum.spread[in_band, channel], spectrum.count - 1)
+        distortion_power = excess_power(
             spreads,
-            np.repeat(spectrum.floor[inside, channel], spectrum.count - 1),
+            np.repeat(spectrum.floor[in_band, channel], spectrum.count - 1),
             float(spectrum.floor_freedom[channel]),
         )
-        found.append(("varying", beyond, 1 / (spectrum.count - 1), int(inside.sum())))
+        results.append(("varying", distortion_power, 1 / (spectrum.count - 1), int(in_band.sum())))
     return [
-        Distortion(*cell, whole, kind, _rms(share * beyond), _rms(share * limit), signal_rms, p_value, lines)
-        for kind, (beyond, limit, p_value), share, lines in found
+        Distortion(
+            *cell, whole_band, kind, _rms(share * distortion_power), _rms(share * limit), signal_rms, p_value, lines
+        )
+        for kind, (distortion_power, limit, p_value), share, lines in results
     ]
 
 
-def _detection_masks(spectrum: SegmentSpectrum, inside: Mask) -> list[tuple[Kind, Mask, int]]:
+def _detection_masks(spectrum: SegmentSpectrum, in_band: Mask) -> list[tuple[Kind, Mask, int]]:
     """Kinds of distortion with their lines in the band, and the number of lines of the band that each kind reaches."""
-    numbers = np.arange(1, len(inside) + 1)
-    multiple = inside & (numbers % spectrum.lines.step == 0)
+    numbers = np.arange(1, len(in_band) + 1)
+    multiple = in_band & (numbers % spectrum.lines.step == 0)
     odd = numbers // spectrum.lines.step % 2 == 1
     kinds: list[tuple[Kind, Mask, int]] = [
-        ("odd", np.asarray(inside & spectrum.lines.odd), int((multiple & odd).sum())),
-        ("even", np.asarray(inside & spectrum.lines.even), int((multiple & ~odd).sum())),
-        ("either", np.asarray(inside & spectrum.lines.either), int(multiple.sum())),
+        ("odd", np.asarray(in_band & spectrum.lines.odd), int((multiple & odd).sum())),
+        ("even", np.asarray(in_band & spectrum.lines.even), int((multiple & ~odd).sum())),
+        ("either", np.asarray(in_band & spectrum.lines.either), int(multiple.sum())),
     ]
     return [kind for kind in kinds if kind[1].any()]
 

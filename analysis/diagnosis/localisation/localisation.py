@@ -16,7 +16,7 @@ from analysis.diagnosis.errors.output_error import Fitted, gather_evidence
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.forces.missing_force import axis_transfer
 from analysis.diagnosis.localisation.distortion import Distortions
-from analysis.diagnosis.localisation.entry_point import Entry, EntryPoint, entry_point
+from analysis.diagnosis.localisation.entry_point import Entry, EntryPoint, rank_entries
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, Prediction
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.residual_spectra import residual_spectra
@@ -60,10 +60,10 @@ def find_entry_point(
     spectra = residual_spectra(recording, Prediction(predicted[:, :p], position), floor, record.fit | record.choose)
     if spectra is None:
         return None
-    model, beside = tuning.tune(fitted.deviations), spectra.residual.shape[2] > p
-    entries = possible_entries(model, recording, spectra.frequency_hz, beside)
+    model, position_compared = tuning.tune(fitted.deviations), spectra.residual.shape[2] > p
+    entries = possible_entries(model, recording, spectra.frequency_hz, position_compared)
     kinds = {_DERIVATIVES.get(quantity) for quantity in recording.response.quantities}
-    return entry_point(spectra, entries, kinds.pop() if len(kinds) == 1 else None)
+    return rank_entries(spectra, entries, kinds.pop() if len(kinds) == 1 else None)
 
 
 def find_tied_states(
@@ -72,13 +72,16 @@ def find_tied_states(
     fitted: Fitted,
     cells: Sequence[MismatchCell],
     entry: EntryPoint | None,
-    known: Sequence[Evidence] = (),
+    computed_evidence: Sequence[Evidence] = (),
 ) -> tuple[StateMismatch, ...]:
     """State dependences of the first recording: of the sensor's error where that is the best entry, else of the missing
-    force. cells: of this fit. known: evidence of this fit; empty = to be computed."""
+    force. cells: of this fit. computed_evidence: evidence of this fit; empty = to be computed."""
     if not any(cell.beyond_noise for cell in cells):
         return ()
-    recording, evidence = measure.records[0].recording, (known or gather_evidence(measure, tuning, fitted))[0]
+    recording, evidence = (
+        measure.records[0].recording,
+        (computed_evidence or gather_evidence(measure, tuning, fitted))[0],
+    )
     best = entry.ranking[0] if entry is not None and entry.ranking else None
     if best is not None and best.place == "sensor":
         channels = recording.response.channels if best.axis is None else (best.axis,)
@@ -96,16 +99,16 @@ def possible_entries(
     axes = tuple(axis_letter(channel, recording.command.channels) for channel in recording.command.channels)
     p, channels = model.outputs, forces.shape[1]
     unit = np.eye(channels, dtype=np.complex128)[None]
-    found = [Entry(f"a force along {axis}", "mechanism", axis, forces[:, :, [k]]) for k, axis in enumerate(axes)]
-    found += [Entry("forces along several axes", "mechanism", None, forces)] if len(axes) > 1 else []
-    found += [
+    entries = [Entry(f"a force along {axis}", "mechanism", axis, forces[:, :, [k]]) for k, axis in enumerate(axes)]
+    entries += [Entry("forces along several axes", "mechanism", None, forces)] if len(axes) > 1 else []
+    entries += [
         Entry(f"an error of the {name} channel", "sensor", name, unit[:, :, [k]])
         for k, name in enumerate(recording.response.channels[:p])
     ]
-    found += [Entry("errors of several response channels", "sensor", None, unit[:, :, :p])] if p > 1 else []
+    entries += [Entry("errors of several response channels", "sensor", None, unit[:, :, :p])] if p > 1 else []
     if position and recording.position is not None:
-        found += [
+        entries += [
             Entry(f"an error of the position channel {name}", "sensor", name, unit[:, :, [p + k]], of_position=True)
             for k, name in enumerate(recording.position.channels)
         ]
-    return tuple(found)
+    return tuple(entries)

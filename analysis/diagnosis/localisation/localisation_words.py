@@ -10,7 +10,7 @@ from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.settings import ENTRY_AS_GOOD_P, ENTRY_LEAST_LINES
 from analysis.diagnosis.unit_wording import share_text
-from analysis.wording import conjoin, p_text
+from analysis.wording import conjoin, format_p_text
 
 _FORCE = "the drive, the mechanism and a hand all act there, and these channels do not distinguish them"
 _FORCES = (
@@ -50,7 +50,7 @@ def states_sentence(states: Sequence[StateMismatch]) -> str:
         return ""
     parts = [
         f"{state.output}, driven by {state.input}, {state.region.words} ({share_text(state.region.share)} of the "
-        f"mismatch, {p_text(state.region.p_value)})"
+        f"mismatch, {format_p_text(state.region.p_value)})"
         for state in states
     ]
     return f"The mismatch depends on a state: {'; '.join(parts)}."
@@ -58,18 +58,22 @@ def states_sentence(states: Sequence[StateMismatch]) -> str:
 
 def _rival_entry(entry: EntryPoint) -> str:
     """Clauses on entries that the data cannot distinguish from the best, and on the next best entry; may be empty."""
-    best, others = entry.ranking[0], [score for score in entry.ranking[1:] if score.name not in entry.ranking[0].alike]
-    alike = f"; {conjoin(best.alike)} would have the same effect" if best.alike else ""
+    best, distinguishable = (
+        entry.ranking[0],
+        [score for score in entry.ranking[1:] if score.name not in entry.ranking[0].equivalents],
+    )
+    equivalents = f"; {conjoin(best.equivalents)} would have the same effect" if best.equivalents else ""
     # Entries along several axes contain those along each, and errors of several channels contain each channel's.
-    rivals = [other for other in others if not (other.axis is None and other.place == best.place)]
+    rivals = [rival for rival in distinguishable if not (rival.axis is None and rival.place == best.place)]
     if not rivals:
-        return alike
+        return equivalents
     second = rivals[0]
-    chance = p_text(second.p_value)
+    chance = format_p_text(second.p_value)
     if second.p_value > ENTRY_AS_GOOD_P:
-        return f"{alike}; {second.name} would explain it about equally well ({_percent(second)}, {chance})"
+        return f"{equivalents}; {second.name} would explain it about equally well ({_percent(second)}, {chance})"
     return (
-        f"{alike}; the next best entry is {second.name} with {_percent(second)} ({chance} for its being equally good)"
+        f"{equivalents}; the next best entry is {second.name} with {_percent(second)} "
+        f"({chance} for its being equally good)"
     )
 
 

@@ -100,19 +100,19 @@ def mismatch_cells(
     Raises ValueError where a prediction has another shape than the recording.
     """
     observations = _observations(recording, prediction, floor)
-    if not floor.known:
+    if not floor.is_known:
         return ()
-    counted = np.ones(len(recording), dtype=np.bool_) if used is None else used
-    if counted.shape != (len(recording),):
-        raise ValueError(f"the mask of used samples must have shape ({len(recording)},), not {counted.shape}")
-    allowed = margin or Margin()
+    used_samples = np.ones(len(recording), dtype=np.bool_) if used is None else used
+    if used_samples.shape != (len(recording),):
+        raise ValueError(f"the mask of used samples must have shape ({len(recording)},), not {used_samples.shape}")
+    equivalence_margin = margin or Margin()
     cells: list[MismatchCell] = []
     for channels, observation in observations:
         groups: dict[tuple[str, Band, float], list[ResidualLines]] = {}
-        for lines in residual_lines(recording, observation, counted):
+        for lines in residual_lines(recording, observation, used_samples):
             groups.setdefault((lines.input, lines.band_hz, lines.amplitude), []).append(lines)
         for group in groups.values():
-            cells += [_cell(group, k, name, observation, allowed) for k, name in enumerate(channels)]
+            cells += [_cell(group, k, name, observation, equivalence_margin) for k, name in enumerate(channels)]
     return tuple(replace(cell, beyond_noise=cell.significant) for cell in adjust_for_cells(cells))
 
 
@@ -134,23 +134,24 @@ def _observations(
 def _cell(group: Sequence[ResidualLines], k: int, name: str, observation: Observation, margin: Margin) -> MismatchCell:
     first = group[0]
     quantity = observation.quantities[k]
-    allowed = margin.of(name, quantity, first.input, first.band_hz)
+    margin_share = margin.of(name, quantity, first.input, first.band_hz)
     seconds = np.array([part.seconds for part in group])
     lines = np.array([part.lines for part in group])
     residual, noise, signal = (
-        float(np.average([getattr(part, what)[k] for part in group], weights=seconds))
-        for what in ("residual", "noise", "signal")
+        float(np.average([getattr(part, power_name)[k] for part in group], weights=seconds))
+        for power_name in ("residual", "noise", "signal")
     )
     ratio = float(np.average([part.whitened[k] for part in group], weights=lines))
-    over_noise, freedom = (
+    signal_in_noise, freedom = (
         sum(float(part.signal_to_noise[k]) for part in group),
         max(float(observation.noise.freedom[k]), 1.0),
     )
-    p_value = float(noncentral_f_sf(ratio, lines.sum(), freedom, 2 * allowed**2 * over_noise))
+    p_value = float(noncentral_f_sf(ratio, lines.sum(), freedom, 2 * margin_share**2 * signal_in_noise))
     return MismatchCell(
         name, quantity, first.input, first.band_hz, first.amplitude,
         float(np.sqrt(max(residual - noise, 0.0))), float(np.sqrt(signal)), float(np.sqrt(ratio)),
-        allowed, p_value, 1.0, float(seconds.sum()), float(lines.sum()), freedom, over_noise / float(lines.sum()),
+        margin_share, p_value, 1.0, float(seconds.sum()), float(lines.sum()), freedom,
+        signal_in_noise / float(lines.sum()),
     )  # fmt: skip
 
 
@@ -169,8 +170,8 @@ def learn_floor(clean: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
         for cell in cells:
             key = (cell.output, cell.quantity, cell.input, cell.band_hz)
             shares[key] = max(shares.get(key, 0.0), cell.share)
-    beyond = CleanFloor(recordings=len(clean)).beyond
-    return CleanFloor({key: beyond * share for key, share in shares.items()}, recordings=len(clean))
+    factor = CleanFloor(recordings=len(clean)).beyond
+    return CleanFloor({key: factor * share for key, share in shares.items()}, recordings=len(clean))
 
 
 def adjust_nested_p_values(p_values: FloatArray, families: Sequence[tuple[Hashable, ...]], level: float) -> FloatArray:
@@ -193,25 +194,27 @@ def _adjust_families(
     p_values: FloatArray,
     families: Sequence[tuple[Hashable, ...]],
     members: np.ndarray[tuple[int], np.dtype[np.intp]],
-    at: tuple[int, float, float],
+    position: tuple[int, float, float],
     adjusted: FloatArray,
 ) -> None:
-    """at: depth, factor that the level was lowered by, level. Writes the largest p-value along each path."""
-    depth, factor, level = at
+    """position: depth, factor that the level was lowered by, level. Writes the largest p-value along each path."""
+    depth, factor, level = position
     if depth == len(families[int(members[0])]):
         adjusted[members] = np.maximum(adjusted[members], factor * _benjamini_hochberg(p_values[members]))
         return
     groups: dict[Hashable, list[int]] = {}
     for member in members:
         groups.setdefault(families[int(member)][depth], []).append(int(member))
-    within = [np.array(group) for group in groups.values()]
-    simes = np.array([_benjamini_hochberg(p_values[group]).min() for group in within])
-    own = factor * _benjamini_hochberg(simes)
-    found = int(np.sum(own <= level))
-    for group, p_value in zip(within, own, strict=True):
+    subfamilies = [np.array(group) for group in groups.values()]
+    simes = np.array([_benjamini_hochberg(p_values[group]).min() for group in subfamilies])
+    family_p_values = factor * _benjamini_hochberg(simes)
+    found_count = int(np.sum(family_p_values <= level))
+    for group, p_value in zip(subfamilies, family_p_values, strict=True):
         adjusted[group] = np.maximum(adjusted[group], p_value)
         if p_value <= level:
-            _adjust_families(p_values, families, group, (depth + 1, factor * len(within) / found, level), adjusted)
+            _adjust_families(
+                p_values, families, group, (depth + 1, factor * len(subfamilies) / found_count, level), adjusted
+            )
         else:
             adjusted[group] = np.maximum(adjusted[group], p_values[group])
 

@@ -2,10 +2,10 @@
 
 A mismatch is significant only beyond the model's typical error on held-out data. No model is exact, and its error does
 not follow from the noise. The residual in a cell is therefore modelled as noise plus model error, both random, with the
-error's power a share of the signal's that varies slowly with frequency. The share is learned from the held-out cells of
+error's power a share of the signal's that varies slowly with frequency. The share is estimated on the held-out cells of
 the most complete model, of the same channel, in the same and the neighbouring octaves: other levels, other axes, other
 recordings. Its robust estimate is the median, so that a mismatch at one level or in one octave does not raise its own
-reference.
+reference. Called by `assemble_findings`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -53,7 +53,7 @@ class Maps:
         )
 
 
-def mismatch_maps(
+def build_mismatch_maps(
     measure: ErrorMeasure,
     stages: Mapping[str, Fitted],
     floors: tuple[NoiseFloor, ...],
@@ -67,15 +67,18 @@ def mismatch_maps(
 
     def make_map(number: int) -> Cells:
         if number == len(fits):
-            return cells_of(measure, stages["after"], floors, held_out=True)
-        return cells_of(measure, fits[number], floors, learned)
+            return compute_cells(measure, stages["after"], floors, held_out=True)
+        return compute_cells(measure, fits[number], floors, learned)
 
-    found: list[Cells] = list(map_(make_map, range(len(fits) + 1)))  # type: ignore[arg-type]
-    error, cells = model_error(found[-1]), {id(fitted): own for fitted, own in zip(fits, found, strict=False)}
+    cells_by_fit: list[Cells] = list(map_(make_map, range(len(fits) + 1)))  # type: ignore[arg-type]
+    error, cells = (
+        collect_model_error(cells_by_fit[-1]),
+        {id(fitted): fit_cells for fitted, fit_cells in zip(fits, cells_by_fit, strict=False)},
+    )
     return Maps({stage: adjust_for_model_error(cells[id(fitted)], error) for stage, fitted in stages.items()})
 
 
-def whole_mismatch(measure: ErrorMeasure, score: FitScore, fitted: Fitted) -> tuple[Mismatch, ...]:
+def summarise_worst_channel(measure: ErrorMeasure, score: FitScore, fitted: Fitted) -> tuple[Mismatch, ...]:
     """One row for the worst channel over the whole band, where no cell is significant. Its p-value is that of an error
     above the noise, in the mean over stretches (one-sided t test) or in their sum."""
     record = measure.records[0].recording
@@ -83,33 +86,36 @@ def whole_mismatch(measure: ErrorMeasure, score: FitScore, fitted: Fitted) -> tu
     worst = int(np.argmax(errors))
     names = (*record.response.channels, *(() if record.position is None else record.position.channels))
     signal = np.sqrt(np.nanmean(measure.records[0].measured[:, worst] ** 2))
-    left = float(errors[worst] * measure.noise[worst])
-    share = min(left / signal, 1.0) if signal > 0 else 1.0
-    inputs, p_value = "+".join(record.command.channels), _p_value_of_noise(measure, fitted, worst)
+    error_rms = float(errors[worst] * measure.noise[worst])
+    share = min(error_rms / signal, 1.0) if signal > 0 else 1.0
+    inputs, p_value = "+".join(record.command.channels), _test_against_noise(measure, fitted, worst)
     return (Mismatch(names[worst], inputs, (0.0, record.sample_rate_hz / 2), None, None, share, p_value),)
 
 
-def _p_value_of_noise(measure: ErrorMeasure, fitted: Fitted, channel: int) -> float:
+def _test_against_noise(measure: ErrorMeasure, fitted: Fitted, channel: int) -> float:
     """p-value of an error power above that of noise, over stretches of time, within which errors are correlated.
 
-    Either by the mean over stretches (t test), or by their sum with each stretch as a single sample of noise
-    (chi-squared test): where a few stretches have large errors, their scatter hides from the first what the second
-    detects. Twice the smaller p-value of the two (Bonferroni).
+    Twice the smaller p-value (Bonferroni) of two tests: a t test of the mean over stretches, and a chi-squared test of
+    their sum with each stretch as a single sample of noise. Large errors in a few stretches raise the standard error of
+    the t test, but not the limit of the chi-squared test.
     """
     powers = []
     for record, residuals in zip(measure.records, fitted.residuals, strict=True):
-        left = residuals[record.fit | record.choose | record.test, channel]
-        powers += [float(np.mean(part**2)) for part in np.array_split(left, STRETCHES) if len(part)]
-    over = np.array(powers) * (measure.unit[channel] / measure.noise[channel]) ** 2
-    known = over[np.isfinite(over)]
-    if len(known) < len(over) or len(known) < 2 or np.ptp(known) == 0:
-        return 0.0 if not known.size or known.mean() > 1 else 1.0
-    score = (known.mean() - 1.0) / (known.std(ddof=1) / np.sqrt(len(known)))
-    p_of_mean, p_of_sum = float(stdtr(len(known) - 1, -score)), float(chdtrc(len(known), known.sum()))
+        channel_residuals = residuals[record.fit | record.choose | record.test, channel]
+        powers += [float(np.mean(part**2)) for part in np.array_split(channel_residuals, STRETCHES) if len(part)]
+    power_ratios = np.array(powers) * (measure.unit[channel] / measure.noise[channel]) ** 2
+    finite_ratios = power_ratios[np.isfinite(power_ratios)]
+    if len(finite_ratios) < len(power_ratios) or len(finite_ratios) < 2 or np.ptp(finite_ratios) == 0:
+        return 0.0 if not finite_ratios.size or finite_ratios.mean() > 1 else 1.0
+    score = (finite_ratios.mean() - 1.0) / (finite_ratios.std(ddof=1) / np.sqrt(len(finite_ratios)))
+    p_of_mean, p_of_sum = (
+        float(stdtr(len(finite_ratios) - 1, -score)),
+        float(chdtrc(len(finite_ratios), finite_ratios.sum())),
+    )
     return min(2 * min(p_of_mean, p_of_sum), 1.0)
 
 
-def cells_of(
+def compute_cells(
     measure: ErrorMeasure,
     fitted: Fitted,
     floors: tuple[NoiseFloor, ...],
@@ -124,12 +130,12 @@ def cells_of(
         predicted = record.measured - residuals * measure.unit
         position = predicted[:, p:] if predicted.shape[1] > p else None
         used = record.choose | record.test if held_out else None
-        found = mismatch_cells(record.recording, Prediction(predicted[:, :p], position), floor, used, margin)
-        cells += [replace(cell, part=part) for cell in found]
+        record_cells = mismatch_cells(record.recording, Prediction(predicted[:, :p], position), floor, used, margin)
+        cells += [replace(cell, part=part) for cell in record_cells]
     return tuple(cells)
 
 
-BESIDE = 2.1
+NEIGHBOUR_RATIO = 2.1
 """Ratio of the lower ends of two octaves up to which these are the same or neighbours."""
 
 
@@ -145,40 +151,44 @@ class _HeldOutShare:
 class ModelError:
     """Held-out mismatch as shares of the signal, from which the expected model error near a cell is estimated."""
 
-    held: Mapping[tuple[str, str], tuple[_HeldOutShare, ...]]
+    held_out_shares: Mapping[tuple[str, str], tuple[_HeldOutShare, ...]]
     """Held-out shares by (channel, quantity)."""
 
-    def of(self, cell: MismatchCell) -> tuple[float, int]:
+    def estimate_square(self, cell: MismatchCell) -> tuple[float, int]:
         """Expected square of the cell's share, from other cells near it, and their number; 0 and 0 without any."""
-        near = [
-            held.share**2
-            for held in self.held.get((cell.output, cell.quantity), ())
-            if 1 / BESIDE < held.band_hz[0] / cell.band_hz[0] < BESIDE
-            and (held.fold, held.band_hz) != (_fold(cell), cell.band_hz)
+        neighbour_squares = [
+            reference.share**2
+            for reference in self.held_out_shares.get((cell.output, cell.quantity), ())
+            if 1 / NEIGHBOUR_RATIO < reference.band_hz[0] / cell.band_hz[0] < NEIGHBOUR_RATIO
+            and (reference.fold, reference.band_hz) != (_identify_fold(cell), cell.band_hz)
         ]
         # The power of one line is exponentially distributed, with a median of ln 2 times its mean.
-        return (float(np.median(near) / np.log(2)), len(near)) if near else (0.0, 0)
+        return (
+            (float(np.median(neighbour_squares) / np.log(2)), len(neighbour_squares)) if neighbour_squares else (0.0, 0)
+        )
 
 
-def model_error(held_out: Sequence[MismatchCell]) -> ModelError:
+def collect_model_error(held_out: Sequence[MismatchCell]) -> ModelError:
     """The typical error of a model, from its held-out cells. held_out: cells of samples that nothing was fitted to, of
     the most complete model."""
-    found: dict[tuple[str, str], list[_HeldOutShare]] = {}
+    shares: dict[tuple[str, str], list[_HeldOutShare]] = {}
     for cell in held_out:
-        found.setdefault((cell.output, cell.quantity), []).append(_HeldOutShare(_fold(cell), cell.band_hz, cell.share))
-    return ModelError({channel: tuple(held) for channel, held in found.items()})
+        shares.setdefault((cell.output, cell.quantity), []).append(
+            _HeldOutShare(_identify_fold(cell), cell.band_hz, cell.share)
+        )
+    return ModelError({channel: tuple(channel_shares) for channel, channel_shares in shares.items()})
 
 
 def adjust_for_model_error(cells: Sequence[MismatchCell], error: ModelError) -> tuple[MismatchCell, ...]:
     """The cells with p-values against noise and model error together; `beyond_noise` is kept."""
-    return adjust_for_cells([replace(cell, p_value=_p_value(cell, error)) for cell in cells])
+    return adjust_for_cells([replace(cell, p_value=_compute_p_value(cell, error)) for cell in cells])
 
 
-def _p_value(cell: MismatchCell, error: ModelError) -> float:
+def _compute_p_value(cell: MismatchCell, error: ModelError) -> float:
     """p-value of an F ratio of two sums of powers, each with the degrees of freedom of a chi-squared variable of its
     mean and variance (Satterthwaite, Biometrics Bulletin 2:110, 1946). The model error in the cell has the degrees of
     freedom of a single line."""
-    share, count = error.of(cell)
+    share, count = error.estimate_square(cell)
     model_error_power = share * cell.signal_in_noise
     if not count or model_error_power <= 0:
         return cell.p_value
@@ -188,5 +198,5 @@ def _p_value(cell: MismatchCell, error: ModelError) -> float:
     return max(float(fdtrc(freedom_of_cell, freedom_of_reference, cell.in_noise**2 / expected)), cell.p_value)
 
 
-def _fold(cell: MismatchCell) -> tuple[int, str, float]:
+def _identify_fold(cell: MismatchCell) -> tuple[int, str, float]:
     return cell.part, cell.input, cell.amplitude

@@ -28,17 +28,17 @@ class StateMismatch:
 
 
 def mismatch_rows(
-    cells: Sequence[MismatchCell], states: Sequence[StateMismatch] = (), most: int = MOST_ROWS
+    cells: Sequence[MismatchCell], states: Sequence[StateMismatch] = (), limit: int = MOST_ROWS
 ) -> tuple[Mismatch, ...]:
     """Significant rows: states first, in the order of the mismatch power that they contain; then cells, by their
     missing share of the channel's whole signal. `share` of a cell's row is relative to the signal within the cell (rms,
     at most 1), which is large in bands without signal and has little meaning by itself."""
-    tied = [state for state in states if state.region.p_value <= FALSE_DISCOVERY_RATE]
-    found = [cell for cell in cells if cell.significant]
-    whole = _whole_signals(cells)
-    tied.sort(key=lambda state: (-state.region.share, state.region.p_value))
-    found.sort(key=lambda cell: (-cell.rms / whole[_channel(cell)], cell.adjusted_p_value))
-    return (*map(_state_row, tied), *map(_cell_row, found))[:most]
+    significant_states = [state for state in states if state.region.p_value <= FALSE_DISCOVERY_RATE]
+    significant_cells = [cell for cell in cells if cell.significant]
+    channel_signals = _channel_signals(cells)
+    significant_states.sort(key=lambda state: (-state.region.share, state.region.p_value))
+    significant_cells.sort(key=lambda cell: (-cell.rms / channel_signals[_channel(cell)], cell.adjusted_p_value))
+    return (*map(_state_row, significant_states), *map(_cell_row, significant_cells))[:limit]
 
 
 def _channel(cell: MismatchCell) -> tuple[str, str]:
@@ -46,14 +46,14 @@ def _channel(cell: MismatchCell) -> tuple[str, str]:
     return cell.output, cell.quantity
 
 
-def _whole_signals(cells: Sequence[MismatchCell]) -> dict[tuple[str, str], float]:
+def _channel_signals(cells: Sequence[MismatchCell]) -> dict[tuple[str, str], float]:
     """Rms of each channel's response over all bands, in the segment that excited it most."""
     powers: dict[tuple[str, str], dict[tuple[str, float], float]] = {}
     for cell in cells:
-        driven = powers.setdefault(_channel(cell), {})
-        by = (cell.input, cell.amplitude)
-        driven[by] = driven.get(by, 0.0) + cell.signal_rms**2
-    return {channel: max(max(driven.values()) ** 0.5, 1e-300) for channel, driven in powers.items()}
+        segment_powers = powers.setdefault(_channel(cell), {})
+        segment_key = (cell.input, cell.amplitude)
+        segment_powers[segment_key] = segment_powers.get(segment_key, 0.0) + cell.signal_rms**2
+    return {channel: max(max(segment_powers.values()) ** 0.5, 1e-300) for channel, segment_powers in powers.items()}
 
 
 def _cell_row(cell: MismatchCell) -> Mismatch:

@@ -83,53 +83,57 @@ def residual_lines(recording: Recording, observation: Observation, used: Mask) -
     window are left out."""
     usable = used & np.isfinite(observation.measured).all(axis=1) & np.isfinite(observation.predicted).all(axis=1)
     periods = {period.index: period for period in find_settled_periods(recording)}
-    left = observation.measured - observation.predicted
-    found: list[ResidualLines] = []
+    residual = observation.measured - observation.predicted
+    lines: list[ResidualLines] = []
     for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
         if segment.kind == "rest":
             continue
         if index in periods:
             starts = tuple(s for s in periods[index].starts if usable[s : s + segment.period].all())
             if starts:
-                found += _lines_of_periods(
-                    recording, observation, left, Periods(index, segment, starts, periods[index].settled)
+                lines += _lines_of_periods(
+                    recording, observation, residual, Periods(index, segment, starts, periods[index].settled)
                 )
         else:
-            found += _lines_of_windows(recording, observation, left, (segment, usable))
-    return found
+            lines += _lines_of_windows(recording, observation, residual, (segment, usable))
+    return lines
 
 
 def _lines_of_periods(
-    recording: Recording, observation: Observation, left: FloatArray, periods: Periods
+    recording: Recording, observation: Observation, residual: FloatArray, periods: Periods
 ) -> list[ResidualLines]:
-    """Residual power of the mean period, by octave. left: residual (n, channels)."""
+    """Residual power of the mean period, by octave. residual: (n, channels)."""
     excitation = mean_spectrum(instrument_signal(recording), periods)
     driven = detection_lines(excitation, hold_length(instrument_signal(recording)))
     if driven is None:
         return []
     lines_hz = periods.frequency_hz(recording.sample_rate_hz)
     response = np.abs(mean_spectrum(observation.measured, periods)) ** 2
-    residual = np.abs(mean_spectrum(left, periods)) ** 2
+    residual_power = np.abs(mean_spectrum(residual, periods)) ** 2
     noise = _noise_power(observation, lines_hz, periods.count) / periods.length
     inputs = "+".join(find_driven_inputs(np.sum(np.abs(excitation) ** 2, axis=0), recording.command.channels))
     lowest, highest = (float(line) for line in lines_hz[driven.driven][[0, -1]])
-    inside = (lines_hz >= lowest) & (lines_hz <= highest)
+    in_driven_band = (lines_hz >= lowest) & (lines_hz <= highest)
     seconds = periods.count * periods.length / recording.sample_rate_hz
-    found = []
+    octave_lines = []
     for band in octaves_between(lowest, highest):
-        chosen = inside & lines_in_band(lines_hz, band)
-        if (chosen & driven.driven).any():
-            where = (inputs, periods.segment.amplitude, band, seconds, float(chosen.sum()))
-            found.append(_sum_lines(where, residual[chosen], noise[chosen], response[chosen], observation.quantities))
-    return found
+        in_octave = in_driven_band & lines_in_band(lines_hz, band)
+        if (in_octave & driven.driven).any():
+            cell = (inputs, periods.segment.amplitude, band, seconds, float(in_octave.sum()))
+            octave_lines.append(
+                _sum_lines(
+                    cell, residual_power[in_octave], noise[in_octave], response[in_octave], observation.quantities
+                )
+            )
+    return octave_lines
 
 
 def _lines_of_windows(
-    recording: Recording, observation: Observation, left: FloatArray, where_used: tuple[Segment, Mask]
+    recording: Recording, observation: Observation, residual: FloatArray, segment_and_mask: tuple[Segment, Mask]
 ) -> list[ResidualLines]:
-    """Residual power of Hann windows, by octave. left: residual (n, channels). where_used: the segment, and the mask
+    """Residual power of Hann windows, by octave. residual: (n, channels). segment_and_mask: the segment, and the mask
     (n,) of samples that count."""
-    segment, usable = where_used
+    segment, usable = segment_and_mask
     length = min(round(_WINDOW_S * recording.sample_rate_hz), segment.stop - segment.start)
     starts = [
         s for s in range(segment.start, segment.stop - length + 1, max(length // 2, 1)) if usable[s : s + length].all()
@@ -140,32 +144,32 @@ def _lines_of_windows(
     lines_hz: FloatArray = np.arange(1.0, (length + 1) // 2) * (recording.sample_rate_hz / length)
     excitation = np.sum(_window_power(instrument_signal(recording), starts, length), axis=2)
     response = _window_power(observation.measured, starts, length)
-    residual = _window_power(left, starts, length)
+    residual_power = _window_power(residual, starts, length)
     noise = np.broadcast_to(_noise_power(observation, lines_hz, 1) / length, response.shape)
     inputs = "+".join(find_driven_inputs(command.var(axis=0), recording.command.channels))
     by_band = [
         (band, lines_in_band(lines_hz, band)) for band in octaves_between(2 * float(lines_hz[0]), float(lines_hz[-1]))
     ]
     strongest = max(float(excitation[:, lines].sum(axis=1).max(initial=0.0)) for _, lines in by_band)
-    found = []
+    octave_lines = []
     for band, lines in by_band:
         power = excitation[:, lines].sum(axis=1)
         if not lines.any() or power.max() <= _DRIVEN_IN_BAND * strongest:
             continue
-        chosen = np.ix_(power > _DRIVEN_IN_WINDOW * power.max(), lines)
-        windows, width = len(chosen[0]), int(lines.sum())
+        driven_lines = np.ix_(power > _DRIVEN_IN_WINDOW * power.max(), lines)
+        windows, width = len(driven_lines[0]), int(lines.sum())
         independent = windows * width / (_HANN_NEIGHBOURS * (_HANN_OVERLAP if windows > 1 else 1.0))
-        where = (
+        cell = (
             inputs,
             segment.amplitude,
             band,
             windows * length / 2 / recording.sample_rate_hz,
             max(independent, 1.0),
         )
-        flat = [power_of[chosen].reshape(windows * width, -1) for power_of in (residual, noise, response)]
-        per_window = _sum_lines(where, flat[0], flat[1], flat[2], observation.quantities)
-        found.append(_per_window(per_window, windows))
-    return found
+        powers = [power_of[driven_lines].reshape(windows * width, -1) for power_of in (residual_power, noise, response)]
+        per_window = _sum_lines(cell, powers[0], powers[1], powers[2], observation.quantities)
+        octave_lines.append(_per_window(per_window, windows))
+    return octave_lines
 
 
 def _window_power(samples: FloatArray, starts: Sequence[int], length: int) -> FloatArray:
@@ -186,21 +190,27 @@ def _noise_power(observation: Observation, lines_hz: FloatArray, periods: int) -
 
 
 def _sum_lines(
-    where: tuple[str, float, Band, float, float],
+    cell: tuple[str, float, Band, float, float],
     residual: FloatArray,
     noise: FloatArray,
     response: FloatArray,
     quantities: tuple[str, ...],
 ) -> ResidualLines:
-    """The powers summed over lines. where: input, amplitude, band (Hz), duration (s) and number of independent lines.
+    """The powers summed over lines. cell: input, amplitude, band (Hz), duration (s) and number of independent lines.
     residual, noise, response: (lines, channels), squared magnitudes of the lines of positive frequency."""
     signal = np.maximum(response - noise, 0.0)
-    strongest = np.stack([signal[:, [q == own for q in quantities]].max(axis=1) for own in quantities], axis=1)
+    strongest = np.stack(
+        [
+            signal[:, [other_quantity == quantity for other_quantity in quantities]].max(axis=1)
+            for quantity in quantities
+        ],
+        axis=1,
+    )
     raised = np.maximum(signal, _LEAST_AMPLITUDE**2 * strongest)
     positive_noise = np.maximum(noise, np.finfo(np.float64).tiny)
-    lines = where[4]
+    lines = cell[4]
     return ResidualLines(
-        *where,
+        *cell,
         2 * residual.sum(axis=0),
         2 * noise.sum(axis=0),
         2 * raised.sum(axis=0),

@@ -50,61 +50,61 @@ def residual_spectra(
     """Spectra of each segment's mean period, or of windows of `_WINDOW_S` where nothing is periodic. None without
     either, without known noise, or where no line is driven. used: (n,), usable samples. model_error: relative to the
     response; counts as noise, or residuals of the re-tuned model on other axes would appear as a second force."""
-    left = [recording.response.samples - prediction.response]
+    residuals = [recording.response.samples - prediction.response]
     noises = [floor.response]
     if recording.position is not None and prediction.position is not None and floor.position is not None:
-        left.append(recording.position.samples - prediction.position)
+        residuals.append(recording.position.samples - prediction.position)
         noises.append(floor.position)
-    residual = np.hstack(left)
-    whole = np.isfinite(residual).all(axis=1) & (np.ones(len(residual), dtype=np.bool_) if used is None else used)
+    residual = np.hstack(residuals)
+    is_usable = np.isfinite(residual).all(axis=1) & (np.ones(len(residual), dtype=np.bool_) if used is None else used)
     segments = [
         period
-        for period in (_whole_periods(periods, whole) for periods in find_settled_periods(recording))
+        for period in (_select_usable_periods(periods, is_usable) for periods in find_settled_periods(recording))
         if period.starts
     ]
     if not segments:
-        segments = _windows(recording, whole)
+        segments = _windows(recording, is_usable)
     segments = [segment for segment in segments if segment.length == segments[0].length]
-    if not segments or not floor.known:
+    if not segments or not floor.is_known:
         return None
     lines_hz = segments[0].frequency_hz(recording.sample_rate_hz)
     excitation = np.stack([period_spectra(instrument_signal(recording), segment).mean(axis=0) for segment in segments])
-    together = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
-    driven = detection_lines(together, hold_length(instrument_signal(recording)))
+    total_excitation = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
+    driven = detection_lines(total_excitation, hold_length(instrument_signal(recording)))
     if driven is None:
         return None
     first, last = np.flatnonzero(driven.driven)[[0, -1]]
-    inside = slice(int(first), int(last) + 1)
-    spectra = np.stack([period_spectra(residual, segment).mean(axis=0)[inside] for segment in segments])
-    noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], segment) for segment in segments])
+    driven_lines = slice(int(first), int(last) + 1)
+    spectra = np.stack([period_spectra(residual, segment).mean(axis=0)[driven_lines] for segment in segments])
+    noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[driven_lines], segment) for segment in segments])
     noise += model_error**2 * np.stack(
-        [_response_power(recording, segment, len(noises) > 1)[inside] for segment in segments]
+        [_response_power(recording, segment, len(noises) > 1)[driven_lines] for segment in segments]
     )
-    return ResidualSpectra(lines_hz[inside], spectra, noise, left[0].shape[1])
+    return ResidualSpectra(lines_hz[driven_lines], spectra, noise, residuals[0].shape[1])
 
 
-def _whole_periods(periods: Periods, whole: Mask) -> Periods:
+def _select_usable_periods(periods: Periods, usable: Mask) -> Periods:
     """The periods whose samples are all usable; `starts` may then be empty."""
-    starts = tuple(start for start in periods.starts if whole[start : start + periods.length].all())
+    starts = tuple(start for start in periods.starts if usable[start : start + periods.length].all())
     return Periods(periods.index, periods.segment, starts, periods.settled)
 
 
-def _windows(recording: Recording, whole: Mask) -> list[Periods]:
+def _windows(recording: Recording, usable: Mask) -> list[Periods]:
     """Windows of a recording without periods, each as a single period; segments of rest are left out."""
     length = min(round(_WINDOW_S * recording.sample_rate_hz), len(recording))
-    found = []
+    windows = []
     for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
         for start in range(segment.start, segment.stop - length + 1, length):
-            if segment.kind != "rest" and whole[start : start + length].all():
+            if segment.kind != "rest" and usable[start : start + length].all():
                 window = Segment(start, start + length, segment.kind, segment.amplitude, length, segment.role)
-                found.append(Periods(index, window, (start,), True))
-    return found
+                windows.append(Periods(index, window, (start,), True))
+    return windows
 
 
-def _response_power(recording: Recording, periods: Periods, position: bool) -> FloatArray:
+def _response_power(recording: Recording, periods: Periods, with_position: bool) -> FloatArray:
     """(lines, channels): power of response (and position); a weak channel counts with the amplitude
     `_LEAST_AMPLITUDE` of the strongest channel of its signal."""
-    signals = [recording.response, *([recording.position] if position and recording.position is not None else [])]
+    signals = [recording.response, *([recording.position] if with_position and recording.position is not None else [])]
     parts = []
     for signal in signals:
         power = np.abs(period_spectra(signal.samples, periods).mean(axis=0)) ** 2

@@ -53,31 +53,36 @@ def segment_spectra(
     periods: Sequence[tuple[Periods, DetectionLines]],
 ) -> list[SegmentSpectrum]:
     """One spectrum per periodic segment. noise: of the signal, on the lines floor_hz."""
-    found = []
+    spectra = []
     for length in dict.fromkeys(period.length for period, _ in periods):
-        alike = [(period, lines) for period, lines in periods if period.length == length]
-        commands = [period_spectra(recording.command.samples, period).mean(axis=0) for period, _ in alike]
-        answers = [period_spectra(signal.samples, period) for period, _ in alike]
-        driven = [np.where(lines.driven[:, None], u, 0) for (_, lines), u in zip(alike, commands, strict=True)]
-        linear = _linear_response(driven, commands, answers)
-        lines_hz = alike[0][0].frequency_hz(recording.sample_rate_hz)
+        equal_periods = [(period, lines) for period, lines in periods if period.length == length]
+        commands = [period_spectra(recording.command.samples, period).mean(axis=0) for period, _ in equal_periods]
+        responses = [period_spectra(signal.samples, period) for period, _ in equal_periods]
+        driven = [
+            np.where(lines.driven[:, None], excitation, 0)
+            for (_, lines), excitation in zip(equal_periods, commands, strict=True)
+        ]
+        linear_response = _linear_response(driven, commands, responses)
+        lines_hz = equal_periods[0][0].frequency_hz(recording.sample_rate_hz)
         floor = _noise_on_lines(noise, floor_hz, lines_hz) / length
-        for (period, lines), command, answer in zip(alike, commands, answers, strict=True):
-            mean, error, spread = _mean_and_errors(answer, floor, noise.rounding / length)
-            if linear is not None:
+        for (period, lines), command, response in zip(equal_periods, commands, responses, strict=True):
+            mean, error, spread = _mean_and_errors(response, floor, noise.rounding / length)
+            if linear_response is not None:
                 contribution, contribution_error = command_contribution(
-                    linear, np.where(lines.driven[:, None], 0, command)
+                    linear_response, np.where(lines.driven[:, None], 0, command)
                 )
                 mean, error = mean - contribution, error + contribution_error
             spectrum = (lines, lines_hz, mean, error, spread, floor, period.count, noise.freedom)
-            found.append(SegmentSpectrum(inputs_of(recording, period), period.segment.amplitude, *spectrum))
-    return found
+            spectra.append(SegmentSpectrum(inputs_of(recording, period), period.segment.amplitude, *spectrum))
+    return spectra
 
 
 def inputs_of(recording: Recording, periods: Periods) -> str:
     """Names of the inputs that are driven in the first of the periods, joined by "+"."""
-    there = slice(periods.starts[0], periods.starts[0] + periods.length)
-    return "+".join(find_driven_inputs(instrument_signal(recording)[there].var(axis=0), recording.command.channels))
+    first_period = slice(periods.starts[0], periods.starts[0] + periods.length)
+    return "+".join(
+        find_driven_inputs(instrument_signal(recording)[first_period].var(axis=0), recording.command.channels)
+    )
 
 
 def _noise_on_lines(noise: ChannelNoise, floor_hz: FloatArray, lines_hz: FloatArray) -> FloatArray:
@@ -86,23 +91,27 @@ def _noise_on_lines(noise: ChannelNoise, floor_hz: FloatArray, lines_hz: FloatAr
 
 
 def _mean_and_errors(
-    answer: ComplexArray, floor: FloatArray, rounding: FloatArray
+    response: ComplexArray, floor: FloatArray, rounding: FloatArray
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    count = len(answer)
-    spread = period_variance(answer) if count > 1 else floor
-    larger = np.maximum(floor, smooth_over_lines(spread, _SMOOTHED_LINES))
-    return answer.mean(axis=0), larger / count + rounding, spread
+    count = len(response)
+    spread = period_variance(response) if count > 1 else floor
+    smoothed_spread = np.maximum(floor, smooth_over_lines(spread, _SMOOTHED_LINES))
+    return response.mean(axis=0), smoothed_spread / count + rounding, spread
 
 
 def _linear_response(
-    driven: Sequence[ComplexArray], commands: Sequence[ComplexArray], answers: Sequence[ComplexArray]
+    driven: Sequence[ComplexArray], commands: Sequence[ComplexArray], responses: Sequence[ComplexArray]
 ) -> ComplexArray | None:
     """The linear frequency response at all lines; None where the commands are zero on silent lines."""
     clean = all(
-        np.abs(whole - lines).max(initial=0.0) <= _CLEAN * np.abs(whole).max(initial=0.0)
-        for lines, whole in zip(driven, commands, strict=True)
+        np.abs(command - driven_lines).max(initial=0.0) <= _CLEAN * np.abs(command).max(initial=0.0)
+        for driven_lines, command in zip(driven, commands, strict=True)
     )
-    return None if clean else interpolate_response(line_responses(driven, [answer.mean(axis=0) for answer in answers]))
+    return (
+        None
+        if clean
+        else interpolate_response(line_responses(driven, [response.mean(axis=0) for response in responses]))
+    )
 
 
 def line_responses(commands: Sequence[ComplexArray], responses: Sequence[ComplexArray]) -> ComplexArray:
@@ -113,22 +122,22 @@ def line_responses(commands: Sequence[ComplexArray], responses: Sequence[Complex
     inputs, outputs = np.stack(commands, axis=1), np.stack(responses, axis=1)
     size = np.linalg.svd(inputs, compute_uv=False)
     usable = (inputs.shape[1] >= inputs.shape[2]) & (size[:, -1] > _LEAST_INDEPENDENCE * size[:, 0])
-    found = np.full((len(inputs), outputs.shape[2], inputs.shape[2]), np.nan + 0j)
+    transfer = np.full((len(inputs), outputs.shape[2], inputs.shape[2]), np.nan + 0j)
     if usable.any():
-        solved = np.linalg.pinv(inputs[usable]) @ outputs[usable]
-        found[usable] = np.swapaxes(solved, 1, 2)
-    return found
+        solutions = np.linalg.pinv(inputs[usable]) @ outputs[usable]
+        transfer[usable] = np.swapaxes(solutions, 1, 2)
+    return transfer
 
 
 def interpolate_response(response: ComplexArray) -> ComplexArray | None:
     """The response at all lines, interpolated between known ones; None with fewer than two. response: (lines, ...)"""
-    known = np.flatnonzero(np.isfinite(response).all(axis=(1, 2)))
-    if len(known) < 2:
+    known_lines = np.flatnonzero(np.isfinite(response).all(axis=(1, 2)))
+    if len(known_lines) < 2:
         return None
     lines = np.arange(len(response))
     flat = response.reshape(len(response), -1)
-    real = [np.interp(lines, known, column) for column in flat[known].real.T]
-    imaginary = [np.interp(lines, known, column) for column in flat[known].imag.T]
+    real = [np.interp(lines, known_lines, column) for column in flat[known_lines].real.T]
+    imaginary = [np.interp(lines, known_lines, column) for column in flat[known_lines].imag.T]
     return np.asarray((np.array(real) + 1j * np.array(imaginary)).T.reshape(response.shape), dtype=np.complex128)
 
 

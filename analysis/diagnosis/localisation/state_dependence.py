@@ -15,7 +15,13 @@ from analysis.diagnosis.data.spectral_lines import Band
 from analysis.diagnosis.localisation.block_permutation import IntArray
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
-from analysis.diagnosis.localisation.state_regions import MIDDLING, Disturbance, State, StateRegion, state_regions
+from analysis.diagnosis.localisation.state_regions import (
+    MIDDLE_PHRASE,
+    Disturbance,
+    State,
+    StateRegion,
+    find_state_regions,
+)
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, STATE_CROWDED, STATES_NAMED
 from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import axis_letter
@@ -39,10 +45,10 @@ def force_states(
 ) -> tuple[StateMismatch, ...]:
     """State dependences of the missing force along each driven axis with a cell beyond noise. p-values are corrected
     for all regions tested."""
-    found = []
+    axis_states = []
     for k, channel in enumerate(recording.command.channels):
-        of_channel = [cell for cell in cells if cell.beyond_noise and channel in cell.input.split("+")]
-        if not of_channel:
+        channel_cells = [cell for cell in cells if cell.beyond_noise and channel in cell.input.split("+")]
+        if not channel_cells:
             continue
         letter = axis_letter(channel, recording.command.channels)
         length = system.length
@@ -55,21 +61,23 @@ def force_states(
             State("time", "t", "s", np.arange(len(command)) / evidence.sample_rate_hz),
         ]
         strata = _strata(recording, evidence.used > 0, command)
-        worst = max(of_channel, key=lambda cell: cell.in_noise)
-        seen = state_regions(Disturbance(evidence.axis_force[:, k], strata, command), states, _SEED)
-        found.append([StateMismatch(worst.output, channel, _band(of_channel), region) for region in seen])
-    return _correct_p_values(found, FORCE_TESTS)
+        worst = max(channel_cells, key=lambda cell: cell.in_noise)
+        regions = find_state_regions(Disturbance(evidence.axis_force[:, k], strata, command), states, _SEED)
+        axis_states.append([StateMismatch(worst.output, channel, _band(channel_cells), region) for region in regions])
+    return _correct_p_values(axis_states, FORCE_TESTS)
 
 
 def error_states(
     evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], channels: Sequence[str]
 ) -> tuple[StateMismatch, ...]:
     """State dependences of the error of each response channel among `channels` with a cell beyond noise."""
-    found = []
+    channel_states = []
     for k, channel in enumerate(recording.response.channels):
-        own = recording.response.quantities[k]
-        of_channel = [cell for cell in cells if cell.beyond_noise and (cell.output, cell.quantity) == (channel, own)]
-        if not of_channel or channel not in channels:
+        quantity = recording.response.quantities[k]
+        channel_cells = [
+            cell for cell in cells if cell.beyond_noise and (cell.output, cell.quantity) == (channel, quantity)
+        ]
+        if not channel_cells or channel not in channels:
             continue
         reading = evidence.response[:, k]
         states = [
@@ -78,44 +86,48 @@ def error_states(
         ]
         strata = _strata(recording, evidence.used > 0, reading)
         inputs = "+".join(
-            channel for channel in recording.command.channels if any(channel in m.input.split("+") for m in of_channel)
+            channel
+            for channel in recording.command.channels
+            if any(channel in m.input.split("+") for m in channel_cells)
         )
-        seen = state_regions(Disturbance(reading - evidence.predicted[:, k], strata, reading), states, _SEED)
-        found.append([StateMismatch(channel, inputs, _band(of_channel), region) for region in seen])
-    return _correct_p_values(found, ERROR_TESTS)
+        regions = find_state_regions(Disturbance(reading - evidence.predicted[:, k], strata, reading), states, _SEED)
+        channel_states.append([StateMismatch(channel, inputs, _band(channel_cells), region) for region in regions])
+    return _correct_p_values(channel_states, ERROR_TESTS)
 
 
-def _correct_p_values(found: Sequence[Sequence[StateMismatch]], tests_of_each: int) -> tuple[StateMismatch, ...]:
-    """Bonferroni correction over all axes or channels, with tests_of_each tests; only significant ones are kept,
+def _correct_p_values(groups: Sequence[Sequence[StateMismatch]], tests_per_group: int) -> tuple[StateMismatch, ...]:
+    """Bonferroni correction over all axes or channels, with tests_per_group tests each; only significant ones are kept,
     of each axis or channel those with the largest share."""
-    tests = tests_of_each * len(found)
-    kept = []
-    for group in found:
-        raised = [
+    tests = tests_per_group * len(groups)
+    significant_states = []
+    for group in groups:
+        corrected = [
             replace(state, region=replace(state.region, p_value=min(1.0, tests * state.region.p_value)))
             for state in group
         ]
         significant = [
-            state for state in raised if state.region.p_value <= FALSE_DISCOVERY_RATE and _is_informative(state.region)
+            state
+            for state in corrected
+            if state.region.p_value <= FALSE_DISCOVERY_RATE and _is_informative(state.region)
         ]
-        kept += sorted(significant, key=lambda state: -state.region.share)[:STATES_NAMED]
-    return tuple(kept)
+        significant_states += sorted(significant, key=lambda state: -state.region.share)[:STATES_NAMED]
+    return tuple(significant_states)
 
 
 def _is_informative(region: StateRegion) -> bool:
     """Whether a region says more than where most samples are. A middle of a state has no meaning in mechanics."""
-    if region.words.startswith(MIDDLING):
+    if region.words.startswith(MIDDLE_PHRASE):
         return False
-    return region.by == "sign" or region.share > STATE_CROWDED * region.occupied
+    return region.criterion == "sign" or region.share > STATE_CROWDED * region.occupied
 
 
 def _strata(recording: Recording, used: Mask, driven: FloatArray) -> IntArray:
     """(n,): number of the segment; -1 where samples do not count, or hardly any command drives them."""
     n = len(driven)
     strata = np.full(n, -1, dtype=np.int64)
-    parts = [(s.start, min(s.stop, n)) for s in recording.segments if s.kind != "rest" and s.start < n] or [(0, n)]
-    driven_rms = [float(np.sqrt(np.nanmean(driven[start:stop] ** 2))) for start, stop in parts]
-    for number, ((start, stop), rms) in enumerate(zip(parts, driven_rms, strict=True)):
+    spans = [(s.start, min(s.stop, n)) for s in recording.segments if s.kind != "rest" and s.start < n] or [(0, n)]
+    driven_rms = [float(np.sqrt(np.nanmean(driven[start:stop] ** 2))) for start, stop in spans]
+    for number, ((start, stop), rms) in enumerate(zip(spans, driven_rms, strict=True)):
         if rms > _DRIVEN * max(driven_rms):
             strata[start:stop] = number
     strata[~used] = -1

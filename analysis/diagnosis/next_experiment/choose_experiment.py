@@ -1,13 +1,13 @@
-"""Optimal experiments to discriminate rivals: where they differ most after the rival was re-tuned.
+"""Optimal experiments to discriminate rivals: the largest difference of their predictions after the rival's re-tuning.
 
-Hunter and Reiner (1965), with the information of the existing recordings as the prior of the rival's parameters. A
-difference that re-tuning of the rival removes within its tolerance does not count.
+Method of Hunter and Reiner (Technometrics 7:307, 1965), with the information of the existing recordings as the prior of
+the rival's parameters. Called by `propose_experiment`.
 
 Several recordings: with residuals r_i of n recordings, sensitivities X_i and prior information K,
 
     min over d of sum_i |r_i - X_i d|^2 + d' K d  >=  sum_i (min over d of |r_i - X_i d|^2 + d' (K / n) d),
 
-so that gains which were computed with the n-th part of the prior add up to a lower bound of what they gain together.
+so that the sum of gains computed with the n-th part of the prior is a lower bound of their joint gain.
 """
 
 from collections.abc import Sequence
@@ -27,9 +27,9 @@ from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelErr
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
-MOST_TOGETHER = 3
+MOST_RECORDINGS = 3
 """Recordings that are proposed at once."""
-RETUNED = 3
+RETUNING_STEPS = 3
 """Gauss-Newton steps of the rival's re-tuning."""
 
 
@@ -52,15 +52,18 @@ class PredictedGain:
     gain: float
     """Expected log likelihood ratio in favour of the true effect; 0 where a simulation diverged."""
     shared: float = 0.0
-    """The same with a part of the prior information, as one of `MOST_TOGETHER` recordings."""
+    """The same with a part of the prior information, as one of `MOST_RECORDINGS` recordings."""
 
 
 def predict_gains(
-    bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, menu: Sequence[Experiment]
+    bench: Bench, named_fit: Fitted, rival: Fitted, information: FloatArray, menu: Sequence[Experiment]
 ) -> tuple[PredictedGain, ...]:
-    """The experiments with their gains, in the menu's order. known: (t + parameters, t + parameters), information
+    """The experiments with their gains, in the menu's order. information: (t + parameters, t + parameters), information
     matrix of the rival's parameters from what has been recorded, calibration included."""
-    return tuple(PredictedGain(experiment, *_gains(bench, named, rival, known, experiment)) for experiment in menu)
+    return tuple(
+        PredictedGain(experiment, *_compute_gains(bench, named_fit, rival, information, experiment))
+        for experiment in menu
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,35 +72,43 @@ class ExperimentSet:
 
     experiments: tuple[Experiment, ...]
     discriminated: tuple[int, ...]
-    """Which rivals they discriminate from what is named, by their place."""
+    """Indices of the rivals that they discriminate from the named effect."""
     gain: float
     """Smallest expected log likelihood ratio, over these rivals."""
 
 
-def choose_set(predicted: Sequence[Sequence[PredictedGain]]) -> ExperimentSet:
-    """The recordings to make for rivals of one effect; empty where none would discriminate. A single one where one
-    discriminates all that can be, that with the largest gain per cost; else the one first that adds most, per cost, to
-    what is still missing (greedy set cover). predicted: per rival, the gains of one menu, in its order."""
-    alone, shared = (
-        np.array([[float(getattr(each, name)) for each in of] for of in predicted]).reshape(len(predicted), -1)
+def choose_experiments(predicted: Sequence[Sequence[PredictedGain]]) -> ExperimentSet:
+    """Choose recordings that discriminate the rivals of one effect; empty where none would. If a single recording
+    discriminates all rivals, that with the largest gain per minute; else a greedy set cover: each next recording
+    reduces the missing gain most per minute. predicted: per rival, the gains of one menu, in its order."""
+    single_gains, shared_gains = (
+        np.array(
+            [[float(getattr(prediction, name)) for prediction in rival_gains] for rival_gains in predicted]
+        ).reshape(len(predicted), -1)
         for name in ("gain", "shared")
     )
-    menu = [each.experiment for each in predicted[0]] if len(predicted) else []
+    menu = [prediction.experiment for prediction in predicted[0]] if len(predicted) else []
     cost = np.array([experiment.minutes for experiment in menu])
-    most = np.maximum(alone.max(axis=1, initial=0.0), np.sort(shared, axis=1)[:, -MOST_TOGETHER:].sum(axis=1))
-    wanted = [int(number) for number in np.argsort(-most, kind="stable") if most[number] >= TELLING_GAIN]
-    # Without the hardest rival, where all together are out of reach.
-    while wanted:
-        chosen = _single(alone[wanted], cost) or _cover(shared[wanted], cost)
+    largest_gains = np.maximum(
+        single_gains.max(axis=1, initial=0.0), np.sort(shared_gains, axis=1)[:, -MOST_RECORDINGS:].sum(axis=1)
+    )
+    rivals = [int(index) for index in np.argsort(-largest_gains, kind="stable") if largest_gains[index] >= TELLING_GAIN]
+    # Where no set discriminates all rivals, the rival with the smallest gain is left out.
+    while rivals:
+        chosen = _choose_single(single_gains[rivals], cost) or _choose_cover(shared_gains[rivals], cost)
         if chosen:
-            discriminated = tuple(sorted(wanted))
-            gain = alone[wanted][:, chosen].min() if len(chosen) == 1 else shared[wanted][:, chosen].sum(axis=1).min()
-            return ExperimentSet(tuple(menu[number] for number in chosen), discriminated, float(gain))
-        wanted.pop()
+            discriminated = tuple(sorted(rivals))
+            gain = (
+                single_gains[rivals][:, chosen].min()
+                if len(chosen) == 1
+                else shared_gains[rivals][:, chosen].sum(axis=1).min()
+            )
+            return ExperimentSet(tuple(menu[index] for index in chosen), discriminated, float(gain))
+        rivals.pop()
     return ExperimentSet((), (), 0.0)
 
 
-def _single(gains: FloatArray, cost: FloatArray) -> list[int]:
+def _choose_single(gains: FloatArray, cost: FloatArray) -> list[int]:
     """The recording that discriminates every rival by itself, with the largest gain per cost; empty where none does."""
     weakest = gains.min(axis=0)
     if not (weakest >= TELLING_GAIN).any():
@@ -105,91 +116,102 @@ def _single(gains: FloatArray, cost: FloatArray) -> list[int]:
     return [int(np.argmax(np.where(weakest >= TELLING_GAIN, weakest / cost, -np.inf)))]
 
 
-def _cover(gains: FloatArray, cost: FloatArray) -> list[int]:
-    """A few recordings that discriminate every rival together; empty where as many as `MOST_TOGETHER` do not."""
+def _choose_cover(gains: FloatArray, cost: FloatArray) -> list[int]:
+    """A few recordings that discriminate every rival together; empty where as many as `MOST_RECORDINGS` do not."""
     chosen: list[int] = []
-    while (missing := np.maximum(TELLING_GAIN - gains[:, chosen].sum(axis=1), 0.0)).any():
-        if len(chosen) == min(MOST_TOGETHER, len(cost)):
+    while (deficit := np.maximum(TELLING_GAIN - gains[:, chosen].sum(axis=1), 0.0)).any():
+        if len(chosen) == min(MOST_RECORDINGS, len(cost)):
             return []
-        added = np.minimum(gains, missing[:, None]).sum(axis=0) / cost
-        added[chosen] = -np.inf
-        chosen.append(int(np.argmax(added)))
-    needless = (k for k in chosen if (gains[:, [j for j in chosen if j != k]].sum(axis=1) >= TELLING_GAIN).all())
-    dropped = next(needless, None)
+        added_gain = np.minimum(gains, deficit[:, None]).sum(axis=0) / cost
+        added_gain[chosen] = -np.inf
+        chosen.append(int(np.argmax(added_gain)))
+    redundant = (k for k in chosen if (gains[:, [j for j in chosen if j != k]].sum(axis=1) >= TELLING_GAIN).all())
+    dropped = next(redundant, None)
     return [number for number in chosen if number != dropped]
 
 
-def as_document(best: ExperimentSet, names: Sequence[str]) -> NextExperiment | None:
-    """The proposed recordings for the document; None where even the best would not tell the rivals apart. names: of
-    what is named, then of each rival."""
+def make_document_entry(best: ExperimentSet, names: Sequence[str]) -> NextExperiment | None:
+    """The proposed recordings as an entry of the document; None where `best` is empty. names: of the named effect, then
+    of each rival."""
     if not best.experiments:
         return None
-    weighted = any(experiment.added for experiment in best.experiments)
-    said = "; the recording's meta must state the weight (added_mass_kg, or added_inertia_kg_m2)" if weighted else ""
-    first, *more = (experiment.words for experiment in best.experiments)
-    where = "in these recordings together" if more else "there"
+    has_added_mass = any(experiment.added for experiment in best.experiments)
+    weight_remark = (
+        "; the recording's meta must state the weight (added_mass_kg, or added_inertia_kg_m2)" if has_added_mass else ""
+    )
+    first_command, *later_commands = (experiment.words for experiment in best.experiments)
+    place = "in these recordings together" if later_commands else "there"
     return NextExperiment(
-        command="; then ".join([f"record {first}", *more]),
+        command="; then ".join([f"record {first_command}", *later_commands]),
         splits=(names[0], *dict.fromkeys(names[1 + number] for number in best.discriminated)),
-        why=f"{where} their predictions differ by more than noise and tolerances can explain: the log likelihood of "
-        f"the true effect would exceed that of the others by at least {best.gain:.3g}{said}",
+        why=f"{place} their predictions differ by more than noise and tolerances can explain: the log likelihood of "
+        f"the true effect would exceed that of the others by at least {best.gain:.3g}{weight_remark}",
     )
 
 
-def _gains(
-    bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, experiment: Experiment
+def _compute_gains(
+    bench: Bench, named_fit: Fitted, rival: Fitted, information: FloatArray, experiment: Experiment
 ) -> tuple[float, float]:
-    """Gain by itself, and as one of several recordings."""
+    """Gain of the experiment alone, and with the n-th part of the prior, as one of `MOST_RECORDINGS` recordings."""
     base = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment)
-    differs = _simulate(bench, named.deviations, named.hypothesis, named.hypothesis.point, experiment) - base
+    difference = (
+        _simulate(bench, named_fit.deviations, named_fit.hypothesis, named_fit.hypothesis.point, experiment) - base
+    )
     columns = []
     for number in range(len(rival.deviations)):
-        there = rival.deviations.copy()
-        there[number] += DIFFERENCE_STEP
-        moved = _simulate(bench, there, rival.hypothesis, rival.hypothesis.point, experiment)
-        columns.append((moved - base) / DIFFERENCE_STEP)
-    for number, of in enumerate(rival.hypothesis.parameters):
+        displaced = rival.deviations.copy()
+        displaced[number] += DIFFERENCE_STEP
+        displaced_signals = _simulate(bench, displaced, rival.hypothesis, rival.hypothesis.point, experiment)
+        columns.append((displaced_signals - base) / DIFFERENCE_STEP)
+    for number, free_parameter in enumerate(rival.hypothesis.parameters):
         point = rival.hypothesis.point.copy()
-        point[number] += of.move
-        columns.append((_simulate(bench, rival.deviations, rival.hypothesis, point, experiment) - base) / of.move)
-    moves = np.array(columns)
-    if not (np.isfinite(differs).all() and np.isfinite(moves).all()):
+        point[number] += free_parameter.difference_step
+        columns.append(
+            (_simulate(bench, rival.deviations, rival.hypothesis, point, experiment) - base)
+            / free_parameter.difference_step
+        )
+    sensitivities = np.array(columns)
+    if not (np.isfinite(difference).all() and np.isfinite(sensitivities).all()):
         return 0.0, 0.0
-    alone, shared = (
-        _squares_after_retuning(bench, rival, of, (experiment, differs, moves)) / 2
-        for of in (known, known / MOST_TOGETHER)
+    single_gain, shared_gain = (
+        _retune_rival(bench, rival, free_parameter, (experiment, difference, sensitivities)) / 2
+        for free_parameter in (information, information / MOST_RECORDINGS)
     )
-    return alone, min(shared, alone)
+    return single_gain, min(shared_gain, single_gain)
 
 
-def _squares_after_retuning(
-    bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment, FloatArray, FloatArray]
+def _retune_rival(
+    bench: Bench, rival: Fitted, information: FloatArray, prediction: tuple[Experiment, FloatArray, FloatArray]
 ) -> float:
-    """Sum of squares that remains after the rival is re-tuned, by Gauss-Newton steps. seen: the experiment, the
-    difference to be tuned away, and the sensitivities to the rival's parameters."""
-    experiment, differs, moves = seen
-    tuned, t = np.zeros(len(known)), len(rival.deviations)
-    wanted = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + differs
-    whole, least, rest = float(differs @ differs), np.inf, differs
-    rhs = moves @ differs
-    straight = whole - float(rhs @ np.linalg.lstsq(moves @ moves.T + known, rhs, rcond=None)[0])
-    for _ in range(RETUNED):
-        step = np.linalg.lstsq(moves @ moves.T + known, moves @ rest - known @ tuned, rcond=None)[0]
+    """Sum of squares that remains after the rival is re-tuned by Gauss-Newton steps. prediction: the experiment, the
+    difference of the predictions, and the sensitivities to the rival's parameters."""
+    experiment, difference, sensitivities = prediction
+    tuned, t = np.zeros(len(information)), len(rival.deviations)
+    target = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + difference
+    initial_squares, smallest, remainder = float(difference @ difference), np.inf, difference
+    rhs = sensitivities @ difference
+    linear_prediction = initial_squares - float(
+        rhs @ np.linalg.lstsq(sensitivities @ sensitivities.T + information, rhs, rcond=None)[0]
+    )
+    for _ in range(RETUNING_STEPS):
+        step = np.linalg.lstsq(
+            sensitivities @ sensitivities.T + information, sensitivities @ remainder - information @ tuned, rcond=None
+        )[0]
         tuned = tuned + step
         try:
-            there = _simulate(
+            retuned_signals = _simulate(
                 bench, rival.deviations + tuned[:t], rival.hypothesis, rival.hypothesis.point + tuned[t:], experiment
             )
         except (MechanicalModelError, np.linalg.LinAlgError):
             break
-        rest = wanted - there
+        remainder = target - retuned_signals
         with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-            squares = float(rest @ rest + tuned @ known @ tuned)
-        if not squares < least:
+            squares = float(remainder @ remainder + tuned @ information @ tuned)
+        if not squares < smallest:
             break
-        least = squares
-    # Where the steps diverge, the linear prediction is used: it promises rather too little.
-    return least if least < whole else max(straight, 0.0)
+        smallest = squares
+    # Where the steps diverge, the prediction of the linearised model is used, which is rather too small.
+    return smallest if smallest < initial_squares else max(linear_prediction, 0.0)
 
 
 def _simulate(

@@ -17,7 +17,7 @@ from equalizer.signals.signal import FloatArray
 
 SLOWEST_HZ, SLOWEST_SHARE = 1.0, 0.1
 """Lowest frequency of sweeps: in Hz, or as a share of their usual upper end; the lower of the two."""
-CYCLES, LONGER = 8.0, 5.0
+CYCLES, LONG_FACTOR = 8.0, 5.0
 """Length of an experiment in cycles of the sweep's lowest frequency, and the factor on it for the long sweep."""
 USUAL_HZ, USUAL_SHARE, FASTEST_SHARE = 240.0, 0.24, 0.45
 """Upper end of sweeps: in Hz, or as a share of the sample rate, the lower of the two; and that of wide sweeps, as a
@@ -57,70 +57,70 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
     slow_hz = 4.0 / length_s
     added = ADDED_SHARE * _find_grounded_mass(model)
 
-    def along(wave: FloatArray) -> FloatArray:
+    def drive(wave: FloatArray) -> FloatArray:
         return np.outer(apply_fades(wave, fade, fade), np.arange(model.inputs) == axis)
 
-    def swept(of: float, to_hz: float = usual_hz, times: float = 1.0) -> FloatArray:
-        return along(log_sweep(slowest_hz, to_hz, of, int(times * length_s * sample_rate_hz), sample_rate_hz))
+    def chirp(peak: float, to_hz: float = usual_hz, times: float = 1.0) -> FloatArray:
+        return drive(log_sweep(slowest_hz, to_hz, peak, int(times * length_s * sample_rate_hz), sample_rate_hz))
 
-    def slow(of: float) -> FloatArray:
-        return along(sine(slow_hz, of, int(length_s * sample_rate_hz), sample_rate_hz))
+    def tone(peak: float) -> FloatArray:
+        return drive(sine(slow_hz, peak, int(length_s * sample_rate_hz), sample_rate_hz))
 
     sweep, wide = (f"a sweep from {slowest_hz:.3g} to {end:.3g} Hz" for end in (usual_hz, fastest_hz))
     levels = {1: "the highest level so far", 4: "a quarter of the highest level", 20: "a twentieth of it"}
     return (
-        *(Experiment(f"{sweep} at {level / n:.3g}, {words}", swept(level / n), "sweep") for n, words in levels.items()),
-        Experiment(f"{wide} at {level:.3g}", swept(level, fastest_hz), "sweep"),
-        Experiment(f"a slow sinusoid of {slow_hz:.3g} Hz at {level:.3g}", slow(level), "slow"),
+        *(Experiment(f"{sweep} at {level / n:.3g}, {words}", chirp(level / n), "sweep") for n, words in levels.items()),
+        Experiment(f"{wide} at {level:.3g}", chirp(level, fastest_hz), "sweep"),
+        Experiment(f"a slow sinusoid of {slow_hz:.3g} Hz at {level:.3g}", tone(level), "slow"),
         Experiment(
             f"a slow sinusoid of {slow_hz:.3g} Hz at {level / 10:.3g}, so small that the device hardly moves",
-            slow(level / 10),
+            tone(level / 10),
             "slow",
         ),
         Experiment(
-            f"{wide} at {level:.3g} that lasts {LONGER * length_s:.3g} s",
-            swept(level, fastest_hz, LONGER),
+            f"{wide} at {level:.3g} that lasts {LONG_FACTOR * length_s:.3g} s",
+            chirp(level, fastest_hz, LONG_FACTOR),
             "sweep",
             minutes=1.5,
         ),
-        *(_pushes(sweep, level, swept(level / 2), fade) if _is_held(model, axis, slowest_hz) else ()),
+        *(_pushes(sweep, level, chirp(level / 2), fade) if _is_stiff(model, axis, slowest_hz) else ()),
         Experiment(
-            f"{sweep} at {level:.3g} with {_weight_words(model, added)}", swept(level), "sweep", added, minutes=3.0
+            f"{sweep} at {level:.3g} with {_weight_words(model, added)}", chirp(level), "sweep", added, minutes=3.0
         ),
     )
 
 
-def _is_held(model: MechanicalModel, axis: int, slowest_hz: float) -> bool:
+def _is_stiff(model: MechanicalModel, axis: int, slowest_hz: float) -> bool:
     """Whether a constant force deflects the axis at most twice as far as a sinusoid of the sweep's lowest frequency:
     an axis without stiffness, or with little, would be driven away. From the static compliance b' K^-1 b and the
     dynamic one b' (M s^2 + D s + K)^-1 b, with b the axis."""
     axes = driven_axes(model)[:, axis]
     s = 2j * np.pi * slowest_hz
     try:
-        still = np.linalg.solve(model.stiffness, axes)
-        moving = np.linalg.solve(model.mass * s**2 + model.damping * s + model.stiffness, axes)
+        static_compliance = np.linalg.solve(model.stiffness, axes)
+        dynamic_compliance = np.linalg.solve(model.mass * s**2 + model.damping * s + model.stiffness, axes)
     except np.linalg.LinAlgError:
         return False
-    return bool(0 < axes @ still <= 2 * abs(axes @ moving))
+    return bool(0 < axes @ static_compliance <= 2 * abs(axes @ dynamic_compliance))
 
 
 def _pushes(sweep: str, level: float, half: FloatArray, fade: int) -> tuple[Experiment, Experiment]:
     """Experiments with a static force: a sweep about another position, and releases from deflection. sweep: its
     description. half: (n, m), the sweep at half the level. fade: samples."""
-    along = (np.abs(half).max(axis=0) > 0).astype(np.float64)
+    axis_mask = (np.abs(half).max(axis=0) > 0).astype(np.float64)
     samples = len(half)
-    push = apply_fades(np.full(samples, level / 2), fade, fade)
+    constant_force = apply_fades(np.full(samples, level / 2), fade, fade)
     return (
         Experiment(
             f"{sweep} at {level / 2:.3g} in addition to a constant force of the same size, which moves the device to "
             "another place",
-            half + np.outer(push, along),
+            half + np.outer(constant_force, axis_mask),
             "sweep",
         ),
         Experiment(
             f"{RELEASES} releases: a force that grows slowly to {level:.3g}, in alternating directions, and ends "
             "abruptly",
-            np.outer(_releases(level, samples), along),
+            np.outer(_releases(level, samples), axis_mask),
             "step",
         ),
     )
@@ -129,8 +129,8 @@ def _pushes(sweep: str, level: float, half: FloatArray, fade: int) -> tuple[Expe
 def _releases(level: float, samples: int) -> FloatArray:
     """(n,): ramps up to the level, in either direction in turn, each followed by zero force for as long: the device
     then decays freely."""
-    half = samples // (2 * RELEASES)
-    ramp = np.append(np.linspace(0.0, level, half), np.zeros(half))
+    ramp_samples = samples // (2 * RELEASES)
+    ramp = np.append(np.linspace(0.0, level, ramp_samples), np.zeros(ramp_samples))
     signs = [1.0 if number % 2 == 0 else -1.0 for number in range(RELEASES)]
     return np.concatenate([sign * ramp for sign in signs])
 

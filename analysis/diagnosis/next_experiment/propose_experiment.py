@@ -1,4 +1,4 @@
-"""Proposes the next recordings for a finished search whose data could not distinguish effects."""
+"""Proposes the next recordings after a search whose data cannot distinguish effects. Called by `assemble_findings`."""
 
 from dataclasses import dataclass
 
@@ -9,14 +9,14 @@ from analysis.diagnosis.errors.output_error import Fitted, hypothesis_sensitivit
 from analysis.diagnosis.next_experiment.choose_experiment import (
     Bench,
     ExperimentSet,
-    as_document,
-    choose_set,
+    choose_experiments,
+    make_document_entry,
     predict_gains,
 )
 from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.parsimony import both_stand
-from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, sensitivity_at
+from analysis.diagnosis.search.parsimony import is_equal_rival
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, compute_sensitivity
 from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
@@ -29,7 +29,7 @@ class Proposal:
     """Recordings of the menu that would distinguish the named effect from its rivals, with what each would gain."""
 
     names: tuple[str, ...]
-    """What is named, then its rivals."""
+    """The named effect, then its rivals."""
     axis: int
     level: float
     """Level of the menu's commands."""
@@ -38,48 +38,52 @@ class Proposal:
     @property
     def document(self) -> NextExperiment | None:
         """The proposed recordings; None where none would discriminate."""
-        return as_document(self.chosen, self.names)
+        return make_document_entry(self.chosen, self.names)
 
 
-def propose_experiment(context: SearchContext, found: Explanation) -> Proposal | None:
+def propose_experiment(context: SearchContext, explanation: Explanation) -> Proposal | None:
     """Propose recordings for the first effect that some recording would distinguish from one of its rivals, else for
     the last that has rivals; None where no rival is as good as the named effects."""
     proposal = None
-    for fitted_candidates in found.rounds[: len(found.steps)]:
-        rivals = _rivals(fitted_candidates)
-        named = fitted_candidates[0].fitted
-        if not rivals or _has_conditions(named):
+    for fitted_candidates in explanation.rounds[: len(explanation.steps)]:
+        rivals = _select_rivals(fitted_candidates)
+        named_fit = fitted_candidates[0].fitted
+        if not rivals or _has_conditions(named_fit):
             continue  # no experiment of the menu sets a condition
-        claim = named.hypothesis.claims[-1]
+        claim = named_fit.hypothesis.claims[-1]
         record = context.measure.records[0]
-        sensed = place_of_effect(claim.effect) == "sensor"
-        axis = min(claim.sites[0], record.command.shape[1] - 1) if sensed else claim.sites[0]
-        # No louder than that axis was driven.
-        level = max(float(np.abs(each.command[:, axis]).max()) for each in context.measure.records)
+        is_sensor_effect = place_of_effect(claim.effect) == "sensor"
+        axis = min(claim.sites[0], record.command.shape[1] - 1) if is_sensor_effect else claim.sites[0]
+        # The menu's largest command is that of the existing recordings on this axis.
+        level = max(float(np.abs(recorded.command[:, axis]).max()) for recorded in context.measure.records)
         if level == 0:
             continue
         rate_hz = record.recording.sample_rate_hz
         bench = Bench(context.tuning, rate_hz, record.recording.hold, context.measure.noise)
         menu = experiment_menu(context.tuning.model, rate_hz, axis, level)
         predicted = [
-            predict_gains(bench, named, rival.fitted, _compute_recorded_information(context, rival), menu)
+            predict_gains(bench, named_fit, rival.fitted, _compute_recorded_information(context, rival), menu)
             for rival in rivals
         ]
         names = (claim.effect.name, *(rival.newest for rival in rivals))
-        proposal = Proposal(names, axis, level, choose_set(predicted))
+        proposal = Proposal(names, axis, level, choose_experiments(predicted))
         if proposal.document is not None:
             break
     return proposal
 
 
-def _rivals(fitted_candidates: tuple[FittedCandidate, ...]) -> list[FittedCandidate]:
+def _select_rivals(fitted_candidates: tuple[FittedCandidate, ...]) -> list[FittedCandidate]:
     """The best rivals, each of another name, that the data do not distinguish from the named effect."""
     best = fitted_candidates[0]
-    found: dict[str, FittedCandidate] = {}
-    for other in fitted_candidates[1:]:
-        if other.newest != best.newest and both_stand(best, other) and not _has_conditions(other.fitted):
-            found.setdefault(other.newest, other)
-    return list(found.values())[:MOST_RIVALS]
+    rivals: dict[str, FittedCandidate] = {}
+    for candidate in fitted_candidates[1:]:
+        if (
+            candidate.newest != best.newest
+            and is_equal_rival(best, candidate)
+            and not _has_conditions(candidate.fitted)
+        ):
+            rivals.setdefault(candidate.newest, candidate)
+    return list(rivals.values())[:MOST_RIVALS]
 
 
 def _has_conditions(fitted: Fitted) -> bool:
@@ -89,11 +93,11 @@ def _has_conditions(fitted: Fitted) -> bool:
 def _compute_recorded_information(context: SearchContext, candidate: FittedCandidate) -> FloatArray:
     """Information matrix of a candidate's parameters from the existing recordings, calibration included."""
     fitted = candidate.fitted
-    own = hypothesis_sensitivity(
+    effect_columns = hypothesis_sensitivity(
         context.measure, context.tuning, fitted, residuals_to_fit(context.measure, fitted.residuals)
     )
-    columns = np.vstack([sensitivity_at(context, fitted.deviations, fitted.hypothesis).columns, own])
-    known = columns @ columns.T
+    columns = np.vstack([compute_sensitivity(context, fitted.deviations, fitted.hypothesis).columns, effect_columns])
+    information = columns @ columns.T
     t = len(fitted.deviations)
-    known[:t, :t] += np.eye(t)
-    return np.asarray(known)
+    information[:t, :t] += np.eye(t)
+    return np.asarray(information)

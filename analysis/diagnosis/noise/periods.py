@@ -46,16 +46,20 @@ class Periods:
 def find_settled_periods(recording: Recording) -> tuple[Periods, ...]:
     """The usable periods of every periodic segment. The first period is left out, and further ones until the transient
     has decayed; so are periods with missing samples. Segments without a usable period are left out."""
-    found = []
+    usable_periods = []
     for index, segment in enumerate(recording.segments):
         if segment.period < _SHORTEST:
             continue
         starts = range(segment.start, segment.stop - segment.period + 1, segment.period)
-        whole = [start for start in starts if _is_whole(recording, start, segment.period)]
-        later = _after_transients(recording, [start for start in whole if start != segment.start], segment.period)
-        if later or whole:
-            found.append(Periods(index, segment, tuple(later or whole), bool(later)))
-    return tuple(found)
+        complete_starts = [start for start in starts if _is_complete(recording, start, segment.period)]
+        settled_starts = _drop_transients(
+            recording, [start for start in complete_starts if start != segment.start], segment.period
+        )
+        if settled_starts or complete_starts:
+            usable_periods.append(
+                Periods(index, segment, tuple(settled_starts or complete_starts), bool(settled_starts))
+            )
+    return tuple(usable_periods)
 
 
 def period_samples(samples: FloatArray, periods: Periods) -> FloatArray:
@@ -74,20 +78,20 @@ def mean_spectrum(samples: FloatArray, periods: Periods) -> ComplexArray:
     return np.asarray(line_spectra(period_samples(samples, periods).mean(axis=0, keepdims=True))[0])
 
 
-def _is_whole(recording: Recording, start: int, length: int) -> bool:
+def _is_complete(recording: Recording, start: int, length: int) -> bool:
     """Whether no sample of the period is missing (NaN), in command, response and position."""
     signals = [recording.command.samples, recording.response.samples]
     signals += [] if recording.position is None else [recording.position.samples]
     return all(bool(np.isfinite(samples[start : start + length]).all()) for samples in signals)
 
 
-def _after_transients(recording: Recording, starts: list[int], length: int) -> list[int]:
+def _drop_transients(recording: Recording, starts: list[int], length: int) -> list[int]:
     """The periods after the transient: leading periods are dropped, except for the last two, while their difference
     from the last period decays within a period (`_TRANSIENT_RATIO`)."""
     samples, third = recording.response.samples, length // 3
     while len(starts) > 2:
-        apart = samples[starts[0] : starts[0] + length] - samples[starts[-1] : starts[-1] + length]
-        energy = np.sum((apart - apart.mean(axis=0)) ** 2, axis=1)
+        difference = samples[starts[0] : starts[0] + length] - samples[starts[-1] : starts[-1] + length]
+        energy = np.sum((difference - difference.mean(axis=0)) ** 2, axis=1)
         if energy[:third].sum() <= _TRANSIENT_RATIO * energy[-third:].sum():
             break
         starts = starts[1:]

@@ -24,9 +24,9 @@ _LEAST_SAMPLES = 8
 """Least number of samples of a window: recordings at less than 32 Hz have no window."""
 _WINDOW_S = 0.25
 """Length of a window at rest (s)."""
-_SILENT = 1e-4
+_UNDRIVEN_SHARE = 1e-4
 """Share of the strongest smoothed power of the command below which nothing is driven."""
-_CLEAR = 1.3
+_LEAKAGE_RATIO = 1.3
 """Ratio to the highest driven line above which leakage of the windows is negligible."""
 _LEAST_LINES = 16
 """Fewest lines above the driven band from which the noise is estimated."""
@@ -53,10 +53,10 @@ def fast_noise_at_rest(recording: Recording, samples: FloatArray) -> FastNoise |
         return None
     variances = []
     for start, stop in rest_intervals(recording, _WINDOW_S):
-        for at in range(start, stop - length + 1, length):
-            stretch = samples[at : at + length]
-            if np.isfinite(stretch).all():
-                variances.append(np.mean(np.diff(stretch, n=3, axis=0) ** 2, axis=0) / _DIFFERENCE_GAIN)
+        for window_start in range(start, stop - length + 1, length):
+            window = samples[window_start : window_start + length]
+            if np.isfinite(window).all():
+                variances.append(np.mean(np.diff(window, n=3, axis=0) ** 2, axis=0) / _DIFFERENCE_GAIN)
     if not variances:
         return None
     variance: FloatArray = np.array(variances)
@@ -87,7 +87,7 @@ def quiet_band_noise(
     """White density (lines, channels) with the power of the median line above the driven band, and its degrees of
     freedom; None without such a band. The median excludes the lines of harmonics."""
     instrument = instrument_signal(recording)
-    start, stop = _longest_whole(np.hstack([samples, instrument]))
+    start, stop = _find_longest_run(np.hstack([samples, instrument]))
     samples, command = samples[start:stop], instrument[start:stop]
     if len(samples) < 2 * _LEAST_LINES:
         return None
@@ -99,16 +99,16 @@ def quiet_band_noise(
     smooth = smooth_over_lines(driven.sum(axis=1, keepdims=True), max(9, n // 500))[:, 0]
     if smooth.max() == 0:
         return None
-    highest_hz = float(lines_hz[np.flatnonzero(smooth > _SILENT * smooth.max())[-1]])
-    quiet = np.flatnonzero(lines_hz > _CLEAR * highest_hz)
-    if len(quiet) < _LEAST_LINES:
+    highest_hz = float(lines_hz[np.flatnonzero(smooth > _UNDRIVEN_SHARE * smooth.max())[-1]])
+    quiet_lines = np.flatnonzero(lines_hz > _LEAKAGE_RATIO * highest_hz)
+    if len(quiet_lines) < _LEAST_LINES:
         return None
     power = np.abs(np.fft.rfft((samples - samples.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2 / n
     # The power of a line is exponentially distributed, with a median of ln 2 times its mean.
-    level = np.median(power[quiet], axis=0) / np.log(2)
-    return np.tile(level, (len(frequency_hz), 1)), float(len(quiet))
+    level = np.median(power[quiet_lines], axis=0) / np.log(2)
+    return np.tile(level, (len(frequency_hz), 1)), float(len(quiet_lines))
 
 
-def _longest_whole(samples: FloatArray) -> tuple[int, int]:
+def _find_longest_run(samples: FloatArray) -> tuple[int, int]:
     """Start and stop of the longest stretch without a gap: edges of a filled gap would add power at all frequencies."""
     return max(runs_of(np.asarray(np.isfinite(samples).all(axis=1))), key=lambda run: run[1] - run[0], default=(0, 0))

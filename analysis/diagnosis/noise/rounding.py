@@ -34,8 +34,8 @@ class RoundedNoise:
 def rounding_step(samples: FloatArray) -> float:
     """The step of which all values of a channel are multiples, apart from an offset; 0 where there is none, or for
     fewer than three values. samples: (n,)"""
-    known = samples[np.isfinite(samples)][:_EXAMINED]
-    values = np.unique(known)
+    finite_samples = samples[np.isfinite(samples)][:_EXAMINED]
+    values = np.unique(finite_samples)
     if len(values) < 3:
         return 0.0
     gaps = np.diff(values)
@@ -43,10 +43,10 @@ def rounding_step(samples: FloatArray) -> float:
     gaps = gaps[gaps > 1e-3 * np.median(gaps)]
     step = float(np.median(gaps[gaps <= 1.5 * gaps.min()]))
     steps = np.round((values - values[0]) / step)
-    within = max(_TOLERANCE * step, float(np.spacing(np.float32(np.abs(values).max()))))
-    regular = bool(np.max(np.abs(values - values[0] - step * steps)) < 0.1 * step + within)
+    tolerance = max(_TOLERANCE * step, float(np.spacing(np.float32(np.abs(values).max()))))
+    regular = bool(np.max(np.abs(values - values[0] - step * steps)) < 0.1 * step + tolerance)
     # A fine-grained float also has a smallest gap, but a rounded channel returns to each of its values.
-    return step if regular and len(values) < 0.5 * len(known) else 0.0
+    return step if regular and len(values) < 0.5 * len(finite_samples) else 0.0
 
 
 def undo_rounding(between_repeats: float, step: float) -> RoundedNoise:
@@ -54,25 +54,27 @@ def undo_rounding(between_repeats: float, step: float) -> RoundedNoise:
     not rounded. Variances above step² are not corrected, because noise then blurs the saw tooth completely."""
     if step == 0:
         return RoundedNoise(between_repeats, 0.0)
-    seen = between_repeats / step**2
-    if seen > 1.0:
+    scaled_variance = between_repeats / step**2
+    if scaled_variance > 1.0:
         return RoundedNoise(between_repeats, 0.0)
-    repeating = _compute_repeating_variance(_variance_before_rounding(seen)) * step**2
+    repeating = _compute_repeating_variance(_variance_before_rounding(scaled_variance)) * step**2
     return RoundedNoise(between_repeats + repeating, repeating)
 
 
-def _variance_before_rounding(seen: float) -> float:
-    """v for a variance between repeats `seen`, both for steps of 1: bisection, as one grows with the other."""
-    low, high = 0.0, 1.0 if seen > 0 else 0.0
+def _variance_before_rounding(between_repeats: float) -> float:
+    """v from the variance between repeats, both for steps of 1: bisection, as one grows with the other."""
+    low, high = 0.0, 1.0 if between_repeats > 0 else 0.0
     for _ in range(_HALVES):
         middle = (low + high) / 2
-        low, high = (middle, high) if middle + 1 / 12 - _compute_repeating_variance(middle) < seen else (low, middle)
+        low, high = (
+            (middle, high) if middle + 1 / 12 - _compute_repeating_variance(middle) < between_repeats else (low, middle)
+        )
     return high
 
 
 def _compute_repeating_variance(variance: float) -> float:
-    """Variance of the repeating part for steps of 1, see above. variance: v. Without noise, the sum of all terms that
-    were left out is added."""
+    """Variance of the repeating part for steps of 1, see above. variance: v. Without noise, the sum of all further
+    terms is added."""
     blurred = np.exp(-4 * np.pi**2 * _TERMS**2 * variance) / _TERMS**2
-    left_out = 0.0 if variance > 0 else np.pi**2 / 6 - float(np.sum(1 / _TERMS**2))
-    return float((np.sum(blurred) + left_out) / (2 * np.pi**2))
+    remainder = 0.0 if variance > 0 else np.pi**2 / 6 - float(np.sum(1 / _TERMS**2))
+    return float((np.sum(blurred) + remainder) / (2 * np.pi**2))

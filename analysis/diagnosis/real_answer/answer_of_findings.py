@@ -11,30 +11,30 @@ from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, HeldOutStre
 from analysis.diagnosis.result.candidate_wording import candidate_sentences
 from analysis.diagnosis.result.findings import Findings, TimeSeries
 from analysis.diagnosis.result.wording import (
-    answer_of,
-    device_of,
-    effect_title,
-    inseparable_sentence,
-    remainder_sentence,
+    describe_equivalents,
+    describe_remainder,
+    extract_device,
+    format_effect_title,
+    write_answer,
 )
 from analysis.wording import capitalise
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-_REACH = 1.96
+_HALF_WIDTH_95 = 1.96
 """Standard errors of half a 95 % interval (normal distribution)."""
 
 
 def answer_of_findings(
-    found: Findings,
+    findings: Findings,
     recording: Recording,
     names: tuple[str, str, str],
     nominal: Mapping[str, float],
 ) -> RealAnswer:
     """The answer to a real recording from the findings of its diagnosis. names: of folder, recording and what it is.
     What only the caller knows (further tests, a pair, objections, the time it took) is left empty."""
-    diagnosis, box = found.diagnosis, found.black_box
+    diagnosis, box = findings.diagnosis, findings.black_box
     folder, recording_name, title = names
     return RealAnswer(
         folder=folder,
@@ -42,138 +42,155 @@ def answer_of_findings(
         title=title,
         device=recording.device,
         verdict=diagnosis.verdict,
-        answer=answer_of(found),
-        model=model_sentence(found),
+        answer=write_answer(findings),
+        model=model_sentence(findings),
         error=diagnosis.error,
         fitted=diagnosis.fit.fit,
         held_out=diagnosis.fit.test,
-        black_box=None if box is None or not np.isfinite(box.test) else box.test,
-        where=localisation_sentences(found.local) if found.maps else (),
-        named=describe_named(found),
+        black_box=None if box is None or not np.isfinite(box.test_error) else box.test_error,
+        where=localisation_sentences(findings.localisation) if findings.maps else (),
+        named=describe_named(findings),
         effects=tuple(effect.effect for effect in diagnosis.effects),
-        left=remainder_sentence(diagnosis, device_of(found)),
-        remarks=found.remarks,
-        numbers=own_parameters(found, nominal),
-        stretches=held_out_stretches(found.time_series),
-        excerpt=drawn_excerpt(found.time_series),
+        left=describe_remainder(diagnosis, extract_device(findings)),
+        remarks=findings.remarks,
+        numbers=own_parameters(findings, nominal),
+        stretches=held_out_stretches(findings.time_series),
+        excerpt=drawn_excerpt(findings.time_series),
         further=(),
         pair=None,
         objections=(),
         seconds=0.0,
         candidates=diagnosis.candidates,
-        not_confirmed=candidate_sentences(diagnosis, device_of(found)),
+        not_confirmed=candidate_sentences(diagnosis, extract_device(findings)),
     )
 
 
-def describe_named(found: Findings) -> tuple[str, ...]:
+def describe_named(findings: Findings) -> tuple[str, ...]:
     """Each effect with its parameters, and what these data cannot tell from it."""
-    single = found.given.inputs == 1
+    single = findings.given.inputs == 1
     return tuple(
         " ".join(
             filter(
                 None,
                 (
-                    f"{capitalise(effect_title(effect, single))}, {parameters_text(effect.effect, effect.parameters)}.",
-                    inseparable_sentence(effect),
+                    f"{capitalise(format_effect_title(effect, single))}, "
+                    f"{parameters_text(effect.effect, effect.parameters)}.",
+                    describe_equivalents(effect),
                 ),
             )
         )
-        for effect in found.diagnosis.effects
+        for effect in findings.diagnosis.effects
     )
 
 
-def model_sentence(found: Findings) -> str:
+def model_sentence(findings: Findings) -> str:
     """Sentence on the given model: its name, numbers of coordinates, commands and responses, and quantity."""
-    given = found.given
-    bodies = "one body" if given.coordinates == 1 else f"{given.coordinates} bodies or modes"
-    driven = "one command" if given.inputs == 1 else f"{given.inputs} commands"
-    seen = "one response" if given.outputs == 1 else f"{given.outputs} responses"
-    return f"{capitalise(given.name)}: linear, {bodies}, {driven}, {seen} ({given.quantity})."
+    model = findings.given
+    bodies = "one body" if model.coordinates == 1 else f"{model.coordinates} bodies or modes"
+    commands = "one command" if model.inputs == 1 else f"{model.inputs} commands"
+    responses = "one response" if model.outputs == 1 else f"{model.outputs} responses"
+    return f"{capitalise(model.name)}: linear, {bodies}, {commands}, {responses} ({model.quantity})."
 
 
 def held_out_stretches(time_series: Sequence[TimeSeries]) -> tuple[HeldOutStretch, ...]:
     """Each held-out stretch by channel, with its times in s and three rms values: of the signal about its mean, and of
     the errors of the re-tuned and the completed model. Stretches without finite values are left out."""
-    found = []
+    stretches = []
     for series in time_series:
         for start, stop in series.tested:
-            part = slice(start, stop)
+            samples = slice(start, stop)
             for c, channel in enumerate(series.channels):
-                measured = series.measured[part, c]
-                known = np.isfinite(measured)
-                if not known.any():
+                measured = series.measured[samples, c]
+                is_measured = np.isfinite(measured)
+                if not is_measured.any():
                     continue
                 sizes = [
-                    float(np.sqrt(np.mean((measured - other)[known] ** 2)))
-                    for other in (measured[known].mean(), series.retuned[part, c], series.after[part, c])
+                    float(np.sqrt(np.mean((measured - reference)[is_measured] ** 2)))
+                    for reference in (
+                        measured[is_measured].mean(),
+                        series.retuned[samples, c],
+                        series.after[samples, c],
+                    )
                 ]
                 times = start / series.sample_rate_hz, stop / series.sample_rate_hz
                 if np.isfinite(sizes).all():
-                    found.append(HeldOutStretch(series.name, channel, series.units[c], *times, *sizes))
-    return tuple(found)
+                    stretches.append(HeldOutStretch(series.name, channel, series.units[c], *times, *sizes))
+    return tuple(stretches)
 
 
-DRAWN = 900
+EXCERPT_SAMPLES = 900
 """Samples of an excerpt, around where re-tuned and final prediction differ most."""
 
 
 def drawn_excerpt(time_series: Sequence[TimeSeries]) -> DrawnExcerpt | None:
-    """At most `DRAWN` held-out samples of a channel, about where the completed model departs most from the re-tuned
-    model; None without held-out data."""
+    """At most `EXCERPT_SAMPLES` held-out samples of a channel, about where the completed model departs most from the
+    re-tuned model; None without held-out data."""
     stretches = [(series, *ends) for series in time_series for ends in series.tested]
     if not stretches:
         return None
     series, first, last = max(stretches, key=lambda stretch: float(_change(*stretch).max(initial=0.0)))
-    changed = _change(series, first, last)
-    at, c = divmod(int(np.argmax(changed)), changed.shape[1])
-    begin = max(min(first + at - DRAWN // 2, last - DRAWN), first)
-    part = slice(begin, min(begin + DRAWN, last))
+    change = _change(series, first, last)
+    peak_index, c = divmod(int(np.argmax(change)), change.shape[1])
+    start = max(min(first + peak_index - EXCERPT_SAMPLES // 2, last - EXCERPT_SAMPLES), first)
+    samples = slice(start, min(start + EXCERPT_SAMPLES, last))
     measured, retuned, after = (
-        tuple(np.nan_to_num(values_of[part, c]).tolist())
+        tuple(np.nan_to_num(values_of[samples, c]).tolist())
         for values_of in (series.measured, series.retuned, series.after)
     )
     step_s = 1 / series.sample_rate_hz
     return DrawnExcerpt(
-        series.name, series.channels[c], series.units[c], begin * step_s, step_s, measured, retuned, after
+        series.name, series.channels[c], series.units[c], start * step_s, step_s, measured, retuned, after
     )
 
 
 def _change(series: TimeSeries, start: int, stop: int) -> FloatArray:
-    """(samples, c): how far what was found moves the prediction, as a share of the channel's rms."""
+    """(samples, c): how far the found effects move the prediction, as a share of the channel's rms."""
     size = np.maximum(np.nanstd(series.measured, axis=0), np.finfo(float).tiny)
     return np.asarray(np.nan_to_num(np.abs(series.retuned - series.after)[start:stop] / size))
 
 
-def own_parameters(found: Findings, nominal: Mapping[str, float]) -> tuple[OwnParameter, ...]:
+def own_parameters(findings: Findings, nominal: Mapping[str, float]) -> tuple[OwnParameter, ...]:
     """Mass, damping and stiffness of the re-tuned model with their 95 % intervals, where it has one body; else empty.
     nominal: values known by other means, by these words, in SI.
 
     The intervals are those at the end of the search, on the samples that were fitted. Where the residual exceeds the
     noise they are widened by the ratio of both in the worst channel: a slightly wrong law shifts the other parameters.
     """
-    model, tuning = found.given, found.tuning
-    if model.coordinates != 1 or found.explanation.statistic is not None or tuning is None or found.own_errors is None:
+    model, tuning = findings.given, findings.tuning
+    if (
+        model.coordinates != 1
+        or findings.explanation.statistic is not None
+        or tuning is None
+        or findings.own_errors is None
+    ):
         return ()
-    after = found.explanation.after
-    wide = max(after.score.worst_channel, 1.0)
-    return _parameters(tuning, model, tuning.values(after.fitted.deviations), found.own_errors * wide, nominal)
+    after = findings.explanation.after
+    error_ratio = max(after.score.worst_channel, 1.0)
+    return _parameters(
+        tuning, model, tuning.values(after.fitted.deviations), findings.own_errors * error_ratio, nominal
+    )
 
 
 def _parameters(
     tuning: Tuning, model: MechanicalModel, changes: FloatArray, errors: FloatArray, nominal: Mapping[str, float]
 ) -> tuple[OwnParameter, ...]:
-    given = (model.mass[0, 0], model.damping[0, 0], model.stiffness[0, 0])
-    words = ("mass", "damping", "stiffness")
-    rows = zip(words, given, tuning.units, changes, errors, strict=False)
+    nominal_values = (model.mass[0, 0], model.damping[0, 0], model.stiffness[0, 0])
+    names = ("mass", "damping", "stiffness")
+    rows = zip(names, nominal_values, tuning.units, changes, errors, strict=False)
     return tuple(
-        _compare_parameter(name, unit, float(start + by), float(error), nominal)
-        for name, start, unit, by, error in rows
+        _compare_parameter(name, unit, float(start + change), float(error), nominal)
+        for name, start, unit, change, error in rows
     )
 
 
 def _compare_parameter(name: str, unit: str, value: float, error: float, nominal: Mapping[str, float]) -> OwnParameter:
-    reach = _REACH * error
-    sure = bool(np.isfinite(reach))
+    half_width = _HALF_WIDTH_95 * error
+    has_interval = bool(np.isfinite(half_width))
     return OwnParameter(
-        name, unit, value, value - reach if sure else None, value + reach if sure else None, nominal.get(name)
+        name,
+        unit,
+        value,
+        value - half_width if has_interval else None,
+        value + half_width if has_interval else None,
+        nominal.get(name),
     )

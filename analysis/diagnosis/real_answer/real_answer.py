@@ -1,4 +1,6 @@
-"""The diagnosis of one real recording as plain values: a row of a table, a section of a page."""
+"""Document of the diagnosis of one real recording, format `hapteq-real-answer`, version 1: the values of a row of the
+table of real recordings, and of its section in the report. Made by `answer_of_findings`; field names are those of the
+file."""
 
 import json
 from dataclasses import asdict
@@ -22,7 +24,7 @@ class RealAnswerError(ListedProblemsError):
 
 @dataclass(frozen=True, config=STRICT)
 class HeldOutStretch:
-    """One channel over one stretch that nothing was fitted to; root-mean-squares in `unit`."""
+    """One channel over one stretch that was not used in a fit; root mean squares in `unit`."""
 
     record: str
     channel: str
@@ -36,7 +38,7 @@ class HeldOutStretch:
 
 @dataclass(frozen=True, config=STRICT)
 class OwnParameter:
-    """A number of the simple model after everything, with its 95 % interval, and what is known by other means."""
+    """A parameter of the simple model after all fits, with its 95 % interval, and the value known by other means."""
 
     name: str
     unit: str
@@ -56,7 +58,7 @@ class OwnParameter:
 
 @dataclass(frozen=True, config=STRICT)
 class FurtherTest:
-    """Another recording of the device, predicted with what was found and nothing fitted; shares of the signal."""
+    """Another recording of the device, predicted with the result and without a fit; errors are shares of the signal."""
 
     recording: str
     title: str
@@ -64,32 +66,32 @@ class FurtherTest:
     retuned: float | None
     after: float | None
     stretches: tuple[HeldOutStretch, ...] = ()
-    """The whole of each channel, where what was compared are the responses."""
+    """The whole recording of each channel, where responses were compared."""
     problem: str = ""
 
 
 @dataclass(frozen=True, config=STRICT)
 class PairOutcome:
-    """Before and after something was changed. Errors on the held-out part of the recording from after."""
+    """Comparison of the device before and after a change. Errors on the held-out part of the recording from after."""
 
     changed: str
     before: str
     after: str
     verdict: Outcome
     named: tuple[str, ...]
-    """Effects, each as a reader calls it with its parameters."""
+    """Named effects in words, each with its parameters."""
     returned: tuple[str, ...]
-    """Names of the vocabulary: what was named, and what these data cannot tell from it."""
+    """Names in the vocabulary of the named effects, and of those that these data cannot distinguish from them."""
     as_before: float | None
-    """Error of the model from before, unchanged."""
+    """Error of the model fitted to the recording from before, unchanged."""
     gain: float | None
-    """Error with one gain factor re-tuned."""
+    """Error of that model with one gain factor re-tuned."""
     retuned: float | None
-    """Error re-tuned within its tolerances."""
+    """Error of that model re-tuned within its tolerances."""
     with_effects: float | None
-    """Error with the named effects."""
+    """Error of the re-tuned model with the named effects."""
     expected_left: float | None
-    """Error of the model on the recording from before."""
+    """Error of that model on the recording from before: expected as the remaining error."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -108,7 +110,7 @@ class DrawnExcerpt:
 
 @dataclass(frozen=True, config=STRICT)
 class RealAnswer:
-    """One recording. Errors are shares of the signal."""
+    """Result for one recording. Errors are shares of the signal."""
 
     folder: str
     recording: str
@@ -120,16 +122,17 @@ class RealAnswer:
     model: str
     """The simple model, in words."""
     error: str
-    """How errors were measured; empty where nothing was."""
+    """Error measure, as in `diagnosis.json`; empty where the recording was refused."""
     fitted: Errors | None
     held_out: Errors | None
     black_box: float | None
     where: tuple[str, ...]
+    """Sentences on where the mismatch occurs."""
     named: tuple[str, ...]
     effects: tuple[str, ...]
     """Names of the vocabulary."""
     left: str
-    """What is still unexplained, in a sentence."""
+    """Sentence on the unexplained remainder."""
     remarks: tuple[str, ...]
     numbers: tuple[OwnParameter, ...]
     stretches: tuple[HeldOutStretch, ...]
@@ -139,9 +142,9 @@ class RealAnswer:
     objections: tuple[str, ...]
     seconds: float
     candidates: tuple[Candidate, ...] = ()
-    """The best that were not confirmed, the first first;"""
+    """Best candidates that were not confirmed, in descending order."""
     not_confirmed: tuple[str, ...] = ()
-    """each as a sentence with its parameters, but for one that `answer` says."""
+    """These candidates as sentences with their parameters, without the candidate that `answer` states."""
 
 
 def real_answer_to_json(answer: RealAnswer) -> dict[str, Any]:
@@ -154,8 +157,8 @@ def real_answer_from_json(document: dict[str, Any]) -> RealAnswer:
     try:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
-        wrong = tuple(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
-        raise RealAnswerError(wrong) from error
+        problems = tuple(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
+        raise RealAnswerError(problems) from error
 
 
 def real_answer_schema() -> dict[str, Any]:

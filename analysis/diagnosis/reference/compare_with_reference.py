@@ -1,9 +1,9 @@
 """Comparison of recordings of a faulty device with reference recordings of the same device without the fault.
 
 First, faults that the recordings show directly are looked for: sensor faults in the readings, hum in a spectrum, steps
-of a quantized command, additional sensor noise. Without any, `contrast.compare` tests every fault of the catalogue by
-the error that it removes from a base model that is fitted to both sets of recordings. A recording is called clean where
-it is such a reference.
+of a quantized command, additional sensor noise. Without any, `contrast.rank_faults` tests every fault of the catalogue
+by the error that it removes from a base model that is fitted to both sets of recordings. Reference recordings are
+called clean. Called by `diagnose`.
 """
 
 from collections.abc import Sequence
@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.contrast.compare import compare
 from analysis.diagnosis.contrast.comparison import Comparison
-from analysis.diagnosis.contrast.decide import Decision, decide
+from analysis.diagnosis.contrast.decide import Decision, choose_fault
 from analysis.diagnosis.contrast.part import split_into_parts
+from analysis.diagnosis.contrast.rank_faults import rank_faults
 from analysis.diagnosis.contrast.signal_faults import SignalFault, find_hum, find_quantization, find_sensor_noise
 from analysis.diagnosis.errors.choose_measure import MeasureChoice
 from analysis.diagnosis.errors.hypothesis import Hypothesis
@@ -26,40 +26,40 @@ from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
-NOISE, STEPS = "sensor_noise", "force_quantization"
+SENSOR_NOISE, QUANTIZATION = "sensor_noise", "force_quantization"
 """Names of these two effects in the catalogue."""
 LARGEST_CLEAN_ERROR = 0.02
 """Relative prediction error of a model on a clean recording up to which the model is used alone to find faults. Chosen
-by hand, as `NOISY`."""
-NOISY = 0.1
+by hand, as `LARGEST_NOISE`."""
+LARGEST_NOISE = 0.1
 """Variation between repeats, relative to the signal's standard deviation, above which it is more than sensor noise, as
 of a device with stick-slip."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contrast:
-    """Faults that distinguish the recordings from clean ones. Of `shown`, `line` and `comparison` at most one is not
-    None."""
+    """Faults that distinguish the recordings from clean ones. At most one of `sensor_fault`,
+    `signal_fault` and `comparison` is not None."""
 
-    shown: Hypothesis | None
+    sensor_fault: Hypothesis | None
     """A sensor fault that the readings themselves show."""
-    line: SignalFault | None
+    signal_fault: SignalFault | None
     """A fault that the spectrum, the steps of a command or the noise shows."""
     comparison: Comparison | None
     """Test of every fault with a base model; None also where the recordings do not allow it."""
     decision: Decision | None
     """The fault that `comparison` names, and its candidates."""
 
-    def without_name(self, why_not: str) -> "Contrast":
+    def withdraw_name(self, reason: str) -> "Contrast":
         """The result with the fault that `decision` names made a candidate, for the reason `why_not`. Faults that the
         recordings show directly stay named."""
         if self.decision is None or self.decision.named is None:
             return self
-        left = ((self.decision.named, why_not), *self.decision.others)
-        return replace(self, decision=Decision(None, (), 0.0, left))
+        candidates = ((self.decision.named, reason), *self.decision.unnamed)
+        return replace(self, decision=Decision(None, (), 0.0, candidates))
 
     @property
-    def left_open(self) -> bool:
+    def is_unexplained(self) -> bool:
         """Whether faulty and clean recordings differ significantly (`Comparison.differ`), and no fault is named that
         explains the difference."""
         if self.comparison is None or self.decision is None or self.decision.named is not None:
@@ -69,17 +69,17 @@ class Contrast:
     @property
     def named_effects(self) -> frozenset[str]:
         """The named effect, and the effects that cannot be distinguished from it; empty where none is named."""
-        if self.shown is not None:
-            return frozenset(claim.effect.name for claim in self.shown.claims)
-        if self.line is not None:
-            return frozenset({self.line.effect})
+        if self.sensor_fault is not None:
+            return frozenset(claim.effect.name for claim in self.sensor_fault.claims)
+        if self.signal_fault is not None:
+            return frozenset({self.signal_fault.effect})
         if self.decision is None or self.decision.named is None:
             return frozenset()
-        return frozenset({self.decision.named.fault.effect, *self.decision.alike})
+        return frozenset({self.decision.named.fault.effect, *self.decision.equivalents})
 
-    def contradicts(self, names: frozenset[str], explained: bool) -> bool:
+    def contradicts(self, names: frozenset[str], residual_is_noise: bool) -> bool:
         """Whether this comparison contradicts the result of a search by simulation on the same recordings. names: the
-        effects that the search names, with those that it cannot distinguish from them; explained: whether the search's
+        effects that the search names, with those that it cannot distinguish from them; residual_is_noise: whether its
         residual is noise.
 
         A named fault contradicts a search that does not name it, unless the residual is noise: a search with a larger
@@ -87,33 +87,38 @@ class Contrast:
         that both the search names and the comparison tested only corrects the model.
         """
         if self.named_effects:
-            return not (explained or names & self.named_effects)
+            return not (residual_is_noise or names & self.named_effects)
         differ = self.comparison is None or self.comparison.differ
         return not differ and bool(names & self.tested_effects)
 
     @property
     def tested_effects(self) -> frozenset[str]:
         """Effects that the comparison tested; empty without a comparison."""
-        return frozenset(() if self.comparison is None else (each.fault.effect for each in self.comparison.faults))
+        return frozenset(
+            () if self.comparison is None else (judged_fault.fault.effect for judged_fault in self.comparison.faults)
+        )
 
 
-def contrast_of(
-    recordings: Sequence[Recording], clean: Sequence[Recording], without: frozenset[str], time_left: TimeBudget
+def find_contrast(
+    recordings: Sequence[Recording], clean: Sequence[Recording], excluded: frozenset[str], time_left: TimeBudget
 ) -> Contrast:
     """The difference between recordings and clean ones: the first fault that the recordings show directly, else the
-    comparison of all faults by base models. without: names of effects that are not considered."""
-    effects = [effect for effect in CATALOGUE if effect.name not in without]
-    shown = find_sensor_faults(recordings, clean, effects)
-    if shown:
-        return Contrast(shown[0], None, None, None)
+    comparison of all faults by base models. excluded: names of effects that are not considered."""
+    effects = [effect for effect in CATALOGUE if effect.name not in excluded]
+    sensor_faults = find_sensor_faults(recordings, clean, effects)
+    if sensor_faults:
+        return Contrast(sensor_faults[0], None, None, None)
     faulty, references = split_into_parts(recordings), split_into_parts(clean)
-    for name, look in ((HUM, find_hum), (STEPS, find_quantization), (NOISE, find_sensor_noise)):
-        line = look(faulty, references) if faulty and references and name not in without else None
-        if line is not None:
-            return Contrast(None, line, None, None)
-    found = compare(recordings, clean, without, time_left)
+    for name, detect in ((HUM, find_hum), (QUANTIZATION, find_quantization), (SENSOR_NOISE, find_sensor_noise)):
+        signal_fault = detect(faulty, references) if faulty and references and name not in excluded else None
+        if signal_fault is not None:
+            return Contrast(None, signal_fault, None, None)
+    comparison = rank_faults(recordings, clean, excluded, time_left)
     return Contrast(
-        None, None, found, None if found is None else decide(found, recordings[0].response.samples.shape[1])
+        None,
+        None,
+        comparison,
+        None if comparison is None else choose_fault(comparison, recordings[0].response.samples.shape[1]),
     )
 
 
@@ -126,7 +131,11 @@ def predicts_clean(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
 
 def noise_is_from_repeats(chosen: MeasureChoice) -> bool:
     """Whether the error measure is a free simulation, and its noise was estimated from repeats in every record and is
-    at most `NOISY` times the standard deviation of each channel."""
-    size = np.nanstd(np.vstack([record.measured for record in chosen.measure.records]), axis=0)
-    repeats = all(floor.how == "repeats" for floor in chosen.floors)
-    return repeats and bool(np.all(chosen.measure.noise <= NOISY * size)) and chosen.measure.name == "free simulation"
+    at most `LARGEST_NOISE` times the standard deviation of each channel."""
+    signal_std = np.nanstd(np.vstack([record.measured for record in chosen.measure.records]), axis=0)
+    repeats = all(floor.method == "repeats" for floor in chosen.floors)
+    return (
+        repeats
+        and bool(np.all(chosen.measure.noise <= LARGEST_NOISE * signal_std))
+        and chosen.measure.name == "free simulation"
+    )

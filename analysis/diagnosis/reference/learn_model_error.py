@@ -2,8 +2,8 @@
 
 A linear model is never exact. What it leaves on recordings of the intact device is no evidence for a missing effect. It
 is learned in two forms: its share of the signal by channel, input and octave (the floor of the mismatch map), and its
-spectrum, as the filter that whitens it (an AR(p) model, `whitening_filter`). In the diagnosed recordings residuals pass
-through this filter, and their noise is the whitened residual's rms, scaled with the signal.
+spectrum, as the filter that whitens it (an AR(p) model, `fit_whitening_filter`). In the diagnosed recordings residuals
+pass through this filter, and their noise is the whitened residual's rms, scaled with the signal.
 """
 
 from collections.abc import Sequence
@@ -17,14 +17,14 @@ from analysis.diagnosis.errors.tuning import Tuning, tuning_of
 from analysis.diagnosis.errors.whitened_measure import (
     WhitenedMeasure,
     WhiteningFilter,
+    fit_whitening_filter,
     whiten_measure,
-    whitening_filter,
 )
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, learn_floor
-from analysis.diagnosis.localisation.mismatch_maps import cells_of
+from analysis.diagnosis.localisation.mismatch_maps import compute_cells
 from analysis.diagnosis.search.explain import retune_alone
-from analysis.diagnosis.search.reference_recordings import ReferenceRecordings, reference_recording
+from analysis.diagnosis.search.reference_recordings import ReferenceRecordings, prepare_reference_recording
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -86,7 +86,7 @@ def learn_model_error(
     for number, recording in enumerate(clean):
         progress(LEARNING, LEARNED_AT * number / len(clean))
         chosen = measure_of((recording,), model, (*diagnosed, *clean))
-        require_alike(chosen.measure.name, error)
+        require_same_measure(chosen.measure.name, error)
         fits.append(_learn_from_recording(chosen, model, recording, map_))
     floor = learn_floor([fit.cells for fit in fits])
     largest = np.max([fit.channels for fit in fits], axis=0)
@@ -104,7 +104,7 @@ def learn_model_floor(
         return CleanFloor()
 
 
-def require_alike(learned_by: str, error: str) -> None:
+def require_same_measure(learned_by: str, error: str) -> None:
     """Require that clean and diagnosed recordings have the same error measure. Raises NothingLearned."""
     if learned_by != error:
         raise NothingLearned(
@@ -116,8 +116,8 @@ def require_alike(learned_by: str, error: str) -> None:
 def _learn_spectrum(floor: CleanFloor, fits: Sequence[_RetunedFit], map_: Mapper) -> LearnedError:
     """The whitening filter of all residuals, the whitened residual's share of the signal (the largest of all
     recordings), and the clean recordings as references."""
-    residuals = [each for fit in fits for each in fit.residuals]
-    whitening = whitening_filter(residuals, np.min([fit.measure.noise for fit in fits], axis=0))
+    residuals = [record_residual for fit in fits for record_residual in fit.residuals]
+    whitening = fit_whitening_filter(residuals, np.min([fit.measure.noise for fit in fits], axis=0))
     shares = [
         _rms([whitening.apply(residual) for residual in fit.residuals])
         / _signal(fit.measure, fit.retuned.fitted.residuals)
@@ -125,7 +125,7 @@ def _learn_spectrum(floor: CleanFloor, fits: Sequence[_RetunedFit], map_: Mapper
     ]
     share = np.max(shares, axis=0)
     learned = [
-        reference_recording(
+        prepare_reference_recording(
             whiten_measure(count_as_noise(fit.measure, floor), whitening, share * fit.signal),
             fit.tuning,
             fit.retuned.fitted.deviations,
@@ -140,7 +140,7 @@ def _signal(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArra
     """(c,): standard deviation of the measured or the predicted signal, the smaller of both, so that neither hum and
     drift nor a bad model increases it."""
     measured = [record.measured for record in measure.records]
-    predicted = [each - left * measure.unit for each, left in zip(measured, residuals, strict=True)]
+    predicted = [channels - residual * measure.unit for channels, residual in zip(measured, residuals, strict=True)]
     sizes = [np.nanstd(np.vstack(series), axis=0) for series in (measured, predicted)]
     return np.asarray(np.maximum(np.fmin(*sizes), np.finfo(float).tiny))
 
@@ -152,11 +152,11 @@ def _rms(residuals: Sequence[FloatArray]) -> FloatArray:
 def _learn_from_recording(
     chosen: MeasureChoice, model: MechanicalModel, recording: Recording, map_: Mapper
 ) -> _RetunedFit:
-    whole, tuning = chosen.measure, tuning_of(model, recording.command.channels)
-    context = SearchContext(whole.shorten(), whole, tuning, map_)
+    full_measure, tuning = chosen.measure, tuning_of(model, recording.command.channels)
+    context = SearchContext(full_measure.shorten(), full_measure, tuning, map_)
     retuned = context.with_test_score(context.candidate(retune_alone(context)))
-    cells = cells_of(whole, retuned.fitted, chosen.floors)
-    return _RetunedFit(whole, tuning, retuned, cells, _channel_shares(whole, retuned))
+    cells = compute_cells(full_measure, retuned.fitted, chosen.floors)
+    return _RetunedFit(full_measure, tuning, retuned, cells, _channel_shares(full_measure, retuned))
 
 
 def _channel_shares(measure: ErrorMeasure, retuned: FittedCandidate) -> FloatArray:

@@ -1,7 +1,7 @@
 """Detection of sensor faults without a model: quantization, clipping (saturation), lost samples (repeated readings).
 
 A healthy device also repeats readings and has a largest one. Reference recordings of the device without the fault
-therefore give the usual count of such readings, which a fault must exceed significantly (`_unusual`).
+therefore give the usual count of such readings, which a fault must exceed significantly (`_is_unusual`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,17 +16,17 @@ from equalizer.effects.starts.lattice import confirm_lattice_step, lattice_step
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-ALIKE = 1e-3
+EQUAL_STEPS = 1e-3
 """Relative difference of the quantization steps of two channels up to which they count as equal."""
 LONG_RUNS = 2.0
 """Largest mean length in samples of runs of repeats that are taken for lost samples, as with half of all samples lost
 at random: longer runs are backlash, or a sensor at rest."""
-CATCHES_UP = 0.75
+FULL_STEP_SHARE = 0.75
 """Least median step after a repeat, relative to the median of the other steps: after backlash it is half of that or
 less."""
 STRETCHES = 3
 """Number of stretches into which each reference recording is divided: the largest share of any stretch is usual."""
-SAME = 1e-9
+EQUAL_READINGS = 1e-9
 """Relative difference up to which readings count as equal to a limit."""
 
 
@@ -36,23 +36,23 @@ def find_sensor_faults(
     """The first fault of quantization, clipping and lost samples that is found: at most one hypothesis, because
     quantized readings also repeat and accumulate at the largest value. clean: reference recordings, at least one;
     effects: those that may be named."""
-    known = {effect.name: effect for effect in effects}
-    new = _readings(recordings)
+    effects_by_name = {effect.name: effect for effect in effects}
+    readings = _readings(recordings)
     references = [
         part for recording in clean for part in np.array_split(_readings([recording]), STRETCHES) if len(part)
     ]
-    for name, look in (
+    for name, detect in (
         ("quantization", _quantization),
         ("sensor_clipping", _find_clipping),
         ("lost_samples", _lost_samples),
     ):
-        found = look(new, references)
-        if found is not None:
-            return (_hypothesis_of(known[name], *found),) if name in known else ()
+        fault = detect(readings, references)
+        if fault is not None:
+            return (_hypothesis_of(effects_by_name[name], *fault),) if name in effects_by_name else ()
     return ()
 
 
-Found = tuple[tuple[int, ...], Values]
+ChannelFault = tuple[tuple[int, ...], Values]
 """Channels, and the parameters of their fault."""
 
 
@@ -68,39 +68,47 @@ def _readings(recordings: Sequence[Recording]) -> FloatArray:
     return np.asarray(samples[np.isfinite(samples).all(axis=1)])
 
 
-def _quantization(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
+def _quantization(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
     """Quantization: readings lie on a lattice whose step is more than `STEP_FACTOR` times that of every reference."""
-    found = {}
-    for c in range(new.shape[1]):
-        step = lattice_step(new[:, c])
+    steps = {}
+    for c in range(readings.shape[1]):
+        step = lattice_step(readings[:, c])
         if step is not None and all(
-            step > STEP_FACTOR * confirm_lattice_step(readings[:, c], step) for readings in references
+            step > STEP_FACTOR * confirm_lattice_step(reference[:, c], step) for reference in references
         ):
-            found[c] = step
-    alike = bool(found) and min(found.values()) > (1 - ALIKE) * max(found.values())
-    return _choose_channels(found, alike and len(found) == new.shape[1], new.shape[1], "step")
+            steps[c] = step
+    equal_steps = bool(steps) and min(steps.values()) > (1 - EQUAL_STEPS) * max(steps.values())
+    return _choose_channels(steps, equal_steps and len(steps) == readings.shape[1], readings.shape[1], "step")
 
 
-def _find_clipping(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
+def _find_clipping(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
     """Clipping: significantly more readings at the largest magnitude than in the references, which exceed that
     magnitude, and no more repeats below it than usual."""
-    found = {}
-    for c in range(new.shape[1]):
-        limit, count = _top_readings(new[:, c])
-        usual = max(_top_readings(readings[:, c])[1] / len(readings) for readings in references) * len(new)
-        beyond = max(float(np.abs(readings[:, c]).max()) for readings in references)
-        elsewhere = max(_repeats_below_top(readings[:, c]) / len(readings) for readings in references) * len(new)
-        if limit < beyond and _unusual(count, usual) and not _unusual(_repeats_below_top(new[:, c]), elsewhere):
-            found[c] = limit
-    within = bool(found) and bool(np.all(np.abs(new) <= max(found.values()) * (1 + SAME)))
-    return _choose_channels(found, within, new.shape[1], "limit")
+    limits = {}
+    for c in range(readings.shape[1]):
+        limit, count = _top_readings(readings[:, c])
+        usual_count = max(_top_readings(reference[:, c])[1] / len(reference) for reference in references) * len(
+            readings
+        )
+        largest_reference = max(float(np.abs(reference[:, c]).max()) for reference in references)
+        usual_repeats = max(_repeats_below_top(reference[:, c]) / len(reference) for reference in references) * len(
+            readings
+        )
+        if (
+            limit < largest_reference
+            and _is_unusual(count, usual_count)
+            and not _is_unusual(_repeats_below_top(readings[:, c]), usual_repeats)
+        ):
+            limits[c] = limit
+    all_clipped = bool(limits) and bool(np.all(np.abs(readings) <= max(limits.values()) * (1 + EQUAL_READINGS)))
+    return _choose_channels(limits, all_clipped, readings.shape[1], "limit")
 
 
 def _repeats_below_top(values: FloatArray) -> int:
     """Number of repeated readings below the largest magnitude of one channel: backlash holds readings at any level,
     clipping at the limit only."""
     sizes = np.abs(values[1:])
-    return int(np.count_nonzero((np.diff(values) == 0) & (sizes < sizes.max() * (1 - SAME))))
+    return int(np.count_nonzero((np.diff(values) == 0) & (sizes < sizes.max() * (1 - EQUAL_READINGS))))
 
 
 def _top_readings(values: FloatArray) -> tuple[float, int]:
@@ -108,31 +116,39 @@ def _top_readings(values: FloatArray) -> tuple[float, int]:
     magnitude."""
     sizes = np.abs(values)
     limit = float(sizes.max())
-    there = sizes >= limit * (1 - SAME)
-    rest = sizes[~there]
-    below = int(np.count_nonzero(rest >= rest.max() * (1 - SAME))) if len(rest) else 0
-    return limit, int(np.count_nonzero(there)) - below
+    at_limit = sizes >= limit * (1 - EQUAL_READINGS)
+    smaller = sizes[~at_limit]
+    next_count = int(np.count_nonzero(smaller >= smaller.max() * (1 - EQUAL_READINGS))) if len(smaller) else 0
+    return limit, int(np.count_nonzero(at_limit)) - next_count
 
 
-def _lost_samples(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
+def _lost_samples(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
     """Lost samples: significantly more runs of repeats than in the references, short and followed by a full step. The
     parameter is the share of lost samples. A sensor that rests for a while has not lost samples."""
-    repeated = _repeats(new)
-    usual = max(float(_run_starts(_repeats(readings)).mean()) for readings in references) * len(repeated)
-    begun = int(_run_starts(repeated).sum())
-    if not _unusual(begun, usual) or repeated.sum() > LONG_RUNS * begun or not _catches_up(new, repeated):
+    repeated = _repeats(readings)
+    usual_count = max(float(_run_starts(_repeats(reference)).mean()) for reference in references) * len(repeated)
+    run_count = int(_run_starts(repeated).sum())
+    if (
+        not _is_unusual(run_count, usual_count)
+        or repeated.sum() > LONG_RUNS * run_count
+        or not _makes_full_steps(readings, repeated)
+    ):
         return None
-    fraction = (float(repeated.sum()) - usual) / len(repeated)
-    return tuple(range(new.shape[1])), {"fraction": fraction}
+    fraction = (float(repeated.sum()) - usual_count) / len(repeated)
+    return tuple(range(readings.shape[1])), {"fraction": fraction}
 
 
-def _catches_up(values: FloatArray, repeated: Mask) -> bool:
+def _makes_full_steps(values: FloatArray, repeated: Mask) -> bool:
     """Whether the median step after a repeat is about as large as the other steps, as after lost samples; after
     backlash it is smaller."""
     sizes = np.abs(np.diff(values, axis=0)).sum(axis=1)[1:]
-    after = repeated[:-1] & ~repeated[1:]
-    other = ~repeated[:-1] & ~repeated[1:]
-    return bool(np.median(sizes[after]) > CATCHES_UP * np.median(sizes[other])) if after.any() and other.any() else True
+    follows_repeat = repeated[:-1] & ~repeated[1:]
+    is_regular = ~repeated[:-1] & ~repeated[1:]
+    return (
+        bool(np.median(sizes[follows_repeat]) > FULL_STEP_SHARE * np.median(sizes[is_regular]))
+        if follows_repeat.any() and is_regular.any()
+        else True
+    )
 
 
 def _repeats(values: FloatArray) -> Mask:
@@ -145,7 +161,7 @@ def _run_starts(repeated: Mask) -> Mask:
     return np.asarray(repeated & ~np.concatenate([[False], repeated[:-1]]), dtype=np.bool_)
 
 
-def _unusual(count: int, usual: float) -> bool:
+def _is_unusual(count: int, usual: float) -> bool:
     """Whether a count exceeds the usual one by a factor and by several standard deviations of a Poisson count,
     sqrt(usual)."""
     return (
@@ -155,10 +171,12 @@ def _unusual(count: int, usual: float) -> bool:
     )
 
 
-def _choose_channels(found: Mapping[int, float], everywhere: bool, width: int, name: str) -> Found | None:
-    """The channels with the fault: all, or only the one with the largest parameter. found: parameter by channel;
-    everywhere: whether all channels have the fault; name: name of the parameter."""
-    if not found:
+def _choose_channels(
+    parameters: Mapping[int, float], in_all_channels: bool, width: int, name: str
+) -> ChannelFault | None:
+    """The channels with the fault: all, or only the one with the largest parameter. parameters: by channel;
+    in_all_channels: whether all channels have the fault; name: name of the parameter."""
+    if not parameters:
         return None
-    most = max(found, key=lambda channel: found[channel])
-    return tuple(range(width)) if everywhere else (most,), {name: found[most]}
+    worst_channel = max(parameters, key=lambda channel: parameters[channel])
+    return tuple(range(width)) if in_all_channels else (worst_channel,), {name: parameters[worst_channel]}

@@ -2,7 +2,8 @@
 
 The residual of the re-tuned model on clean recordings (`learn_model_error`) counts as noise in two ways: as coloured
 noise, by a whitening filter; and, where the residual is much larger than that noise, by its rms only. Effects that also
-improve the prediction of the clean recordings are not named: the model lacks them, but they are not the fault.
+improve the prediction of the clean recordings are not named: the model lacks them, but they are not the fault. Called
+by `search_by_simulation`.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,7 @@ from analysis.diagnosis.settings import EXPLAINED_ERROR, NOISE_ALONE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 
-THERE_BEFORE = "it improves the prediction of the clean recordings, too, so it was present before the change"
+IMPROVES_CLEAN_REASON = "it improves the prediction of the clean recordings, too, so it was present before the change"
 
 
 def search_with_reference(
@@ -39,40 +40,49 @@ def search_with_reference(
     Where the residual is much larger, whitening helps little: effects are then also searched for with the plain
     residual, and the result with the smaller error is kept.
     """
-    fine = _unname_what_was_there(_search_by_contrast(context, learned, catalogue, progress, time_left), learned)
-    if context.certain or fine.found.after.score.worst_channel <= learned.floor.beyond or not time_left():
-        return fine
-    coarse = _unname_what_was_there(_search_by_size(context, learned, catalogue, progress, time_left), learned)
+    whitened_result = _withdraw_shared_effects(
+        _search_whitened_residual(context, learned, catalogue, progress, time_left), learned
+    )
+    if context.certain or whitened_result.found.after.score.worst_channel <= learned.floor.beyond or not time_left():
+        return whitened_result
+    plain_result = _withdraw_shared_effects(
+        _search_plain_residual(context, learned, catalogue, progress, time_left), learned
+    )
     return (
-        coarse
-        if coarse.judgement.named and _mean_log_error(fine.context, coarse) < _mean_log_error(fine.context, fine)
-        else fine
+        plain_result
+        if plain_result.judgement.named
+        and _compute_mean_log_error(whitened_result.context, plain_result)
+        < _compute_mean_log_error(whitened_result.context, whitened_result)
+        else whitened_result
     )
 
 
-def _unname_what_was_there(seen: SearchResult, learned: LearnedError) -> SearchResult:
-    """The result without effects that the clean recordings show with the same parameters; these become unconfirmed."""
-    found, before = seen.found, []
-    for place in reversed(range(len(found.steps) if seen.judgement.named and not seen.context.certain else 0)):
-        whole = found.after.fitted.hypothesis
-        if not learned.references.hold(whole, place):
+def _withdraw_shared_effects(result: SearchResult, learned: LearnedError) -> SearchResult:
+    """The result without effects that also improve the prediction of the clean recordings with the same parameters;
+    these become unconfirmed candidates."""
+    explanation, unconfirmed = result.found, []
+    for index in reversed(
+        range(len(explanation.steps) if result.judgement.named and not result.context.certain else 0)
+    ):
+        hypothesis = explanation.after.fitted.hypothesis
+        if not learned.references.is_present_on_clean(hypothesis, index):
             continue
-        before.append(Unconfirmed(whole, 0.0, THERE_BEFORE, place))
-        found = without_effect(seen.context, found, place)
-    if not before:
-        return seen
-    judged = _judge_with_floor(seen.context.whole, found, bool(found.steps), learned.floor.beyond)
-    return replace(seen, found=found, judgement=judged, unconfirmed=(*seen.unconfirmed, *before))
+        unconfirmed.append(Unconfirmed(hypothesis, 0.0, IMPROVES_CLEAN_REASON, index))
+        explanation = without_effect(result.context, explanation, index)
+    if not unconfirmed:
+        return result
+    judgement = _judge_with_floor(result.context.whole, explanation, bool(explanation.steps), learned.floor.beyond)
+    return replace(result, found=explanation, judgement=judgement, unconfirmed=(*result.unconfirmed, *unconfirmed))
 
 
-def _mean_log_error(context: SearchContext, seen: SearchResult) -> float:
+def _compute_mean_log_error(context: SearchContext, result: SearchResult) -> float:
     """Mean log error power with the named effects, on the samples to fit and to choose by."""
-    stands = seen.found.after if seen.judgement.named else seen.found.retuned
-    fitted = evaluate_fit(context.measure, context.tuning, stands.fitted.deviations, stands.fitted.hypothesis)
+    candidate = result.found.after if result.judgement.named else result.found.retuned
+    fitted = evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
     return FittedCandidate(fitted, fit_score(context.measure, fitted.residuals)).score.mean_log_error
 
 
-def _search_by_size(
+def _search_plain_residual(
     context: SearchContext,
     learned: LearnedError,
     catalogue: Sequence[Effect],
@@ -80,16 +90,20 @@ def _search_by_size(
     time_left: TimeBudget,
 ) -> SearchResult:
     """Search on the plain residual, with the model error on clean recordings, raised by its factor, as white noise."""
-    wide = replace(learned.floor, channels=tuple(learned.floor.beyond * channel for channel in learned.floor.channels))
-    plain = count_as_noise(context.whole, wide)
-    beside = replace(context, measure=plain.shorten(), whole=plain, least_left=EXPLAINED_ERROR)
-    seen = search_effects(beside, catalogue, progress, time_left)
-    back = count_as_noise(context.whole, learned.floor).with_records(seen.context.whole.records)
-    own = replace(context, measure=back.shorten(), whole=back)
-    return replace(seen, context=own, found=_refit_by(own, seen.found))
+    raised_floor = replace(
+        learned.floor, channels=tuple(learned.floor.beyond * channel for channel in learned.floor.channels)
+    )
+    noise_measure = count_as_noise(context.whole, raised_floor)
+    search_context = replace(
+        context, measure=noise_measure.shorten(), whole=noise_measure, least_remaining_error=EXPLAINED_ERROR
+    )
+    result = search_effects(search_context, catalogue, progress, time_left)
+    full_measure = count_as_noise(context.whole, learned.floor).with_records(result.context.whole.records)
+    final_context = replace(context, measure=full_measure.shorten(), whole=full_measure)
+    return replace(result, context=final_context, found=_refit_with(final_context, result.found))
 
 
-def _search_by_contrast(
+def _search_whitened_residual(
     context: SearchContext,
     learned: LearnedError,
     catalogue: Sequence[Effect],
@@ -97,64 +111,72 @@ def _search_by_contrast(
     time_left: TimeBudget,
 ) -> SearchResult:
     """Search on the whitened residual; the result is refitted and judged on the plain one."""
-    plain = count_as_noise(context.whole, learned.floor)
-    whole = learned.noise_measure(plain, context.tuning.model)
+    plain_measure = count_as_noise(context.whole, learned.floor)
+    whitened_measure = learned.noise_measure(plain_measure, context.tuning.model)
     # Model error is not random noise: even the right law leaves more than its learned size.
-    least_left = EXPLAINED_ERROR * learned.references.beyond
-    beside = replace(
-        context, measure=whole.shorten(), whole=whole, references=learned.references, least_left=least_left
+    least_error = EXPLAINED_ERROR * learned.references.gain_factor
+    search_context = replace(
+        context,
+        measure=whitened_measure.shorten(),
+        whole=whitened_measure,
+        references=learned.references,
+        least_remaining_error=least_error,
     )
-    seen = search_effects(beside, catalogue, progress, time_left)
-    plain = plain.with_records(seen.context.whole.records)
-    back = replace(context, measure=plain.shorten(), whole=plain)
-    found = _refit_by(back, seen.found)
+    result = search_effects(search_context, catalogue, progress, time_left)
+    plain_measure = plain_measure.with_records(result.context.whole.records)
+    final_context = replace(context, measure=plain_measure.shorten(), whole=plain_measure)
+    explanation = _refit_with(final_context, result.found)
     if context.certain:
         return replace(
-            seen,
-            context=back,
-            found=found,
-            judgement=_judge_with_floor(plain, found, True, learned.floor.beyond),
+            result,
+            context=final_context,
+            found=explanation,
+            judgement=_judge_with_floor(plain_measure, explanation, True, learned.floor.beyond),
             remarks=(),
         )
-    named = seen.judgement.named and not is_without_prediction(plain, found.after)
+    is_named = result.judgement.named and not is_without_prediction(plain_measure, explanation.after)
     return replace(
-        seen, context=back, found=found, judgement=_judge_with_floor(plain, found, named, learned.floor.beyond)
+        result,
+        context=final_context,
+        found=explanation,
+        judgement=_judge_with_floor(plain_measure, explanation, is_named, learned.floor.beyond),
     )
 
 
-def _judge_with_floor(measure: ErrorMeasure, found: Explanation, named: bool, beyond: float) -> Judgement:
-    """The verdict, with all thresholds raised by the factor `beyond`, because devices differ from day to day. measure:
+def _judge_with_floor(measure: ErrorMeasure, explanation: Explanation, is_named: bool, factor: float) -> Judgement:
+    """The verdict, with all thresholds raised by `factor`, because devices differ from day to day. measure:
     that of the result's residuals; scores may be of a whitened one, which does not show slow changes."""
-    if named:
+    if is_named:
         return Judgement(
-            "explained" if found.after.score.worst_channel <= beyond * EXPLAINED_ERROR else "partly_explained", True
+            "explained" if explanation.after.score.worst_channel <= factor * EXPLAINED_ERROR else "partly_explained",
+            True,
         )
-    plain = fit_score(measure, found.before.fitted.residuals).worst_channel
-    if max(plain, found.before.score.worst_channel) <= beyond * NOISE_ALONE:
+    plain_error = fit_score(measure, explanation.before.fitted.residuals).worst_channel
+    if max(plain_error, explanation.before.score.worst_channel) <= factor * NOISE_ALONE:
         return Judgement("no_mismatch", False)
     return Judgement(
-        "parameters" if found.retuned.score.worst_channel <= beyond * NOISE_ALONE else "unexplained", False
+        "parameters" if explanation.retuned.score.worst_channel <= factor * NOISE_ALONE else "unexplained", False
     )
 
 
-def _refit_by(context: SearchContext, found: Explanation) -> Explanation:
+def _refit_with(context: SearchContext, explanation: Explanation) -> Explanation:
     """The explanation with its parameters refitted on the plain residual. Effects are chosen on the whitened residual,
     which would bias the parameters of a law that is not exact."""
-    after = found.after.fitted
-    if after.hypothesis.claims and not context.certain:
-        start = evaluate_fit(context.measure, context.tuning, after.deviations, after.hypothesis)
-        after = refine(context, start)
-    steps = [*found.steps[:-1], *(replace(step, fitted=after) for step in found.steps[-1:])]
+    final_fit = explanation.after.fitted
+    if final_fit.hypothesis.claims and not context.certain:
+        start = evaluate_fit(context.measure, context.tuning, final_fit.deviations, final_fit.hypothesis)
+        final_fit = refine(context, start)
+    steps = [*explanation.steps[:-1], *(replace(step, fitted=final_fit) for step in explanation.steps[-1:])]
     return replace(
-        found,
-        before=_evaluate_by(context.whole, context, found.before),
-        retuned=_evaluate_by(context.whole, context, found.retuned),
-        after=_evaluate_by(context.whole, context, replace(found.after, fitted=after)),
-        steps=tuple(_evaluate_by(context.measure, context, step) for step in steps),
+        explanation,
+        before=_evaluate_with(context.whole, context, explanation.before),
+        retuned=_evaluate_with(context.whole, context, explanation.retuned),
+        after=_evaluate_with(context.whole, context, replace(explanation.after, fitted=final_fit)),
+        steps=tuple(_evaluate_with(context.measure, context, step) for step in steps),
     )
 
 
-def _evaluate_by(measure: ErrorMeasure, context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
+def _evaluate_with(measure: ErrorMeasure, context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
     """The candidate with its residuals by this measure, at the same parameters; its score is unchanged."""
     return replace(
         candidate,

@@ -1,7 +1,7 @@
 """Assembles the findings of a finished search: the document (`Diagnosis`), and the data of figures and sentences.
 
 In this order: labels and re-tuned models, standard errors, mismatch maps of the given, re-tuned and completed model,
-examination of the fits (`post_search`), choice of the next recording, document.
+examination of the fits (`post_search`), choice of the next recording, document. Called by `diagnose`.
 """
 
 from collections.abc import Sequence
@@ -19,17 +19,17 @@ from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, clean_floor_sentence
 from analysis.diagnosis.localisation.localisation import Localisation
-from analysis.diagnosis.localisation.mismatch_maps import Maps, mismatch_maps, whole_mismatch
+from analysis.diagnosis.localisation.mismatch_maps import Maps, build_mismatch_maps, summarise_worst_channel
 from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.result.error_table import channel_errors, errors_of, held_out_stands_still
+from analysis.diagnosis.result.error_table import collect_channel_errors, compute_fit_errors, is_held_out_still
 from analysis.diagnosis.result.findings import Findings, TimeSeries
-from analysis.diagnosis.result.named_effects import Labels, labels_of, named_effects
+from analysis.diagnosis.result.named_effects import Labels, make_labels, make_named_effects
 from analysis.diagnosis.result.post_search import examine_fits
-from analysis.diagnosis.result.unconfirmed import with_gains
+from analysis.diagnosis.result.unconfirmed import add_held_out_gains
 from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.identifiability import final_errors, interval_errors
+from analysis.diagnosis.search.identifiability import compute_final_errors, compute_interval_errors
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, INTERVAL_FACTOR
@@ -47,60 +47,60 @@ def assemble_findings(
 ) -> Findings:
     """The findings of a search. result.found.after: the model with the named effects, or the re-tuned model without
     any. names: of the recordings. learned: the residual of clean recordings, counted as noise."""
-    context, found, judged = result.context, result.found, result.judgement
+    context, fits, verdict = result.context, result.found, result.judgement
     measure, tuning = context.whole, context.tuning
-    recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.list_placed_effects()
-    labels, (improved, retuned) = labels_of(recording, tuning.model), _models(result, recording)
-    channels, errors = channel_names(recording, len(measure.noise)), _standard_errors(result)
-    maps = mismatch_maps(measure, found.stages, floors, learned, context.map_)
-    time_series = _time_series(measure, found, names)
-    examined = examine_fits(result, floors[0], maps)
+    recording, placed_effects = measure.records[0].recording, fits.after.fitted.hypothesis.list_placed_effects()
+    labels, (improved, retuned) = make_labels(recording, tuning.model), _build_models(result, recording)
+    channels, errors = list_channel_names(recording, len(measure.noise)), _compute_standard_errors(result)
+    maps = build_mismatch_maps(measure, fits.stages, floors, learned, context.map_)
+    time_series = _build_time_series(measure, fits, names)
+    examination = examine_fits(result, floors[0], maps)
     in_samples = "" if recording.is_timed or is_quasi_static(recording) else IN_SAMPLES
-    proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
+    proposal = context.guard.run("the next recording", "its choice", partial(_propose, context, fits, verdict), None)
     return Findings(
-        diagnosis=_document(result, errors, (maps, examined.local), proposal),
-        explanation=found,
+        diagnosis=_build_document(result, errors, (maps, examination.local), proposal),
+        explanation=fits,
         given=tuning.model,
         improved=improved,
         retuned=retuned,
-        named=placed,
-        evidence=examined.evidence,
+        named=placed_effects,
+        evidence=examination.evidence,
         time_series=time_series,
         noise_rms=dict(zip(channels, measure.noise.tolist(), strict=True)),
-        channel_errors=channel_errors(found, channels),
+        channel_errors=collect_channel_errors(fits, channels),
         mismatch=maps.rows,
         is_timed=recording.is_timed,
-        signatures=examined.signatures,
-        black_box=examined.black_box,
-        remarks=_remarks(
-            (_still_sentence(measure), clean_floor_sentence(learned, channels), in_samples), time_series, tuning, floors
+        signatures=examination.signatures,
+        black_box=examination.black_box,
+        remarks=_collect_remarks(
+            (_describe_rest(measure), clean_floor_sentence(learned, channels), in_samples), time_series, tuning, floors
         ),
         maps=maps.cells,
-        local=examined.local,
+        localisation=examination.local,
         floor=floors[0],
         tuning=tuning,
         axes=tuple(axis_letter(name, labels.inputs) for name in labels.inputs),
         proposal=proposal,
-        split_s=_split_s(measure),
+        split_s=_measure_split_s(measure),
         own_errors=errors[: len(tuning.names)] * tuning.deviation,
     )
 
 
-def _models(result: SearchResult, recording: Recording) -> tuple[MechanicalModel, MechanicalModel]:
+def _build_models(result: SearchResult, recording: Recording) -> tuple[MechanicalModel, MechanicalModel]:
     """The re-tuned models with the named effects and without, driven by the commands as they were recorded."""
-    tuning, found = result.context.tuning, result.found
-    fitted, labels = found.after.fitted, labels_of(recording, tuning.model)
+    tuning, explanation = result.context.tuning, result.found
+    fitted, labels = explanation.after.fitted, make_labels(recording, tuning.model)
     effects = (
         *tuning.model.effects,
         *model_effects(fitted.hypothesis.list_placed_effects(), labels.inputs, labels.outputs),
     )
-    with_them = replace(tuning.tune(fitted.deviations), effects=effects)
-    return as_recorded(with_them, recording), as_recorded(tuning.tune(found.retuned.fitted.deviations), recording)
+    completed = replace(tuning.tune(fitted.deviations), effects=effects)
+    return as_recorded(completed, recording), as_recorded(tuning.tune(explanation.retuned.fitted.deviations), recording)
 
 
-def _still_sentence(measure: ErrorMeasure) -> str:
+def _describe_rest(measure: ErrorMeasure) -> str:
     """Sentence where the held-out samples contain no motion; else empty."""
-    if not held_out_stands_still(measure.records, measure.noise):
+    if not is_held_out_still(measure.records, measure.noise):
         return ""
     return (
         "The held-out data contain no motion, so no error on them is stated. Give a stretch with motion the role of "
@@ -108,16 +108,16 @@ def _still_sentence(measure: ErrorMeasure) -> str:
     )
 
 
-def _remarks(
-    first: Sequence[str], time_series: Sequence[TimeSeries], tuning: Tuning, floors: tuple[NoiseFloor, ...]
+def _collect_remarks(
+    leading: Sequence[str], time_series: Sequence[TimeSeries], tuning: Tuning, floors: tuple[NoiseFloor, ...]
 ) -> tuple[str, ...]:
-    """Remarks without repetition: the first, doubtful units, a constant force of the model, and those of the noise."""
+    """Remarks without repetition: `leading`, then on doubtful units, a constant force of the model, and the noise."""
     of_noise = (remark for floor in floors for remark in floor.remarks)
-    texts = (*first, *unit_sentences(time_series), constant_sentence(tuning.model), *of_noise)
+    texts = (*leading, *unit_sentences(time_series), constant_sentence(tuning.model), *of_noise)
     return tuple(dict.fromkeys(filter(None, texts)))
 
 
-def _split_s(measure: ErrorMeasure) -> dict[str, float]:
+def _measure_split_s(measure: ErrorMeasure) -> dict[str, float]:
     """Seconds to fit, to choose and to test by."""
     rate_hz = measure.records[0].recording.sample_rate_hz
     return {
@@ -126,108 +126,110 @@ def _split_s(measure: ErrorMeasure) -> dict[str, float]:
     }
 
 
-def _standard_errors(result: SearchResult) -> FloatArray:
+def _compute_standard_errors(result: SearchResult) -> FloatArray:
     """Standard errors of the model's own parameters, then of the named effects' parameters; NaN where they are not
-    computed. See `final_errors`."""
-    context, found = result.context, result.found
-    own, numbers = len(context.tuning.names), len(found.after.fitted.hypothesis.point)
-    if found.statistic is not None:
-        return np.concatenate([np.full(own, np.nan), found.statistic.errors])
+    computed. See `compute_final_errors`."""
+    context, explanation = result.context, result.found
+    own_count, effect_count = len(context.tuning.names), len(explanation.after.fitted.hypothesis.point)
+    if explanation.statistic is not None:
+        return np.concatenate([np.full(own_count, np.nan), explanation.statistic.errors])
     if result.errors is not None and result.judgement.named:
         return result.errors
     if result.judgement.named or context.tuning.model.coordinates == 1:
-        return final_errors(context, found if result.judgement.named else replace(found, steps=()))
-    return np.full(own + numbers, np.nan)
+        return compute_final_errors(context, explanation if result.judgement.named else replace(explanation, steps=()))
+    return np.full(own_count + effect_count, np.nan)
 
 
-def _document(
+def _build_document(
     result: SearchResult, errors: FloatArray, examined: tuple[Maps, Localisation], proposal: "Proposal | None"
 ) -> Diagnosis:
     """The document. errors: standard errors of all parameters. examined: mismatch maps and localisation."""
-    found, judged = result.found, result.judgement
-    measure, tuning, fitted = result.context.whole, result.context.tuning, found.after.fitted
+    explanation, judgement = result.found, result.judgement
+    measure, tuning, fitted = result.context.whole, result.context.tuning, explanation.after.fitted
     maps, local = examined
-    labels = labels_of(measure.records[0].recording, tuning.model)
+    labels = make_labels(measure.records[0].recording, tuning.model)
     return Diagnosis(
-        verdict=judged.verdict,
+        verdict=judgement.verdict,
         mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
         or (
-            () if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.score, found.before.fitted)
+            ()
+            if judgement.verdict == "no_mismatch"
+            else summarise_worst_channel(measure, explanation.before.score, explanation.before.fitted)
         ),
-        effects=_effects_with_gains(result, errors, labels) if judged.named else (),
+        effects=_list_effects_with_gains(result, errors, labels) if judgement.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
-        if judged.verdict not in ("partly_explained", "unexplained")
-        else impact_remainder(measure, found)
+        if judgement.verdict not in ("partly_explained", "unexplained")
+        else list_impact_remainder(measure, explanation)
         or mismatch_rows(maps.cells["after"], local.states["after"])
-        or whole_mismatch(measure, found.after.score, fitted),
-        fit=errors_of(measure, found),
+        or summarise_worst_channel(measure, explanation.after.score, fitted),
+        fit=compute_fit_errors(measure, explanation),
         error=measure.name,
         next_experiment=None if proposal is None else proposal.document,
     )
 
 
-def _interval_errors(result: SearchResult, errors: FloatArray) -> FloatArray:
+def _compute_interval_errors(result: SearchResult, errors: FloatArray) -> FloatArray:
     """(parameters,): standard errors of the named effects' parameters for the intervals that are stated."""
-    own = len(result.context.tuning.names)
+    own_count = len(result.context.tuning.names)
     if result.found.statistic is not None:
-        return INTERVAL_FACTOR * errors[own:]
-    return interval_errors(result.context, result.found, errors)[own:]
+        return INTERVAL_FACTOR * errors[own_count:]
+    return compute_interval_errors(result.context, result.found, errors)[own_count:]
 
 
-def _effects_with_gains(result: SearchResult, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
+def _list_effects_with_gains(result: SearchResult, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
     """The named effects, with their gains on held-out data where samples were compared."""
-    context, found = result.context, result.found
-    effects = named_effects(found, _interval_errors(result, errors), labels)
-    if found.statistic is not None or len(found.steps) != len(effects):
+    context, explanation = result.context, result.found
+    effects = make_named_effects(explanation, _compute_interval_errors(result, errors), labels)
+    if explanation.statistic is not None or len(explanation.steps) != len(effects):
         return effects
-    between = [context.with_test_score(step) for step in found.steps[:-1]]
-    return with_gains(effects, context.whole, (found.plain, *between, found.after))
+    intermediate_fits = [context.with_test_score(step) for step in explanation.steps[:-1]]
+    return add_held_out_gains(effects, context.whole, (explanation.plain, *intermediate_fits, explanation.after))
 
 
-def _proposal(context: SearchContext, found: Explanation, judged: Judgement) -> "Proposal | None":
+def _propose(context: SearchContext, explanation: Explanation, judgement: Judgement) -> "Proposal | None":
     """Proposal of the next recording; None where no effect is named, or where recordings cannot be predicted by
     simulation."""
-    if not judged.named or context.whole.name != "free simulation" or found.statistic is not None:
+    if not judgement.named or context.whole.name != "free simulation" or explanation.statistic is not None:
         return None
     # Imported here: only named effects have rivals that a further recording could separate.
     from analysis.diagnosis.next_experiment.propose_experiment import propose_experiment
 
-    return propose_experiment(context, found)
+    return propose_experiment(context, explanation)
 
 
-def channel_names(recording: Recording, count: int) -> tuple[str, ...]:
+def list_channel_names(recording: Recording, count: int) -> tuple[str, ...]:
     """Names of the response's channels, then of the position's, as many as `count`."""
     position = () if recording.position is None else recording.position.channels
     return (*recording.response.channels, *position)[:count]
 
 
-def _time_series(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) -> tuple[TimeSeries, ...]:
+def _build_time_series(measure: ErrorMeasure, explanation: Explanation, names: Sequence[str]) -> tuple[TimeSeries, ...]:
     """Measured signals and those predicted at each stage, per recording."""
     time_series = []
-    for number, record in enumerate(measure.records):
+    for index, record in enumerate(measure.records):
         count = record.measured.shape[1]
-        before, retuned, after = (
-            record.measured - candidate.fitted.residuals[number] * measure.unit
-            for candidate in (found.before, found.retuned, found.after)
+        given_predicted, retuned_predicted, completed_predicted = (
+            record.measured - candidate.fitted.residuals[index] * measure.unit
+            for candidate in (explanation.before, explanation.retuned, explanation.after)
         )
         time_series.append(
             TimeSeries(
-                name=names[number] if number < len(names) else f"recording {number + 1}",
+                name=names[index] if index < len(names) else f"recording {index + 1}",
                 sample_rate_hz=record.recording.sample_rate_hz,
-                channels=channel_names(record.recording, count),
-                units=_units(record.recording)[:count],
+                channels=list_channel_names(record.recording, count),
+                units=_list_units(record.recording)[:count],
                 measured=record.measured,
-                before=before,
-                retuned=retuned,
-                after=after,
+                before=given_predicted,
+                retuned=retuned_predicted,
+                after=completed_predicted,
                 tested=tuple(runs_of(record.test)),
             )
         )
     return tuple(time_series)
 
 
-def _units(recording: Recording) -> tuple[str, ...]:
+def _list_units(recording: Recording) -> tuple[str, ...]:
     """Unit of each channel of the response, then of the position."""
     signals = [signal for signal in (recording.response, recording.position) if signal is not None]
     return tuple(
@@ -237,20 +239,20 @@ def _units(recording: Recording) -> tuple[str, ...]:
     )
 
 
-def impact_remainder(measure: ErrorMeasure, found: Explanation) -> tuple[Mismatch, ...]:
+def list_impact_remainder(measure: ErrorMeasure, explanation: Explanation) -> tuple[Mismatch, ...]:
     """One row for each channel whose band powers differ by more than chance; the share is the rms logarithm of the
     ratio of amplitudes. For impacts, which are compared by band power because no simulation predicts single ones; empty
     where samples were compared."""
-    if found.statistic is None:
+    if explanation.statistic is None:
         return ()
-    record, score = measure.records[0].recording, found.after.score
+    record, score = measure.records[0].recording, explanation.after.score
     names = (*record.response.channels, *(() if record.position is None else record.position.channels))
-    worst = np.maximum(score.fit, score.choose)
+    errors_by_channel = np.maximum(score.fit, score.choose)
     return tuple(
         Mismatch(
             names[c], "+".join(record.command.channels), (0.0, record.sample_rate_hz / 2), None, None,
-            min(float(worst[c] * found.statistic.chance[c]), 1.0), 0.0,
+            min(float(errors_by_channel[c] * explanation.statistic.chance[c]), 1.0), 0.0,
         )
-        for c in np.argsort(-worst).tolist()
-        if worst[c] > EXPLAINED_BY_CHANCE
+        for c in np.argsort(-errors_by_channel).tolist()
+        if errors_by_channel[c] > EXPLAINED_BY_CHANCE
     )  # fmt: skip

@@ -32,28 +32,31 @@ def black_box(measure: ErrorMeasure, retuned: FittedCandidate, terms: int, physi
     fitted = [record.fit for record in measure.records]
     signals = [
         # Missing samples are neither fitted nor tested, so their value does not matter.
-        _signals_and_changes(record.command, np.nan_to_num(record.measured - left * measure.unit))
-        for record, left in zip(measure.records, retuned.fitted.residuals, strict=True)
+        _signals_and_changes(record.command, np.nan_to_num(record.measured - residuals * measure.unit))
+        for record, residuals in zip(measure.records, retuned.fitted.residuals, strict=True)
     ]
     signals = _clip_to_fitted_range(signals, fitted)
     rows = np.vstack([signal[mask] for signal, mask in zip(signals, fitted, strict=True)])
-    left = np.vstack([residual[mask] for residual, mask in zip(retuned.fitted.residuals, fitted, strict=True)])
-    every = max(len(rows) // SELECTION_SAMPLES, 1)
-    seen = _terms(rows[::every], range(_term_count(rows)))
-    scale = _scale(seen)
-    chosen = [_select_terms(seen / scale, wanted, terms) for wanted in left[::every].T]
-    picked = sorted({number for each in chosen for number in each})
-    whole, weights = _terms(rows, picked) / scale[picked], np.zeros((len(picked), left.shape[1]))
-    for channel, each in enumerate(chosen):
-        its = [picked.index(number) for number in each]
-        weights[its, channel] = np.linalg.lstsq(whole[:, its], left[:, channel], rcond=None)[0]
+    residuals = np.vstack([residual[mask] for residual, mask in zip(retuned.fitted.residuals, fitted, strict=True)])
+    stride = max(len(rows) // SELECTION_SAMPLES, 1)
+    selection_terms = _terms(rows[::stride], range(_term_count(rows)))
+    scale = _scale(selection_terms)
+    selected = [_select_terms(selection_terms / scale, target, terms) for target in residuals[::stride].T]
+    used_terms = sorted({number for numbers in selected for number in numbers})
+    terms_matrix, weights = (
+        _terms(rows, used_terms) / scale[used_terms],
+        np.zeros((len(used_terms), residuals.shape[1])),
+    )
+    for channel, numbers in enumerate(selected):
+        columns = [used_terms.index(number) for number in numbers]
+        weights[columns, channel] = np.linalg.lstsq(terms_matrix[:, columns], residuals[:, channel], rcond=None)[0]
     corrected = [
-        residual[record.test] - _terms(signal[record.test], picked) / scale[picked] @ weights
+        residual[record.test] - _terms(signal[record.test], used_terms) / scale[used_terms] @ weights
         for record, residual, signal in zip(measure.records, retuned.fitted.residuals, signals, strict=True)
     ]
     return BlackBox(
         "polynomial of the model's signals",
-        terms * left.shape[1],
+        terms * residuals.shape[1],
         _normalise_error(measure, np.vstack(corrected)),
         physics,
     )
@@ -68,16 +71,16 @@ def _scale(rows: FloatArray) -> FloatArray:
 
 def _clip_to_fitted_range(signals: list[FloatArray], fitted: list[Mask]) -> list[FloatArray]:
     """The signals clipped to the range that was fitted to: beyond it, a polynomial extrapolates badly."""
-    seen = np.vstack([signal[mask] for signal, mask in zip(signals, fitted, strict=True)])
-    return [np.clip(signal, seen.min(axis=0), seen.max(axis=0)) for signal in signals]
+    fitted_signals = np.vstack([signal[mask] for signal, mask in zip(signals, fitted, strict=True)])
+    return [np.clip(signal, fitted_signals.min(axis=0), fitted_signals.max(axis=0)) for signal in signals]
 
 
 def _signals_and_changes(command: FloatArray, predicted: FloatArray) -> FloatArray:
     """(n, 2 signals): commands and predictions, one sample before, and their changes; each with an rms of 1."""
     signals = np.hstack([command, predicted])
     signals = signals / np.maximum(np.sqrt(np.mean(signals**2, axis=0)), _TINY)
-    before = np.vstack([signals[:1], signals[:-1]])
-    base = np.hstack([before, signals - before])
+    previous = np.vstack([signals[:1], signals[:-1]])
+    base = np.hstack([previous, signals - previous])
     return np.asarray(base / np.maximum(np.sqrt(np.mean(base**2, axis=0)), _TINY))
 
 
@@ -92,34 +95,36 @@ def _terms(base: FloatArray, numbers: Sequence[int]) -> FloatArray:
     index: s, s², s |s| and s³ for powers 0 to 3; then the products of two signals."""
     width = base.shape[1]
     products = list(combinations(range(width // 2), 2))
-    found = np.empty((len(base), len(numbers)))
-    for place, number in enumerate(numbers):
-        power, at = divmod(number, width)
+    values = np.empty((len(base), len(numbers)))
+    for column, number in enumerate(numbers):
+        power, index = divmod(number, width)
         if power < 4:
-            signal = base[:, at]
-            found[:, place] = signal * (1.0, signal, np.abs(signal), signal**2)[power]
+            signal = base[:, index]
+            values[:, column] = signal * (1.0, signal, np.abs(signal), signal**2)[power]
         else:
-            first, other = products[number - 4 * width]
-            found[:, place] = base[:, first] * base[:, other]
-    return found
+            first_signal, second_signal = products[number - 4 * width]
+            values[:, column] = base[:, first_signal] * base[:, second_signal]
+    return values
 
 
-def _select_terms(seen: FloatArray, wanted: FloatArray, count: int) -> list[int]:
+def _select_terms(candidate_terms: FloatArray, target: FloatArray, count: int) -> list[int]:
     """Indices of the terms selected by orthogonal least squares, one after the other."""
-    picked: list[int] = []
-    rest = wanted
-    power = np.sum(seen**2, axis=0)
+    selected: list[int] = []
+    residual = target
+    power = np.sum(candidate_terms**2, axis=0)
     for _ in range(count):
-        gain = (seen.T @ rest) ** 2 / np.maximum(power, _TINY)
-        gain[picked] = -1.0
-        picked.append(int(np.argmax(gain)))
-        rest = wanted - seen[:, picked] @ np.linalg.lstsq(seen[:, picked], wanted, rcond=None)[0]
-    return picked
+        gain = (candidate_terms.T @ residual) ** 2 / np.maximum(power, _TINY)
+        gain[selected] = -1.0
+        selected.append(int(np.argmax(gain)))
+        residual = (
+            target - candidate_terms[:, selected] @ np.linalg.lstsq(candidate_terms[:, selected], target, rcond=None)[0]
+        )
+    return selected
 
 
-def _normalise_error(measure: ErrorMeasure, left: FloatArray) -> float:
-    """Rms error over the rms signal, root mean square over channels. left: (test samples, c), in units of the
+def _normalise_error(measure: ErrorMeasure, errors: FloatArray) -> float:
+    """Rms error over the rms signal, root mean square over channels. errors: (test samples, c), in units of the
     measure."""
     size = np.maximum(signal_rms(measure.records, [record.test for record in measure.records]), _TINY)
-    rms = np.sqrt(np.mean(left**2, axis=0)) * measure.unit / size
+    rms = np.sqrt(np.mean(errors**2, axis=0)) * measure.unit / size
     return float(np.sqrt(np.mean(rms**2)))

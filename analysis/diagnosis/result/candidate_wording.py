@@ -70,13 +70,13 @@ def class_noun(effect: NamedEffect) -> str:
     """Name of an effect with its class, such as "friction (dry friction, or 2 laws like it)"; its own name without a
     class."""
     names = _class_names(effect)
-    others = len(names) - 1
+    rival_count = len(names) - 1
     family = _family(names)
-    if others < 1 or family is None:
+    if rival_count < 1 or family is None:
         return noun_of(names[0])
     if ":" in family[0]:
         return family[0]
-    return f"{family[0]} ({noun_of(names[0])}, or {others} {'law' if others == 1 else 'laws'} like it)"
+    return f"{family[0]} ({noun_of(names[0])}, or {rival_count} {'law' if rival_count == 1 else 'laws'} like it)"
 
 
 def class_sentence(effect: NamedEffect) -> str:
@@ -114,7 +114,7 @@ def _class_names(effect: NamedEffect) -> tuple[str, ...]:
 
 def _family(names: Sequence[str]) -> tuple[str, str] | None:
     """Short name and title of the first family that contains all names; None where none does."""
-    return next(((short, long) for short, long, members in _FAMILIES if set(names) <= members), None)
+    return next(((name, title) for name, title, members in _FAMILIES if set(names) <= members), None)
 
 
 def candidate_title(candidate: Candidate, device: Device | None = None) -> str:
@@ -137,9 +137,10 @@ def candidate_parameters(candidate: Candidate, device: Device | None = None) -> 
 
 def candidate_sentences(diagnosis: Diagnosis, device: Device | None = None) -> tuple[str, ...]:
     """A sentence for each of the best `SENTENCES` candidates, without that of `best_candidate_sentence`."""
-    already = 1 if best_candidate_sentence(diagnosis, device) else 0
+    reported_count = 1 if best_candidate_sentence(diagnosis, device) else 0
     return tuple(
-        f"Not confirmed: {_with_gain(candidate, device)}" for candidate in diagnosis.candidates[already:SENTENCES]
+        f"Not confirmed: {_with_gain(candidate, device)}"
+        for candidate in diagnosis.candidates[reported_count:SENTENCES]
     )
 
 

@@ -24,73 +24,70 @@ if TYPE_CHECKING:
     from analysis.diagnosis.balance.judged_law import JudgedLaw
 
 
-_NAME, _FREE, _OWN_SIGNAL = re.compile(r"[A-Za-z_]\w*"), re.compile(r"^p\d+$"), re.compile(r"^([vf]?)[xyz]$")
+_NAME, _FREE_PARAMETER, _AXIS_SIGNAL = re.compile(r"[A-Za-z_]\w*"), re.compile(r"^p\d+$"), re.compile(r"^([vf]?)[xyz]$")
 """Names in a formula; names of its free parameters; names of the position, velocity or command of an axis."""
 _NUMBER = re.compile(r"(?<![A-Za-z_\d])\d[\d.]*(?:[eE][+-]?\d+)?")
-MOST = 6
+MOST_LISTED = 6
 """Most candidates that a diagnosis lists. By hand."""
-REFINING = {
+SPECIAL_CASES = {
     "drifting_friction": ("coulomb_friction",),
     "condition_dependent_friction": ("coulomb_friction",),
     "drifting_force": ("constant_force",),
 }
 """Laws without a simulation, and the special cases that each contains."""
-# PLAINER, ALIKE and BEYOND: reasons in the document for which an effect is not named.
-PLAINER = (
+# SPECIAL_CASE, EQUALLY_GOOD and LINEAR_DYNAMICS: reasons in the document for which an effect is not named.
+SPECIAL_CASE = (
     "its special case, which is named, has hardly a larger error in a simulation, which does not determine the "
     "further parameters"
 )
-ALIKE = "equally good in its place on held-out data"
-LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
+EQUALLY_GOOD = "equally good in its place on held-out data"
+DELAY_EFFECTS = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
 """Effects that delay a signal: with a single measured response, a late command and a late reading are equivalent."""
 
 
-BEYOND = "a mode, lag or relaxation that the model lacks: linear dynamics, which simulations did not confirm"
+LINEAR_DYNAMICS = "a mode, lag or relaxation that the model lacks: linear dynamics, which simulations did not confirm"
 
 
-def beside_given(
-    diagnosis: Diagnosis,
-    balances: "Sequence[Balance]",
-    unconfirmed: Sequence[Candidate],
-    channels: tuple[str, ...],
+def add_balances_to_search(
+    diagnosis: Diagnosis, balances: "Sequence[Balance]", unconfirmed: Sequence[Candidate], channels: tuple[str, ...]
 ) -> Diagnosis:
     """The diagnosis with classes and candidates, where a model was given. unconfirmed: effects that the search by
     simulation found and did not name. channels: of the commands."""
-    alike = {
-        (law.law.effect, axis_letter(channels[axis], channels)): law.alike
+    equivalents = {
+        (law.law.effect, axis_letter(channels[axis], channels)): law.equivalents
         for axis, balance in enumerate(balances)
         for law in balance.laws
     }
     effects = tuple(
-        replace(effect, class_=_class_of(effect, alike.get((effect.effect, effect.axis or ""), ())))
+        replace(effect, class_=_find_class(effect, equivalents.get((effect.effect, effect.axis or ""), ())))
         for effect in diagnosis.effects
     )
     named = {(name, effect.axis) for effect in effects for name in (effect.effect, *effect.class_)}
-    weighed = [
+    judged_laws = [
         (axis_letter(channels[axis], channels), law)
         for axis, balance in enumerate(balances)
-        for law in (*balance.laws, *balance.others)
+        for law in (*balance.laws, *balance.further_laws)
     ]
-    by_balance = [
-        _candidate(replace(law, why_not=BEYOND) if law.law.linear else law, axis)
-        for axis, law in sorted(weighed, key=lambda placed: (_rank(placed[1]), -placed[1].gain))
+    balance_candidates = [
+        _make_candidate(replace(law, objection=LINEAR_DYNAMICS) if law.law.linear else law, axis)
+        for axis, law in sorted(judged_laws, key=lambda entry: (_rank_law(entry[1]), -entry[1].gain))
         if law.share >= LAW_OF_CEILING and law.gain >= FURTHER_LAW_GAIN
     ]
-    both = sorted((*unconfirmed, *by_balance), key=lambda each: -each.held_out_gain)
-    left = [each for each in both if (each.effect, each.axis) not in named]
-    return replace(diagnosis, effects=effects, candidates=_once(left)[:MOST])
+    ranked = sorted((*unconfirmed, *balance_candidates), key=lambda candidate: -candidate.held_out_gain)
+    listed = [candidate for candidate in ranked if (candidate.effect, candidate.axis) not in named]
+    return replace(diagnosis, effects=effects, candidates=_deduplicate(listed)[:MOST_LISTED])
 
 
-def _class_of(effect: NamedEffect, alike: tuple[str, ...]) -> tuple[str, ...]:
-    """The effect with its rivals that neither simulation nor balance can distinguish from it; empty without any. alike:
-    rivals by the balance."""
-    passed = {rival.effect for rival in effect.rivals if not rival.inseparable}
+def _find_class(effect: NamedEffect, equivalents: tuple[str, ...]) -> tuple[str, ...]:
+    """The effect with its rivals that neither simulation nor balance can distinguish from it; empty without any.
+    equivalents: rivals by the balance."""
+    distinguished = {rival.effect for rival in effect.rivals if not rival.inseparable}
     names = [rival.effect for rival in effect.rivals if rival.inseparable]
-    names += [name for name in alike if name not in passed]
+    names += [name for name in equivalents if name not in distinguished]
     return tuple(dict.fromkeys((effect.effect, *names))) if names else ()
 
 
-def with_balances(
+def add_balance_classes(
     diagnosis: Diagnosis,
     balances: "Sequence[Balance]",
     channels: tuple[str, ...],
@@ -101,7 +98,7 @@ def with_balances(
     constant force that no balance names is a parameter of the model, not an effect."""
     if not balances:
         return diagnosis
-    weighed = [
+    judged_laws = [
         (law, axis_letter(channels[axis], channels), _compute_explained_share(balance, law))
         for axis, balance in enumerate(balances)
         for law in balance.laws
@@ -109,163 +106,163 @@ def with_balances(
     constants = {
         f"{effect.effect.replace('_', ' ')} {effect.axis}": effect.parameters[CONSTANTS[effect.effect]].value
         for effect in diagnosis.effects
-        if effect.effect in CONSTANTS and _weigh_law(effect, weighed) is None
+        if effect.effect in CONSTANTS and _find_matching_law(effect, judged_laws) is None
     }
     effects = tuple(
-        _with_class(effect, _weigh_law(effect, weighed))
+        _add_class(effect, _find_matching_law(effect, judged_laws))
         for effect in diagnosis.effects
         if f"{effect.effect.replace('_', ' ')} {effect.axis}" not in constants
     )
-    named = {(name, effect.axis) for effect in effects for name in _names_covered_by(effect)}
-    found = [
-        (_rank(law), _candidate(law, axis_letter(channels[axis], channels), effects))
+    named = {(name, effect.axis) for effect in effects for name in _list_covered_names(effect)}
+    ranked = [
+        (_rank_law(law), _make_candidate(law, axis_letter(channels[axis], channels), effects))
         for axis, balance in enumerate(balances)
-        for law in (*balance.laws, *balance.others)
-        if law.formula is None or (law.played_as, axis_letter(channels[axis], channels)) not in named
+        for law in (*balance.laws, *balance.further_laws)
+        if law.formula is None or (law.simulated_as, axis_letter(channels[axis], channels)) not in named
     ]
-    found += [(1, each) for each in unconfirmed]
-    left = [each for _, each in sorted(found, key=lambda ranked: ranked[0]) if (each.effect, each.axis) not in named]
+    ranked += [(1, entry) for entry in unconfirmed]
+    listed = [entry for _, entry in sorted(ranked, key=lambda pair: pair[0]) if (entry.effect, entry.axis) not in named]
     retuned = {**diagnosis.retuned, **constants}
     verdict = diagnosis.verdict
     if not effects and diagnosis.effects:
         verdict = "parameters" if verdict == "explained" else "unexplained"
-    return replace(diagnosis, verdict=verdict, effects=effects, retuned=retuned, candidates=_once(left)[:MOST])
+    return replace(
+        diagnosis, verdict=verdict, effects=effects, retuned=retuned, candidates=_deduplicate(listed)[:MOST_LISTED]
+    )
 
 
-def _weigh_law(
-    effect: NamedEffect, weighed: "Sequence[tuple[JudgedLaw, str, float]]"
+def _find_matching_law(
+    effect: NamedEffect, judged_laws: "Sequence[tuple[JudgedLaw, str, float]]"
 ) -> "tuple[JudgedLaw, float] | None":
     """The law of a balance that the named effect represents, and its share of the mismatch; None where no balance has
-    it. weighed: laws with their axis and share."""
-    for law, axis, share in weighed:
-        same = (law.played_as, axis) == (effect.effect, effect.axis or "")
-        if same and law.formula is not None and effect.law is not None:
-            same = law.named and _form(effect.law.expression) == _form(law.formula.text)
-        if same:
+    it. judged_laws: laws with their axis and share."""
+    for law, axis, share in judged_laws:
+        is_match = (law.simulated_as, axis) == (effect.effect, effect.axis or "")
+        if is_match and law.formula is not None and effect.law is not None:
+            is_match = law.named and _extract_form(effect.law.expression) == _extract_form(law.formula.text)
+        if is_match:
             return law, share
     return None
 
 
-def _form(formula: str) -> list[str]:
+def _extract_form(formula: str) -> list[str]:
     """Signals and functions of a formula in their order, to compare formulas; the axis's own signals have the names of
     a balance (x, vx and fx become q, v and f)."""
-    names = (_FREE.sub("", name) for name in _NAME.findall(_NUMBER.sub("", formula)))
-    return [_OWN_SIGNAL.sub(lambda own: own[1] or "q", name) for name in names if name]
+    names = (_FREE_PARAMETER.sub("", name) for name in _NAME.findall(_NUMBER.sub("", formula)))
+    return [_AXIS_SIGNAL.sub(lambda match: match[1] or "q", name) for name in names if name]
 
 
-def _names_covered_by(effect: NamedEffect) -> tuple[str, ...]:
+def _list_covered_names(effect: NamedEffect) -> tuple[str, ...]:
     """Names that are not listed as candidates once the effect is named: its own, its class, and its refinements."""
     refined = (rival.effect for rival in effect.rivals if rival.why_not == REFINED)
     return (effect.effect, *effect.class_, *refined)
 
 
-def _rank(weighed: "JudgedLaw") -> int:
+def _rank_law(judged_law: "JudgedLaw") -> int:
     """Order of candidates: physics with a significant gain and possible parameters first; then a linear model of a
     higher order; and last laws that explain almost nothing."""
-    if weighed.law.linear:
+    if judged_law.law.linear:
         return 2
-    if weighed.share < LAW_OF_CEILING:
+    if judged_law.share < LAW_OF_CEILING:
         return 3
-    return 0 if weighed.possible and (weighed.gain_low > 0 or weighed.agreed) else 1
+    return 0 if judged_law.is_physical and (judged_law.gain_low > 0 or judged_law.confirmed_by_folds) else 1
 
 
-def linear_remarks(
+def describe_linear_terms(
     balances: "Sequence[Balance]", channels: tuple[str, ...], in_samples: bool = False
 ) -> tuple[str, ...]:
     """Remarks on the linear terms of the first model other than mass, damping and stiffness. channels: of the commands.
     in_samples: times are in samples."""
     texts = []
     for channel, balance in zip(channels, balances, strict=False):
-        beside, motion = balance.search.regression.beside, balance.search.regression.motions[0]
+        linear_part, motion = balance.search.regression.base_terms, balance.search.regression.motions[0]
         laws = [law.effect for law in balance.linear_laws]
-        late = f"{beside.delay_s:.3g} samples" if in_samples else f"{1e3 * beside.delay_s:.3g} ms"
-        parts = [f"a delay of the command of {late} (or a lag)"] if beside.delay_s else []
+        delay_text = f"{linear_part.delay_s:.3g} samples" if in_samples else f"{1e3 * linear_part.delay_s:.3g} ms"
+        parts = [f"a delay of the command of {delay_text} (or a lag)"] if linear_part.delay_s else []
         parts += [noun_of(name) for name in dict.fromkeys(laws)]
         if len(motion.channels) > len(balances):
-            others = [name for k, name in enumerate(motion.channels) if k != beside.own]
-            parts.append(f"the motion of {conjoin(others)}")
+            further_motions = [name for k, name in enumerate(motion.channels) if k != linear_part.driven_channel]
+            parts.append(f"the motion of {conjoin(further_motions)}")
         if parts:
-            where = f" along {channel}" if len(channels) > 1 else ""
+            place = f" along {channel}" if len(channels) > 1 else ""
             texts.append(
-                f"In addition to mass, damping and stiffness, the first model contains{where} {conjoin(parts)}; "
+                f"In addition to mass, damping and stiffness, the first model contains{place} {conjoin(parts)}; "
                 "linear terms are not counted as missing physics."
             )
     return tuple(texts)
 
 
-def balance_errors(
+def collect_balance_errors(
     diagnosis: Diagnosis, balances: "Sequence[Balance]", channels: tuple[str, ...]
 ) -> tuple[BalanceErrors, ...]:
-    """Errors of each axis's balance with the laws that the document names; see `with_balances`."""
-    found = []
+    """Errors of each axis's balance with the laws that the document names; see `add_balance_classes`."""
+    errors = []
     for axis, balance in enumerate(balances):
         letter = axis_letter(channels[axis], channels)
         names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
-        laws = [law.place for law in balance.laws if law.played_as in names]
+        laws = [law.place for law in balance.laws if law.simulated_as in names]
         rms = balance.error_of(laws) if laws else balance.linear
-        given = balance.search.regression.prior is not None
-        found.append(BalanceErrors(letter, balance.linear, rms, balance.ceiling, bool(laws), balance.tested, given))
-    return tuple(found)
+        has_prior = balance.search.regression.prior is not None
+        errors.append(
+            BalanceErrors(letter, balance.linear, rms, balance.ceiling, bool(laws), balance.tested, has_prior)
+        )
+    return tuple(errors)
 
 
-def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """The candidates with each effect only once, at its best place; laws without a name are the same only if their
+def _deduplicate(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """The candidates with each effect only once, at its highest rank; laws without a name are the same only if their
     formulas and axes are. candidates: the best first."""
-    first: dict[object, Candidate] = {}
+    unique: dict[object, Candidate] = {}
     for candidate in candidates:
         law = candidate.law
-        first.setdefault(candidate.effect if law is None else (law.axis, law.expression), candidate)
-    return tuple(first.values())
+        unique.setdefault(candidate.effect if law is None else (law.axis, law.expression), candidate)
+    return tuple(unique.values())
 
 
 def _compute_explained_share(balance: "Balance", law: "JudgedLaw") -> float:
     """Share of the linear model's held-out error power that a law removes. `JudgedLaw.share` is relative to the
     decrease by all laws together, and for a law of the command to the linear error already."""
-    whole = 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2 if law.has_column else 1.0
-    return min(max(whole * law.share, 0.0), 1.0)
+    total_share = 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2 if law.has_column else 1.0
+    return min(max(total_share * law.share, 0.0), 1.0)
 
 
-def _with_class(effect: NamedEffect, found: "tuple[JudgedLaw, float] | None") -> NamedEffect:
-    """The effect with its class, share and probability by the balance. found: the law of the balance, and its share of
-    the mismatch; None where no balance has it."""
-    if found is None:
-        late = effect.effect in LATE
-        return replace(effect, class_=tuple(dict.fromkeys((effect.effect, *LATE)))) if late else effect
-    weighed, share = found
+def _add_class(effect: NamedEffect, law_and_share: "tuple[JudgedLaw, float] | None") -> NamedEffect:
+    """The effect with its class, share and probability by the balance. law_and_share: the law of the balance, and its
+    share of the mismatch; None where no balance has it."""
+    if law_and_share is None:
+        is_delay = effect.effect in DELAY_EFFECTS
+        return replace(effect, class_=tuple(dict.fromkeys((effect.effect, *DELAY_EFFECTS)))) if is_delay else effect
+    law, share = law_and_share
     known_rivals = {rival.effect for rival in effect.rivals}
-    others = tuple(name for name in weighed.alike if name == weighed.stands_for or not refines(name, effect.effect))
+    equivalents = tuple(name for name in law.equivalents if name == law.stands_for or not refines(name, effect.effect))
     rivals = tuple(
-        Rival(name, 0.0, name in others, ALIKE if name in others else REFINED)
-        for name in weighed.alike
+        Rival(name, 0.0, name in equivalents, EQUALLY_GOOD if name in equivalents else REFINED)
+        for name in law.equivalents
         if name not in known_rivals
     )
-    own = (effect.effect,) if weighed.formula is None else (effect.effect, weighed.law.effect)
-    alike = (*own, *others) if len(own) + len(others) > 1 else ()
+    effect_names = (effect.effect,) if law.formula is None else (effect.effect, law.law.effect)
+    class_names = (*effect_names, *equivalents) if len(effect_names) + len(equivalents) > 1 else ()
     return replace(
-        effect,
-        share=share,
-        probability=weighed.probability,
-        rivals=(*effect.rivals, *rivals),
-        class_=alike,
+        effect, share=share, probability=law.probability, rivals=(*effect.rivals, *rivals), class_=class_names
     )
 
 
-def refines(effect: str, plain: str) -> bool:
-    """Whether an effect contains another (plain) as a special case."""
-    known = EFFECTS[effect].simpler if effect in EFFECTS else REFINING.get(effect, ())
-    return plain in known
+def refines(effect: str, special_case: str) -> bool:
+    """Whether an effect contains another as a special case."""
+    special_cases = EFFECTS[effect].simpler if effect in EFFECTS else SPECIAL_CASES.get(effect, ())
+    return special_case in special_cases
 
 
-def _candidate(weighed: "JudgedLaw", axis: str, effects: Sequence[NamedEffect] = ()) -> Candidate:
+def _make_candidate(judged_law: "JudgedLaw", axis: str, effects: Sequence[NamedEffect] = ()) -> Candidate:
     """A law of a balance as a candidate of the document. effects: the named effects."""
-    plainer = any(refines(weighed.law.effect, named.effect) and named.axis == axis for named in effects)
-    why_not = PLAINER if plainer else "simulations of the whole recording do not confirm it"
+    is_refinement = any(refines(judged_law.law.effect, effect.effect) and effect.axis == axis for effect in effects)
+    default_reason = SPECIAL_CASE if is_refinement else "simulations of the whole recording do not confirm it"
     return Candidate(
-        effect=weighed.law.effect,
-        place=place_of(weighed.law.effect),
+        effect=judged_law.law.effect,
+        place=place_of(judged_law.law.effect),
         axis=axis or None,
-        parameters=weighed.values,
-        held_out_gain=min(max(weighed.gain, 0.0), 1.0),
-        share_of_black_box=min(max(weighed.share, 0.0), 1.0),
-        why_not=weighed.why_not or why_not,
+        parameters=judged_law.values,
+        held_out_gain=min(max(judged_law.gain, 0.0), 1.0),
+        share_of_black_box=min(max(judged_law.share, 0.0), 1.0),
+        why_not=judged_law.objection or default_reason,
     )

@@ -12,7 +12,7 @@ from analysis.diagnosis.settings import FIT_CONFIRMED, SAME_TO_READERS
 from analysis.diagnosis.unit_wording import error_of_signal, error_text, share_text
 from analysis.wording import capitalise
 
-SAME = 1e-9
+ROUNDING = 1e-9
 """Relative difference of two errors of the same data that is due to rounding."""
 
 
@@ -22,50 +22,54 @@ def black_box_sentence(box: BlackBox | None, named: bool) -> str:
     if box is None:
         return ""
     physics = "the physics" if named else "the re-tuned model"
-    fitted = f"A black box ({box.kind}, {box.numbers} parameters), fitted to the same samples, has an error of"
-    errors = f"{error_of_signal(box.test)} on the held-out data; {physics} has {error_text(box.physics)}"
+    fitted = (
+        f"A black box ({box.kind}, {box.coefficient_count} parameters), fitted to the same samples, has an error of"
+    )
+    errors = f"{error_of_signal(box.test_error)} on the held-out data; {physics} has {error_text(box.physics_error)}"
     if black_box_beats(box):
         return (
             f"{fitted} {errors}. The black box predicts better: the data contain structure that no named effect "
             "explains."
         )
-    if box.physics * SAME_TO_READERS < box.test:
+    if box.physics_error * SAME_TO_READERS < box.test_error:
         return f"{fitted} {errors}. {capitalise(physics)} predicts better."
     return f"{fitted} {errors}: the black box does not predict better."
 
 
 def black_box_beats(box: BlackBox) -> bool:
     """Whether the held-out error of the black box is smaller by more than the factor `SAME_TO_READERS`."""
-    return box.test * SAME_TO_READERS < box.physics
+    return box.test_error * SAME_TO_READERS < box.physics_error
 
 
-def describe_ceiling(reached: Sequence[BalanceErrors]) -> tuple[str, ...]:
+def describe_ceiling(axis_errors: Sequence[BalanceErrors]) -> tuple[str, ...]:
     """One sentence per axis whose force balance was tested."""
-    return tuple(_describe_ceiling_of_axis(each, len(reached) == 1) for each in reached)
+    return tuple(_describe_ceiling_of_axis(errors, len(axis_errors) == 1) for errors in axis_errors)
 
 
-def _describe_ceiling_of_axis(reached: BalanceErrors, single: bool) -> str:
+def _describe_ceiling_of_axis(errors: BalanceErrors, single: bool) -> str:
     """The sentence of one axis. single: whether the device has no other, so that it needs no name."""
-    along = "" if single else f" along {reached.axis}"
-    if not reached.tested:
+    axis = "" if single else f" along {errors.axis}"
+    if not errors.tested:
         return (
-            f"In the force balance{along}, no law could be tested: the device moves only once, and the held-out data "
+            f"In the force balance{axis}, no law could be tested: the device moves only once, and the held-out data "
             "contain almost no motion. Record several motions, or give one of them the role of a test."
         )
     model = (
-        "the error of the re-tuned model is" if reached.given else "the error of mass, damping and stiffness alone is"
+        "the error of the re-tuned model is"
+        if errors.is_model_given
+        else "the error of mass, damping and stiffness alone is"
     )
-    alone = f"In the force balance{along}, on held-out data, {model} {error_text(reached.linear)} of the force"
-    named = f"with the named laws it is {error_text(reached.named)}" if reached.any_named else "no law is named"
-    if reached.any_named and reached.named <= reached.ceiling * (1 + SAME):
-        return f"{alone}, {named}, and all laws together reach no smaller error."
+    linear = f"In the force balance{axis}, on held-out data, {model} {error_text(errors.linear)} of the force"
+    named = f"with the named laws it is {error_text(errors.named_error)}" if errors.has_named_law else "no law is named"
+    if errors.has_named_law and errors.named_error <= errors.ceiling * (1 + ROUNDING):
+        return f"{linear}, {named}, and all laws together reach no smaller error."
     share = (
-        f", and that is {share_text(reached.share)} of the reduction of the error power that all laws together reach"
-        if reached.named < reached.linear
+        f", and that is {share_text(errors.share)} of the reduction of the error power that all laws together reach"
+        if errors.named_error < errors.linear
         else ""
     )
     return (
-        f"{alone}; with all laws together it is {error_text(reached.ceiling)}, a bound that a sum of a few laws can "
+        f"{linear}; with all laws together it is {error_text(errors.ceiling)}, a bound that a sum of a few laws can "
         f"hardly reach; {named}{share}."
     )
 
@@ -80,32 +84,32 @@ def times_text(ratio: float) -> str:
     return f"{ratio:.2f} times" if ratio < 10 else f"{ratio:.3g} times"
 
 
-def fall_text(errors: Errors, first: tuple[str, str], last: tuple[str, str], how: str = "") -> str:
-    """Clause on the change of the held-out error between two stages. first, last: a field of `Errors`, and its name in
-    words. how: `NoiseFloor.how`; empty where it is not known."""
-    before, after = getattr(errors, first[0]), getattr(errors, last[0])
-    if before is None or after is None:
+def fall_text(errors: Errors, first_stage: tuple[str, str], last_stage: tuple[str, str], noise_method: str = "") -> str:
+    """Clause on the change of the held-out error between two stages. first_stage, last_stage: a field of `Errors`, and
+    its name in words. noise_method: `NoiseFloor.how`; empty where it is not known."""
+    first_error, last_error = getattr(errors, first_stage[0]), getattr(errors, last_stage[0])
+    if first_error is None or last_error is None:
         return "how much better it predicts held-out data is not known"
-    goes = "falls" if after * SAME_TO_READERS < before else "goes"
+    verb = "falls" if last_error * SAME_TO_READERS < first_error else "goes"
     return (
-        f"the error on held-out data {goes} from {error_of_signal(before)} ({first[1]}) to "
-        f"{error_text(after)} ({last[1]}){_noise(errors, after, how)}"
+        f"the error on held-out data {verb} from {error_of_signal(first_error)} ({first_stage[1]}) to "
+        f"{error_text(last_error)} ({last_stage[1]}){_noise(errors, last_error, noise_method)}"
     )
 
 
-def one_error(text: str, error: float | None, errors: Errors, how: str = "") -> str:
-    """Clause on a single held-out error and on the noise, or that the error is not known. text: begins the clause."""
+def describe_error(beginning: str, error: float | None, errors: Errors, noise_method: str = "") -> str:
+    """Clause on a single held-out error and on the noise, or that the error is not known. beginning: of the clause."""
     if error is None:
         return "its error on held-out data is not known"
-    return f"{text}, its error on held-out data is {error_of_signal(error)}{_noise(errors, error, how)}"
+    return f"{beginning}, its error on held-out data is {error_of_signal(error)}{_noise(errors, error, noise_method)}"
 
 
-def _noise(errors: Errors, error: float, how: str) -> str:
+def _noise(errors: Errors, error: float, noise_method: str) -> str:
     """End of a clause: an error compared with that of noise alone."""
-    if not errors.noise or how == "unknown":
+    if not errors.noise or noise_method == "unknown":
         return "; what noise alone would leave is not known"
-    if how in _NOISE_SOURCES:
-        return f"; noise {_NOISE_SOURCES[how]} would leave {error_text(errors.noise)}"
+    if noise_method in _NOISE_SOURCES:
+        return f"; noise {_NOISE_SOURCES[noise_method]} would leave {error_text(errors.noise)}"
     return f", {times_text(error / errors.noise)} what noise alone would leave ({error_text(errors.noise)})"
 
 
@@ -120,10 +124,10 @@ def confirmation_sentence(fit: Errors, test: Errors) -> str:
             "The held-out data do not confirm this: there the re-tuned model alone has a smaller error "
             f"({error_of_signal(test.retuned)} compared with {error_text(test.after)})."
         )
-    there, here = test.after / test.noise, fit.after / fit.noise
-    if there > FIT_CONFIRMED * max(here, 1.0):
+    test_ratio, fit_ratio = test.after / test.noise, fit.after / fit.noise
+    if test_ratio > FIT_CONFIRMED * max(fit_ratio, 1.0):
         return (
-            f"The held-out data confirm this only in part: the error is {times_text(there)} the noise there and "
-            f"{times_text(here)} the noise on the fitted data."
+            f"The held-out data confirm this only in part: the error is {times_text(test_ratio)} the noise there and "
+            f"{times_text(fit_ratio)} the noise on the fitted data."
         )
     return ""

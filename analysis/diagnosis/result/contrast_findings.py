@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
-from analysis.diagnosis.contrast.decide import BOUND, Decision
+from analysis.diagnosis.contrast.decide import T_BOUND, Decision
 from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
 from analysis.diagnosis.effect_words import unit_of
@@ -25,9 +25,9 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.unit_system import LINEAR, UnitSystem
 
-MOST = 6
-"""Most candidates that a diagnosis lists."""
-BESIDE = (
+MOST_LISTED = 6
+"""Most candidates that a diagnosis lists. By hand."""
+COMPARED_WITH_CLEAN = (
     "The recordings were compared with the clean ones by a model that was fitted to both sets at once, with all laws "
     "that they need: a fault is an effect that the clean recordings lack. It counts where its gain exceeds {:.3g} "
     "times the gain that it would have between stretches of one set."
@@ -36,32 +36,39 @@ NOT_COMPARED = (
     "The recordings could not be compared with the clean ones: too little was recorded without gaps, one recording "
     "contains hardly any motion, or the fits failed. The results here use the model alone."
 )
-BY_ITSELF = "The sensor's signal itself shows this fault, and the clean recordings do not; no model was used."
+SHOWN_DIRECTLY = "The sensor's signal itself shows this fault, and the clean recordings do not; no model was used."
 
 
-def add_contrast(whole: Findings, found: Contrast, recording: Recording, beyond: float) -> Findings:
+def add_contrast(findings: Findings, contrast: Contrast, recording: Recording, gain_factor: float) -> Findings:
     """The findings with the result of a comparison in their diagnosis, model and remarks. recording: one of the faulty
-    set. beyond: factor on the usual gain from which a fault counts."""
-    if found.comparison is None or found.decision is None:
-        named = _directly_shown_fault(found, recording)
-        if named is None:
-            return replace(whole, remarks=(NOT_COMPARED, *whole.remarks))
-        diagnosis = _with_effects(whole.diagnosis, "partly_explained", (named,), ())
-        remarks: tuple[str, ...] = (BY_ITSELF,)
+    set. gain_factor: factor on the usual gain from which a fault counts."""
+    if contrast.comparison is None or contrast.decision is None:
+        named_fault = _find_directly_shown_fault(contrast, recording)
+        if named_fault is None:
+            return replace(findings, remarks=(NOT_COMPARED, *findings.remarks))
+        diagnosis = _replace_effects(findings.diagnosis, "partly_explained", (named_fault,), ())
+        remarks: tuple[str, ...] = (SHOWN_DIRECTLY,)
     else:
-        diagnosis = _with_comparison(whole.diagnosis, found.comparison, found.decision, recording, whole.given.system)
-        remarks = (BESIDE.format(beyond), *(() if found.comparison.complete else (OUT_OF_TIME,)))
-    improved = _improve_model(whole.given, diagnosis.effects)
+        diagnosis = _apply_comparison(
+            findings.diagnosis, contrast.comparison, contrast.decision, recording, findings.given.system
+        )
+        remarks = (COMPARED_WITH_CLEAN.format(gain_factor), *(() if contrast.comparison.complete else (OUT_OF_TIME,)))
+    improved = _improve_model(findings.given, diagnosis.effects)
     return replace(
-        whole, diagnosis=diagnosis, improved=improved, remarks=(*remarks, *whole.remarks), proposal=None, black_box=None
+        findings,
+        diagnosis=diagnosis,
+        improved=improved,
+        remarks=(*remarks, *findings.remarks),
+        proposal=None,
+        black_box=None,
     )
 
 
-def _with_effects(
+def _replace_effects(
     diagnosis: Diagnosis, verdict: Verdict, effects: tuple[NamedEffect, ...], candidates: tuple[Candidate, ...]
 ) -> Diagnosis:
     """The diagnosis with other verdict, effects and candidates; mismatch and remainder as the verdict requires."""
-    left = diagnosis.remainder or diagnosis.mismatch
+    remainder = diagnosis.remainder or diagnosis.mismatch
     return replace(
         diagnosis,
         verdict=verdict,
@@ -69,104 +76,129 @@ def _with_effects(
         candidates=candidates,
         next_experiment=None,
         mismatch=diagnosis.mismatch if verdict != "no_mismatch" else (),
-        remainder=left if verdict in ("partly_explained", "unexplained") else (),
+        remainder=remainder if verdict in ("partly_explained", "unexplained") else (),
     )
 
 
-def _with_comparison(
-    diagnosis: Diagnosis, found: Comparison, decided: Decision, recording: Recording, system: UnitSystem
+def _apply_comparison(
+    diagnosis: Diagnosis, comparison: Comparison, decision: Decision, recording: Recording, system: UnitSystem
 ) -> Diagnosis:
     """The diagnosis with the decision of a comparison. Errors are those of the faulty set."""
-    best = decided.named
-    named = () if best is None else (_name_fault(best, decided, recording, system),)
-    candidates = tuple(_candidate(law, why, recording) for law, why in decided.others)
-    verdict: Verdict = "partly_explained" if named else "no_mismatch" if found.excess <= SETS_AS_ONE else "unexplained"
-    fit = Fit(
-        _errors(
-            found,
-            found.plain[:CONTRAST_BLOCKS].sum(),
-            (found.plain if best is None else best.errors)[:CONTRAST_BLOCKS].sum(),
-        ),
-        _errors(found, found.held_out, found.held_out if best is None else best.held_out),
+    judged_fault = decision.named
+    named_effects = () if judged_fault is None else (_name_fault(judged_fault, decision, recording, system),)
+    candidates = tuple(_make_candidate(law, reason, recording) for law, reason in decision.unnamed)
+    verdict: Verdict = (
+        "partly_explained" if named_effects else "no_mismatch" if comparison.excess <= SETS_AS_ONE else "unexplained"
     )
-    error = "predicted force" if found.by_force else f"windows of {found.step_s:.6f} s"
-    changed = _with_effects(diagnosis, verdict, named, candidates[:MOST])
-    return replace(changed, fit=fit, error=error)
+    fit = Fit(
+        _compute_errors(
+            comparison,
+            comparison.errors[:CONTRAST_BLOCKS].sum(),
+            (comparison.errors if judged_fault is None else judged_fault.errors)[:CONTRAST_BLOCKS].sum(),
+        ),
+        _compute_errors(
+            comparison,
+            comparison.held_out_squares,
+            comparison.held_out_squares if judged_fault is None else judged_fault.held_out_squares,
+        ),
+    )
+    error_kind = "predicted force" if comparison.by_force else f"windows of {comparison.step_s:.6f} s"
+    updated = _replace_effects(diagnosis, verdict, named_effects, candidates[:MOST_LISTED])
+    return replace(updated, fit=fit, error=error_kind)
 
 
-def _errors(found: Comparison, before: float, after: float) -> Errors:
-    """Errors of the faulty set before and after a fault was undone, rms over the rms of its signal. before, after: sums
-    of squares."""
-    sizes = [float(np.sqrt(left / found.faulty_samples)) * found.faulty_share for left in (before, after)]
-    return Errors(sizes[0], sizes[0], sizes[1], None)
+def _compute_errors(comparison: Comparison, squares_before: float, squares_after: float) -> Errors:
+    """Errors of the faulty set before and after a fault was undone, rms over the rms of its signal. squares_before,
+    squares_after: sums of squares."""
+    relative_errors = [
+        float(np.sqrt(square_sum / comparison.faulty_samples)) * comparison.faulty_share
+        for square_sum in (squares_before, squares_after)
+    ]
+    return Errors(relative_errors[0], relative_errors[0], relative_errors[1], None)
 
 
-def _name_fault(best: JudgedFault, decided: Decision, recording: Recording, system: UnitSystem) -> NamedEffect:
+def _name_fault(judged_fault: JudgedFault, decision: Decision, recording: Recording, system: UnitSystem) -> NamedEffect:
     """The fault as a named effect of the document, with its class."""
-    effect = best.fault.effect
-    rivals = tuple(Rival(name, 0.0, True, "equally good in its place on the compared data") for name in decided.alike)
+    effect = judged_fault.fault.effect
+    rivals = tuple(
+        Rival(name, 0.0, True, "equally good in its place on the compared data") for name in decision.equivalents
+    )
     return NamedEffect(
         effect=effect,
-        place=best.fault.place,
-        axis=_axis(best, recording),
-        share=float(np.clip(best.share, 0.0, 1.0)),
-        probability=decided.probability,
-        parameters=_estimates(best, recording, system),
+        place=judged_fault.fault.place,
+        axis=_find_axis_letter(judged_fault, recording),
+        share=float(np.clip(judged_fault.share, 0.0, 1.0)),
+        probability=decision.probability,
+        parameters=_make_estimates(judged_fault, recording, system),
         rivals=rivals,
-        class_=(effect, *decided.alike) if decided.alike else (),
+        class_=(effect, *decision.equivalents) if decision.equivalents else (),
     )
 
 
-def _axis(weighed: JudgedFault, recording: Recording) -> str | None:
+def _find_axis_letter(judged_fault: JudgedFault, recording: Recording) -> str | None:
     """Letter of the fault's axis or channel; None where it concerns all."""
-    channels = recording.response.channels if weighed.fault.place == "sensor" else recording.command.channels
-    return axis_letter(weighed.fault.axis, channels) if weighed.fault.axis in channels else None
+    channels = recording.response.channels if judged_fault.fault.place == "sensor" else recording.command.channels
+    return axis_letter(judged_fault.fault.axis, channels) if judged_fault.fault.axis in channels else None
 
 
-def _estimates(weighed: JudgedFault, recording: Recording, system: UnitSystem) -> dict[str, Estimate]:
+def _make_estimates(judged_fault: JudgedFault, recording: Recording, system: UnitSystem) -> dict[str, Estimate]:
     """Parameters of the fault with units and 95 % intervals; without an interval where the standard error is 0."""
-    units = _units(weighed.fault, recording, system)
+    units = _find_units(judged_fault.fault, recording, system)
     return {
         name: Estimate(
-            value, units.get(name, "1"), (value - BOUND * spread, value + BOUND * spread) if spread else None
+            value,
+            units.get(name, "1"),
+            (value - T_BOUND * standard_error, value + T_BOUND * standard_error) if standard_error else None,
         )
-        for (name, value), spread in zip(weighed.values.items(), weighed.spread.values(), strict=True)
+        for (name, value), standard_error in zip(judged_fault.values.items(), judged_fault.spread.values(), strict=True)
     }
 
 
-def _units(fault: Fault, recording: Recording, system: UnitSystem) -> Mapping[str, str]:
+def _find_units(fault: Fault, recording: Recording, system: UnitSystem) -> Mapping[str, str]:
     """Unit of each parameter of a fault: that of the reading for a sensor's, of the command for an actuator's."""
     if fault.effect in EFFECTS_BY_NAME:
-        read = recording.response.units[max(fault.site, 0)] if fault.place == "sensor" else "1"
-        return {each.name: each.unit_in(system, read) for each in EFFECTS_BY_NAME[fault.effect].parameters}
+        reading_unit = recording.response.units[max(fault.site, 0)] if fault.place == "sensor" else "1"
+        return {
+            parameter.name: parameter.unit_in(system, reading_unit)
+            for parameter in EFFECTS_BY_NAME[fault.effect].parameters
+        }
     signal = recording.response if fault.place == "sensor" else recording.command
     unit = signal.units[max(fault.site, 0)]
     stiffness = unit_of(fault.effect, "stiffness", system)
     return {"stiffness": stiffness, "offset": unit, "cubic": f"1/({unit})^2", "square": f"1/({unit})"}
 
 
-def _candidate(weighed: JudgedFault, why: str, recording: Recording) -> Candidate:
+def _make_candidate(judged_fault: JudgedFault, reason: str, recording: Recording) -> Candidate:
     """The fault as a candidate. Its gain E / E' - 1 becomes the share 1 - E' / E of the error with the fault."""
     return Candidate(
-        effect=weighed.fault.effect,
-        place=weighed.fault.place,
-        axis=_axis(weighed, recording),
-        parameters=weighed.values,
-        held_out_gain=float(np.clip(1 - 1 / (1 + weighed.gain), 0.0, 1.0)),
-        share_of_black_box=float(np.clip(weighed.share, 0.0, 1.0)),
-        why_not=why,
+        effect=judged_fault.fault.effect,
+        place=judged_fault.fault.place,
+        axis=_find_axis_letter(judged_fault, recording),
+        parameters=judged_fault.values,
+        held_out_gain=float(np.clip(1 - 1 / (1 + judged_fault.gain), 0.0, 1.0)),
+        share_of_black_box=float(np.clip(judged_fault.share, 0.0, 1.0)),
+        why_not=reason,
     )
 
 
-def _directly_shown_fault(found: Contrast, recording: Recording) -> NamedEffect | None:
+def _find_directly_shown_fault(contrast: Contrast, recording: Recording) -> NamedEffect | None:
     """The fault that the readings show without a model (`signal_faults`, `model_free_faults`), such as hum or clipping;
     None without any. It has no interval."""
     place: Place = "sensor"
-    if found.line is not None:
-        name, sites, values, place = found.line.effect, found.line.channels, found.line.values, found.line.place
-    elif found.shown is not None:
-        claim = found.shown.claims[0]
-        name, sites, values = claim.effect.name, claim.sites, dict(found.shown.list_placed_effects()[0].values)
+    if contrast.signal_fault is not None:
+        name, sites, values, place = (
+            contrast.signal_fault.effect,
+            contrast.signal_fault.channels,
+            contrast.signal_fault.values,
+            contrast.signal_fault.place,
+        )
+    elif contrast.sensor_fault is not None:
+        claim = contrast.sensor_fault.claims[0]
+        name, sites, values = (
+            claim.effect.name,
+            claim.sites,
+            dict(contrast.sensor_fault.list_placed_effects()[0].values),
+        )
     else:
         return None
     signal = recording.response if place == "sensor" else recording.command
@@ -177,16 +209,16 @@ def _directly_shown_fault(found: Contrast, recording: Recording) -> NamedEffect 
         if effect is None
         else {parameter.name: parameter.unit_in(LINEAR, unit) for parameter in effect.parameters}
     )
-    known = {key: Estimate(value, units[key]) for key, value in values.items() if key in units}
+    estimates = {key: Estimate(value, units[key]) for key, value in values.items() if key in units}
     axis = axis_letter(channels[sites[0]], channels) if len(sites) < len(channels) or len(channels) == 1 else None
-    return NamedEffect(name, place, axis, 1.0, 1.0, known)
+    return NamedEffect(name, place, axis, 1.0, 1.0, estimates)
 
 
-def _improve_model(given: MechanicalModel, effects: tuple[NamedEffect, ...]) -> MechanicalModel:
+def _improve_model(model: MechanicalModel, effects: tuple[NamedEffect, ...]) -> MechanicalModel:
     """The given model with the faults that have a simulation, among its effects."""
-    played = tuple(
+    model_effects = tuple(
         ModelEffect(effect.effect, effect.axis, {name: estimate.value for name, estimate in effect.parameters.items()})
         for effect in effects
         if effect.effect in EFFECTS
     )
-    return replace(given, effects=(*given.effects, *played))
+    return replace(model, effects=(*model.effects, *model_effects))

@@ -21,78 +21,92 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
 
 
-def errors_of(measure: ErrorMeasure, found: Explanation) -> Fit:
+def compute_fit_errors(measure: ErrorMeasure, explanation: Explanation) -> Fit:
     """The table for the document (`Fit`). "fit" includes the samples to choose by."""
-    if found.statistic is not None:
-        return Fit(*(_log_errors(found, found.statistic, parts) for parts in (("fit", "choose"), ("test",))))
-    return Fit(_errors(measure, found, ("fit", "choose")), _errors(measure, found, ("test",)))
+    if explanation.statistic is not None:
+        return Fit(
+            *(
+                _compute_log_errors(explanation, explanation.statistic, parts)
+                for parts in (("fit", "choose"), ("test",))
+            )
+        )
+    return Fit(
+        _compute_errors(measure, explanation, ("fit", "choose")), _compute_errors(measure, explanation, ("test",))
+    )
 
 
-def channel_errors(found: Explanation, names: tuple[str, ...]) -> Mapping[str, Mapping[str, float]]:
+def collect_channel_errors(explanation: Explanation, names: tuple[str, ...]) -> Mapping[str, Mapping[str, float]]:
     """Rms errors over the test samples, in units of the noise, by stage and channel."""
-    stages = {"before": found.before, "retuned": found.retuned, "after": found.after}
+    stages = {"before": explanation.before, "retuned": explanation.retuned, "after": explanation.after}
     return {stage: dict(zip(names, candidate.score.test.tolist(), strict=True)) for stage, candidate in stages.items()}
 
 
-def _log_errors(found: Explanation, statistic: Statistic, parts: tuple[str, ...]) -> Errors:
+def _compute_log_errors(explanation: Explanation, statistic: Statistic, parts: tuple[str, ...]) -> Errors:
     """Rms over the channels of the error of ln a (`band_power`), and its chance value in place of the noise. parts:
     roles of the samples."""
 
-    def error(candidate: FittedCandidate) -> float | None:
-        off = np.array([getattr(candidate.score, part) for part in parts]) * statistic.chance
-        whole = float(np.sqrt(np.mean(off**2)))
-        return whole if np.isfinite(whole) else None
+    def compute_error(candidate: FittedCandidate) -> float | None:
+        log_errors = np.array([getattr(candidate.score, part) for part in parts]) * statistic.chance
+        mean_error = float(np.sqrt(np.mean(log_errors**2)))
+        return mean_error if np.isfinite(mean_error) else None
 
     chance = float(np.sqrt(np.mean(statistic.chance**2)))
-    return Errors(error(found.before), error(found.retuned), error(found.after), chance)
+    return Errors(
+        compute_error(explanation.before), compute_error(explanation.retuned), compute_error(explanation.after), chance
+    )
 
 
-def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -> Errors:
+def _compute_errors(measure: ErrorMeasure, explanation: Explanation, parts: tuple[str, ...]) -> Errors:
     """Normalised errors on the samples of these roles; None where there are none, or where held-out samples contain no
     motion."""
-    if parts == ("test",) and held_out_stands_still(measure.records, measure.noise):
+    if parts == ("test",) and is_held_out_still(measure.records, measure.noise):
         return Errors(None, None, None, None)
     masks = [np.logical_or.reduce([getattr(record, part) for part in parts]) for record in measure.records]
     if not any(mask.any() for mask in masks):
         return Errors(None, None, None, None)
-    size = np.maximum(signal_rms(measure.records, masks), np.finfo(float).tiny)
+    signal_size = np.maximum(signal_rms(measure.records, masks), np.finfo(float).tiny)
 
-    def error(candidate: FittedCandidate) -> float | None:
-        rms = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit / size
-        whole = float(np.sqrt(np.mean(rms**2)))
-        return whole if np.isfinite(whole) else None
+    def compute_error(candidate: FittedCandidate) -> float | None:
+        rms = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit / signal_size
+        mean_error = float(np.sqrt(np.mean(rms**2)))
+        return mean_error if np.isfinite(mean_error) else None
 
-    noise = float(np.sqrt(np.mean((measure.noise / size) ** 2)))
-    before, retuned, after = (error(each) for each in (found.before, found.retuned, found.after))
+    noise = float(np.sqrt(np.mean((measure.noise / signal_size) ** 2)))
+    given_error, retuned_error, completed_error = (
+        compute_error(stage_error) for stage_error in (explanation.before, explanation.retuned, explanation.after)
+    )
     # An error smaller than the noise refutes the estimate of the noise, such as one from above the driven band.
-    known = all(each is None or noise <= SAME_TO_READERS * each for each in (before, retuned, after))
-    return Errors(before, retuned, after, noise if known else None)
+    is_noise_plausible = all(
+        stage_error is None or noise <= SAME_TO_READERS * stage_error
+        for stage_error in (given_error, retuned_error, completed_error)
+    )
+    return Errors(given_error, retuned_error, completed_error, noise if is_noise_plausible else None)
 
 
-def held_out_stands_still(records: Sequence[Observed], noise: FloatArray) -> bool:
+def is_held_out_still(records: Sequence[Observed], noise: FloatArray) -> bool:
     """Whether samples are held out, and every channel's mean square in them is below `STILL_SHARE` of that in the other
     samples, or at its noise, although a channel moves above the noise in the others. Errors on such samples test
     nothing. noise: (c,), rms."""
-    if not any(each.test.any() for each in records):
+    if not any(record.test.any() for record in records):
         return False
-    held = _mean_power(records, [each.test for each in records])
-    known = _mean_power(records, [each.fit | each.choose for each in records])
+    held_out_power = _compute_mean_power(records, [record.test for record in records])
+    fitted_power = _compute_mean_power(records, [record.fit | record.choose for record in records])
     # A channel that contains only noise is never below a share of that in the fitted samples.
-    still = np.fmax(STILL_SHARE * known, (HELD_OUT_SURPRISE * noise) ** 2)
-    return bool((STILL_SHARE * known > noise**2).any() and (held <= still).all())
+    still_power = np.fmax(STILL_SHARE * fitted_power, (HELD_OUT_SURPRISE * noise) ** 2)
+    return bool((STILL_SHARE * fitted_power > noise**2).any() and (held_out_power <= still_power).all())
 
 
-def _mean_power(records: Sequence[Observed], masks: Sequence[Mask]) -> FloatArray:
+def _compute_mean_power(records: Sequence[Observed], masks: Sequence[Mask]) -> FloatArray:
     """(c,): mean square of each channel about its rest value, over the masked samples."""
-    moved = [_about_rest(each, mask)[mask] for each, mask in zip(records, masks, strict=True)]
-    return np.asarray(np.nanmean(np.concatenate(moved) ** 2, axis=0))
+    deviations = [_subtract_rest(record, mask)[mask] for record, mask in zip(records, masks, strict=True)]
+    return np.asarray(np.nanmean(np.concatenate(deviations) ** 2, axis=0))
 
 
-def _about_rest(record: Observed, mask: Mask) -> FloatArray:
+def _subtract_rest(record: Observed, mask: Mask) -> FloatArray:
     """(n, c): speeds unchanged, because rest is zero; other channels about their mean over the masked samples."""
     signals = (record.recording.response, record.recording.position)
-    quantities = [word for signal in signals if signal is not None for word in signal.quantities]
-    speeds = [DERIVATIVE_OF_QUANTITY.get(word) == 1 for word in quantities[: record.measured.shape[1]]]
+    quantities = [quantity for signal in signals if signal is not None for quantity in signal.quantities]
+    speeds = [DERIVATIVE_OF_QUANTITY.get(quantity) == 1 for quantity in quantities[: record.measured.shape[1]]]
     if not mask.any():
         return record.measured
     return np.asarray(record.measured - np.where(speeds, 0.0, np.nanmean(record.measured[mask], axis=0)))

@@ -55,21 +55,21 @@ class Signature:
     effect: str
     axis: str | None
     """Letter of the axis; None where all axes share the effect."""
-    along: str
+    abscissa_label: str
     """Label of the abscissa with unit: "velocity of x (m/s)"."""
-    of: str
+    ordinate_label: str
     """Label of the ordinate with unit."""
-    measured_at: FloatArray
+    measured_abscissa: FloatArray
     """(k,): abscissa of the measured points."""
     measured: FloatArray
     """(k,): mean of the missing force, or of the residual, at these points."""
     spread: FloatArray
     """(k,): standard error of that mean."""
-    law_at: FloatArray
+    law_abscissa: FloatArray
     """(q,): abscissa of the law's points."""
     law: FloatArray
     """(q,): value of the fitted law at these points."""
-    visited: tuple[float, float] | None = None
+    visited_range: tuple[float, float] | None = None
     """Range of the abscissa that the recordings visited; beyond it the law is extrapolated."""
 
 
@@ -80,11 +80,11 @@ class BlackBox:
 
     kind: str
     """What it is, in words."""
-    numbers: int
+    coefficient_count: int
     """Number of its coefficients, all channels together."""
-    test: float
+    test_error: float
     """Error on the test samples, relative to the signal, as in `document.Errors`."""
-    physics: float
+    physics_error: float
     """Error of the model with the named effects on the same samples, relative to the signal."""
 
 
@@ -95,23 +95,27 @@ class BalanceErrors:
     axis: str
     linear: float
     """With mass, damping and stiffness alone."""
-    named: float
+    named_error: float
     """With the named laws in addition."""
     ceiling: float
     """With all candidate laws together: the best that laws achieve here."""
-    any_named: bool
+    has_named_law: bool
     """Whether a law is named on this axis."""
     tested: bool = True
     """Whether the held-out samples move enough to test laws by."""
-    given: bool = False
+    is_model_given: bool = False
     """Whether the model was given: `linear` is then the error of the re-tuned model."""
 
     @property
     def share(self) -> float:
         """Reduction of the error power by the named laws over the reduction by all laws together, 0 to 1; 0 where all
         laws together reduce nothing."""
-        room = self.linear**2 - self.ceiling**2
-        return min(max((self.linear**2 - self.named**2) / room, 0.0), 1.0) if room > 0 else 0.0
+        possible_reduction = self.linear**2 - self.ceiling**2
+        return (
+            min(max((self.linear**2 - self.named_error**2) / possible_reduction, 0.0), 1.0)
+            if possible_reduction > 0
+            else 0.0
+        )
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
@@ -141,7 +145,7 @@ class Findings(Summarised):
     """Remarks as sentences: assumptions, weaknesses, implausible results."""
     maps: Mapping[str, tuple[MismatchCell, ...]] = field(default_factory=dict)
     """Every cell of the mismatch map, in units of the noise, by stage ("before", "retuned", "after")."""
-    local: Localisation = field(default_factory=Localisation)
+    localisation: Localisation = field(default_factory=Localisation)
     """Localisation of the mismatch: the states it occurs in, where it enters, and the kind of distortion."""
     fitted: bool = False
     """Whether the program fitted `given` to these recordings, so that its parameters have no calibration."""
@@ -156,7 +160,7 @@ class Findings(Summarised):
     """Displayed names of the driven axes; empty = x, y, z."""
     proposal: "Proposal | None" = None
     """Proposed next recording, where rivals fit as well as the named effects; None = no proposal."""
-    reached: tuple[BalanceErrors, ...] = ()
+    balance_errors: tuple[BalanceErrors, ...] = ()
     """Force balance per axis; empty where none was computed."""
     state_maps: tuple[StateMaps, ...] = ()
     """The missing force over the states of motion, per axis, in the order of drawing."""
@@ -171,23 +175,26 @@ class Findings(Summarised):
     def summary(self) -> Summary:
         """Verdict, missing effects, the first three candidates and the held-out errors."""
         errors = self.diagnosis.fit.test
-        left = {"as given": errors.before, "re-tuned": errors.retuned, "with the effects": errors.after}
+        held_out_errors = {"as given": errors.before, "re-tuned": errors.retuned, "with the effects": errors.after}
         return Summary(
             f"Diagnosis: {self.diagnosis.verdict.replace('_', ' ')}",
             (
-                *(("missing", effect_text(effect)) for effect in self.diagnosis.effects),
-                *(("candidate", f"{each.effect} {each.axis or ''}".strip()) for each in self.diagnosis.candidates[:3]),
-                *((f"held-out error {stage}", error_text(value)) for stage, value in left.items()),
+                *(("missing", format_effect(effect)) for effect in self.diagnosis.effects),
+                *(
+                    ("candidate", f"{candidate.effect} {candidate.axis or ''}".strip())
+                    for candidate in self.diagnosis.candidates[:3]
+                ),
+                *((f"held-out error {stage}", error_text(value)) for stage, value in held_out_errors.items()),
                 ("noise alone", error_text(errors.noise)),
             ),
         )
 
 
-def effect_text(effect: NamedEffect) -> str:
+def format_effect(effect: NamedEffect) -> str:
     """Name and axis of the effect with its parameters and their units, on one line; values to four significant
     digits."""
-    numbers = ", ".join(
-        f"{name} {each.value:.4g} {'' if each.unit == '1' else each.unit}".strip()
-        for name, each in effect.parameters.items()
+    parameter_texts = ", ".join(
+        f"{name} {estimate.value:.4g} {'' if estimate.unit == '1' else estimate.unit}".strip()
+        for name, estimate in effect.parameters.items()
     )
-    return f"{effect.effect} {effect.axis or ''}: {numbers}"
+    return f"{effect.effect} {effect.axis or ''}: {parameter_texts}"

@@ -22,14 +22,14 @@ def impact_sentence(diagnosis: Diagnosis, named: str) -> str:
     """The answer, with which the report begins: the named effects, and the factors by which amplitudes are off without
     them, with them, and by chance alone (held-out errors, else those of the fit). named: the effects, in words."""
     errors = diagnosis.fit.test if diagnosis.fit.test.after is not None else diagnosis.fit.fit
-    rest = "" if diagnosis.verdict == "explained" else ", but that is not all"
-    off = [errors.retuned, errors.after, errors.noise]
-    factors = [f"{math.exp(ratio):.3g}" for ratio in off if ratio is not None]
+    remainder = "" if diagnosis.verdict == "explained" else ", but that is not all"
+    log_ratios = [errors.retuned, errors.after, errors.noise]
+    factors = [f"{math.exp(ratio):.3g}" for ratio in log_ratios if ratio is not None]
     text = "the error of the predicted amplitudes is not known"
-    if len(factors) == len(off):
-        without, with_it, chance = factors
+    if len(factors) == len(log_ratios):
+        factor_without, factor_with, factor_by_chance = factors
         text = (
-            f"their strength can: in half octaves, the predicted amplitudes are wrong by a factor of {without} "
-            f"without this effect and of {with_it} with it; chance alone gives a factor of {chance}"
+            f"their strength can: in half octaves, the predicted amplitudes are wrong by a factor of {factor_without} "
+            f"without this effect and of {factor_with} with it; chance alone gives a factor of {factor_by_chance}"
         )
-    return f"Missing in the model: {named}{rest}. Its impacts cannot be predicted one by one; {text}."
+    return f"Missing in the model: {named}{remainder}. Its impacts cannot be predicted one by one; {text}."

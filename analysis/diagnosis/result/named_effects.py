@@ -9,20 +9,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.document import Estimate, FoundLaw, NamedEffect, Rival, found_law
+from analysis.diagnosis.document import Estimate, FoundLaw, NamedEffect, Rival, make_found_law
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.parsimony import both_stand, only_refines
+from analysis.diagnosis.search.parsimony import is_equal_rival, only_refines
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.search.verdict import shares_taken
+from analysis.diagnosis.search.verdict import compute_step_shares
 from analysis.diagnosis.settings import (
-    ELSEWHERE_HALFWAY,
-    ELSEWHERE_LEAST,
-    ELSEWHERE_MOST,
-    ELSEWHERE_STEEPNESS,
     EXPLAINED_BY_CHANCE,
     INTERVAL_SHARE,
     MOST_RIVALS,
+    NO_CANDIDATE_HALFWAY,
+    NO_CANDIDATE_LEAST,
+    NO_CANDIDATE_MOST,
+    NO_CANDIDATE_STEEPNESS,
     PROBABILITY_SCALE,
 )
 from equalizer.effects.discovered_law import Channels, law_units, law_with_values
@@ -54,7 +54,7 @@ class Labels:
     """Quantity of the response."""
 
 
-def labels_of(recording: Recording, model: MechanicalModel) -> Labels:
+def make_labels(recording: Recording, model: MechanicalModel) -> Labels:
     """Channels of the command and the response, unit of the first response channel, and unit system and quantity of the
     model."""
     unit = recording.response.unit
@@ -67,121 +67,130 @@ def labels_of(recording: Recording, model: MechanicalModel) -> Labels:
     )
 
 
-def named_effects(found: Explanation, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
+def make_named_effects(explanation: Explanation, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
     """The effects of the final hypothesis with parameters, rivals and probabilities. errors: (parameters,), standard
-    errors of the coordinates of the hypothesis's point (`interval_errors`)."""
-    whole, named, first = found.after.fitted.hypothesis, [], 0
-    shares = shares_taken(found.retuned, found.steps)
-    for number, claim in enumerate(whole.claims):
-        size = claim.groups * sum(not p.fixed for p in claim.effect.parameters)
-        rivals, likely = _rivals(found, number, labels)
-        named.append(
+    errors of the coordinates of the hypothesis's point (`compute_interval_errors`)."""
+    hypothesis, effects, coordinate = explanation.after.fitted.hypothesis, [], 0
+    shares = compute_step_shares(explanation.retuned, explanation.steps)
+    for claim_index, claim in enumerate(hypothesis.claims):
+        coordinate_count = claim.groups * sum(not p.fixed for p in claim.effect.parameters)
+        rivals, probability = _list_rivals(explanation, claim_index, labels)
+        effects.append(
             NamedEffect(
                 effect=claim.effect.name,
                 place=place_of_effect(claim.effect),
-                axis=axis_of(claim, labels),
-                share=shares[number],
-                probability=likely,
-                parameters=_estimates(whole, number, errors, slice(first, first + size), labels),
+                axis=find_axis_letter(claim, labels),
+                share=shares[claim_index],
+                probability=probability,
+                parameters=_make_estimates(
+                    hypothesis, claim_index, errors, slice(coordinate, coordinate + coordinate_count), labels
+                ),
                 rivals=rivals,
-                law=law_of_claim(whole, number, axis_of(claim, labels)),
+                law=extract_law(hypothesis, claim_index, find_axis_letter(claim, labels)),
             )
         )
-        first += size
-    return tuple(named)
+        coordinate += coordinate_count
+    return tuple(effects)
 
 
-def axis_of(claim: Claim, labels: Labels) -> str | None:
+def find_axis_letter(claim: Claim, labels: Labels) -> str | None:
     """The axis letter of an effect's site; None where all axes share the effect."""
     if claim.spread != "one" or (claim.effect.sites and "one" not in claim.effect.sites):
         return None
-    sensed = place_of_effect(claim.effect) == "sensor"
-    channels = labels.outputs if sensed else labels.inputs
+    is_sensor_effect = place_of_effect(claim.effect) == "sensor"
+    channels = labels.outputs if is_sensor_effect else labels.inputs
     return axis_letter(channels[claim.sites[0]], channels)
 
 
-def _rivals(found: Explanation, number: int, labels: Labels) -> tuple[tuple[Rival, ...], float]:
+def _list_rivals(explanation: Explanation, number: int, labels: Labels) -> tuple[tuple[Rival, ...], float]:
     """The other effects tried in the round of an effect, each once, up to `MOST_RIVALS`; and the probability of the
     named effect. number: index of the round."""
-    fitted_candidates = found.rounds[number]
-    left = (
-        found.after.score.worst_channel
-        if found.statistic is None
-        else found.after.score.worst_channel / EXPLAINED_BY_CHANCE
+    fitted_candidates = explanation.rounds[number]
+    error_in_limits = (
+        explanation.after.score.worst_channel
+        if explanation.statistic is None
+        else explanation.after.score.worst_channel / EXPLAINED_BY_CHANCE
     )
-    chances = probabilities(fitted_candidates, left)
-    best, by_name = fitted_candidates[0], _chances_of_names(fitted_candidates, chances)
+    candidate_probabilities = compute_probabilities(fitted_candidates, error_in_limits)
+    best, by_name = fitted_candidates[0], _sum_by_name(fitted_candidates, candidate_probabilities)
     rivals: dict[str, Rival] = {}
-    unit = BY_NOISE if found.statistic is None else BY_CHANCE
-    for other in fitted_candidates[1:]:
-        claim = other.fitted.hypothesis.claims[-1]
+    unit = BY_NOISE if explanation.statistic is None else BY_CHANCE
+    for candidate in fitted_candidates[1:]:
+        claim = candidate.fitted.hypothesis.claims[-1]
         if claim.effect.name == best.newest or claim.effect.name in rivals:
             continue
-        same = both_stand(best, other)
+        is_equal = is_equal_rival(best, candidate)
         rivals[claim.effect.name] = Rival(
-            claim.effect.name, by_name[claim.effect.name], same, _why_not(best, other, same, (labels, unit))
+            claim.effect.name,
+            by_name[claim.effect.name],
+            is_equal,
+            _explain_rejection(best, candidate, is_equal, (labels, unit)),
         )
         if len(rivals) == MOST_RIVALS:
             break
     return tuple(rivals.values()), by_name[best.newest]
 
 
-def _chances_of_names(fitted_candidates: Sequence[FittedCandidate], chances: Sequence[float]) -> dict[str, float]:
+def _sum_by_name(
+    fitted_candidates: Sequence[FittedCandidate], candidate_probabilities: Sequence[float]
+) -> dict[str, float]:
     """Probability of each effect name, summed over its candidates at other axes or from other starts."""
-    found: dict[str, float] = {}
-    for candidate, chance in zip(fitted_candidates, chances, strict=True):
+    probability_by_name: dict[str, float] = {}
+    for candidate, probability in zip(fitted_candidates, candidate_probabilities, strict=True):
         name = candidate.newest
-        found[name] = min(1.0, found.get(name, 0.0) + chance)
-    return found
+        probability_by_name[name] = min(1.0, probability_by_name.get(name, 0.0) + probability)
+    return probability_by_name
 
 
-def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: tuple[Labels, str]) -> str:
+def _explain_rejection(best: FittedCandidate, rival: FittedCandidate, is_equal: bool, words: tuple[Labels, str]) -> str:
     """Reason for not choosing a rival. words: labels of the device, and the unit of errors."""
     labels, unit = words
-    worst, least = other.score.worst_channel, best.score.worst_channel
-    claim = other.fitted.hypothesis.claims[-1]
-    axis = axis_of(claim, labels)
-    where = f" ({axis})" if axis else ""
-    if only_refines(other, best):
-        gain = "too little" if worst < (1 - _SAME_ERROR) * least else "nothing"
+    rival_error, best_error = rival.score.worst_channel, best.score.worst_channel
+    claim = rival.fitted.hypothesis.claims[-1]
+    axis = find_axis_letter(claim, labels)
+    site = f" ({axis})" if axis else ""
+    if only_refines(rival, best):
+        gain = "too little" if rival_error < (1 - _SAME_ERROR) * best_error else "nothing"
         return (
-            f"it contains the named law as a special case{where}, and its further parameters gain {gain}: its error "
-            f"in the worst channel is {worst:.3g} times {unit}, that of the named law {least:.3g}"
+            f"it contains the named law as a special case{site}, and its further parameters gain {gain}: its error "
+            f"in the worst channel is {rival_error:.3g} times {unit}, that of the named law {best_error:.3g}"
         )
-    if same:
+    if is_equal:
         return (
-            f"equally good{where}: its error in the worst channel is {worst:.2f} times {unit}, that of the named "
-            f"effect {least:.2f}"
+            f"equally good{site}: its error in the worst channel is {rival_error:.2f} times {unit}, that of the named "
+            f"effect {best_error:.2f}"
         )
     return (
-        f"at its best{where}, its error in the worst channel is {worst:.3g} times {unit}, that of the named effect "
-        f"{least:.3g}"
+        f"at its best{site}, its error in the worst channel is {rival_error:.3g} times {unit}, that of the named "
+        f"effect {best_error:.3g}"
     )
 
 
-def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, labels: Labels) -> dict[str, Estimate]:
+def _make_estimates(
+    hypothesis: Hypothesis, number: int, errors: FloatArray, coordinates: slice, labels: Labels
+) -> dict[str, Estimate]:
     """Parameters of a claim with units and intervals. The variance of a parameter is the sum of its squared changes
-    when each coordinate moves by its standard error; covariances are left out. own: the claim's coordinates of the
-    point."""
-    claim = whole.claims[number]
-    at = report_parameters(whole, number, whole.point)
-    spread = {name: 0.0 for name in at}
-    for coordinate in range(own.start, own.stop):
+    when each coordinate moves by its standard error; covariances are left out. coordinates: the claim's coordinates of
+    the point."""
+    claim = hypothesis.claims[number]
+    values = report_parameters(hypothesis, number, hypothesis.point)
+    variances = {name: 0.0 for name in values}
+    for coordinate in range(coordinates.start, coordinates.stop):
         if not np.isfinite(errors[coordinate]):
             continue
-        moved = whole.point.copy()
-        moved[coordinate] += errors[coordinate]
-        for name, value in report_parameters(whole, number, moved).items():
-            spread[name] += (value - at[name]) ** 2
-    units = _units(claim.effect, at, labels)
+        displaced = hypothesis.point.copy()
+        displaced[coordinate] += errors[coordinate]
+        for name, value in report_parameters(hypothesis, number, displaced).items():
+            variances[name] += (value - values[name]) ** 2
+    units = _find_units(claim.effect, values, labels)
     return {
-        name: Estimate(value, units.get(name) or "1", _interval(value, float(np.sqrt(spread[name]))))
-        for name, value in at.items()
+        name: Estimate(value, units.get(name) or "1", _compute_interval(value, float(np.sqrt(variances[name]))))
+        for name, value in values.items()
         if np.isfinite(value)
     }
 
 
-def _units(effect: Effect, values: Values, labels: Labels) -> dict[str, str]:
+def _find_units(effect: Effect, values: Values, labels: Labels) -> dict[str, str]:
     """Units by parameter, in the model's unit system: of a discovered law by its dimensions, else of the vocabulary."""
     if effect.law is not None:
         law = law_with_values(effect.law, values)
@@ -190,62 +199,66 @@ def _units(effect: Effect, values: Values, labels: Labels) -> dict[str, str]:
     return {p.name: p.unit_in(labels.system, labels.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
 
 
-def law_of_claim(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:
+def extract_law(hypothesis: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:
     """The discovered law of a claim, with its fitted parameters, as the document writes it; None for an effect of the
     catalogue. axis: replaces that of the law."""
-    law = whole.claims[number].effect.law
+    law = hypothesis.claims[number].effect.law
     if law is None:
         return None
-    found = law_with_values(law, _groups(whole, number, whole.point)[0])
-    return found_law(replace(found, axis=axis or found.axis))
+    fitted_law = law_with_values(law, _list_group_values(hypothesis, number, hypothesis.point)[0])
+    return make_found_law(replace(fitted_law, axis=axis or fitted_law.axis))
 
 
-def _interval(value: float, standard_error: float) -> tuple[float, float] | None:
+def _compute_interval(value: float, standard_error: float) -> tuple[float, float] | None:
     """The 95 % interval of a value; None where no standard error is known (0 or infinite)."""
-    reach = float(np.hypot(1.96 * standard_error, INTERVAL_SHARE * value)) if standard_error > 0 else 0.0
-    return (value - reach, value + reach) if np.isfinite(reach) and reach > 0 else None
+    half_width = float(np.hypot(1.96 * standard_error, INTERVAL_SHARE * value)) if standard_error > 0 else 0.0
+    return (value - half_width, value + half_width) if np.isfinite(half_width) and half_width > 0 else None
 
 
-def report_parameters(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
-    """Parameters of a claim as the vocabulary defines them: of its first site, or, for an effect in `LARGEST`, of the
-    site with the largest main parameter. point: coordinates of the whole hypothesis."""
-    groups = _groups(whole, number, point)
-    claim = whole.claims[number]
+def report_parameters(hypothesis: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
+    """Parameters of a claim as the vocabulary defines them: of its first site, or, for an effect in
+    `REPORTED_AT_LARGEST`, of the site with the largest main parameter. point: coordinates of the whole hypothesis."""
+    groups = _list_group_values(hypothesis, number, point)
+    claim = hypothesis.claims[number]
     reported = [dict(claim.effect.report(values)) for values in groups]
-    if claim.effect.name in LARGEST and len(reported) > 1:
+    if claim.effect.name in REPORTED_AT_LARGEST and len(reported) > 1:
         main = EFFECTS_BY_NAME[claim.effect.name].main.name
         return max(reported, key=lambda values: abs(values[main]))
     return reported[0]
 
 
-LARGEST = ("mains_hum", "sensor_drift", "sensor_offset")
+REPORTED_AT_LARGEST = ("mains_hum", "sensor_drift", "sensor_offset")
 """Effects of which only the channel with the largest main parameter is reported."""
 
 
-def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[str, float]]:
+def _list_group_values(hypothesis: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[str, float]]:
     """Parameters of each group of a claim (one group per site, or one for all), at a point of the hypothesis."""
-    placed = whole.list_placed_effects(point)
-    first = sum(claim.groups for claim in whole.claims[:number])
-    return [dict(effect.values) for effect in placed[first : first + whole.claims[number].groups]]
+    placed_effects = hypothesis.list_placed_effects(point)
+    first_group = sum(claim.groups for claim in hypothesis.claims[:number])
+    return [
+        dict(effect.values) for effect in placed_effects[first_group : first_group + hypothesis.claims[number].groups]
+    ]
 
 
-def probabilities(fitted_candidates: Sequence[FittedCandidate], left: float) -> tuple[float, ...]:
+def compute_probabilities(fitted_candidates: Sequence[FittedCandidate], error: float) -> tuple[float, ...]:
     """Probability of each candidate of a round: proportional to exp(-excess / PROBABILITY_SCALE), the excess being its
     mean log error above that of the first, preferred candidate (at least 0); 0 for a refinement of the first. The sum
-    is 1 - `probability_of_none(left)`."""
+    is 1 - `compute_none_probability(error)`."""
     if not fitted_candidates:
         return ()
     best = fitted_candidates[0]
-    behind = np.array(
+    excess = np.array(
         [max(candidate.score.mean_log_error - best.score.mean_log_error, 0.0) for candidate in fitted_candidates]
     )
-    refines = np.array([candidate is not best and only_refines(candidate, best) for candidate in fitted_candidates])
-    weights = np.where(refines, 0.0, np.exp(-behind / PROBABILITY_SCALE))
-    return tuple((1 - probability_of_none(left)) * float(weight) for weight in weights / weights.sum())
+    is_refinement = np.array(
+        [candidate is not best and only_refines(candidate, best) for candidate in fitted_candidates]
+    )
+    weights = np.where(is_refinement, 0.0, np.exp(-excess / PROBABILITY_SCALE))
+    return tuple((1 - compute_none_probability(error)) * float(weight) for weight in weights / weights.sum())
 
 
-def probability_of_none(left: float) -> float:
-    """Probability that no candidate is right: a logistic function of ln(left - 1), from ELSEWHERE_LEAST to
-    ELSEWHERE_MOST. left: error of the whole explanation in the worst channel, in units of the noise."""
-    odds = (max(left - 1.0, 0.0) / ELSEWHERE_HALFWAY) ** ELSEWHERE_STEEPNESS
-    return float(ELSEWHERE_LEAST + (ELSEWHERE_MOST - ELSEWHERE_LEAST) * odds / (1 + odds))
+def compute_none_probability(error: float) -> float:
+    """Probability that no candidate is right: a logistic function of ln(error - 1), from
+    NO_CANDIDATE_LEAST to NO_CANDIDATE_MOST. error: of the explanation in the worst channel, in units of the noise."""
+    odds = (max(error - 1.0, 0.0) / NO_CANDIDATE_HALFWAY) ** NO_CANDIDATE_STEEPNESS
+    return float(NO_CANDIDATE_LEAST + (NO_CANDIDATE_MOST - NO_CANDIDATE_LEAST) * odds / (1 + odds))

@@ -18,28 +18,28 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, RESPONSE
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
-_AT_THE_EDGE = 1e-3
+_BOUND_TOLERANCE = 1e-3
 """Relative distance from a bound within which a parameter counts as at that bound."""
-_LOSSES = 1e-6
+_EIGENVALUE_ROUNDING = 1e-6
 """Magnitude of a negative eigenvalue that rounding may cause, relative to the largest eigenvalue."""
 
 
-def implausible_sentences(found: Findings) -> tuple[str, ...]:
+def implausible_sentences(findings: Findings) -> tuple[str, ...]:
     """Sentences on implausible parameters of the named effects, on their intervals, and on the improved model."""
     return (
-        *(sentence for placed in found.named for sentence in _effect_doubts(placed, found)),
-        *(sentence for effect in found.diagnosis.effects for sentence in _interval_doubts(effect, found.named)),
-        *_model_doubts(found.improved),
+        *(sentence for placed in findings.named for sentence in _effect_doubts(placed, findings)),
+        *(sentence for effect in findings.diagnosis.effects for sentence in _interval_doubts(effect, findings.named)),
+        *_model_doubts(findings.improved),
     )
 
 
-def _effect_doubts(placed: PlacedEffect, found: Findings) -> Iterator[str]:
+def _effect_doubts(placed: PlacedEffect, findings: Findings) -> Iterator[str]:
     """Sentences on fitted parameters at a bound, and on friction that is smaller at rest than in motion."""
     noun, values = noun_of(placed.effect.name), placed.values
     for parameter in placed.effect.parameters:
         value = values[parameter.name]
         if not parameter.fixed and _is_at_bound(value, parameter):
-            text = value_text(value, _unit(placed.effect.name, parameter.name, found))
+            text = value_text(value, _unit(placed.effect.name, parameter.name, findings))
             yield (
                 f"The {parameter.name.replace('_', ' ')} of {noun} reached the limit of its allowed range ({text}): "
                 "the fit has not found a best value."
@@ -52,12 +52,12 @@ def _is_at_bound(value: float, parameter: Parameter) -> bool:
     """Whether a parameter is at a bound of its fit. A bound of 0 is not checked, nor one at which the effect
     vanishes."""
     edges = [edge for edge in (parameter.lower, parameter.upper) if edge != parameter.none]
-    return any(np.isclose(value, edge, rtol=_AT_THE_EDGE, atol=0.0) for edge in edges if edge)
+    return any(np.isclose(value, edge, rtol=_BOUND_TOLERANCE, atol=0.0) for edge in edges if edge)
 
 
-def _interval_doubts(effect: NamedEffect, named: Sequence[PlacedEffect]) -> Iterator[str]:
+def _interval_doubts(effect: NamedEffect, placed_effects: Sequence[PlacedEffect]) -> Iterator[str]:
     """A sentence where the 95 % interval of an effect's main parameter contains the value without the effect."""
-    placed = next((placed for placed in named if placed.effect.name == effect.effect), None)
+    placed = next((placed for placed in placed_effects if placed.effect.name == effect.effect), None)
     for parameter in placed.effect.parameters[:1] if placed is not None else ():
         estimate = effect.parameters.get(parameter.name)
         if estimate is None or estimate.ci95 is None or parameter.none is None:
@@ -75,13 +75,13 @@ def _model_doubts(improved: MechanicalModel) -> Iterator[str]:
     """Sentences on a damping or stiffness matrix with a negative eigenvalue beyond rounding."""
     for name, matrix in (("damping", improved.damping), ("stiffness", improved.stiffness)):
         lowest, largest = _ends(matrix)
-        if lowest < -_LOSSES * max(largest, 1e-300):
-            what = (
+        if lowest < -_EIGENVALUE_ROUNDING * max(largest, 1e-300):
+            consequence = (
                 "would generate energy"
                 if name == "damping"
                 else "would move away from its position of rest without a force"
             )
-            yield f"The improved model's {name} is negative in one direction: in it, the device {what}."
+            yield f"The improved model's {name} is negative in one direction: in it, the device {consequence}."
 
 
 def _ends(matrix: FloatArray) -> tuple[float, float]:
@@ -90,11 +90,11 @@ def _ends(matrix: FloatArray) -> tuple[float, float]:
     return float(values[0]), float(np.abs(values).max())
 
 
-def _unit(effect: str, parameter: str, found: Findings) -> str:
+def _unit(effect: str, parameter: str, findings: Findings) -> str:
     """Unit of an effect's parameter in the given model's unit system; "1" where it is not in the vocabulary."""
-    known = EFFECTS_BY_NAME.get(effect)
-    for known_parameter in known.parameters if known else ():
+    entry = EFFECTS_BY_NAME.get(effect)
+    for known_parameter in entry.parameters if entry else ():
         if known_parameter.name == parameter:
-            response = found.time_series[0].units[0] if found.time_series else RESPONSE
-            return known_parameter.unit_in(found.given.system, response)
+            response = findings.time_series[0].units[0] if findings.time_series else RESPONSE
+            return known_parameter.unit_in(findings.given.system, response)
     return "1"

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.hypothesis import without_claim
+from analysis.diagnosis.errors.hypothesis import remove_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.localisation.distortion import Distortions, find_distortions
 from analysis.diagnosis.localisation.localisation import Localisation, find_entry_point, find_tied_states
@@ -17,9 +17,9 @@ from analysis.diagnosis.localisation.mismatch_maps import Maps
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.black_box import black_box
 from analysis.diagnosis.result.curves.signature_curves import Names, signature_of
-from analysis.diagnosis.result.error_table import errors_of
+from analysis.diagnosis.result.error_table import compute_fit_errors
 from analysis.diagnosis.result.findings import BlackBox, Signature
-from analysis.diagnosis.result.named_effects import labels_of
+from analysis.diagnosis.result.named_effects import make_labels
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Part
 from analysis.diagnosis.search.search_context import SearchContext
@@ -28,7 +28,7 @@ from equalizer.effects.effect import Values
 from equalizer.effects.placing import axis_letter
 from equalizer.effects.starts.evidence import Evidence
 
-WHERE = "the localisation"
+LOCALISATION_NAME = "the localisation"
 """Name of the work in the note of a crash (`guard`)."""
 
 
@@ -47,61 +47,68 @@ class Examination:
 def examine_fits(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Examination:
     """Examine the given, the re-tuned and the final model. floor: noise of the first recording. maps: mismatch maps of
     these three stages."""
-    context, found = result.context, result.found
-    measure, tuning, stages = context.whole, context.tuning, found.stages
+    context, explanation = result.context, result.found
+    measure, tuning, stages = context.whole, context.tuning, explanation.stages
     evidence = gather_evidence(measure, tuning, stages["retuned"])
     entry_search = partial(find_entry_point, measure, tuning, stages["retuned"], floor, maps.cells["retuned"])
-    entry = context.guard.part(WHERE, "its work", entry_search, None)
+    entry = context.guard.run(LOCALISATION_NAME, "its work", entry_search, None)
     # Stages with the same fit are examined once.
     fits = {id(fitted): stage for stage, fitted in stages.items()}
-    tied = [
-        partial(find_tied_states, measure, tuning, stages[stage], maps.cells[stage], entry, known)
+    state_searches = [
+        partial(find_tied_states, measure, tuning, stages[stage], maps.cells[stage], entry, retuned_evidence)
         for stage in fits.values()
-        for known in [evidence if stages[stage] is stages["retuned"] else ()]
+        for retuned_evidence in [evidence if stages[stage] is stages["retuned"] else ()]
     ]
-    pieces = [
-        *(Part(WHERE, "its work", work, ()) for work in tied),
-        Part("the curves of effects", "their making", partial(_signatures, context, found), ()),
-        Part("the black box", "its fit", partial(_black_box, context, found), None),
-        Part(WHERE, "its work", partial(find_distortions, measure.records[0].recording, floor), Distortions((), ())),
+    parts = [
+        *(Part(LOCALISATION_NAME, "its work", work, ()) for work in state_searches),
+        Part("the curves of effects", "their making", partial(_signatures, context, explanation), ()),
+        Part("the black box", "its fit", partial(_black_box, context, explanation), None),
+        Part(
+            LOCALISATION_NAME,
+            "its work",
+            partial(find_distortions, measure.records[0].recording, floor),
+            Distortions((), ()),
+        ),
     ]
-    *each, signatures, box, distortions = context.guard.parts(context.map_, pieces)
-    by_fit = dict(zip(fits, each, strict=True))
+    *state_results, signatures, box, distortions = context.guard.run_parts(context.map_, parts)
+    by_fit = dict(zip(fits, state_results, strict=True))
     states = {stage: by_fit[id(fitted)] for stage, fitted in stages.items()}
     return Examination(evidence, Localisation(states, entry, distortions), signatures, box)
 
 
-def _black_box(context: SearchContext, found: Explanation) -> BlackBox | None:
+def _black_box(context: SearchContext, explanation: Explanation) -> BlackBox | None:
     """A black box with as many terms per channel as the effects have parameters, at least 1, fitted to the residuals of
     the re-tuned model; None where band powers are compared instead of samples."""
-    if found.statistic is not None:
+    if explanation.statistic is not None:
         return None
-    parameters = max(len(found.after.fitted.hypothesis.point), 1)
-    return black_box(context.whole, found.retuned, parameters, errors_of(context.whole, found).test.after)
+    parameters = max(len(explanation.after.fitted.hypothesis.point), 1)
+    return black_box(
+        context.whole, explanation.retuned, parameters, compute_fit_errors(context.whole, explanation).test.after
+    )
 
 
-def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, ...]:
+def _signatures(context: SearchContext, explanation: Explanation) -> tuple[Signature, ...]:
     """Curve of each named effect: the missing force or residual of the final model without that effect, in the record
     with the most samples to fit or choose by."""
-    measure, tuning, fitted = context.whole, context.tuning, found.after.fitted
+    measure, tuning, fitted = context.whole, context.tuning, explanation.after.fitted
     if not fitted.hypothesis.claims:
         return ()
-    shown = _most_fitted(measure)
-    recording = measure.records[shown].recording
-    labels, drawn = labels_of(recording, tuning.model), []
+    record_index = _most_fitted(measure)
+    recording = measure.records[record_index].recording
+    labels, signatures = make_labels(recording, tuning.model), []
     names = Names(
         tuple(axis_letter(name, labels.inputs) for name in labels.inputs),
         labels.outputs,
         labels.response_unit,
         labels.system,
     )
-    complete = gather_evidence(measure, tuning, fitted)[shown].predicted
+    complete = gather_evidence(measure, tuning, fitted)[record_index].predicted
     for number in range(len(fitted.hypothesis.claims)):
-        others = without_claim(fitted.hypothesis, number)
-        bare = gather_evidence(measure, tuning, evaluate_fit(measure, tuning, fitted.deviations, others))
-        main = max(fitted.hypothesis.of_claim(number), key=lambda placed: _strength(placed.values))
-        drawn.append(signature_of(bare[shown], complete, main, names, recording.hold))
-    return tuple(drawn)
+        remaining = remove_claim(fitted.hypothesis, number)
+        evidence = gather_evidence(measure, tuning, evaluate_fit(measure, tuning, fitted.deviations, remaining))
+        main = max(fitted.hypothesis.list_effects_of(number), key=lambda placed: _strength(placed.values))
+        signatures.append(signature_of(evidence[record_index], complete, main, names, recording.hold))
+    return tuple(signatures)
 
 
 def _most_fitted(measure: ErrorMeasure) -> int:

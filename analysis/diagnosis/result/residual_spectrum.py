@@ -14,9 +14,9 @@ from analysis.diagnosis.result.findings import TimeSeries
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import spectral_density
 
-_LENGTH = 2048
-"""Most samples of a Welch window; a shorter stretch sets its own length."""
-_PER_OCTAVE = 6
+_MAX_WINDOW_SAMPLES = 2048
+"""Most samples of a Welch window; the shortest stretch limits it further."""
+_BINS_PER_OCTAVE = 6
 """Bins per octave of the drawn spectrum."""
 
 
@@ -40,59 +40,63 @@ class RemainderSpectrum:
     """Density of the noise; NaN where not known."""
 
 
-def remainder_spectra(time_series: Sequence[TimeSeries], floor: NoiseFloor | None) -> tuple[RemainderSpectrum, ...]:
+def compute_remainder_spectra(
+    time_series: Sequence[TimeSeries], floor: NoiseFloor | None
+) -> tuple[RemainderSpectrum, ...]:
     """A spectrum per channel, over all held-out stretches of 64 samples or more in the recordings that have the first
     one's channels. Empty where there is no such stretch."""
-    parts = [(series, start, stop) for series in time_series for start, stop in series.tested if stop - start >= 64]
-    if not parts:
+    stretches = [(series, start, stop) for series in time_series for start, stop in series.tested if stop - start >= 64]
+    if not stretches:
         return ()
-    first = parts[0][0]
-    parts = [part for part in parts if part[0].channels == first.channels]
-    rate_hz = min(series.sample_rate_hz for series, _, _ in parts)
-    length = min(_LENGTH, min(stop - start for _, start, stop in parts))
-    lines_hz: FloatArray = np.fft.rfftfreq(length, 1 / rate_hz)[1:].astype(np.float64)
-    weights = np.array([stop - start for _, start, stop in parts], dtype=float)
+    first = stretches[0][0]
+    stretches = [stretch for stretch in stretches if stretch[0].channels == first.channels]
+    rate_hz = min(series.sample_rate_hz for series, _, _ in stretches)
+    window_samples = min(_MAX_WINDOW_SAMPLES, min(stop - start for _, start, stop in stretches))
+    lines_hz: FloatArray = np.fft.rfftfreq(window_samples, 1 / rate_hz)[1:].astype(np.float64)
+    weights = np.array([stop - start for _, start, stop in stretches], dtype=float)
     power = {
-        name: np.average([_power(part, name, length) for part in parts], axis=0, weights=weights)[1:]
+        name: np.average(
+            [_compute_power(stretch, name, window_samples) for stretch in stretches], axis=0, weights=weights
+        )[1:]
         for name in ("measured", "before", "retuned", "after")
     }
-    group = np.floor(_PER_OCTAVE * np.log2(lines_hz)).astype(int)
-    count = np.unique(group, return_counts=True)[1]
+    bin_of_line = np.floor(_BINS_PER_OCTAVE * np.log2(lines_hz)).astype(int)
+    count = np.unique(bin_of_line, return_counts=True)[1]
 
-    def means(values: FloatArray) -> FloatArray:
-        sums = np.add.reduceat(values, np.flatnonzero(np.diff(group, prepend=group[0] - 1)), axis=0)
+    def mean_per_bin(values: FloatArray) -> FloatArray:
+        sums = np.add.reduceat(values, np.flatnonzero(np.diff(bin_of_line, prepend=bin_of_line[0] - 1)), axis=0)
         return np.asarray(sums / count.reshape((-1,) + (1,) * (values.ndim - 1)))
 
-    noise = np.sqrt(means(_noise_power(floor, lines_hz, rate_hz, len(first.channels))))
-    shown = {name: np.sqrt(means(each)) for name, each in power.items()}
-    at = np.exp(means(np.log(lines_hz)))
+    noise = np.sqrt(mean_per_bin(_compute_noise_power(floor, lines_hz, rate_hz, len(first.channels))))
+    densities = {name: np.sqrt(mean_per_bin(density)) for name, density in power.items()}
+    centres_hz = np.exp(mean_per_bin(np.log(lines_hz)))
     return tuple(
         RemainderSpectrum(
-            name, first.units[k], at, shown["measured"][:, k], shown["before"][:, k], shown["retuned"][:, k],
-            shown["after"][:, k], noise[:, k],
+            name, first.units[k], centres_hz, densities["measured"][:, k], densities["before"][:, k],
+            densities["retuned"][:, k], densities["after"][:, k], noise[:, k],
         )
         for k, name in enumerate(first.channels)
     )  # fmt: skip
 
 
-def _power(part: tuple[TimeSeries, int, int], name: str, length: int) -> FloatArray:
+def _compute_power(part: tuple[TimeSeries, int, int], name: str, length: int) -> FloatArray:
     """(lines, channels): one-sided power density of the measured signal, or of the residual of the named prediction, in
     one stretch; missing samples count as 0."""
     series, start, stop = part
     measured = series.measured[start:stop]
     values = measured if name == "measured" else measured - getattr(series, name)[start:stop]
-    known = np.nan_to_num(values)
-    return spectral_density(known, series.sample_rate_hz, length)[1]
+    finite_values = np.nan_to_num(values)
+    return spectral_density(finite_values, series.sample_rate_hz, length)[1]
 
 
-def _noise_power(floor: NoiseFloor | None, lines_hz: FloatArray, rate_hz: float, channels: int) -> FloatArray:
+def _compute_noise_power(floor: NoiseFloor | None, lines_hz: FloatArray, rate_hz: float, channels: int) -> FloatArray:
     """(lines, channels): one-sided power density of the noise, in the channel's unit squared per hertz; NaN where
     unknown. `ChannelNoise.density` is s² for white noise of variance s², hence the factor 2 / rate_hz."""
     unknown = np.full((len(lines_hz), channels), np.nan)
-    if floor is None or not floor.known:
+    if floor is None or not floor.is_known:
         return unknown
     parts = [floor.response.density] + ([] if floor.position is None else [floor.position.density])
-    density = np.hstack(parts)
-    for k in range(min(channels, density.shape[1])):
-        unknown[:, k] = np.interp(lines_hz, floor.frequency_hz, density[:, k]) * 2 / rate_hz
+    floor_density = np.hstack(parts)
+    for k in range(min(channels, floor_density.shape[1])):
+        unknown[:, k] = np.interp(lines_hz, floor.frequency_hz, floor_density[:, k]) * 2 / rate_hz
     return unknown

@@ -10,7 +10,7 @@ from analysis.diagnosis.unit_wording import error_text, value_text
 from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
-_LISTED = 4
+_MOST_LISTED = 4
 """Largest number of re-tuned parameters that a sentence lists; the others are counted."""
 
 
@@ -31,17 +31,19 @@ class MovedParameter:
     @property
     def text(self) -> str:
         """Name and change in words: "damping fx +0.35 N s/m (2.1 standard deviations)"."""
-        return f"{self.name} {self.size} ({abs(self.deviations):.2g} standard deviations)"
+        return f"{self.name} {self.change_text} ({abs(self.deviations):.2g} standard deviations)"
 
     @property
-    def size(self) -> str:
+    def change_text(self) -> str:
         """The change with its sign and unit; a relative change in per cent."""
         sign = "+" if self.change >= 0 else ""
-        size = f"{typeset(f'{100 * self.change:.2g}')} %" if self.unit == "1" else value_text(self.change, self.unit)
-        return f"{sign}{size}"
+        change_size = (
+            f"{typeset(f'{100 * self.change:.2g}')} %" if self.unit == "1" else value_text(self.change, self.unit)
+        )
+        return f"{sign}{change_size}"
 
 
-def all_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
+def list_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
     """All free parameters of the model with their changes. deviations: (parameters,), in standard deviations of the
     calibration."""
     return tuple(
@@ -55,53 +57,58 @@ def all_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParamet
 def find_moved_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
     """Parameters that moved by `RETUNING_NAMED` standard deviations or more, the largest move first. deviations:
     (parameters,), in standard deviations of the calibration."""
-    moved = [number for number in all_parameters(tuning, deviations) if abs(number.deviations) >= RETUNING_NAMED]
-    return tuple(sorted(moved, key=lambda number: -abs(number.deviations)))
+    moved_parameters = [
+        parameter for parameter in list_parameters(tuning, deviations) if abs(parameter.deviations) >= RETUNING_NAMED
+    ]
+    return tuple(sorted(moved_parameters, key=lambda parameter: -abs(parameter.deviations)))
 
 
-def describe_retuning(moved: Sequence[MovedParameter], fitted: bool = False) -> str:
+def describe_retuning(moved_parameters: Sequence[MovedParameter], fitted: bool = False) -> str:
     """Sentence on the re-tuned parameters; empty where none moved. fitted: the model was fitted to the same recordings
     first, so that its parameters have no calibration."""
-    if not moved:
+    if not moved_parameters:
         return ""
-    texts = [f"{number.name} {number.size}" if fitted else number.text for number in moved[:_LISTED]]
-    more = len(moved) - _LISTED
-    sentence = conjoin([*texts, f"{more} more"] if more > 0 else texts)
+    texts = [
+        f"{parameter.name} {parameter.change_text}" if fitted else parameter.text
+        for parameter in moved_parameters[:_MOST_LISTED]
+    ]
+    unlisted = len(moved_parameters) - _MOST_LISTED
+    sentence = conjoin([*texts, f"{unlisted} more"] if unlisted > 0 else texts)
     if fitted:
-        beyond = "these parameters of the first model changed by more than the tolerance of the first fit"
-        return f"In the final fit, {beyond}: {sentence}."
+        subject = "these parameters of the first model changed by more than the tolerance of the first fit"
+        return f"In the final fit, {subject}: {sentence}."
     return f"Re-tuned beyond the calibration's standard deviation: {sentence}."
 
 
-def doubtful_sentences(moved: Sequence[MovedParameter], fitted: bool = False) -> tuple[str, ...]:
+def describe_doubtful_parameters(moved_parameters: Sequence[MovedParameter], fitted: bool = False) -> tuple[str, ...]:
     """Sentences on parameters that moved by `RETUNING_DOUBTED` standard deviations or more, so that they may compensate
-    for physics that was not named: one each up to `_LISTED`, else one with their number, because a table lists all.
+    for physics that was not named: one each up to `_MOST_LISTED`, else one with their number; a table lists all.
     fitted: as in `describe_retuning`; then one sentence on the parameters at their bound."""
-    far = [number for number in moved if abs(number.deviations) >= RETUNING_DOUBTED]
-    at_end = [number for number in far if number.at_bound]
+    doubtful = [parameter for parameter in moved_parameters if abs(parameter.deviations) >= RETUNING_DOUBTED]
+    at_bound = [parameter for parameter in doubtful if parameter.at_bound]
     if fitted:
-        names = conjoin([number.name for number in at_end])
+        names = conjoin([parameter.name for parameter in at_bound])
         return (
-            (f"These parameters of the first model reached the limit of their allowed range: {names}.{_OPEN}",)
-            if at_end
+            (f"These parameters of the first model reached the limit of their allowed range: {names}.{_UNDETERMINED}",)
+            if at_bound
             else ()
         )
-    if len(far) > _LISTED:
+    if len(doubtful) > _MOST_LISTED:
         return (
-            f"{len(far)} parameters were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration or "
-            f"more{f', {len(at_end)} of them to the limit of their allowed range' if at_end else ''}: either the "
-            "calibration is wrong, or they compensate for physics that was not named.",
+            f"{len(doubtful)} parameters were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration "
+            f"or more{f', {len(at_bound)} of them to the limit of their allowed range' if at_bound else ''}: either "
+            "the calibration is wrong, or they compensate for physics that was not named.",
         )
     return tuple(
-        f"The {number.name} was moved by {abs(number.deviations):.2g} standard deviations of its "
-        f"calibration{_AS_FAR if number in at_end else ''}: either the calibration is wrong, or it compensates for "
-        "physics that was not named."
-        for number in far
+        f"The {parameter.name} was moved by {abs(parameter.deviations):.2g} standard deviations of its "
+        f"calibration{_AT_LIMIT if parameter in at_bound else ''}: either the calibration is wrong, or it compensates "
+        "for physics that was not named."
+        for parameter in doubtful
     )
 
 
-_OPEN = " The fit has not found a best value for them, or they compensate for physics that was not named."
-_AS_FAR = ", to the limit of its allowed range"
+_UNDETERMINED = " The fit has not found a best value for them, or they compensate for physics that was not named."
+_AT_LIMIT = ", to the limit of its allowed range"
 
 
 def _is_error_raised(errors: Errors) -> bool:
@@ -109,13 +116,13 @@ def _is_error_raised(errors: Errors) -> bool:
     return errors.before is not None and errors.retuned is not None and errors.retuned > SAME_TO_READERS * errors.before
 
 
-def better_model(errors: Errors) -> tuple[str, str]:
+def choose_better_model(errors: Errors) -> tuple[str, str]:
     """Field of `Errors`, and words, of the model with which named effects are compared: the given model where re-tuning
     raises the held-out error, else the re-tuned model."""
     return ("before", "as given") if _is_error_raised(errors) else ("retuned", "re-tuned without it")
 
 
-def better_alone(errors: Errors) -> tuple[str, float | None]:
+def choose_better_error(errors: Errors) -> tuple[str, float | None]:
     """Words and held-out error of the given model where re-tuning raises that error, else of the re-tuned model."""
     return ("as given", errors.before) if _is_error_raised(errors) else ("re-tuned", errors.retuned)
 

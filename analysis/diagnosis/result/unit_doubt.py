@@ -17,16 +17,16 @@ from equalizer.plant.mechanical_model import MechanicalModel
 def unit_sentences(time_series: Sequence[TimeSeries]) -> tuple[str, ...]:
     """A sentence for each channel that differs from the given model's prediction by a factor of `UNIT_FACTOR` or more,
     or by its sign, while both correlate well."""
-    found: dict[str, float] = {}
+    factors: dict[str, float] = {}
     for series in time_series:
         for channel, name in enumerate(series.channels):
             factor = _factor(series, channel)
             if factor is not None and not 1 / UNIT_FACTOR < factor < UNIT_FACTOR:
-                found.setdefault(name, factor)
+                factors.setdefault(name, factor)
     return tuple(
         f"{name} has the shape that the model predicts, but {_words(factor)}: its {_sign_or_unit(factor)}, the "
         "command's or one in the model may be wrong."
-        for name, factor in found.items()
+        for name, factor in factors.items()
     )
 
 
@@ -34,22 +34,22 @@ def _factor(series: TimeSeries, channel: int) -> float | None:
     """Ratio of the measured to the predicted rms, both without their means, with the sign of the correlation; None
     where the correlation is below `UNIT_CORRELATION` in magnitude, a signal is constant, or no sample is finite."""
     measured, predicted = series.measured[:, channel], series.before[:, channel]
-    known = np.isfinite(measured) & np.isfinite(predicted)
-    if not known.any():
+    is_known = np.isfinite(measured) & np.isfinite(predicted)
+    if not is_known.any():
         return None
-    actual, other = (each[known] - np.mean(each[known]) for each in (measured, predicted))
-    sizes = float(np.sqrt(actual @ actual)), float(np.sqrt(other @ other))
-    together = float(actual @ other)
-    if min(sizes) == 0 or not np.isfinite(sizes).all() or abs(together) < UNIT_CORRELATION * sizes[0] * sizes[1]:
+    measured_part, predicted_part = (signal[is_known] - np.mean(signal[is_known]) for signal in (measured, predicted))
+    sizes = float(np.sqrt(measured_part @ measured_part)), float(np.sqrt(predicted_part @ predicted_part))
+    covariance = float(measured_part @ predicted_part)
+    if min(sizes) == 0 or not np.isfinite(sizes).all() or abs(covariance) < UNIT_CORRELATION * sizes[0] * sizes[1]:
         return None
-    return float(np.copysign(sizes[0] / sizes[1], together))
+    return float(np.copysign(sizes[0] / sizes[1], covariance))
 
 
 def _words(factor: float) -> str:
     """The factor in words: "12 times as large and with the other sign"."""
     times = max(abs(factor), 1 / abs(factor))
-    shown = f"{times:.3g}" if times < 100 else f"{times:.0f}"
-    texts = [f"{shown} times {'as large' if abs(factor) > 1 else 'smaller'}"] if times >= UNIT_FACTOR else []
+    text = f"{times:.3g}" if times < 100 else f"{times:.0f}"
+    texts = [f"{text} times {'as large' if abs(factor) > 1 else 'smaller'}"] if times >= UNIT_FACTOR else []
     return " and ".join([*texts, *(["with the other sign"] if factor < 0 else [])])
 
 
@@ -65,15 +65,15 @@ def constant_sentence(model: MechanicalModel) -> str:
     if system.known:
         return ""
     text = "has no unit" if system.force == "1" else f"is in {system.force}"
-    moves = {"m": ("force", "N"), "rad": ("torque", "N m")}.get(system.length)
-    if moves is None:
-        moved = "has no unit" if system.length == "1" else f"is in {system.length}"
+    effort = {"m": ("force", "N"), "rad": ("torque", "N m")}.get(system.length)
+    if effort is None:
+        motion = "has no unit" if system.length == "1" else f"is in {system.length}"
         return (
-            f"The command {text}, and the motion {moved}: forces, masses and stiffnesses are given in these units and "
-            "not in N or kg."
+            f"The command {text}, and the motion {motion}: forces, masses and stiffnesses are given in these units "
+            "and not in N or kg."
         )
     per = "" if system.force == "1" else f" per {system.force}"
     return (
-        f"The command {text}, and the {moves[0]} that it produces is not known: every {moves[0]}, mass, damping and "
-        f"stiffness must be multiplied by the {moves[0]} constant ({moves[1]}{per}); state it with --force-constant."
+        f"The command {text}, and the {effort[0]} that it produces is not known: every {effort[0]}, mass, damping and "
+        f"stiffness must be multiplied by the {effort[0]} constant ({effort[1]}{per}); state it with --force-constant."
     )

@@ -32,14 +32,16 @@ class BandPowerComparison:
 
     def score_candidate(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
         """The candidate with its misfits over the chance variation, those on held-out samples included."""
-        whole = evaluate_fit(self.context.whole, self.context.tuning, deviations, hypothesis)
-        off = self.power.misfits(self.power.measured - self.power.predict(whole.residuals))
-        return FittedCandidate(whole, FitScore(*(self._times(misfit) for misfit in (off.fit, off.choose, off.test))))
+        fitted = evaluate_fit(self.context.whole, self.context.tuning, deviations, hypothesis)
+        misfits = self.power.misfits(self.power.measured - self.power.predict(fitted.residuals))
+        return FittedCandidate(
+            fitted, FitScore(*(self._times(misfit) for misfit in (misfits.fit, misfits.choose, misfits.test)))
+        )
 
-    def _times(self, off: FloatArray) -> FloatArray:
+    def _times(self, misfit: FloatArray) -> FloatArray:
         """(c,): misfit over the chance variation; 1 for a channel whose bands are all below the noise, NaN where no
         channel has a band above it."""
-        return off if np.isnan(off).all() else np.where(np.isnan(off), 1.0, off / self.chance)
+        return misfit if np.isnan(misfit).all() else np.where(np.isnan(misfit), 1.0, misfit / self.chance)
 
 
 def comparison_of(context: SearchContext, best: BandPowerFit) -> BandPowerComparison:
@@ -50,9 +52,9 @@ def comparison_of(context: SearchContext, best: BandPowerFit) -> BandPowerCompar
     def predict(number: int) -> FloatArray:
         return power.predict(context.whole.residuals(model, perturb(best.hypothesis, number).list_placed_effects()))
 
-    first, other = (np.asarray(each) for each in context.map_(predict, range(2)))
-    differ = power.misfits(first - other)
-    chance = np.fmax(np.fmax(differ.fit, differ.choose), differ.test)
+    first_powers, second_powers = (np.asarray(powers) for powers in context.map_(predict, range(2)))
+    differences = power.misfits(first_powers - second_powers)
+    chance = np.fmax(np.fmax(differences.fit, differences.choose), differences.test)
     return BandPowerComparison(context, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
 
 
@@ -65,26 +67,26 @@ def is_convincing(named: FittedCandidate, retuned: FittedCandidate) -> bool:
         if np.isfinite(getattr(named.score, part)).any()
     ]
     return bool(pairs) and all(
-        _rms_over_channels(left) <= (1 - IMPACTS_SHARE) * _rms_over_channels(of)
-        and _rms_over_channels(left) <= IMPACTS_ERROR
-        for of, left in pairs
+        _rms_over_channels(named_misfit) <= (1 - IMPACTS_SHARE) * _rms_over_channels(retuned_misfit)
+        and _rms_over_channels(named_misfit) <= IMPACTS_ERROR
+        for retuned_misfit, named_misfit in pairs
     )
 
 
 def is_as_good(rival: FittedCandidate, named: FittedCandidate) -> bool:
     """Whether a rival's misfit is at most `IMPACTS_AS_GOOD` times that of the named hypothesis, on the samples to
     choose by and on those to test."""
-    ways = [(getattr(candidate.score, part) for candidate in (rival, named)) for part in ("choose", "test")]
+    pairs = [(getattr(candidate.score, part) for candidate in (rival, named)) for part in ("choose", "test")]
     return all(
-        _rms_over_channels(other) <= IMPACTS_AS_GOOD * _rms_over_channels(own)
-        for other, own in ways
-        if np.isfinite(other).any()
+        _rms_over_channels(rival_misfit) <= IMPACTS_AS_GOOD * _rms_over_channels(named_misfit)
+        for rival_misfit, named_misfit in pairs
+        if np.isfinite(rival_misfit).any()
     )
 
 
-def _rms_over_channels(times: FloatArray) -> float:
+def _rms_over_channels(misfit: FloatArray) -> float:
     """Root mean square over the channels; NaN is left out."""
-    return float(np.sqrt(np.nanmean(times**2)))
+    return float(np.sqrt(np.nanmean(misfit**2)))
 
 
 def worst_part(candidate: FittedCandidate) -> float:

@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import has_motion_forces, similar_hypotheses
+from analysis.diagnosis.errors.hypothesis import generate_near_equivalents, has_motion_forces
 from analysis.diagnosis.errors.output_error import (
     Fitted,
     Sensitivity,
@@ -25,8 +25,8 @@ from analysis.diagnosis.errors.output_error import (
     residuals_to_fit,
     sensitivity,
 )
-from analysis.diagnosis.search.search_context import FITTING, FittedCandidate, SearchContext, sensitivity_at
-from analysis.diagnosis.search.short_recordings import coarsen, short_recordings_of
+from analysis.diagnosis.search.search_context import FITTING, FittedCandidate, SearchContext, compute_sensitivity
+from analysis.diagnosis.search.short_recordings import coarsen, shorten_recordings
 from analysis.diagnosis.search.time_budget import OutOfTimeError
 from analysis.diagnosis.settings import (
     MOST_REFINED,
@@ -38,47 +38,57 @@ from analysis.diagnosis.settings import (
     WORTH_REFINING,
 )
 
-SECOND_ROUNDS, WHOLE_ROUNDS = 4, 2
+REFINING_ROUNDS, FULL_FIT_ROUNDS = 4, 2
 """Gauss-Newton steps of a refining fit, and of a fit to all periods."""
-MOST_POLISHED, POLISHED = 3, 0.002
+POLISHING_ROUNDS, POLISHING_SHARE = 3, 0.002
 """Largest number of rounds of `_polish`, and share of the cost that a round must remove for another to follow. A round
 takes a simulation for every parameter of the model. By hand."""
-MOST_REFRESHED, CONVERGED, CONVERGED_FAR, STALE = 4, 0.0005, 0.01, 0.5
+MOST_RENEWALS, CONVERGED_SHARE, CONVERGED_PER_LOG, STALE_DEVIATIONS = 4, 0.0005, 0.01, 0.5
 """Largest number of fits in a row, with the sensitivity renewed between them; share of the cost below which a reduction
-is none, and factor on ln(cost) for that share far above the noise (`_least_gain`); and move of a parameter, in standard
-deviations, from which the sensitivity is renewed, which costs a simulation per parameter."""
+is none, and factor on ln(cost) for that share far above the noise (`_compute_gain_limit`); and move of a parameter, in
+standard deviations, from which the sensitivity is renewed, which costs a simulation per parameter."""
 
 
 def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitted]) -> tuple[FittedCandidate, ...]:
-    """The candidates sorted by error, the best fits refined. fits: first fits, the best first (`first_fits`)."""
-    worth = _worth_refining(base, fits)
+    """The candidates sorted by error, the best fits refined. fits: first fits, the best first (`fit_first`)."""
+    promising = _select_promising(base, fits)
     # Where a held effect is a force that depends on the motion, first fits were continued on all samples already.
-    continued = has_motion_forces(base.hypothesis)
-    first: list[tuple[Fitted, Sensitivity]] = []
-    if not continued:
+    is_continued = has_motion_forces(base.hypothesis)
+    first_refined: list[tuple[Fitted, Sensitivity]] = []
+    if not is_continued:
         refine_first = partial(refine_with_sensitivity, context)
-        first = list(context.guard.over(map, FITTING)(refine_first, worth[:1]))  # type: ignore[arg-type]
-    refined = worth[:1] if continued else [law for law, _ in first]
+        first_refined = list(context.guard.wrap(map, FITTING)(refine_first, promising[:1]))  # type: ignore[arg-type]
+    refined = promising[:1] if is_continued else [trial for trial, _ in first_refined]
 
-    def refit(law: Fitted) -> Fitted:
-        if continued:
-            return law
-        near = first and _is_timeless(law) == _is_timeless(refined[0])
-        near = near and _prediction_difference(context, law, refined[0]) < SHARED_MOTION * (base.cost - refined[0].cost)
-        return refine_with_sensitivity(context, law, first[0][1] if near else None)[0]
+    def refit(trial: Fitted) -> Fitted:
+        if is_continued:
+            return trial
+        is_similar = first_refined and _is_time_invariant(trial) == _is_time_invariant(refined[0])
+        is_similar = is_similar and _compute_prediction_difference(context, trial, refined[0]) < SHARED_MOTION * (
+            base.cost - refined[0].cost
+        )
+        return refine_with_sensitivity(context, trial, first_refined[0][1] if is_similar else None)[0]
 
-    others = [
-        law
-        for number, law in enumerate(worth[1:MOST_REFINED], 1)
-        if not any(_is_same_start(context, law, other) for other in worth[:number])
+    further_fits = [
+        trial
+        for number, trial in enumerate(promising[1:MOST_REFINED], 1)
+        if not any(_is_same_start(context, trial, compared) for compared in promising[:number])
     ]
     if refined and context.candidate(refined[0]).score.worst_channel <= NO_SECOND_START:
-        others = [law for law in others if context.candidate(law).score.worst_channel <= REACHES_NOISE]
-    rest = [law for law in fits[1 if worth else 0 :] if not any(law is other for other in others)]
-    plain = [plain_law for plain_law in rest if any(_contains(richer, plain_law) for richer in refined[:1])][:1]
-    refined += context.guard.over(context.map_, FITTING)(refit, [*others, *plain])  # type: ignore[arg-type]
-    refined = _polish(context, sorted(refined, key=lambda law: context.candidate(law).score.mean_log_error))
-    fitted_candidates = [context.candidate(law) for law in [*refined, *(law for law in rest if law not in plain)]]
+        further_fits = [
+            trial for trial in further_fits if context.candidate(trial).score.worst_channel <= REACHES_NOISE
+        ]
+    remaining = [
+        trial for trial in fits[1 if promising else 0 :] if not any(trial is compared for compared in further_fits)
+    ]
+    special_cases = [special for special in remaining if any(_contains(general, special) for general in refined[:1])][
+        :1
+    ]
+    refined += context.guard.wrap(context.map_, FITTING)(refit, [*further_fits, *special_cases])  # type: ignore[arg-type]
+    refined = _polish(context, sorted(refined, key=lambda trial: context.candidate(trial).score.mean_log_error))
+    fitted_candidates = [
+        context.candidate(trial) for trial in [*refined, *(trial for trial in remaining if trial not in special_cases)]
+    ]
     return tuple(sorted(fitted_candidates, key=lambda candidate: candidate.score.mean_log_error))
 
 
@@ -87,57 +97,64 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
     unchanged without forces that depend on the motion. Rounds follow while they lower the cost, even at the noise: such
     a fit may be two standard deviations off. Where the best reaches the noise, fits far above it are not continued."""
     measure, tuning = context.measure, context.tuning
-    if not any(has_motion_forces(law.hypothesis) for law in fits):
+    if not any(has_motion_forces(trial.hypothesis) for trial in fits):
         return fits
-    if _error_of(context, fits[0]) <= NO_SECOND_START and any(_error_of(context, law) > REACHES_NOISE for law in fits):
-        near = [law for law in fits if _error_of(context, law) <= REACHES_NOISE]
-        return sorted([*_polish(context, near), *(law for law in fits if law not in near)], key=lambda law: law.cost)
-    for _ in range(MOST_POLISHED):
+    if _compute_worst_error(context, fits[0]) <= NO_SECOND_START and any(
+        _compute_worst_error(context, trial) > REACHES_NOISE for trial in fits
+    ):
+        close_fits = [trial for trial in fits if _compute_worst_error(context, trial) <= REACHES_NOISE]
+        return sorted(
+            [*_polish(context, close_fits), *(trial for trial in fits if trial not in close_fits)],
+            key=lambda trial: trial.cost,
+        )
+    for _ in range(POLISHING_ROUNDS):
         try:
-            known = sensitivity(measure, tuning, fits[0].deviations, fits[0].hypothesis, context.map_)
+            jacobian = sensitivity(measure, tuning, fits[0].deviations, fits[0].hypothesis, context.map_)
 
-            def continue_fit(law: Fitted, known: Sensitivity = known) -> Fitted:
-                further = partial(fit, measure, tuning, law, known, WHOLE_ROUNDS, context.map_)
-                return context.guard.part(law.hypothesis.claims[-1].effect.name, FITTING, further, law)
+            def continue_fit(trial: Fitted, jacobian: Sensitivity = jacobian) -> Fitted:
+                continue_candidate = partial(fit, measure, tuning, trial, jacobian, FULL_FIT_ROUNDS, context.map_)
+                return context.guard.run(trial.hypothesis.claims[-1].effect.name, FITTING, continue_candidate, trial)
 
-            before, fits = fits[0].cost, list(context.map_(continue_fit, fits))  # type: ignore[arg-type]
+            previous_cost, fits = fits[0].cost, list(context.map_(continue_fit, fits))  # type: ignore[arg-type]
         except OutOfTimeError:
             break  # the fits so far are valid results
-        if fits[0].cost > before * (1 - max(POLISHED, _least_gain(fits[0]))):
+        if fits[0].cost > previous_cost * (1 - max(POLISHING_SHARE, _compute_gain_limit(fits[0]))):
             break
     return fits
 
 
-def _error_of(context: SearchContext, law: Fitted) -> float:
+def _compute_worst_error(context: SearchContext, fitted: Fitted) -> float:
     """Error of the worst channel, in units of the noise."""
-    return context.candidate(law).score.worst_channel
+    return context.candidate(fitted).score.worst_channel
 
 
-def _is_timeless(law: Fitted) -> bool:
+def _is_time_invariant(fitted: Fitted) -> bool:
     """Whether no effect of the fit depends on time within the recording (`Effect.of_time`)."""
-    return not any(placed.effect.of_time for placed in law.hypothesis.list_placed_effects())
+    return not any(placed_effect.effect.of_time for placed_effect in fitted.hypothesis.list_placed_effects())
 
 
-def _is_same_start(context: SearchContext, law: Fitted, other: Fitted) -> bool:
+def _is_same_start(context: SearchContext, fitted: Fitted, other_fit: Fitted) -> bool:
     """Whether two starts of the same hypothesis have converged to the same fit."""
     return (
-        law.hypothesis.key == other.hypothesis.key
-        and _prediction_difference(context, law, other) < SAME_START * law.cost
+        fitted.hypothesis.key == other_fit.hypothesis.key
+        and _compute_prediction_difference(context, fitted, other_fit) < SAME_START * fitted.cost
     )
 
 
-def _prediction_difference(context: SearchContext, law: Fitted, other: Fitted) -> float:
+def _compute_prediction_difference(context: SearchContext, fitted: Fitted, other_fit: Fitted) -> float:
     """Mean square difference of two fits' predictions on the samples to fit, in units of the noise's variance."""
-    apart = residuals_to_fit(context.measure, law.residuals) - residuals_to_fit(context.measure, other.residuals)
+    difference = residuals_to_fit(context.measure, fitted.residuals) - residuals_to_fit(
+        context.measure, other_fit.residuals
+    )
     with np.errstate(over="ignore", invalid="ignore"):
-        return float(apart @ apart) / max(len(apart), 1)
+        return float(difference @ difference) / max(len(difference), 1)
 
 
-def _worth_refining(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+def _select_promising(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
     """The fits that lower the cost of `base` by at least `WORTH_REFINING` of what the best fit does. fits: the best
     first."""
-    gained = [base.cost - found.cost for found in fits]
-    return [found for found, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
+    gains = [base.cost - fitted.cost for fitted in fits]
+    return [fitted for fitted, gain in zip(fits, gains, strict=True) if gain >= WORTH_REFINING * gains[0] > 0]
 
 
 def refine(context: SearchContext, fitted: Fitted) -> Fitted:
@@ -146,108 +163,125 @@ def refine(context: SearchContext, fitted: Fitted) -> Fitted:
 
 
 def refine_with_sensitivity(
-    context: SearchContext, fitted: Fitted, known: Sensitivity | None = None
+    context: SearchContext, fitted: Fitted, jacobian: Sensitivity | None = None
 ) -> tuple[Fitted, Sensitivity]:
     """The refined fit and its sensitivity. Where a drive repeats, the fit is first made on one period of each segment,
     and its sensitivity serves for all periods; else, with forces that depend on the motion, first with longer
-    simulation steps (`coarsen`). known: sensitivity of a law that moves the device nearly alike."""
-    short_form = short_recordings_of(context, fitted)
-    coarse = coarsen(context.measure)
-    if short_form is None and (coarse is context.measure or not has_motion_forces(fitted.hypothesis)):
-        return _refine_from_both_starts(context, fitted, known)
-    near_context = replace(context, measure=coarse) if short_form is None else short_form.context
-    near, known = _refine_from_both_starts(
-        near_context, evaluate_fit(near_context.measure, context.tuning, fitted.deviations, fitted.hypothesis), known
+    simulation steps (`coarsen`). jacobian: sensitivity of a law that moves the device nearly alike."""
+    short_form = shorten_recordings(context, fitted)
+    coarse_measure = coarsen(context.measure)
+    if short_form is None and (coarse_measure is context.measure or not has_motion_forces(fitted.hypothesis)):
+        return _refine_from_both_starts(context, fitted, jacobian)
+    short_context = replace(context, measure=coarse_measure) if short_form is None else short_form.context
+    short_fit, jacobian = _refine_from_both_starts(
+        short_context,
+        evaluate_fit(short_context.measure, context.tuning, fitted.deviations, fitted.hypothesis),
+        jacobian,
     )
-    start = evaluate_fit(context.measure, context.tuning, near.deviations, near.hypothesis)
-    found = _fit_whole(context, start, known if short_form is None else short_form.repeat_sensitivity(known))
+    start = evaluate_fit(context.measure, context.tuning, short_fit.deviations, short_fit.hypothesis)
+    full_fit = _fit_full_record(
+        context, start, jacobian if short_form is None else short_form.repeat_sensitivity(jacobian)
+    )
     # Parameters that one period does not determine may diverge on all samples: then the fit before is kept.
-    if found.cost <= fitted.cost:
-        return choose_plainest(context, found), known
-    return (fitted if has_motion_forces(fitted.hypothesis) else _refine_from_both_starts(context, fitted)[0]), known
+    if full_fit.cost <= fitted.cost:
+        return choose_plainest(context, full_fit), jacobian
+    return (fitted if has_motion_forces(fitted.hypothesis) else _refine_from_both_starts(context, fitted)[0]), jacobian
 
 
-def _fit_whole(context: SearchContext, start: Fitted, known: Sensitivity) -> Fitted:
+def _fit_full_record(context: SearchContext, start: Fitted, jacobian: Sensitivity) -> Fitted:
     """The fit to all periods, started from the fit to one period of each segment: a few steps are usually enough, more
     where the error is above the noise, because periods may then differ."""
     best = start
-    for _ in range(MOST_REFRESHED):
-        better = fit(context.measure, context.tuning, best, known, WHOLE_ROUNDS, context.map_)
-        settled = better.cost > best.cost * (1 - _least_gain(better))
-        best = better
-        if settled:
+    for _ in range(MOST_RENEWALS):
+        next_fit = fit(context.measure, context.tuning, best, jacobian, FULL_FIT_ROUNDS, context.map_)
+        has_converged = next_fit.cost > best.cost * (1 - _compute_gain_limit(next_fit))
+        best = next_fit
+        if has_converged:
             break
     return best
 
 
-def _least_gain(fitted: Fitted) -> float:
-    """Relative reduction of the cost below which a fit has converged: max(CONVERGED, CONVERGED_FAR ln(cost))."""
-    return max(CONVERGED, CONVERGED_FAR * float(np.log(max(fitted.cost, 1.0))))
+def _compute_gain_limit(fitted: Fitted) -> float:
+    """Relative reduction of the cost below which a fit has converged: max(CONVERGED_SHARE, CONVERGED_PER_LOG
+    ln(cost))."""
+    return max(CONVERGED_SHARE, CONVERGED_PER_LOG * float(np.log(max(fitted.cost, 1.0))))
 
 
 def _refine_from_both_starts(
-    context: SearchContext, fitted: Fitted, known: Sensitivity | None = None
+    context: SearchContext, fitted: Fitted, jacobian: Sensitivity | None = None
 ) -> tuple[Fitted, Sensitivity]:
     """The better of two refined fits, with its sensitivity. Where the first leaves more than noise, a second starts
     from the calibrated model, because re-tuning may have absorbed the missing effect and ended in another minimum. With
     a known sensitivity there is no second start: the law it belongs to, which moves the device nearly alike, had it."""
-    shared = known is not None
+    is_jacobian_shared = jacobian is not None
     # With 1 as the reduction before, `_refine_from` may renew a shared sensitivity instead of ending after one fit.
-    here, known = _refine_from(context, fitted, known, 1.0)
-    here, known = _refine_similar(context, here, known)
-    if shared or context.candidate(here).score.worst_channel <= NO_SECOND_START:
-        return here, known
-    calibrated = evaluate_fit(context.measure, context.tuning, np.zeros_like(here.deviations), here.hypothesis)
-    there, beside = _refine_from(context, calibrated, known)
-    return (there, beside) if there.cost < here.cost else (here, known)
+    first_fit, jacobian = _refine_from(context, fitted, jacobian, 1.0)
+    first_fit, jacobian = _refine_similar(context, first_fit, jacobian)
+    if is_jacobian_shared or context.candidate(first_fit).score.worst_channel <= NO_SECOND_START:
+        return first_fit, jacobian
+    calibrated = evaluate_fit(
+        context.measure, context.tuning, np.zeros_like(first_fit.deviations), first_fit.hypothesis
+    )
+    second_fit, second_jacobian = _refine_from(context, calibrated, jacobian)
+    return (second_fit, second_jacobian) if second_fit.cost < first_fit.cost else (first_fit, jacobian)
 
 
-def _refine_similar(context: SearchContext, fitted: Fitted, known: Sensitivity) -> tuple[Fitted, Sensitivity]:
-    """The best fit among similar hypotheses (`similar_hypotheses`), or the plainest of them if it is about as good, and
-    the sensitivity there."""
-    best = fitted, known
-    for other in similar_hypotheses(fitted.hypothesis):
-        beside = _refine_from(context, evaluate_fit(context.measure, context.tuning, fitted.deviations, other), known)
-        best = beside if beside[0].cost < best[0].cost else best
+def _refine_similar(context: SearchContext, fitted: Fitted, jacobian: Sensitivity) -> tuple[Fitted, Sensitivity]:
+    """The best fit among similar hypotheses (`generate_near_equivalents`), or the plainest of them if it is about as
+    good, and the sensitivity there."""
+    best = fitted, jacobian
+    for variant in generate_near_equivalents(fitted.hypothesis):
+        refined_variant = _refine_from(
+            context, evaluate_fit(context.measure, context.tuning, fitted.deviations, variant), jacobian
+        )
+        best = refined_variant if refined_variant[0].cost < best[0].cost else best
     return choose_plainest(context, best[0]), best[1]
 
 
 def choose_plainest(context: SearchContext, fitted: Fitted) -> Fitted:
-    """The fit, or a similar form of its laws (`similar_hypotheses`) whose sum of squares exceeds that of the form
-    preferred so far by less than `RICHER_LAW_SQUARES` noise variances."""
+    """The fit, or a similar form of its laws (`generate_near_equivalents`) whose sum of squares exceeds that of the
+    form preferred so far by less than `RICHER_LAW_SQUARES` noise variances."""
     best = fitted
-    for other in similar_hypotheses(fitted.hypothesis):
-        plain = evaluate_fit(context.measure, context.tuning, best.deviations, other)
-        samples = len(residuals_to_fit(context.measure, plain.residuals))
-        best = plain if plain.cost < best.cost + RICHER_LAW_SQUARES / samples else best
+    for variant in generate_near_equivalents(fitted.hypothesis):
+        variant_fit = evaluate_fit(context.measure, context.tuning, best.deviations, variant)
+        samples = len(residuals_to_fit(context.measure, variant_fit.residuals))
+        best = variant_fit if variant_fit.cost < best.cost + RICHER_LAW_SQUARES / samples else best
     return best
 
 
 def _refine_from(
-    context: SearchContext, fitted: Fitted, known: Sensitivity | None, before: float = np.inf
+    context: SearchContext, fitted: Fitted, jacobian: Sensitivity | None, previous_gain: float = np.inf
 ) -> tuple[Fitted, Sensitivity]:
-    """The fit continued with renewed sensitivities until the cost hardly falls. known: sensitivity at another point of
-    the same hypothesis, or of a hypothesis that moves the device nearly alike; None = not computed yet. before:
-    relative reduction of the cost by the fit before; infinite = unknown, no further reduction is expected."""
+    """The fit continued with renewed sensitivities until the cost hardly falls. jacobian: sensitivity at another point
+    of the same hypothesis, or of a hypothesis that moves the device nearly alike; None = not computed yet.
+    previous_gain: relative reduction of the cost by the fit before; infinite = unknown, no further reduction is
+    expected."""
     best = fitted
-    complete = known is not None
-    before = before if complete else np.inf
-    there = known or sensitivity_at(context, best.deviations, best.hypothesis)
-    for _ in range(MOST_REFRESHED):
-        better = fit(context.measure, context.tuning, best, there, SECOND_ROUNDS, context.map_)
-        gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
-        best, expected, before = better, expect_gain(gained, before), gained
-        settled = (expected if complete else gained) < _least_gain(best)
-        if (complete and settled) or (context.candidate(best).score.worst_channel <= NO_SECOND_START and settled):
+    is_complete = jacobian is not None
+    previous_gain = previous_gain if is_complete else np.inf
+    current_jacobian = jacobian or compute_sensitivity(context, best.deviations, best.hypothesis)
+    for _ in range(MOST_RENEWALS):
+        next_fit = fit(context.measure, context.tuning, best, current_jacobian, REFINING_ROUNDS, context.map_)
+        gain = 1 - next_fit.cost / best.cost if best.cost > 0 else 0.0
+        best, expected_gain, previous_gain = next_fit, expect_gain(gain, previous_gain), gain
+        has_converged = (expected_gain if is_complete else gain) < _compute_gain_limit(best)
+        if (is_complete and has_converged) or (
+            context.candidate(best).score.worst_channel <= NO_SECOND_START and has_converged
+        ):
             break
-        if not complete or np.abs(best.deviations - there.at).max(initial=0.0) > STALE:
-            there = sensitivity_at(context, best.deviations, best.hypothesis, with_forces=True)
-            complete = True
-    return best, there
+        if (
+            not is_complete
+            or np.abs(best.deviations - current_jacobian.base_deviations).max(initial=0.0) > STALE_DEVIATIONS
+        ):
+            current_jacobian = compute_sensitivity(context, best.deviations, best.hypothesis, with_forces=True)
+            is_complete = True
+    return best, current_jacobian
 
 
-def _contains(richer: Fitted, plain: Fitted) -> bool:
-    """Whether the last effect of `richer` contains that of `plain` as a special case at the same sites: for a fair
+def _contains(general: Fitted, special: Fitted) -> bool:
+    """Whether the last effect of `general` contains that of `special` as a special case at the same sites: for a fair
     comparison both must then be fitted equally far."""
-    last, other = richer.hypothesis.claims[-1], plain.hypothesis.claims[-1]
-    return other.effect.name in last.effect.simpler and set(other.sites) <= set(last.sites)
+    general_claim, special_claim = general.hypothesis.claims[-1], special.hypothesis.claims[-1]
+    return special_claim.effect.name in general_claim.effect.simpler and set(special_claim.sites) <= set(
+        general_claim.sites
+    )

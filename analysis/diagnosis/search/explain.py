@@ -27,16 +27,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Hypothesis, combine
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.next_effect import Step, find_next_effect
-from analysis.diagnosis.search.parsimony import excess, inseparable, is_worthwhile, leaves_little
+from analysis.diagnosis.search.parsimony import are_inseparable, compute_excess, is_worthwhile, leaves_little
 from analysis.diagnosis.search.search_context import (
     FittedCandidate,
     SearchContext,
 )
-from analysis.diagnosis.search.time_budget import OutOfTimeError, always, limit_map
+from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map, unlimited_time
 from analysis.diagnosis.settings import (
     ADDED_GAIN,
     ADDED_SHARE,
@@ -49,9 +49,9 @@ from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
 
-LOOKED_AHEAD = 2
-"""Candidates to which a second effect is added on trial, where none alone is worth adding; each takes a round. By
-hand."""
+LOOK_AHEAD_CANDIDATES = 2
+"""Candidates to which a second effect is added on trial, where none alone is worth adding; each takes a round.
+Heuristic."""
 MOST_REFITTED_RIVALS = 3
 """Rivals of a step that are fitted again where a search continues on more samples; each takes a second or more."""
 
@@ -60,7 +60,7 @@ MOST_REFITTED_RIVALS = 3
 class Statistic:
     """A statistic of the response, by which candidates are compared where waveforms cannot be predicted."""
 
-    words: str
+    name: str
     """Name of the statistic."""
     chance: FloatArray
     """(c,): chance variation of the statistic, between two simulations of one model; used in place of the noise."""
@@ -88,19 +88,20 @@ class Explanation:
     ended_early: bool = False
     """Whether the time limit was reached before the search was done."""
     barred: str = ""
-    """Name of an excluded effect (`SearchContext.barred`), where only refinements of it explain as much; else empty."""
+    """Name of an excluded effect (`SearchContext.excluded`), where only its refinements explain as much; else empty."""
     undetermined: tuple[str, ...] = ()
     """Effects that were found and removed, because the recordings do not determine their parameters."""
     errors: tuple[Fitted, FloatArray] | None = None
-    """A fit and the standard errors of all its parameters (`final_errors`), where they were computed already."""
-    between: tuple[Fitted, FloatArray | None] | None = None
-    """A fit at its minimum, and the jackknife standard errors of its parameters over segments (`segment_errors`)."""
+    """A fit and the standard errors of all its parameters (`compute_final_errors`), where already computed."""
+    jackknife_errors: tuple[Fitted, FloatArray | None] | None = None
+    """A fit at its minimum, and the jackknife standard errors of its parameters over segments (`segment_errors`); None
+    in place of the errors for a single segment."""
 
     @property
     def plain(self) -> FittedCandidate:
         """The better of the given and the re-tuned model on held-out samples: re-tuning may overfit, and effects must
         not be credited with undoing that."""
-        return min(self.retuned, self.before, key=lambda candidate: candidate.held_out)
+        return min(self.retuned, self.before, key=lambda candidate: candidate.held_out_error)
 
     @property
     def stages(self) -> dict[str, Fitted]:
@@ -112,113 +113,125 @@ def explain(
     context: SearchContext,
     catalogue: Sequence[Effect],
     progress: Progress,
-    time_left: TimeBudget = always,
-    begun: Sequence[Sequence[FittedCandidate]] = (),
+    time_left: TimeBudget = unlimited_time,
+    previous_steps: Sequence[Sequence[FittedCandidate]] = (),
 ) -> Explanation:
     """Re-tunes the model and adds effects one by one. time_left: called before each piece of the search; when it
-    returns False, the search ends with what it has found. begun: the steps of a search on fewer samples, each with its
-    rivals; one effect is added to these, up to `MOST_EFFECTS`. Raises OutOfTimeError where the time ends before these
-    are fitted again."""
-    found = begin(replace(context, map_=limit_map(context.map_, time_left)) if begun else context, progress, begun)
-    most = min(len(found.rounds) + 1, MOST_EFFECTS) if begun else MOST_EFFECTS
-    return add_effects(context, catalogue, found, progress, time_left, most)
+    returns False, the search ends with what it has found. previous_steps: those of a search on fewer samples, each with
+    its rivals; one effect is added to these, up to `MOST_EFFECTS`. Raises OutOfTimeError where the time ends before
+    these are fitted again."""
+    explanation = start_explanation(
+        replace(context, map_=limit_map(context.map_, time_left)) if previous_steps else context,
+        progress,
+        previous_steps,
+    )
+    max_effects = min(len(explanation.rounds) + 1, MOST_EFFECTS) if previous_steps else MOST_EFFECTS
+    return add_effects(context, catalogue, explanation, progress, time_left, max_effects)
 
 
-def begin(context: SearchContext, progress: Progress, begun: Sequence[Sequence[FittedCandidate]] = ()) -> Explanation:
+def start_explanation(
+    context: SearchContext, progress: Progress, previous_steps: Sequence[Sequence[FittedCandidate]] = ()
+) -> Explanation:
     """The model as given and re-tuned, with the effects that need no search (`_known_rounds`)."""
-    before = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    given_fit = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
     progress("re-tuning the model within its tolerances", 0.02)
-    base = context.candidate(refine(context, before))
-    rounds = _known_rounds(context, base, begun)
-    steps = tuple(each[0] for each in rounds)
-    ends = (context.with_test_score(context.candidate(before)), context.with_test_score(base))
+    base = context.candidate(refine(context, given_fit))
+    rounds = _known_rounds(context, base, previous_steps)
+    steps = tuple(round_candidates[0] for round_candidates in rounds)
+    ends = (context.with_test_score(context.candidate(given_fit)), context.with_test_score(base))
     return Explanation(*ends, context.with_test_score(steps[-1]) if steps else ends[1], tuple(rounds), steps)
 
 
 def add_effects(
     context: SearchContext,
     catalogue: Sequence[Effect],
-    found: Explanation,
+    selected: Explanation,
     progress: Progress,
-    time_left: TimeBudget = always,
-    most: int = MOST_EFFECTS,
+    time_left: TimeBudget = unlimited_time,
+    max_effects: int = MOST_EFFECTS,
 ) -> Explanation:
-    """The explanation with further effects, up to `most` in total. A last round of `found` in which no effect was added
-    is not computed again: a second effect is looked for together with its best candidate."""
-    rounds, steps = list(found.rounds), list(found.steps)
-    base = steps[-1] if steps else context.candidate(_evaluate_again(context, found.retuned))
-    within_time, barred, ended_early = replace(context, map_=limit_map(context.map_, time_left)), "", found.ended_early
-    open_ended = not context.certain and not found.barred and not ended_early
-    while open_ended and len(steps) < most and is_worth_searching(context, found, base):
+    """The explanation with further effects, up to `max_effects` in total. A last round of `selected` in which no
+    effect was added is not computed again: a second effect is looked for together with its best candidate."""
+    rounds, steps = list(selected.rounds), list(selected.steps)
+    base = steps[-1] if steps else context.candidate(_reevaluate(context, selected.retuned))
+    limited, excluded, ended_early = replace(context, map_=limit_map(context.map_, time_left)), "", selected.ended_early
+    may_extend = not context.certain and not selected.barred and not ended_early
+    while may_extend and len(steps) < max_effects and is_worth_searching(context, selected, base):
         step = Step(f"looking for the {_ORDINALS[len(steps)]} effect", 0.1 + 0.3 * len(steps), progress)
         try:
             resumed = len(rounds) > len(steps)
             if resumed:
-                tried = named = rounds[-1]
+                candidates = allowed = rounds[-1]
             else:
-                tried = find_next_effect(within_time, catalogue, base.fitted, step)
-                named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
-                rounds.append(named)
-            free = named[:1] == tried[:1] and len(rounds) < most and not (resumed and context.barred)
-            both = _look_ahead(within_time, catalogue, base, named, step) if free else ()
+                candidates = find_next_effect(limited, catalogue, base.fitted, step)
+                allowed = tuple(candidate for candidate in candidates if candidate.newest not in context.excluded)
+                rounds.append(allowed)
+            look_ahead = (
+                allowed[:1] == candidates[:1] and len(rounds) < max_effects and not (resumed and context.excluded)
+            )
+            pair_rounds = _look_ahead(limited, catalogue, base, allowed, step) if look_ahead else ()
         except OutOfTimeError:
             ended_early = True
             break
-        rounds[-1:] = both or (named,)
-        if not both and (not named or not is_worthwhile(base, named[0]) or named[0] is not tried[0]):
-            barred = tried[0].newest if named and is_worthwhile(base, named[0]) else ""
+        rounds[-1:] = pair_rounds or (allowed,)
+        if not pair_rounds and (not allowed or not is_worthwhile(base, allowed[0]) or allowed[0] is not candidates[0]):
+            excluded = candidates[0].newest if allowed and is_worthwhile(base, allowed[0]) else ""
             break
-        steps += [each[0] for each in both or (named,)]
+        steps += [round_candidates[0] for round_candidates in pair_rounds or (allowed,)]
         base = steps[-1]
-    after = found.after if len(steps) == len(found.steps) else context.with_test_score(base)
-    barred = barred or found.barred
-    return replace(found, after=after, rounds=tuple(rounds), steps=tuple(steps), ended_early=ended_early, barred=barred)
+    final = selected.after if len(steps) == len(selected.steps) else context.with_test_score(base)
+    excluded = excluded or selected.barred
+    return replace(
+        selected, after=final, rounds=tuple(rounds), steps=tuple(steps), ended_early=ended_early, barred=excluded
+    )
 
 
-def _evaluate_again(context: SearchContext, scored: FittedCandidate) -> Fitted:
+def _reevaluate(context: SearchContext, scored: FittedCandidate) -> Fitted:
     """The candidate's model simulated again on the samples to fit and to choose by; the candidate was scored on all."""
     return evaluate_fit(context.measure, context.tuning, scored.fitted.deviations, scored.fitted.hypothesis)
 
 
-def is_worth_searching(context: SearchContext, found: Explanation, base: FittedCandidate) -> bool:
-    """Whether `base`, the last step of `found`, leaves enough error to look for one more effect. No third effect is
-    looked for where two fit as well as right laws fit a real device, because it would only absorb their small errors;
-    except with opened held-out samples, which are few and may show an effect that the others do not."""
+def is_worth_searching(context: SearchContext, explanation: Explanation, base: FittedCandidate) -> bool:
+    """Whether `base`, the last step of `explanation`, leaves enough error to look for one more effect. No third effect
+    is looked for where two fit as well as right laws fit a real device, because it would only absorb their small
+    errors; except with opened held-out samples, which are few and may show an effect that the others do not."""
     if base.fitted.hypothesis.claims:
-        judged_whole = context.references is None and not context.opened
-        if judged_whole and len(base.fitted.hypothesis.claims) > 1 and leaves_little(found.retuned, base):
+        has_noise_limit = context.references is None and not context.opened
+        if has_noise_limit and len(base.fitted.hypothesis.claims) > 1 and leaves_little(explanation.retuned, base):
             return False
-        return base.score.worst_channel > context.least_left
-    surprised = bool(np.nanmax(found.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE)
-    return surprised or context.references is not None or base.score.worst_channel > NOISE_ALONE
+        return base.score.worst_channel > context.least_remaining_error
+    has_held_out_mismatch = bool(np.nanmax(explanation.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE)
+    return has_held_out_mismatch or context.references is not None or base.score.worst_channel > NOISE_ALONE
 
 
 def _look_ahead(
     context: SearchContext,
     catalogue: Sequence[Effect],
     base: FittedCandidate,
-    named: tuple[FittedCandidate, ...],
+    candidates: tuple[FittedCandidate, ...],
     step: "Step",
 ) -> tuple[tuple[FittedCandidate, ...], ...]:
     """Two rounds: an effect that alone is not worth adding, and a second effect, where both together remove more than
-    twice `ADDED_SHARE` of the excess error. Empty where the best of `named` is worth adding, or no such pair is
-    found."""
-    if not named or is_worthwhile(base, named[0]) or base.score.worst_channel <= REACHES_NOISE:
+    twice `ADDED_SHARE` of the excess error. Empty where the best of `candidates` is worth adding, or no such pair
+    is found."""
+    if not candidates or is_worthwhile(base, candidates[0]) or base.score.worst_channel <= REACHES_NOISE:
         return ()
-    seen = {candidate.newest: candidate for candidate in reversed(named)}
-    for first in [candidate for candidate in named if seen[candidate.newest] is candidate][:LOOKED_AHEAD]:
-        if base.score.mean_log_error - first.score.mean_log_error <= ADDED_GAIN:
+    best_by_name = {candidate.newest: candidate for candidate in reversed(candidates)}
+    for leading in [candidate for candidate in candidates if best_by_name[candidate.newest] is candidate][
+        :LOOK_AHEAD_CANDIDATES
+    ]:
+        if base.score.mean_log_error - leading.score.mean_log_error <= ADDED_GAIN:
             break
-        tried = find_next_effect(context, catalogue, first.fitted, step)
-        gained = base.score.mean_log_error - tried[0].score.mean_log_error if tried else 0.0
-        enough = gained > 2 * ADDED_SHARE * excess(base) and is_worthwhile(first, tried[0])
-        if enough and not any(candidate.newest in context.barred for candidate in tried):
-            return (first, *(other for other in named if other is not first)), tried
+        second_candidates = find_next_effect(context, catalogue, leading.fitted, step)
+        gain = base.score.mean_log_error - second_candidates[0].score.mean_log_error if second_candidates else 0.0
+        is_enough = gain > 2 * ADDED_SHARE * compute_excess(base) and is_worthwhile(leading, second_candidates[0])
+        if is_enough and not any(candidate.newest in context.excluded for candidate in second_candidates):
+            return (leading, *(rival for rival in candidates if rival is not leading)), second_candidates
     return ()
 
 
 def _known_rounds(
-    context: SearchContext, base: FittedCandidate, begun: Sequence[Sequence[FittedCandidate]]
+    context: SearchContext, base: FittedCandidate, previous_steps: Sequence[Sequence[FittedCandidate]]
 ) -> list[tuple[FittedCandidate, ...]]:
     """Rounds that need no search: the certain hypotheses, and the steps of a search on fewer samples with the rivals
     that were inseparable from them, all refitted."""
@@ -226,15 +239,15 @@ def _known_rounds(
     for hypothesis in context.certain:
         base = _add_certain(context, base, hypothesis)
         rounds.append((base,))
-    for step, *others in begun:
-        rivals = [other for other in others if inseparable(step, other)]
-        rounds.append(tuple(_refit(context, each) for each in (step, *rivals[:MOST_REFITTED_RIVALS])))
+    for step, *step_rivals in previous_steps:
+        rivals = [rival for rival in step_rivals if are_inseparable(step, rival)]
+        rounds.append(tuple(_refit(context, candidate) for candidate in (step, *rivals[:MOST_REFITTED_RIVALS])))
     return rounds
 
 
 def _refit(context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
     """The candidate fitted again to the context's samples, from its own parameters."""
-    return context.candidate(refine(context, _evaluate_again(context, candidate)))
+    return context.candidate(refine(context, _reevaluate(context, candidate)))
 
 
 def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:
@@ -247,7 +260,9 @@ def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypo
 
 def retune_alone(context: SearchContext) -> Fitted:
     """The model re-tuned, without any added effect."""
-    return refine(context, evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING))
+    return refine(
+        context, evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
+    )
 
 
 _ORDINALS = ("first", "second", "third")

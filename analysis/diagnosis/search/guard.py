@@ -22,11 +22,11 @@ Result = TypeVar("Result")
 class Crash:
     """An exception that was caught."""
 
-    what: str
+    subject: str
     """Name of the effect that crashed, or the piece of work in words."""
-    doing: str
+    step: str
     """The step at which it crashed, in words: "its fit"."""
-    said: str
+    message: str
     """Class and message of the exception."""
 
 
@@ -34,12 +34,12 @@ class Crash:
 class Part:
     """A piece of the work that can be left out."""
 
-    what: str
+    subject: str
     """Name of an effect, or the piece of work in words."""
-    doing: str
+    step: str
     """The step, in words."""
     work: Callable[[], Any]
-    instead: Any
+    substitute: Any
     """The result that replaces that of `work` if `work` crashes."""
 
 
@@ -54,82 +54,87 @@ class Guard:
     crashes: list[Crash] = field(default_factory=list)
     """Crashes caught so far."""
 
-    def over(self, map_: Mapper, doing: str) -> Mapper:
+    def wrap(self, map_: Mapper, step: str) -> Mapper:
         """A map over effects, hypotheses or fits that notes crashes and leaves out the results of the items that
-        crashed. doing: the step, in words."""
+        crashed. step: in words."""
         if not self.on:
             return map_
 
         def guarded_map(function: Callable[..., object], items: Iterable[object]) -> Iterable[object]:
             @wraps(function)
             def guard_item(item: object) -> tuple[object, ...] | Crash:
-                return _try(_effect_of(item), doing, lambda: function(item))
+                return _try(_find_effect_name(item), step, lambda: function(item))
 
             results: list[tuple[object, ...] | Crash] = list(map_(guard_item, items))  # type: ignore[arg-type]
             # Crashes are noted here and not in `guard_item`, which may run in another process.
-            self.crashes.extend(found for found in results if isinstance(found, Crash))
-            return [result for found in results if not isinstance(found, Crash) for result in found]
+            self.crashes.extend(outcome for outcome in results if isinstance(outcome, Crash))
+            return [result for outcome in results if not isinstance(outcome, Crash) for result in outcome]
 
         return guarded_map
 
-    def part(
+    def run(
         self,
-        what: str,
-        doing: str,
+        subject: str,
+        step: str,
         work: Callable[[], Result],
-        instead: Result,
-        passed_on: tuple[type[Exception], ...] = (),
+        substitute: Result,
+        propagated: tuple[type[Exception], ...] = (),
     ) -> Result:
-        """The result of a piece of work, or `instead` where it crashes. what, doing: as in `Part`. passed_on:
-        exceptions that are meant for the user and propagate."""
-        found = _try(what, doing, work, passed_on) if self.on else (work(),)
-        if isinstance(found, Crash):
-            self.crashes.append(found)
-            return instead
-        return found[0]
+        """The result of a piece of work, or `substitute` where it crashes. subject, step: `what` and `doing` of a
+        `Part`. propagated: exceptions that are meant for the user and propagate."""
+        outcome = _try(subject, step, work, propagated) if self.on else (work(),)
+        if isinstance(outcome, Crash):
+            self.crashes.append(outcome)
+            return substitute
+        return outcome[0]
 
-    def parts(self, map_: Mapper, pieces: Sequence[Part]) -> list[Any]:
-        """The results of independent pieces of work, in their order; `Part.instead` for each that crashed."""
+    def run_parts(self, map_: Mapper, work_parts: Sequence[Part]) -> list[Any]:
+        """The results of independent pieces of work, in their order; `Part.substitute` for each that crashed."""
 
-        def try_part(piece: Part) -> tuple[Any] | Crash:
-            return _try(piece.what, piece.doing, piece.work) if self.on else (piece.work(),)
+        def try_part(work_part: Part) -> tuple[Any] | Crash:
+            return _try(work_part.subject, work_part.step, work_part.work) if self.on else (work_part.work(),)
 
-        results: list[tuple[Any] | Crash] = list(map_(try_part, pieces))  # type: ignore[arg-type]
-        self.crashes.extend(found for found in results if isinstance(found, Crash))
+        results: list[tuple[Any] | Crash] = list(map_(try_part, work_parts))  # type: ignore[arg-type]
+        self.crashes.extend(outcome for outcome in results if isinstance(outcome, Crash))
         return [
-            piece.instead if isinstance(found, Crash) else found[0]
-            for piece, found in zip(pieces, results, strict=True)
+            work_part.substitute if isinstance(outcome, Crash) else outcome[0]
+            for work_part, outcome in zip(work_parts, results, strict=True)
         ]
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """A sentence per effect or piece of work that crashed, with the steps and the exceptions."""
-        return tuple(_sentence(what, self.crashes) for what in dict.fromkeys(crash.what for crash in self.crashes))
+        return tuple(
+            _describe_crashes(subject, self.crashes)
+            for subject in dict.fromkeys(crash.subject for crash in self.crashes)
+        )
 
 
 def _try(
-    what: str, doing: str, work: Callable[[], Result], passed_on: tuple[type[Exception], ...] = ()
+    subject: str, step: str, work: Callable[[], Result], propagated: tuple[type[Exception], ...] = ()
 ) -> tuple[Result] | Crash:
-    """The result in a tuple, or the crash. Raises OutOfTimeError, and the exceptions of `passed_on`."""
+    """The result in a tuple, or the crash. Raises OutOfTimeError, and those of `propagated`."""
     try:
         return (work(),)
     except OutOfTimeError:
         raise
     except Exception as crash:
-        if isinstance(crash, passed_on):
+        if isinstance(crash, propagated):
             raise
-        return Crash(what, doing, f"{type(crash).__name__}: {crash}".rstrip(": ."))
+        return Crash(subject, step, f"{type(crash).__name__}: {crash}".rstrip(": ."))
 
 
-def _sentence(what: str, crashes: Iterable[Crash]) -> str:
-    own = list(dict.fromkeys((crash.doing, crash.said) for crash in crashes if crash.what == what))
-    noun = noun_of(what)
-    name = noun if what in noun or noun == what.replace("_", " ") else f"{noun} ({what})"
-    at = conjoin([f"{doing} ({said})" for doing, said in own])
-    return f"{capitalise(name)} was left out because of a program error at {at}: the result was obtained without it."
+def _describe_crashes(subject: str, crashes: Iterable[Crash]) -> str:
+    steps_and_errors = list(dict.fromkeys((crash.step, crash.message) for crash in crashes if crash.subject == subject))
+    noun = noun_of(subject)
+    name = noun if subject in noun or noun == subject.replace("_", " ") else f"{noun} ({subject})"
+    places = conjoin([f"{step} ({message})" for step, message in steps_and_errors])
+    return (
+        f"{capitalise(name)} was left out because of a program error at {places}: the result was obtained without it."
+    )
 
 
-def _effect_of(item: object) -> str:
+def _find_effect_name(item: object) -> str:
     """Name of the newest effect of an effect, a hypothesis or a fit."""
     if isinstance(item, Effect):
         return item.name

@@ -29,12 +29,16 @@ def predicts_nothing(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> boo
     """Whether the newest effect leaves no predictive power in the channel where it reduces the error most, or in a
     channel whose sensor it acts on: a residual of at least `NO_PREDICTION_SHARE` of the signal and of
     `NO_PREDICTION_ERROR` times the noise. Such an effect only frees the model to fit the other channels."""
-    before, left = _residual_rms(measure, base), _residual_rms(measure, fitted)
-    most = int(np.argmax(np.log(np.maximum(before, _TINY)) - np.log(np.maximum(left, _TINY))))
+    base_rms, fitted_rms = _residual_rms(measure, base), _residual_rms(measure, fitted)
+    main_channel = int(np.argmax(np.log(np.maximum(base_rms, _TINY)) - np.log(np.maximum(fitted_rms, _TINY))))
     claim = fitted.hypothesis.claims[-1]
-    sensed = claim.sites if place_of_effect(claim.effect) == "sensor" else ()
-    nothing = left >= np.maximum(NO_PREDICTION_SHARE * _signal_rms(measure), NO_PREDICTION_ERROR * measure.noise)
-    return bool(nothing[most] or any(nothing[site] for site in sensed if site < len(nothing)))
+    sensor_sites = claim.sites if place_of_effect(claim.effect) == "sensor" else ()
+    is_unpredicted = fitted_rms >= np.maximum(
+        NO_PREDICTION_SHARE * _signal_rms(measure), NO_PREDICTION_ERROR * measure.noise
+    )
+    return bool(
+        is_unpredicted[main_channel] or any(is_unpredicted[site] for site in sensor_sites if site < len(is_unpredicted))
+    )
 
 
 def _residual_rms(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:

@@ -54,39 +54,40 @@ FAMILIES: tuple[frozenset[str], ...] = (
 """Effects of similar action: at one place, at most one of a family is named, and they are exchanged for one another."""
 
 
-def excludes(held: Claim, other: Claim) -> bool:
-    """Whether `other` cannot be added beside `held`: the same effect, or one of its family, at a common place."""
-    if not set(held.sites) & set(other.sites):
+def excludes(existing: Claim, added: Claim) -> bool:
+    """Whether `added` cannot be added beside `present`: the same effect, or one of its family, at a common place."""
+    if not set(existing.sites) & set(added.sites):
         return False
-    names = {held.effect.name, other.effect.name}
+    names = {existing.effect.name, added.effect.name}
     return len(names) == 1 or any(names <= family for family in FAMILIES)
 
 
-def relatives(name: str, catalogue: Sequence[Effect]) -> tuple[Effect, ...]:
+def list_relatives(name: str, catalogue: Sequence[Effect]) -> tuple[Effect, ...]:
     """The effects that may replace the named one, itself included: its family, and the laws of which it is a special
     case."""
     families = {name}.union(*(family for family in FAMILIES if name in family))
     return tuple(effect for effect in catalogue if effect.name in families or name in effect.simpler)
 
 
-def plainest_first(fitted_candidates: Sequence[FittedCandidate]) -> tuple[FittedCandidate, ...]:
+def move_plainest_first(fitted_candidates: Sequence[FittedCandidate]) -> tuple[FittedCandidate, ...]:
     """The candidates with the preferred one moved to the front. fitted_candidates: by error, the best first."""
     if not fitted_candidates:
         return ()
-    chosen = fitted_candidates[0]
-    for other in fitted_candidates[1:]:
-        if _is_plainer(other, chosen) and _good_enough(other, chosen):
-            chosen = other
-    return (chosen, *(candidate for candidate in fitted_candidates if candidate is not chosen))
+    preferred = fitted_candidates[0]
+    for rival in fitted_candidates[1:]:
+        if _is_plainer(rival, preferred) and _is_preferable(rival, preferred):
+            preferred = rival
+    return (preferred, *(candidate for candidate in fitted_candidates if candidate is not preferred))
 
 
-def _is_plainer(plain: FittedCandidate, other: FittedCandidate) -> bool:
-    return only_refines(other, plain) or (
-        _information_criterion(plain) < _information_criterion(other) and not only_refines(plain, other)
+def _is_plainer(simpler: FittedCandidate, reference: FittedCandidate) -> bool:
+    return only_refines(reference, simpler) or (
+        _compute_information_criterion(simpler) < _compute_information_criterion(reference)
+        and not only_refines(simpler, reference)
     )
 
 
-def _information_criterion(candidate: FittedCandidate) -> float:
+def _compute_information_criterion(candidate: FittedCandidate) -> float:
     """2 k + |d|²: Akaike's penalty (1974) for k parameters, and the squared deviations d of the re-tuned parameters
     from the calibration, in prior standard deviations. Without the likelihood: it is only used where errors do not
     differ."""
@@ -94,73 +95,73 @@ def _information_criterion(candidate: FittedCandidate) -> float:
     return 2.0 * len(candidate.fitted.hypothesis.point) + float(deviations @ deviations)
 
 
-def only_refines(other: FittedCandidate, plain: FittedCandidate) -> bool:
-    """Whether the other's last effect contains the plain one's as a special case, at the same place."""
-    return _is_special_case(plain, other)
+def only_refines(general: FittedCandidate, special: FittedCandidate) -> bool:
+    """Whether the general candidate's last effect contains the special one's as a special case, at the same place."""
+    return _is_special_case(special, general)
 
 
-def both_stand(named: FittedCandidate, other: FittedCandidate) -> bool:
-    """Whether the other is a rival: inseparable from the named candidate, and no refinement of it."""
-    return inseparable(named, other) and not only_refines(other, named)
+def is_equal_rival(named_candidate: FittedCandidate, rival: FittedCandidate) -> bool:
+    """Whether the candidate is a rival: inseparable from the named candidate, and no refinement of it."""
+    return are_inseparable(named_candidate, rival) and not only_refines(rival, named_candidate)
 
 
-def excess(candidate: FittedCandidate) -> float:
+def compute_excess(candidate: FittedCandidate) -> float:
     """Mean log error power above the noise."""
     return max(candidate.score.mean_log_error - NOISE_KNOWN_TO, 0.0)
 
 
-def share_of_mismatch(without: FittedCandidate, with_it: FittedCandidate) -> float:
+def compute_mismatch_share(base: FittedCandidate, completed: FittedCandidate) -> float:
     """Relative decrease of the excess log error power over the noise, between 0 and 1."""
-    whole = excess(without)
-    return min(max(1 - excess(with_it) / whole, 0.0), 1.0) if whole > 0 else 0.0
+    base_excess = compute_excess(base)
+    return min(max(1 - compute_excess(completed) / base_excess, 0.0), 1.0) if base_excess > 0 else 0.0
 
 
 def leaves_little(retuned: FittedCandidate, candidate: FittedCandidate) -> bool:
     """Whether a candidate leaves little more than noise: as much as the right laws leave of a real device, which none
     fits exactly. retuned: the model without effects."""
-    worst = candidate.score.worst_channel
-    if worst <= EXPLAINED_ERROR:
+    worst_error = candidate.score.worst_channel
+    if worst_error <= EXPLAINED_ERROR:
         return True
-    return worst <= CONVINCING_ERROR and share_of_mismatch(retuned, candidate) >= CONVINCING_SHARE
+    return worst_error <= CONVINCING_ERROR and compute_mismatch_share(retuned, candidate) >= CONVINCING_SHARE
 
 
-def inseparable(best: FittedCandidate, other: FittedCandidate) -> bool:
+def are_inseparable(best: FittedCandidate, rival: FittedCandidate) -> bool:
     """Whether two candidates' errors do not differ enough; also where the difference is smaller than what both gain on
     clean recordings, where neither effect is present."""
-    worse = other.score.mean_log_error - best.score.mean_log_error
-    return worse <= max(AS_GOOD_GAIN, AS_GOOD_SHARE * excess(best), min(other.usual, best.usual))
+    difference = rival.score.mean_log_error - best.score.mean_log_error
+    return difference <= max(AS_GOOD_GAIN, AS_GOOD_SHARE * compute_excess(best), min(rival.clean_gain, best.clean_gain))
 
 
-def is_worthwhile(base: FittedCandidate, better: FittedCandidate) -> bool:
+def is_worthwhile(base: FittedCandidate, extended: FittedCandidate) -> bool:
     """Whether an effect lowers the error enough to be added. Where only the worst channel is above the noise, and not
     the mean over channels, or no more is left than a right law leaves, its logarithm must fall by half."""
-    gained, over = base.score.mean_log_error - better.score.mean_log_error, np.log(base.score.worst_channel)
-    little = excess(base) == 0 or base.score.worst_channel <= EXPLAINED_ERROR
-    if little and over > np.log(NOISE_ALONE) and np.log(better.score.worst_channel) > over / 2:
+    gain, log_error = base.score.mean_log_error - extended.score.mean_log_error, np.log(base.score.worst_channel)
+    is_small = compute_excess(base) == 0 or base.score.worst_channel <= EXPLAINED_ERROR
+    if is_small and log_error > np.log(NOISE_ALONE) and np.log(extended.score.worst_channel) > log_error / 2:
         return False
-    return gained > max(ADDED_SHARE * excess(base), ADDED_GAIN)
+    return gain > max(ADDED_SHARE * compute_excess(base), ADDED_GAIN)
 
 
-def _is_special_case(candidate: FittedCandidate, other: FittedCandidate) -> bool:
-    plain, refined = candidate.fitted.hypothesis.claims[-1], other.fitted.hypothesis.claims[-1]
-    return plain.effect.name in refined.effect.simpler and set(plain.sites) <= set(refined.sites)
+def _is_special_case(special_candidate: FittedCandidate, general_candidate: FittedCandidate) -> bool:
+    special, general = special_candidate.fitted.hypothesis.claims[-1], general_candidate.fitted.hypothesis.claims[-1]
+    return special.effect.name in general.effect.simpler and set(special.sites) <= set(general.sites)
 
 
-def _good_enough(plain: FittedCandidate, refined: FittedCandidate) -> bool:
+def _is_preferable(simpler: FittedCandidate, refined: FittedCandidate) -> bool:
     """Whether the simpler candidate is preferred: inseparable from the other, or its special case from which the other
     gains too little."""
-    if not _is_special_case(plain, refined):
-        return inseparable(refined, plain)
-    gained = plain.score.mean_log_error - refined.score.mean_log_error
-    share = REFINED_FRICTION_SHARE if plain.newest in DRY_FRICTION else REFINED_SHARE
-    return gained <= max(REFINED_GAIN, min(share * excess(plain), REFINED_MOST_GAIN))
+    if not _is_special_case(simpler, refined):
+        return are_inseparable(refined, simpler)
+    gain = simpler.score.mean_log_error - refined.score.mean_log_error
+    share = REFINED_FRICTION_SHARE if simpler.newest in DRY_FRICTION else REFINED_SHARE
+    return gain <= max(REFINED_GAIN, min(share * compute_excess(simpler), REFINED_MOST_GAIN))
 
 
 def leaves_far_less(candidate: FittedCandidate, rival: FittedCandidate) -> bool:
     """Whether a law outside the catalogue replaces a named effect: its excess error is at most the share `LAW_BEATS` of
     the effect's, and its mean log rms error on the same held-out samples is lower by more than `NOISE_KNOWN_TO`. The
     second condition refuses a law that is the effect's own formula in another form."""
-    held_out, other = (float(np.mean(np.log(each.score.test))) for each in (candidate, rival))
-    if np.isfinite(held_out) and held_out >= other - NOISE_KNOWN_TO:
+    candidate_error, rival_error = (float(np.mean(np.log(fitted.score.test))) for fitted in (candidate, rival))
+    if np.isfinite(candidate_error) and candidate_error >= rival_error - NOISE_KNOWN_TO:
         return False
-    return excess(candidate) <= LAW_BEATS * excess(rival)
+    return compute_excess(candidate) <= LAW_BEATS * compute_excess(rival)

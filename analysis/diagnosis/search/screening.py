@@ -37,26 +37,28 @@ def screen(
     measure: ErrorMeasure,
     tuning: Tuning,
     base: Fitted,
-    known: Sensitivity,
+    jacobian: Sensitivity,
     suggested: Sequence[Hypothesis],
     map_: Mapper,
 ) -> tuple[ScreenedHypothesis, ...]:
-    """The hypotheses, each combined with that of `base`, with their predicted costs, the lowest first. known:
+    """The hypotheses, each combined with that of `base`, with their predicted costs, the lowest first. jacobian:
     sensitivity to the model's own parameters at `base`."""
     model = tuning.tune(base.deviations)
     errors = residuals_to_fit(measure, base.residuals)
 
     def predict(hypothesis: Hypothesis) -> ScreenedHypothesis:
-        whole = combine(base.hypothesis, hypothesis)
+        combined = combine(base.hypothesis, hypothesis)
         with np.errstate(over="ignore", invalid="ignore"):
-            there = residuals_to_fit(measure, measure.residuals(model, whole.list_placed_effects()))
-        return ScreenedHypothesis(whole, _predict_cost(base, known, errors, errors - there, tuning.bound))
+            changed_errors = residuals_to_fit(measure, measure.residuals(model, combined.list_placed_effects()))
+        return ScreenedHypothesis(
+            combined, _predict_cost(base, jacobian, errors, errors - changed_errors, tuning.bound)
+        )
 
-    found: list[ScreenedHypothesis] = list(map_(predict, suggested))  # type: ignore[arg-type]
-    return tuple(sorted(found, key=lambda screened: screened.cost))
+    screened_hypotheses: list[ScreenedHypothesis] = list(map_(predict, suggested))  # type: ignore[arg-type]
+    return tuple(sorted(screened_hypotheses, key=lambda screened: screened.cost))
 
 
-def _predict_cost(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray, bound: float) -> float:
+def _predict_cost(base: Fitted, jacobian: Sensitivity, errors: np.ndarray, change: np.ndarray, bound: float) -> float:
     """Predicted `Fitted.cost`; infinite where the simulation diverged or the effect does not change it. errors, change:
     (samples,), e and c of the module's equation. bound: of |d0 + d|, in standard deviations."""
     with np.errstate(over="ignore", invalid="ignore"):  # a diverged simulation overflows
@@ -64,9 +66,9 @@ def _predict_cost(base: Fitted, known: Sensitivity, errors: np.ndarray, change: 
     if not (np.isfinite(strength) and strength > 0):
         return np.inf
     t = len(base.deviations)
-    cross = known.on(change)
-    products = np.block([[known.squares + np.eye(t), cross[:, None]], [cross[None, :], np.array([[strength]])]])
-    gradient = np.concatenate([known.on(errors) - base.deviations, [float(change @ errors)]])
+    cross = jacobian.multiply(change)
+    products = np.block([[jacobian.gram + np.eye(t), cross[:, None]], [cross[None, :], np.array([[strength]])]])
+    gradient = np.concatenate([jacobian.multiply(errors) - base.deviations, [float(change @ errors)]])
     low = np.concatenate([-bound - base.deviations, [WEAKEST_START]])
     high = np.concatenate([bound - base.deviations, [STRONGEST_START]])
     step = solve_bounded_step(products, gradient, low, high)

@@ -9,23 +9,24 @@ likeliest candidates are fitted, and the best of these refined with the model's 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from analysis.diagnosis.errors.band_power_fit import BandPowerFit, View, evaluate_hypothesis, fit_band_power
+from analysis.diagnosis.errors.band_power_fit import BandPowerFit, BandPowerProblem, evaluate_hypothesis, fit_band_power
 from analysis.diagnosis.errors.hypothesis import Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
-from analysis.diagnosis.errors.refine_band_power import refine_band_power, weight_by_chance
+from analysis.diagnosis.errors.refine_band_power import refine_band_power, weight_by_chance_variation
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.search_context import STARTING, SearchContext
-from analysis.diagnosis.search.starting_hypotheses import candidates
+from analysis.diagnosis.search.search_context import FITTING, SCREENING, STARTING, SearchContext
+from analysis.diagnosis.search.starting_hypotheses import list_candidates
 from analysis.diagnosis.settings import IMPACTS_SHARE
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import Effect
 
 PLAY, RIVAL = "backlash", "loose_joint"
 """Play, and the effect that is fitted at the same place as play for comparison."""
-FIRST_FACTOR, SMALLER, LARGER = 0.55, (0.3, 0.1, 0.03), (1.8, 3.2)
+FIRST_FACTOR, SMALLER_FACTORS, LARGER_FACTORS = 0.55, (0.3, 0.1, 0.03), (1.8, 3.2)
 """Factors on a starting strength: the first decides the direction, then those below or above follow while the cost
 falls. They cover a decade and a half downwards, where the scatter of impacts leads an estimator most. By hand."""
 MOST_FITTED, FIRST_ROUNDS, MOST_REFINED = 6, 3, 3
@@ -33,7 +34,7 @@ MOST_FITTED, FIRST_ROUNDS, MOST_REFINED = 6, 3, 3
 model's parameters are fixed; and most of the fits that are refined, which takes ten times as long. By hand."""
 NEAR_CHANCE = 1.2
 """Cost at which no further candidate is fitted: the difference is then the chance variation's. By hand."""
-BATCH = 8
+BATCH_SIZE = 8
 """Candidates that are evaluated between two looks at the time."""
 
 
@@ -48,108 +49,122 @@ class SecondEffects:
 
 
 def suggest_second_effects(
-    context: SearchContext, found: Explanation, play: BandPowerFit, catalogue: Sequence[Effect]
+    context: SearchContext, explanation: Explanation, play_fit: BandPowerFit, catalogue: Sequence[Effect]
 ) -> list[Hypothesis]:
     """Hypotheses of a second effect in addition to play: each effect of the catalogue with starting values from the
     residuals that play leaves, and the candidates of the first round of the search by waveforms, as fitted there.
-    Effects that contain an excluded effect (`SearchContext.barred`) are left out: they would stand for it."""
-    played = evaluate_fit(context.measure, context.tuning, play.deviations, play.hypothesis)
-    evidence = gather_evidence(context.measure, context.tuning, played)[0]
+    Effects that contain an excluded effect (`SearchContext.excluded`) are left out: they would stand for it."""
+    waveform_fit = evaluate_fit(context.measure, context.tuning, play_fit.deviations, play_fit.hypothesis)
+    evidence = gather_evidence(context.measure, context.tuning, waveform_fit)[0]
     allowed = [
         effect
         for effect in catalogue
-        if effect.name not in (PLAY, RIVAL) and not context.barred.intersection(effect.simpler)
+        if effect.name not in (PLAY, RIVAL) and not context.excluded.intersection(effect.simpler)
     ]
     names = {effect.name for effect in allowed}
-    first_round = found.rounds[0] if found.rounds else ()
-    fitted = [tried.fitted.hypothesis for tried in first_round if tried.newest in names]
-    return [*candidates(allowed, evidence, context.guard.over(context.map_, STARTING)), *fitted]
+    first_round = explanation.rounds[0] if explanation.rounds else ()
+    fitted_hypotheses = [candidate.fitted.hypothesis for candidate in first_round if candidate.newest in names]
+    return [*list_candidates(allowed, evidence, context.guard.wrap(context.map_, STARTING)), *fitted_hypotheses]
 
 
 def fit_second_effects(
-    view: View, play: BandPowerFit, suggested: Sequence[Hypothesis], time_left: TimeBudget
+    context: SearchContext,
+    problem: BandPowerProblem,
+    play_fit: BandPowerFit,
+    suggested_hypotheses: Sequence[Hypothesis],
+    time_left: TimeBudget,
 ) -> SecondEffects:
     """Fits of play with a second effect: those that remove at least `IMPACTS_SHARE` of the cost of play alone, on the
     samples to fit and to choose by."""
-    weighted = weight_by_chance(view, play)
-    of_play = evaluate_hypothesis(weighted, play.deviations, play.hypothesis).cost
-    starts, complete = _evaluate_starts(weighted, play, suggested, time_left)
-    promising = _best_per_effect([start for start in starts if start.cost < of_play])[:MOST_FITTED]
+    weighted = weight_by_chance_variation(problem, play_fit)
+    play_cost = evaluate_hypothesis(weighted, play_fit.deviations, play_fit.hypothesis).cost
+    guarded = replace(weighted, map_=context.guard.wrap(weighted.map_, SCREENING))
+    starts, is_complete = _evaluate_starts(guarded, play_fit, suggested_hypotheses, time_left)
+    promising = _select_best_per_effect([start for start in starts if start.cost < play_cost])[:MOST_FITTED]
     single = replace(weighted, ensemble=1)
+    guarded_map = context.guard.wrap(map, FITTING)
+    first_fits: list[BandPowerFit] = list(guarded_map(partial(_fit_first, single), promising))  # type: ignore[arg-type]
     # Akaike's criterion over the compared bands: a law with more parameters must gain more.
     bands = max(int(np.count_nonzero(weighted.weights)), 1)
-    first_fits = sorted(
-        (fit_band_power(single, start, FIRST_ROUNDS) for start in promising),
-        key=lambda fit: fit.cost + 2 * len(fit.hypothesis.point) / bands,
-    )
+    first_fits.sort(key=lambda fit: fit.cost + 2 * len(fit.hypothesis.point) / bands)
     fits: list[tuple[float, BandPowerFit]] = []
     for start in first_fits[:MOST_REFINED]:
         if fits and not time_left():
-            complete = False
+            is_complete = False
             break
-        fitted = refine_band_power(view, start)
+        name = start.hypothesis.claims[-1].effect.name
+        fitted = context.guard.run(name, FITTING, partial(refine_band_power, problem, start), start)
         cost = evaluate_hypothesis(weighted, fitted.deviations, fitted.hypothesis).cost
         fits.append((cost, fitted))
         if cost <= NEAR_CHANCE:
             break
     ranked = sorted(fits, key=lambda fit: fit[0])
-    return SecondEffects(tuple(fit for cost, fit in ranked if cost <= (1 - IMPACTS_SHARE) * of_play), complete)
+    return SecondEffects(tuple(fit for cost, fit in ranked if cost <= (1 - IMPACTS_SHARE) * play_cost), is_complete)
+
+
+def _fit_first(problem: BandPowerProblem, start: BandPowerFit) -> BandPowerFit:
+    return fit_band_power(problem, start, FIRST_ROUNDS)
 
 
 def _evaluate_starts(
-    weighted: View, play: BandPowerFit, suggested: Sequence[Hypothesis], time_left: TimeBudget
+    weighted: BandPowerProblem,
+    play_fit: BandPowerFit,
+    suggested_hypotheses: Sequence[Hypothesis],
+    time_left: TimeBudget,
 ) -> tuple[list[BandPowerFit], bool]:
     """Each suggestion with play at its best strength, and whether the time sufficed for all. One simulation each: the
     scatter between simulations is in the weights."""
     single = replace(weighted, ensemble=1, map_=map)
 
-    def at_best_strength(hypothesis: Hypothesis) -> BandPowerFit:
-        return _search_strength(single, play, hypothesis)
+    def search_strength(hypothesis: Hypothesis) -> BandPowerFit:
+        return _search_strength(single, play_fit, hypothesis)
 
     starts: list[BandPowerFit] = []
-    for first in range(0, len(suggested), BATCH):
+    for first in range(0, len(suggested_hypotheses), BATCH_SIZE):
         if first and not time_left():
             return starts, False
-        starts += weighted.map_(at_best_strength, suggested[first : first + BATCH])  # type: ignore[arg-type]
+        starts += weighted.map_(search_strength, suggested_hypotheses[first : first + BATCH_SIZE])  # type: ignore[arg-type]
     return starts, True
 
 
-def _search_strength(view: View, play: BandPowerFit, second: Hypothesis) -> BandPowerFit:
-    """Play with the second effect at the strength with the least cost (`FIRST_FACTOR`). An effect whose main parameter
-    does not vanish without it, such as a gain, is evaluated as suggested."""
+def _search_strength(problem: BandPowerProblem, play_fit: BandPowerFit, second_effect: Hypothesis) -> BandPowerFit:
+    """Play with the second effect at the strength with the least cost (`FIRST_FACTOR`). An effect is evaluated as
+    suggested where no strength can be scaled: without parameters, with a main one that is read from the data (such as a
+    step), or with one that is not zero where the effect is absent (such as a gain, or a limit)."""
 
-    def evaluate(factor: float) -> BandPowerFit:
-        return evaluate_hypothesis(view, play.deviations, combine(play.hypothesis, _scale_strength(second, factor)))
+    def evaluate(hypothesis: Hypothesis) -> BandPowerFit:
+        return evaluate_hypothesis(problem, play_fit.deviations, combine(play_fit.hypothesis, hypothesis))
 
-    best = evaluate(1.0)
-    if second.claims[-1].effect.parameters[0].none != 0:
+    best = evaluate(second_effect)
+    main = next(iter(second_effect.claims[-1].effect.parameters), None)
+    if main is None or main.fixed or main.none != 0:
         return best
-    weaker = evaluate(FIRST_FACTOR)
-    factors = SMALLER if weaker.cost < best.cost else LARGER
-    best = min(best, weaker, key=_cost_of)
+    weaker = evaluate(_scale_strength(second_effect, FIRST_FACTOR))
+    factors = SMALLER_FACTORS if weaker.cost < best.cost else LARGER_FACTORS
+    best = min(best, weaker, key=_get_cost)
     for factor in factors:
-        tried = evaluate(factor)
-        if tried.cost >= best.cost:
+        trial = evaluate(_scale_strength(second_effect, factor))
+        if trial.cost >= best.cost:
             break
-        best = tried
+        best = trial
     return best
 
 
 def _scale_strength(hypothesis: Hypothesis, factor: float) -> Hypothesis:
     """The hypothesis of one effect with its main parameter times the factor, at all its sites."""
     (claim,) = hypothesis.claims
-    main = claim.effect.parameters[0].name
-    placed = hypothesis.list_placed_effects()
-    return hypothesis_of_claim(claim, [{**each.values, main: factor * each.values[main]} for each in placed])
+    main_name = claim.effect.parameters[0].name
+    values = [placed_effect.values for placed_effect in hypothesis.list_placed_effects()]
+    return hypothesis_of_claim(claim, [{**group, main_name: factor * group[main_name]} for group in values])
 
 
-def _best_per_effect(starts: Sequence[BandPowerFit]) -> list[BandPowerFit]:
+def _select_best_per_effect(starts: Sequence[BandPowerFit]) -> list[BandPowerFit]:
     """The best start of each effect, by rising cost."""
-    likeliest: dict[str, BandPowerFit] = {}
-    for start in sorted(starts, key=_cost_of):
-        likeliest.setdefault(start.hypothesis.claims[-1].effect.name, start)
-    return list(likeliest.values())
+    best_by_effect: dict[str, BandPowerFit] = {}
+    for start in sorted(starts, key=_get_cost):
+        best_by_effect.setdefault(start.hypothesis.claims[-1].effect.name, start)
+    return list(best_by_effect.values())
 
 
-def _cost_of(fit: BandPowerFit) -> float:
+def _get_cost(fit: BandPowerFit) -> float:
     return fit.cost

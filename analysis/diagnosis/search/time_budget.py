@@ -1,4 +1,4 @@
-"""Time limits of a search. A search that reaches its limit ends with what it has found so far."""
+"""Time limits of a search (`TimeBudget`). A search that reaches its limit returns its result so far."""
 
 from collections.abc import Callable, Iterable
 from functools import wraps
@@ -12,10 +12,10 @@ OUT_OF_TIME = (
 
 
 class OutOfTimeError(Exception):
-    """Raised within the search where the time is over, and caught by it."""
+    """Raised and caught within a search, where its time limit is reached."""
 
 
-def always() -> bool:
+def unlimited_time() -> bool:
     """A `TimeBudget` without a limit."""
     return True
 
@@ -23,44 +23,44 @@ def always() -> bool:
 class CountedBudget:
     """A `TimeBudget` that ends after a number of calls, so that the same work is done on every machine."""
 
-    def __init__(self, most: int) -> None:
-        """most: number of calls that return True."""
-        self._most, self._asked = most, count()
+    def __init__(self, limit: int) -> None:
+        """limit: number of calls that return True."""
+        self._limit, self._call_counter = limit, count()
 
     def __call__(self) -> bool:
-        return next(self._asked) < self._most
+        return next(self._call_counter) < self._limit
 
 
 def limit_map(map_: Mapper, time_left: TimeBudget) -> Mapper:
-    """The map with a time limit; it raises OutOfTimeError before a piece of work that would begin after the limit.
+    """The map with a time limit; it raises OutOfTimeError before a call that would begin after the limit.
 
-    Pieces may run in other processes, which have copies of the budget. The calls made there are returned with the
-    results, and a `CountedBudget` is called as often again here, so that each call counts once. A clock is not called
-    again: pieces that began in time are kept, however late they end.
+    The calls may run in other processes, which have copies of the budget. How often they asked the budget is returned
+    with the results, and a `CountedBudget` is asked as often again here, so that each time counts once. A clock is not
+    asked again: results of calls that began in time are kept, however late these end.
     """
-    asked = [0]
+    calls = [0]
 
-    def ask() -> None:
-        asked[0] += 1
+    def check_time() -> None:
+        calls[0] += 1
         if not time_left():
             raise OutOfTimeError
 
     def timed_map(function: Callable[..., object], *items: Iterable[object]) -> Iterable[object]:
-        begun = asked[0]
+        calls_at_start = calls[0]
 
         @wraps(function)
-        def work(*arguments: object) -> tuple[object, int]:
-            before = asked[0]
-            ask()
-            return function(*arguments), asked[0] - before
+        def call_in_time(*arguments: object) -> tuple[object, int]:
+            calls_before = calls[0]
+            check_time()
+            return function(*arguments), calls[0] - calls_before
 
-        found: list[tuple[object, int]] = list(map_(work, *items))  # type: ignore[arg-type]
-        elsewhere = sum(times for _, times in found) - (asked[0] - begun)
+        outcomes: list[tuple[object, int]] = list(map_(call_in_time, *items))  # type: ignore[arg-type]
+        other_calls = sum(call_count for _, call_count in outcomes) - (calls[0] - calls_at_start)
         if isinstance(time_left, CountedBudget):
-            for _ in range(elsewhere):
-                ask()
+            for _ in range(other_calls):
+                check_time()
         else:
-            asked[0] += elsewhere
-        return [result for result, _ in found]
+            calls[0] += other_calls
+        return [result for result, _ in outcomes]
 
     return timed_map

@@ -13,7 +13,7 @@ from analysis.diagnosis.document import Verdict
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.parsimony import leaves_little, share_of_mismatch
+from analysis.diagnosis.search.parsimony import compute_mismatch_share, leaves_little
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.settings import (
@@ -45,7 +45,7 @@ MILDER_TEST_USED = (
     "The held-out data show a mismatch that the rest of the recording does not contain: all but the strongest part "
     "of these data was used to find its cause, the strongest part to confirm it."
 )
-NOT_SHOWN = "The held-out data show a mismatch that the rest of the recording does not contain."
+TEST_ONLY = "The held-out data show a mismatch that the rest of the recording does not contain."
 ONLY_REFINES = (
     "The best explanation is a law that was excluded from the search. Laws that contain it as a special case explain "
     "the mismatch equally well, but their additional terms are not significant, so none of them is named."
@@ -90,97 +90,105 @@ class SearchResult:
     remarks: tuple[str, ...] = ()
     """Sentences for the user."""
     errors: FloatArray | None = None
-    """Standard errors of the final fit (`final_errors`), where the search needed them."""
+    """Standard errors of the final fit (`compute_final_errors`), where the search needed them."""
     unconfirmed: tuple[Unconfirmed, ...] = ()
     """Effects that were found and are not named, the largest gain first."""
 
 
-def judge(found: Explanation) -> Judgement:
+def judge(explanation: Explanation) -> Judgement:
     """The verdict by the errors on the samples to fit and to choose by. Held-out samples can only withdraw names
     (`_is_confirmed`), or turn "explained" into "partly_explained" or "unexplained"."""
-    if not found.after.fitted.hypothesis.claims or not _is_confirmed(found):
-        if found.before.score.worst_channel <= NOISE_ALONE:
+    if not explanation.after.fitted.hypothesis.claims or not _is_confirmed(explanation):
+        if explanation.before.score.worst_channel <= NOISE_ALONE:
             return Judgement("no_mismatch", False)
-        return Judgement("parameters" if found.retuned.score.worst_channel <= NOISE_ALONE else "unexplained", False)
-    if found.statistic is not None:
         return Judgement(
-            "explained" if found.after.score.worst_channel <= EXPLAINED_BY_CHANCE else "partly_explained", True
+            "parameters" if explanation.retuned.score.worst_channel <= NOISE_ALONE else "unexplained", False
         )
-    if as_good_as_noise(found) and not np.nanmax(found.after.score.test, initial=0.0) > HELD_OUT_ERROR:
+    if explanation.statistic is not None:
+        return Judgement(
+            "explained" if explanation.after.score.worst_channel <= EXPLAINED_BY_CHANCE else "partly_explained", True
+        )
+    if as_good_as_noise(explanation) and not np.nanmax(explanation.after.score.test, initial=0.0) > HELD_OUT_ERROR:
         return Judgement("explained", True)
-    return Judgement("partly_explained", True) if worth_naming(found) else Judgement("unexplained", False)
+    return Judgement("partly_explained", True) if is_worth_naming(explanation) else Judgement("unexplained", False)
 
 
-def search_remarks(found: Explanation) -> tuple[str, ...]:
+def list_remarks(explanation: Explanation) -> tuple[str, ...]:
     """Sentences for the user: that time ran out, and which effects were found but are not named."""
-    early = (OUT_OF_TIME,) if found.ended_early else ()
-    barred = (ONLY_REFINES,) if found.barred else ()
+    time_remark = (OUT_OF_TIME,) if explanation.ended_early else ()
+    excluded_remark = (ONLY_REFINES,) if explanation.barred else ()
     undetermined = (
         f"An explanation by {noun_of(name)} is not named: these recordings hardly determine its parameters."
-        for name in dict.fromkeys(found.undetermined)
+        for name in dict.fromkeys(explanation.undetermined)
     )
-    return (*early, *barred, *undetermined)
+    return (*time_remark, *excluded_remark, *undetermined)
 
 
-def as_good_as_noise(found: Explanation) -> bool:
+def as_good_as_noise(explanation: Explanation) -> bool:
     """Whether the error on the samples to fit and to choose by is little more than noise (`leaves_little`)."""
-    return leaves_little(found.retuned, found.after)
+    return leaves_little(explanation.retuned, explanation.after)
 
 
-def worth_naming(found: Explanation) -> bool:
+def is_worth_naming(explanation: Explanation) -> bool:
     """Whether the effects are named although a mismatch remains: the error is at most `NAMED_ERROR`, or they take
     `NAMED_SHARE` of the mismatch, or they lower the mean log error by `NAMED_GAIN`."""
-    taken = found.retuned.score.mean_log_error - found.after.score.mean_log_error
-    share = share_of_mismatch(found.retuned, found.after)
-    return found.after.score.worst_channel <= NAMED_ERROR or share >= NAMED_SHARE or taken >= NAMED_GAIN
+    gain = explanation.retuned.score.mean_log_error - explanation.after.score.mean_log_error
+    share = compute_mismatch_share(explanation.retuned, explanation.after)
+    return explanation.after.score.worst_channel <= NAMED_ERROR or share >= NAMED_SHARE or gain >= NAMED_GAIN
 
 
-def _is_confirmed(found: Explanation) -> bool:
+def _is_confirmed(explanation: Explanation) -> bool:
     """Whether the explanation lowers the mean logarithm of the held-out errors by at least `CONFIRMED_SHARE` of it;
     also true where that is at most `HELD_OUT_TOO_SMALL`, or where nothing was held out."""
-    whole, left = (float(np.mean(np.log(candidate.score.test))) for candidate in (found.retuned, found.after))
-    if not np.isfinite(whole):
+    retuned_error, remaining_error = (
+        float(np.mean(np.log(candidate.score.test))) for candidate in (explanation.retuned, explanation.after)
+    )
+    if not np.isfinite(retuned_error):
         return True
-    return whole <= HELD_OUT_TOO_SMALL or whole - left >= CONFIRMED_SHARE * whole
+    return retuned_error <= HELD_OUT_TOO_SMALL or retuned_error - remaining_error >= CONFIRMED_SHARE * retuned_error
 
 
-def confirms_addition(without: FittedCandidate, with_it: FittedCandidate) -> bool:
-    """Whether the held-out samples confirm what `with_it` adds to `without`: the logarithm of the worst channel's
+def confirms_addition(base: FittedCandidate, extended: FittedCandidate) -> bool:
+    """Whether the held-out samples confirm what `extended` adds to `base`: the logarithm of the worst channel's
     error, above `HELD_OUT_ALONE_ERROR` without the addition, falls by at least `CONFIRMED_SHARE`."""
-    worst = float(np.max(without.score.test))
+    worst = float(np.max(base.score.test))
     if not np.isfinite(worst) or worst <= HELD_OUT_ALONE_ERROR:
         return False
-    left = float(np.max(with_it.score.test))
-    return float(np.log(worst) - np.log(left)) >= CONFIRMED_SHARE * float(np.log(worst))
+    remaining_error = float(np.max(extended.score.test))
+    return float(np.log(worst) - np.log(remaining_error)) >= CONFIRMED_SHARE * float(np.log(worst))
 
 
-def shares_taken(without: FittedCandidate, steps: Sequence[FittedCandidate]) -> tuple[float, ...]:
+def compute_step_shares(base: FittedCandidate, steps: Sequence[FittedCandidate]) -> tuple[float, ...]:
     """Share of the mismatch of the re-tuned model that each step removed; their sum is at most 1."""
-    left = [0.0, *(share_of_mismatch(without, step) for step in steps)]
-    return tuple(max(after - before, 0.0) for before, after in pairwise(left))
+    cumulative = [0.0, *(compute_mismatch_share(base, step) for step in steps)]
+    return tuple(max(upper - lower, 0.0) for lower, upper in pairwise(cumulative))
 
 
 def may_move_further(result: SearchResult) -> bool:
     """Whether to search with a wider bound: a mismatch remains or three effects were needed, and a parameter of the
     model is at its bound. Never with certain effects, reference recordings, or band powers."""
-    context, found = result.context, result.found
-    verdict, ends = result.judgement.verdict, (found.retuned, *found.steps, found.after)
-    left = verdict in ("unexplained", "partly_explained")
-    left = left or (verdict == "explained" and len(found.steps) == MOST_EFFECTS)
-    fixed = found.statistic is not None or context.references is not None or context.certain
-    return left and not fixed and any(context.tuning.is_at_bound(end.fitted.deviations) for end in ends)
+    context, explanation = result.context, result.found
+    verdict, fits = result.judgement.verdict, (explanation.retuned, *explanation.steps, explanation.after)
+    has_mismatch = verdict in ("unexplained", "partly_explained")
+    has_mismatch = has_mismatch or (verdict == "explained" and len(explanation.steps) == MOST_EFFECTS)
+    is_excluded = explanation.statistic is not None or context.references is not None or context.certain
+    return (
+        has_mismatch
+        and not is_excluded
+        and any(context.tuning.is_at_bound(candidate.fitted.deviations) for candidate in fits)
+    )
 
 
-def is_plainer(again: SearchResult, result: SearchResult) -> bool:
+def is_plainer(repeated: SearchResult, result: SearchResult) -> bool:
     """Whether a search with a wider bound explains the recordings, by effects or by parameters alone, and the first
     does not or needs more effects; with a physically possible model (`Tuning.is_possible`) inside the wider bound."""
-    found, tuning = again.found, again.context.tuning
-    if result.judgement.verdict == "explained" and len(found.steps) >= len(result.found.steps):
+    explanation, tuning = repeated.found, repeated.context.tuning
+    if result.judgement.verdict == "explained" and len(explanation.steps) >= len(result.found.steps):
         return False
-    explains = again.judgement.verdict == "explained"
-    alone = again.judgement.verdict == "parameters"
-    alone = alone and not np.nanmax(found.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE
-    if not explains and not alone:
+    by_effects = repeated.judgement.verdict == "explained"
+    by_parameters = repeated.judgement.verdict == "parameters"
+    by_parameters = by_parameters and not np.nanmax(explanation.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE
+    if not by_effects and not by_parameters:
         return False
-    deviations = (found.after if explains else found.retuned).fitted.deviations
+    deviations = (explanation.after if by_effects else explanation.retuned).fitted.deviations
     return tuning.is_possible(deviations) and not tuning.is_at_bound(deviations)

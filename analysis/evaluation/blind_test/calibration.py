@@ -16,7 +16,7 @@ from equalizer.signals.signal import FloatArray
 
 BINS = 10
 """Bins of the calibration curve, with equally many answers each."""
-TIED = 3
+TIE_DECIMALS = 3
 """Decimals to which probabilities are rounded for comparison. Names of equal probability share their right answers
 equally, so that the bin into which each falls does not matter."""
 ANSWERABLE = ("nothing", "single", "pair")
@@ -51,41 +51,51 @@ class Calibration:
     bins: tuple[Bin, ...]
 
 
-def calibration(outcomes: Sequence[Outcome], kinds: Sequence[str] = ANSWERABLE) -> Calibration:
+def compute_calibration(outcomes: Sequence[Outcome], kinds: Sequence[str] = ANSWERABLE) -> Calibration:
     """Calibration over all named effects of the cases of these kinds: a name is right where the device has the effect,
     at any axis."""
-    named = [(outcome, effect) for outcome in outcomes if outcome.kind in kinds for effect in outcome.named]
-    if not named:
+    names = [(outcome, effect) for outcome in outcomes if outcome.kind in kinds for effect in outcome.named]
+    if not names:
         return Calibration(None, None, None, ())
-    stated = np.array([effect.probability for _, effect in named])
-    right = np.array([float(effect.effect in each.names) for each, effect in named])
-    drawn = np.random.default_rng(21).integers(len(named), size=(RESAMPLED, len(named)))
-    low, high = np.quantile([_calibration_error(stated[k], right[k]) for k in drawn], (0.025, 0.975))
-    return Calibration(_calibration_error(stated, right), float(low), float(high), tuple(_make_bins(stated, right)))
+    probabilities = np.array([effect.probability for _, effect in names])
+    is_right = np.array([float(effect.effect in case.names) for case, effect in names])
+    resamples = np.random.default_rng(21).integers(len(names), size=(RESAMPLED, len(names)))
+    low, high = np.quantile(
+        [_compute_calibration_error(probabilities[k], is_right[k]) for k in resamples], (0.025, 0.975)
+    )
+    return Calibration(
+        _compute_calibration_error(probabilities, is_right),
+        float(low),
+        float(high),
+        tuple(_make_bins(probabilities, is_right)),
+    )
 
 
-def _split_bins(stated: FloatArray) -> list[np.ndarray[tuple[int], np.dtype[np.int64]]]:
+def _split_bins(probabilities: FloatArray) -> list[np.ndarray[tuple[int], np.dtype[np.int64]]]:
     """Indices of the names in each bin, in rising order of probability; at most `BINS`, none empty."""
-    order = np.argsort(stated, kind="stable")
+    order = np.argsort(probabilities, kind="stable")
     return [part for part in np.array_split(order, BINS) if len(part)]
 
 
-def _calibration_error(stated: FloatArray, right: FloatArray) -> float:
-    """Expected calibration error by the equation of this file. right: 1 for a right name, else 0."""
-    even = _average_ties(stated, right)
-    return float(sum(abs(stated[part].sum() - even[part].sum()) for part in _split_bins(stated)) / len(stated))
+def _compute_calibration_error(probabilities: FloatArray, is_right: FloatArray) -> float:
+    """Expected calibration error by the equation of this file. is_right: 1 for a right name, else 0."""
+    tied_shares = _average_ties(probabilities, is_right)
+    return float(
+        sum(abs(probabilities[part].sum() - tied_shares[part].sum()) for part in _split_bins(probabilities))
+        / len(probabilities)
+    )
 
 
-def _average_ties(stated: FloatArray, right: FloatArray) -> FloatArray:
+def _average_ties(probabilities: FloatArray, is_right: FloatArray) -> FloatArray:
     """(n,): for each name, the share of right names among those with the same stated probability."""
-    _, group = np.unique(np.round(stated, TIED), return_inverse=True)
-    mean: FloatArray = np.bincount(group, weights=right) / np.bincount(group)
-    return np.asarray(mean[group])
+    _, group = np.unique(np.round(probabilities, TIE_DECIMALS), return_inverse=True)
+    group_means: FloatArray = np.bincount(group, weights=is_right) / np.bincount(group)
+    return np.asarray(group_means[group])
 
 
-def _make_bins(stated: FloatArray, right: FloatArray) -> list[Bin]:
-    found, even = [], _average_ties(stated, right)
-    for part in _split_bins(stated):
-        hits, of = float(even[part].sum()), len(part)
-        found.append(Bin(float(stated[part].mean()), hits / of, *wilson(hits, of), of))
-    return found
+def _make_bins(probabilities: FloatArray, is_right: FloatArray) -> list[Bin]:
+    bins, tied_shares = [], _average_ties(probabilities, is_right)
+    for part in _split_bins(probabilities):
+        hits, count = float(tied_shares[part].sum()), len(part)
+        bins.append(Bin(float(probabilities[part].mean()), hits / count, *wilson(hits, count), count))
+    return bins

@@ -42,20 +42,20 @@ class Figure:
     """Number of cases that count towards a share; None for a statistic."""
 
 
-def share(name: str, among: Sequence[Item], right: Callable[[Item], bool]) -> Figure:
-    """Share of the items among `among` for which `right` is true, with Wilson's interval; without a value where there
+def share(name: str, items: Sequence[Item], is_hit: Callable[[Item], bool]) -> Figure:
+    """Share of the items among `items` for which `is_hit` is true, with Wilson's interval; without a value where there
     are no items."""
-    hits, of = sum(right(each) for each in among), len(among)
-    if not of:
+    hits, count = sum(is_hit(item) for item in items), len(items)
+    if not count:
         return Figure(name, None, None, None, 0, 0)
-    low, high = wilson(hits, of)
-    return Figure(name, hits / of, low, high, of, hits)
+    low, high = wilson(hits, count)
+    return Figure(name, hits / count, low, high, count, hits)
 
 
-def wilson(hits: float, of: int) -> tuple[float, float]:
-    """Lower and upper end of Wilson's 95 % score interval of a proportion. hits: successes, 0 to `of`. of: trials, at
-    least 1."""
-    low, high = proportion_confint(hits, of, method="wilson")
+def wilson(hits: float, trials: int) -> tuple[float, float]:
+    """Lower and upper end of Wilson's 95 % score interval of a proportion. hits: successes, 0 to `trials`. trials:
+    trials, at least 1."""
+    low, high = proportion_confint(hits, trials, method="wilson")
     return float(low), float(high)
 
 
@@ -63,12 +63,12 @@ def pool_share(name: str, groups: Sequence[Sequence[bool]]) -> Figure:
     """Share of true items in all groups together, whose items depend on each other: the interval resamples groups as a
     whole (cluster bootstrap). Empty groups are left out; without a value where all are empty."""
     hits = np.array([sum(group) for group in groups if group], dtype=np.float64)
-    of = np.array([len(group) for group in groups if group], dtype=np.float64)
-    if not len(of):
+    sizes = np.array([len(group) for group in groups if group], dtype=np.float64)
+    if not len(sizes):
         return Figure(name, None, None, None, 0, 0)
-    drawn = np.random.default_rng(_GROUP_SEED).integers(len(of), size=(RESAMPLED, len(of)))
-    low, high = np.quantile(hits[drawn].sum(axis=1) / of[drawn].sum(axis=1), _QUANTILES)
-    return Figure(name, float(hits.sum() / of.sum()), float(low), float(high), int(of.sum()), int(hits.sum()))
+    resamples = np.random.default_rng(_GROUP_SEED).integers(len(sizes), size=(RESAMPLED, len(sizes)))
+    low, high = np.quantile(hits[resamples].sum(axis=1) / sizes[resamples].sum(axis=1), _QUANTILES)
+    return Figure(name, float(hits.sum() / sizes.sum()), float(low), float(high), int(sizes.sum()), int(hits.sum()))
 
 
 def statistic(name: str, values: Iterable[float], reduce: Callable[..., FloatArray]) -> Figure:
@@ -76,10 +76,10 @@ def statistic(name: str, values: Iterable[float], reduce: Callable[..., FloatArr
 
     reduce: function of an array (resamples, values) and `axis=1`, such as np.median or np.mean.
     """
-    known = np.array([value for value in values if np.isfinite(value)], dtype=np.float64)
-    if not len(known):
+    finite = np.array([value for value in values if np.isfinite(value)], dtype=np.float64)
+    if not len(finite):
         return Figure(name, None, None, None, 0)
-    value = float(reduce(known[None, :], axis=1)[0])
-    drawn = np.random.default_rng(_VALUE_SEED).integers(len(known), size=(RESAMPLED, len(known)))
-    low, high = np.quantile(reduce(known[drawn], axis=1), _QUANTILES)
-    return Figure(name, value, float(low), float(high), len(known))
+    value = float(reduce(finite[None, :], axis=1)[0])
+    resamples = np.random.default_rng(_VALUE_SEED).integers(len(finite), size=(RESAMPLED, len(finite)))
+    low, high = np.quantile(reduce(finite[resamples], axis=1), _QUANTILES)
+    return Figure(name, value, float(low), float(high), len(finite))

@@ -31,7 +31,7 @@ class ControlOutcome:
 def judge_control(name: str, claim: str, answers: Sequence[Diagnosis | None]) -> ControlOutcome:
     """Judge a claim on the answers, in the order of the control's inputs. None = the diagnosis refused or failed.
     Raises KeyError for a claim that `CLAIMS` lacks."""
-    return ControlOutcome(name, claim, CLAIMS[claim](answers), tuple(map(_answer_text, answers)))
+    return ControlOutcome(name, claim, CLAIMS[claim](answers), tuple(map(_format_answer, answers)))
 
 
 def _names_nothing(answers: Sequence[Diagnosis | None]) -> bool:
@@ -41,7 +41,7 @@ def _names_nothing(answers: Sequence[Diagnosis | None]) -> bool:
     )
 
 
-def _not_explained(answers: Sequence[Diagnosis | None]) -> bool:
+def _explains_nothing(answers: Sequence[Diagnosis | None]) -> bool:
     """No answer has the verdict "explained"; a refusal explains nothing."""
     return all(answer is None or answer.verdict != "explained" for answer in answers)
 
@@ -53,13 +53,13 @@ def _no_mismatch(answers: Sequence[Diagnosis | None]) -> bool:
 
 def _same_answers(answers: Sequence[Diagnosis | None]) -> bool:
     """The same verdict, effects and axes, and at least one effect."""
-    distinct = {_verdict_and_effects(answer, with_axes=True) for answer in answers if answer is not None}
+    distinct = {_list_verdict_and_effects(answer, with_axes=True) for answer in answers if answer is not None}
     return len(distinct) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
 def _same_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
     """The same verdict and effects, and at least one effect; axes may differ."""
-    distinct = {_verdict_and_effects(answer, with_axes=False) for answer in answers if answer is not None}
+    distinct = {_list_verdict_and_effects(answer, with_axes=False) for answer in answers if answer is not None}
     return len(distinct) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
@@ -80,20 +80,22 @@ def _opposite_sign(answers: Sequence[Diagnosis | None]) -> bool:
     return abs(mains[0] + mains[1]) <= SAME_NUMBER * abs(mains[0])
 
 
-def _verdict_and_effects(diagnosis: Diagnosis, with_axes: bool) -> tuple[object, ...]:
+def _list_verdict_and_effects(diagnosis: Diagnosis, with_axes: bool) -> tuple[object, ...]:
     return diagnosis.verdict, *((effect.effect, effect.axis if with_axes else None) for effect in diagnosis.effects)
 
 
-def _answer_text(diagnosis: Diagnosis | None) -> str:
+def _format_answer(diagnosis: Diagnosis | None) -> str:
     if diagnosis is None:
         return "no answer"
-    named = ", ".join(f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''}" for effect in diagnosis.effects)
-    return diagnosis.verdict.replace("_", " ") + (f": {named}" if named else "")
+    names_text = ", ".join(
+        f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''}" for effect in diagnosis.effects
+    )
+    return diagnosis.verdict.replace("_", " ") + (f": {names_text}" if names_text else "")
 
 
 CLAIMS: Mapping[str, Callable[[Sequence[Diagnosis | None]], bool]] = {
     "no name": _names_nothing,
-    "not explained": _not_explained,
+    "not explained": _explains_nothing,
     "nothing": _no_mismatch,
     "same": _same_answers,
     "same but axes": _same_but_axes,

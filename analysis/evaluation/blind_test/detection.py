@@ -8,7 +8,7 @@ import numpy as np
 from analysis.evaluation.blind_test.confidence_intervals import wilson
 from analysis.evaluation.blind_test.outcome import DETECTABLE, Outcome
 
-PARTS = 10
+SIZE_GROUPS = 10
 """Bins of the detection curve, with equally many cases each. By hand."""
 LEAST_DRAWS = 3
 """Fewest draws for a line fit. By hand."""
@@ -27,40 +27,40 @@ class EffectDraws:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class SizeGroup:
     """Detection rate of a group of effects of similar size, with Wilson's 95 % interval."""
 
-    adds: float
+    median_change: float
     """Median of its draws: what the effect changes of the readings, in units of the noise."""
-    right: float
+    rate: float
     low: float
     high: float
-    of: int
+    count: int
 
 
-def detection_strips(singles: Sequence[Outcome]) -> tuple[EffectDraws, ...]:
-    """A strip per effect, by name. singles: outcomes with a single concealed effect."""
+def make_detection_strips(singles: Sequence[Outcome]) -> tuple[EffectDraws, ...]:
+    """The draws of each effect, by name. singles: outcomes with a single concealed effect."""
     names = sorted({single.names[0] for single in singles})
-    found = []
+    strips = []
     for name in names:
-        own = [single for single in singles if single.names[0] == name]
-        draws = tuple(sorted((each.strengths[0], classify_outcome(each)) for each in own))
-        found.append(EffectDraws(name, draws, ideal_threshold(own)))
-    return tuple(found)
+        effect_singles = [single for single in singles if single.names[0] == name]
+        draws = tuple(sorted((case.strengths[0], classify_outcome(case)) for case in effect_singles))
+        strips.append(EffectDraws(name, draws, compute_ideal_threshold(effect_singles)))
+    return tuple(strips)
 
 
-def ideal_threshold(draws: Sequence[Outcome]) -> float | None:
+def compute_ideal_threshold(draws: Sequence[Outcome]) -> float | None:
     """The strength (0 to 1) from which an ideal observer detects an effect, by a line fit: strength is the logarithm of
     the effect's parameter, and what it adds grows about as a power of that. None with fewer than `LEAST_DRAWS` draws,
     or where what is added does not grow."""
-    known = [(draw.strengths[0], np.log(draw.adds)) for draw in draws if draw.adds > 0]
-    strengths = [strength for strength, _ in known]
-    if len(known) < LEAST_DRAWS or np.ptp(strengths) == 0:
+    points = [(draw.strengths[0], np.log(draw.adds)) for draw in draws if draw.adds > 0]
+    strengths = [strength for strength, _ in points]
+    if len(points) < LEAST_DRAWS or np.ptp(strengths) == 0:
         return None
-    slope, start = np.polyfit(strengths, [size for _, size in known], 1)
+    slope, intercept = np.polyfit(strengths, [log_change for _, log_change in points], 1)
     if slope <= 0:
         return None
-    return float(np.clip((np.log(np.sqrt(DETECTABLE**2 - 1)) - start) / slope, 0.0, 1.0))
+    return float(np.clip((np.log(np.sqrt(DETECTABLE**2 - 1)) - intercept) / slope, 0.0, 1.0))
 
 
 def classify_outcome(outcome: Outcome) -> str:
@@ -73,13 +73,13 @@ def classify_outcome(outcome: Outcome) -> str:
     return "missed" if outcome.detectable else "invisible"
 
 
-def shares_by_size(singles: Sequence[Outcome]) -> tuple[Part, ...]:
+def compute_rates_by_size(singles: Sequence[Outcome]) -> tuple[SizeGroup, ...]:
     """Detection rate in groups of equal count, the smallest effects first."""
-    order = sorted(singles, key=lambda single: single.adds)
-    found = []
-    for part in np.array_split(np.arange(len(order)), min(PARTS, len(order))):
-        drawn = [order[k] for k in part]
-        hits = sum(each.right for each in drawn)
-        size = float(np.median([max(each.adds, 1e-3) for each in drawn]))
-        found.append(Part(size, hits / len(drawn), *wilson(hits, len(drawn)), len(drawn)))
-    return tuple(found)
+    ordered = sorted(singles, key=lambda single: single.adds)
+    groups = []
+    for indices in np.array_split(np.arange(len(ordered)), min(SIZE_GROUPS, len(ordered))):
+        group = [ordered[k] for k in indices]
+        hits = sum(case.right for case in group)
+        median_change = float(np.median([max(case.adds, 1e-3) for case in group]))
+        groups.append(SizeGroup(median_change, hits / len(group), *wilson(hits, len(group)), len(group)))
+    return tuple(groups)

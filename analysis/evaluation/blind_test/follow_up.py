@@ -39,13 +39,25 @@ class FollowUp:
         return self.after_drawn == (self.effect,)
 
 
-def follow_up_figures(found: Sequence[FollowUp]) -> tuple[Figure, ...]:
+def compute_follow_up_figures(follow_ups: Sequence[FollowUp]) -> tuple[Figure, ...]:
     """Shares of ambiguous answers that the proposed or the random recording resolved: of all answers, and of those with
     a proposal."""
-    asked = [each for each in found if each.proposed]
+    with_proposal = [follow_up for follow_up in follow_ups if follow_up.proposed]
     return (
-        share("several names, the right one left by the proposed recording", found, lambda each: each.resolved),
-        share("several names, the right one left by a random recording", found, lambda each: each.resolved_by_chance),
-        share("the same where one is proposed, by the proposed", asked, lambda each: each.resolved),
-        share("the same where one is proposed, by a random one", asked, lambda each: each.resolved_by_chance),
+        share(
+            "several names, the right one left by the proposed recording",
+            follow_ups,
+            lambda follow_up: follow_up.resolved,
+        ),
+        share(
+            "several names, the right one left by a random recording",
+            follow_ups,
+            lambda follow_up: follow_up.resolved_by_chance,
+        ),
+        share("the same where one is proposed, by the proposed", with_proposal, lambda follow_up: follow_up.resolved),
+        share(
+            "the same where one is proposed, by a random one",
+            with_proposal,
+            lambda follow_up: follow_up.resolved_by_chance,
+        ),
     )

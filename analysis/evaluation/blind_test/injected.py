@@ -9,8 +9,8 @@ from analysis.evaluation.blind_test.confidence_intervals import Figure, share
 DETECTABLE = 1.25
 """Factor by which a fault must change the held-out error of the device's base model, up or down, to count as
 detectable. By hand."""
-Judged = Literal["named", "in class", "other name, right place", "wrong", "unnamed", "nothing named"]
-JUDGED: tuple[Judged, ...] = get_args(Judged)
+AnswerClass = Literal["named", "in class", "other name, right place", "wrong", "unnamed", "nothing named"]
+ANSWER_CLASSES: tuple[AnswerClass, ...] = get_args(AnswerClass)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class InjectedOutcome:
         return self.change >= DETECTABLE or self.change <= 1 / DETECTABLE
 
     @property
-    def judged(self) -> Judged:
+    def answer_class(self) -> AnswerClass:
         """Class of the answer, by the worst of its names: every name is an injected fault ("named"); an injected fault
         is in the returned set ("in class"); the other names are at the right places; or "wrong". With two faults at
         once, naming one of them is right."""
@@ -68,14 +68,14 @@ class InjectedOutcome:
     @property
     def right(self) -> bool:
         """Whether `judged` is "named", "in class" or, without a fault, "nothing named"."""
-        return self.judged in ("named", "in class", "nothing named")
+        return self.answer_class in ("named", "in class", "nothing named")
 
 
 def read_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> InjectedOutcome:
     """Outcome from a sealed label and the document that the diagnosis wrote."""
     diagnosis = answer.get("diagnosis", {})
     effects = diagnosis.get("effects", [])
-    named = [effect["effect"] for effect in effects]
+    names = [effect["effect"] for effect in effects]
     rivals = [rival["effect"] for effect in effects for rival in effect["rivals"] if rival["inseparable"]]
     return InjectedOutcome(
         recording=str(label["recording"]),
@@ -85,64 +85,68 @@ def read_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> Injecte
         values=dict(label["values"]),
         change=label["change"],
         verdict=str(diagnosis.get("verdict", "failed")),
-        named=tuple(named),
+        named=tuple(names),
         named_places=tuple(effect["place"] for effect in effects),
-        returned=tuple(dict.fromkeys([*named, *rivals])),
+        returned=tuple(dict.fromkeys([*names, *rivals])),
         seconds=float(answer.get("seconds", 0.0)),
         failed=str(answer.get("failed", "")),
     )
 
 
-def injected_figures(outcomes: Sequence[InjectedOutcome]) -> tuple[Figure, ...]:
+def score_injections(outcomes: Sequence[InjectedOutcome]) -> tuple[Figure, ...]:
     """Shares of right and wrong answers, with Wilson's 95 % intervals."""
     faults = [outcome for outcome in outcomes if outcome.detectable]
-    weak = [outcome for outcome in outcomes if outcome.effects and not outcome.detectable]
-    nothing = [outcome for outcome in outcomes if not outcome.effects]
+    undetectable = [outcome for outcome in outcomes if outcome.effects and not outcome.detectable]
+    faultless = [outcome for outcome in outcomes if not outcome.effects]
     return (
-        share("nothing injected, nothing named", nothing, lambda each: each.right),
-        share("detectable faults named, or in the class", faults, lambda each: each.right),
-        share("detectable faults, another name at the right place", faults, _is_judged("other name, right place")),
-        share("detectable faults, a wrong fault named", faults, _is_judged("wrong")),
-        share("too weak to ask for, named all the same", weak, lambda each: each.right),
-        share("too weak to ask for, a wrong fault named", weak, _is_judged("wrong")),
+        share("nothing injected, nothing named", faultless, lambda case: case.right),
+        share("detectable faults named, or in the class", faults, lambda case: case.right),
+        share(
+            "detectable faults, another name at the right place", faults, _make_class_test("other name, right place")
+        ),
+        share("detectable faults, a wrong fault named", faults, _make_class_test("wrong")),
+        share("too weak to ask for, named all the same", undetectable, lambda case: case.right),
+        share("too weak to ask for, a wrong fault named", undetectable, _make_class_test("wrong")),
     )
 
 
-def _is_judged(judged: Judged) -> Callable[[InjectedOutcome], bool]:
-    return lambda each: each.judged == judged
+def _make_class_test(answer_class: AnswerClass) -> Callable[[InjectedOutcome], bool]:
+    return lambda case: case.answer_class == answer_class
 
 
 @dataclass(frozen=True, slots=True)
 class Tally:
     """One row of a table: a kind of fault, or a recording."""
 
-    what: str
-    drawn: int
+    name: str
+    fault_count: int
     """Number of injected faults, detectable or not."""
     counts: tuple[int, ...]
-    """Number of detectable faults per entry of JUDGED without its last."""
+    """Number of detectable faults per entry of `ANSWER_CLASSES` without its last."""
     right: Figure
-    nothing: Figure
+    faultless: Figure
     """Cases without a fault in which nothing was named."""
 
 
-def tallies(outcomes: Sequence[InjectedOutcome], key: Callable[[InjectedOutcome], str]) -> tuple[Tally, ...]:
+def make_tallies(outcomes: Sequence[InjectedOutcome], key: Callable[[InjectedOutcome], str]) -> tuple[Tally, ...]:
     """Groups by key, in the order of names; outcomes with an empty key are left out."""
     return tuple(
-        _tally(name, [outcome for outcome in outcomes if key(outcome) == name])
+        _make_tally(name, [outcome for outcome in outcomes if key(outcome) == name])
         for name in sorted({*map(key, outcomes)} - {""})
     )
 
 
-def _tally(name: str, outcomes: Sequence[InjectedOutcome]) -> Tally:
+def _make_tally(name: str, outcomes: Sequence[InjectedOutcome]) -> Tally:
     faults = [outcome for outcome in outcomes if outcome.effects]
     detectable = [fault for fault in faults if fault.detectable]
-    nothing = [outcome for outcome in outcomes if not outcome.effects]
-    counts = tuple(sum(each.judged == judged for each in detectable) for judged in JUDGED[:-1])
+    faultless = [outcome for outcome in outcomes if not outcome.effects]
+    counts = tuple(
+        sum(case.answer_class == answer_class for case in detectable) for answer_class in ANSWER_CLASSES[:-1]
+    )
     return Tally(
         name,
         len(faults),
         counts,
-        share(name, detectable, lambda each: each.right),
-        share(name, nothing, lambda each: each.right),
+        share(name, detectable, lambda case: case.right),
+        share(name, faultless, lambda case: case.right),
     )

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from analysis.diagnosis.document import Diagnosis
 from analysis.evaluation.blind_test.confidence_intervals import Figure, share
 
-NOTHING, MISSING = "nothing", "missing"
+CONTROL_CHANGE, MISSING = "nothing", "missing"
 """Name of the change that changes nothing (control); verdict of a recording without a diagnosis."""
 
 
@@ -21,7 +21,7 @@ class Change:
     """A change that the lab makes to the device."""
 
     name: str
-    how: str
+    instruction: str
     """Instruction to the lab."""
     effects: tuple[str, ...]
     """Effects of which any is a right answer; empty for the control. The value is a parameter of the first of them."""
@@ -31,7 +31,7 @@ class Change:
 
 
 CHANGES: tuple[Change, ...] = (
-    Change(NOTHING, "Remove all attachments and mount them again, as if something were changed.", (), ""),
+    Change(CONTROL_CHANGE, "Remove all attachments and mount them again, as if something were changed.", (), ""),
     Change(
         "added_mass",
         "Screw 20 to 100 g to the handle, close to its middle, and weigh them beforehand.",
@@ -63,7 +63,7 @@ CHANGES: tuple[Change, ...] = (
         "",
     ),
 )
-CHANGES_BY_NAME = {each.name: each for each in CHANGES}
+CHANGES_BY_NAME = {kit_change.name: kit_change for kit_change in CHANGES}
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class Label:
 
 @dataclass(frozen=True, slots=True)
 class Scored:
-    """A diagnosis beside the change that was made; one row of the scored table."""
+    """A diagnosis with the change that was made: one row of the scored table."""
 
     recording: str
     change: str
@@ -101,24 +101,28 @@ def score_label(label: Label, diagnosis: Diagnosis) -> Scored:
     """Score a diagnosis: right where one of the change's effects is in the returned set; for no change, where no effect
     is named."""
     change = CHANGES_BY_NAME[label.change]
-    named = tuple(effect.effect for effect in diagnosis.effects)
-    right = any(each in diagnosis.returned_set for each in change.effects) if change.effects else not named
+    named_effects = tuple(effect.effect for effect in diagnosis.effects)
+    is_answer_right = (
+        any(effect_name in diagnosis.returned_set for effect_name in change.effects)
+        if change.effects
+        else not named_effects
+    )
     return Scored(
         label.recording,
         label.change,
         label.value,
         diagnosis.verdict,
-        " ".join(named),
+        " ".join(named_effects),
         " ".join(diagnosis.returned_set),
-        right,
+        is_answer_right,
         _is_in_interval(label.value, change, diagnosis),
     )
 
 
 def score_unanswered(label: Label) -> Scored:
     """Score a missing diagnosis as wrong, with its value in no interval, so that leaving one out raises no rate."""
-    written = label.value is not None and bool(CHANGES_BY_NAME[label.change].unit)
-    return Scored(label.recording, label.change, label.value, MISSING, "", "", False, False if written else None)
+    has_value = label.value is not None and bool(CHANGES_BY_NAME[label.change].unit)
+    return Scored(label.recording, label.change, label.value, MISSING, "", "", False, False if has_value else None)
 
 
 def _is_in_interval(value: float | None, change: Change, diagnosis: Diagnosis) -> bool | None:
@@ -126,27 +130,27 @@ def _is_in_interval(value: float | None, change: Change, diagnosis: Diagnosis) -
     if value is None or not change.unit:
         return None
     for effect in diagnosis.effects:
-        ends = next(iter(effect.parameters.values())).ci95 if effect.parameters else None
-        if effect.effect == change.effects[0] and ends is not None:
-            return ends[0] <= value <= ends[1]
+        interval = next(iter(effect.parameters.values())).ci95 if effect.parameters else None
+        if effect.effect == change.effects[0] and interval is not None:
+            return interval[0] <= value <= interval[1]
     return None
 
 
-def kit_figures(rows: Sequence[Scored]) -> tuple[Figure, ...]:
+def compute_kit_figures(rows: Sequence[Scored]) -> tuple[Figure, ...]:
     """Rates with Wilson's 95 % intervals."""
-    changed = [row for row in rows if row.change != NOTHING]
-    kinds = [change.name for change in CHANGES if any(row.change == change.name for row in changed)]
+    changed_rows = [row for row in rows if row.change != CONTROL_CHANGE]
+    kinds = [change.name for change in CHANGES if any(row.change == change.name for row in changed_rows)]
     return (
-        share("changes named", changed, lambda each: each.right),
-        share("nothing changed, nothing named", _rows_with_change(rows, NOTHING), lambda each: each.right),
-        share("written numbers inside their interval", _rows_with_interval(rows), lambda each: bool(each.inside)),
-        *(share(kind, _rows_with_change(rows, kind), lambda each: each.right) for kind in kinds),
+        share("changes named", changed_rows, lambda scored: scored.right),
+        share("nothing changed, nothing named", _select_change(rows, CONTROL_CHANGE), lambda scored: scored.right),
+        share("written numbers inside their interval", _select_with_interval(rows), lambda scored: bool(scored.inside)),
+        *(share(kind, _select_change(rows, kind), lambda scored: scored.right) for kind in kinds),
     )
 
 
-def _rows_with_change(rows: Sequence[Scored], change: str) -> list[Scored]:
+def _select_change(rows: Sequence[Scored], change: str) -> list[Scored]:
     return [row for row in rows if row.change == change]
 
 
-def _rows_with_interval(rows: Sequence[Scored]) -> list[Scored]:
+def _select_with_interval(rows: Sequence[Scored]) -> list[Scored]:
     return [row for row in rows if row.inside is not None]

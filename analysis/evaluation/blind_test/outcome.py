@@ -46,9 +46,9 @@ class AnsweredCase:
     @property
     def detectable(self) -> bool:
         """Whether the re-tuned model leaves a detectable error; a failed diagnosis counts as if it did."""
-        return self.diagnosis is None or self.left("retuned") > DETECTABLE
+        return self.diagnosis is None or self.worst_error("retuned") > DETECTABLE
 
-    def left(self, stage: str) -> float:
+    def worst_error(self, stage: str) -> float:
         """Rms error on held-out samples over the noise's rms, in the worst channel; NaN where it is not known. stage:
         "before", "retuned" or "after"."""
         return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))
@@ -70,7 +70,7 @@ class Outcome(AnsweredCase):
     @property
     def names(self) -> tuple[str, ...]:
         """The concealed effects, in the order of `concealed`."""
-        return tuple(each.effect for each in self.concealed)
+        return tuple(concealed.effect for concealed in self.concealed)
 
     @property
     def named(self) -> tuple[NamedEffect, ...]:
@@ -80,7 +80,7 @@ class Outcome(AnsweredCase):
     @property
     def named_names(self) -> tuple[str, ...]:
         """The effects of `named`, without their parameters."""
-        return tuple(each.effect for each in self.named)
+        return tuple(effect.effect for effect in self.named)
 
     @property
     def seen_by_ideal_observer(self) -> bool:
@@ -91,7 +91,7 @@ class Outcome(AnsweredCase):
     @property
     def right(self) -> bool:
         """Whether exactly the concealed effects are named; their places and parameters are scored elsewhere. A failed
-        diagnosis names none: see `score.is_miss`, which counts it."""
+        diagnosis names none: see `score.is_wrong_answer`, which counts it."""
         return sorted(self.named_names) == sorted(self.names)
 
     @property

@@ -1,11 +1,11 @@
-"""Texts for reports of a blind test: a share with its confidence interval, the concealed effects, the answer."""
+"""Texts for reports of a blind test: scores with confidence intervals, concealed effects, and answers."""
 
 from analysis.evaluation.blind_test.confidence_intervals import Figure
 from analysis.evaluation.blind_test.outcome import Outcome
 
 
-def figure_text(figure: Figure) -> str:
-    """A figure with its 95 % interval and its number of cases, in per cent where it is a share, such as
+def format_figure(figure: Figure) -> str:
+    """A score with its 95 % interval and its number of cases, in per cent where it is a share, such as
     "95.7 % [90, 98], 110 of 115"; "none drawn" where it has no value."""
     if figure.value is None or figure.low is None or figure.high is None:
         return "none drawn"
@@ -19,17 +19,21 @@ def describe_concealed(outcome: Outcome) -> str:
     """The concealed effects with their axes, such as "coulomb_friction of x + end_stop of y"; "nothing" where there are
     none."""
     return (
-        " + ".join(f"{each.effect}{f' of {each.axis}' if each.axis else ''}" for each in outcome.concealed) or "nothing"
+        " + ".join(f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''}" for effect in outcome.concealed)
+        or "nothing"
     )
 
 
-def answer_text(outcome: Outcome) -> str:
+def describe_answer(outcome: Outcome) -> str:
     """The verdict, and the named effects with their axes and stated probabilities (0 to 1)."""
-    text = " + ".join(f"{e.effect}{f' of {e.axis}' if e.axis else ''} ({e.probability:.2f})" for e in outcome.named)
+    text = " + ".join(
+        f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''} ({effect.probability:.2f})"
+        for effect in outcome.named
+    )
     return f"{outcome.verdict.replace('_', ' ')}{f': {text}' if text else ''}"
 
 
-def strength_text(outcome: Outcome) -> str:
+def describe_strengths(outcome: Outcome) -> str:
     """The strengths of the concealed effects, from 0 (the weakest that is drawn) to 1 (the strongest), separated by
     commas; empty where nothing was concealed."""
     return ", ".join(f"{value:.2f}" for value in outcome.strengths)

@@ -29,40 +29,42 @@ class FreshMotion:
     rate_hz: float
 
 
-def law_error(laws: Sequence[Law], fresh: FreshMotion) -> float:
+def law_error(laws: Sequence[Law], motion: FreshMotion) -> float:
     """The relative error of the module's equation, on the worst axis that has a true law; inf where a found law gives
     a number that is not finite. laws: the found laws."""
-    return max(_axis_error(laws, fresh, axis) for axis in fresh.added)
+    return max(_axis_error(laws, motion, axis) for axis in motion.added)
 
 
-def _axis_error(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
+def _axis_error(laws: Sequence[Law], motion: FreshMotion, axis: str) -> float:
     """The relative error on one axis. A law that replaces a command or a response contributes its difference from
     it."""
-    true, found = fresh.added[axis], np.zeros(len(fresh.added[axis]))
+    true_contribution, found_contribution = motion.added[axis], np.zeros(len(motion.added[axis]))
     for law in laws:
-        if law.axis[-1] != axis or (law.acts_on == "response") != fresh.response:
+        if law.axis[-1] != axis or (law.acts_on == "response") != motion.response:
             continue
         replaced = {"force": None, "command": f"f{axis}", "response": f"a{axis}"}[law.acts_on]
-        predicted = evaluate(law, _begin_at_rest(fresh), fresh.rate_hz)[1:]
-        found = found + predicted - (0.0 if replaced is None else fresh.columns[replaced])
-    if not np.isfinite(found).all():
+        predicted = evaluate(law, _begin_at_rest(motion), motion.rate_hz)[1:]
+        found_contribution = found_contribution + predicted - (0.0 if replaced is None else motion.columns[replaced])
+    if not np.isfinite(found_contribution).all():
         return float("inf")
     fitted_by_model = [
-        fresh.columns[name] for name in ((f"a{axis}",) if fresh.response else (f"a{axis}", f"v{axis}", axis))
+        motion.columns[name] for name in ((f"a{axis}",) if motion.response else (f"a{axis}", f"v{axis}", axis))
     ]
-    base = np.linalg.qr(np.column_stack([*(_normalise(column) for column in fitted_by_model), np.ones(len(true))]))[0]
+    base = np.linalg.qr(
+        np.column_stack([*(_normalise(column) for column in fitted_by_model), np.ones(len(true_contribution))])
+    )[0]
 
     def norm_beyond_model(force: FloatArray) -> float:
         return float(np.linalg.norm(force - base @ (base.T @ force)))
 
-    return norm_beyond_model(true - found) / max(norm_beyond_model(true), 1e-300)
+    return norm_beyond_model(true_contribution - found_contribution) / max(norm_beyond_model(true_contribution), 1e-300)
 
 
-def _begin_at_rest(fresh: FreshMotion) -> Mapping[str, FloatArray]:
+def _begin_at_rest(motion: FreshMotion) -> Mapping[str, FloatArray]:
     """The signals preceded by a sample of zeros, because the states of laws with memory start at rest, as the simulated
     device did."""
-    columns = {name: np.concatenate([[0.0], column]) for name, column in fresh.columns.items()}
-    return columns | {"t": np.concatenate([[fresh.columns["t"][0] - 1 / fresh.rate_hz], fresh.columns["t"]])}
+    columns = {name: np.concatenate([[0.0], column]) for name, column in motion.columns.items()}
+    return columns | {"t": np.concatenate([[motion.columns["t"][0] - 1 / motion.rate_hz], motion.columns["t"]])}
 
 
 def _normalise(column: FloatArray) -> FloatArray:

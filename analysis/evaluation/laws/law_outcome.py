@@ -1,6 +1,6 @@
 """Outcome of a single case of a bank of laws: the concealed law, the diagnosis, and the error of the law it found.
 
-An answer is right if its structure is (place, axis, variables, memory) and its function is within `CLOSE`.
+An answer is right if its structure is (place, axis, variables, memory) and its function is within `MAX_LAW_ERROR`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from analysis.evaluation.blind_test.outcome import AnsweredCase
 from equalizer.effects.discovered_law import has_memory
 from equalizer.laws.law import Law, law_of
 
-CLOSE = 0.05
+MAX_LAW_ERROR = 0.05
 """Relative error (`law_error`) up to which a law counts as the concealed function."""
 
 
@@ -64,7 +64,9 @@ class LawOutcome(AnsweredCase):
     def names(self) -> tuple[str, ...]:
         """Names of the named effects that are in the catalogue."""
         return (
-            () if self.diagnosis is None else tuple(each.effect for each in self.diagnosis.effects if each.law is None)
+            ()
+            if self.diagnosis is None
+            else tuple(effect.effect for effect in self.diagnosis.effects if effect.law is None)
         )
 
     @property
@@ -74,13 +76,13 @@ class LawOutcome(AnsweredCase):
 
     @property
     def close(self) -> bool:
-        """Whether the error of `laws` is at most `CLOSE` in the visited range."""
-        return bool(self.laws) and bool(self.errors) and self.errors[0] <= CLOSE
+        """Whether the error of `laws` is at most `MAX_LAW_ERROR` in the visited range."""
+        return bool(self.laws) and bool(self.errors) and self.errors[0] <= MAX_LAW_ERROR
 
     @property
     def close_louder(self) -> bool:
-        """Whether the error of `laws` is at most `CLOSE` at a higher level than recorded."""
-        return bool(self.laws) and len(self.errors) > 1 and self.errors[1] <= CLOSE
+        """Whether the error of `laws` is at most `MAX_LAW_ERROR` at a higher level than recorded."""
+        return bool(self.laws) and len(self.errors) > 1 and self.errors[1] <= MAX_LAW_ERROR
 
     @property
     def wrongly_explained(self) -> bool:
@@ -101,9 +103,11 @@ class LawOutcome(AnsweredCase):
         return self.truth is not None and self.detectable and not (self.structured and self.close)
 
 
-def _collect_laws(found: Sequence[NamedEffect] | Sequence[Candidate]) -> tuple[Law, ...]:
+def _collect_laws(entries: Sequence[NamedEffect] | Sequence[Candidate]) -> tuple[Law, ...]:
     """The laws among effects or candidates of the document."""
-    return tuple(law_of(each.law.expression, each.law.acts_on, each.law.axis) for each in found if each.law is not None)
+    return tuple(
+        law_of(entry.law.expression, entry.law.acts_on, entry.law.axis) for entry in entries if entry.law is not None
+    )
 
 
 def _has_true_structure(laws: Sequence[Law], truth: TrueLaw) -> bool:
@@ -111,10 +115,10 @@ def _has_true_structure(laws: Sequence[Law], truth: TrueLaw) -> bool:
     laws_by_axis = {axis: [law for law in laws if law.axis[-1] == axis] for axis in {law.axis[-1] for law in laws}}
     if set(laws_by_axis) != set(truth.axes):
         return False
-    for axis, readings in zip(truth.axes, truth.variables, strict=True):
+    for axis, variable_sets in zip(truth.axes, truth.variables, strict=True):
         variables = " ".join(sorted({name for law in laws_by_axis[axis] for name in law.variables}))
-        remembers = any(has_memory(law) for law in laws_by_axis[axis])
-        if variables not in readings or remembers != truth.memory:
+        has_states = any(has_memory(law) for law in laws_by_axis[axis])
+        if variables not in variable_sets or has_states != truth.memory:
             return False
         if any(law.acts_on not in truth.acts_on for law in laws_by_axis[axis]):
             return False

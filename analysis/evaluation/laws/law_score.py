@@ -24,28 +24,28 @@ class LawScore:
 def law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
     """Score of a bank: rates over cases with a law, without a missing effect and with decoys, and the median processor
     time (s)."""
-    laws = [each for each in outcomes if each.truth is not None]
-    shown = [each for each in laws if each.detectable]
-    nulls = [each for each in outcomes if each.kind == "nothing"]
-    others = [each for each in outcomes if each.kind in ("decoy", "mode")]
-    with_names = [each for each in shown if each.named]
+    laws = [case for case in outcomes if case.truth is not None]
+    detectable = [case for case in laws if case.detectable]
+    nulls = [case for case in outcomes if case.kind == "nothing"]
+    decoys = [case for case in outcomes if case.kind in ("decoy", "mode")]
+    with_names = [case for case in detectable if case.named]
     figures = (
-        share("laws that show", laws, lambda each: each.detectable),
-        share("of these a law is named", shown, lambda each: bool(each.named)),
-        share("a law is named or a candidate", shown, lambda each: bool(each.laws)),
-        share("structure right, named or a candidate", shown, lambda each: each.structured),
-        share("structure right and named", shown, lambda each: bool(each.named) and each.structured),
-        share("function within 5 % where it was visited", shown, lambda each: each.close),
-        share("function within 5 % on louder commands", shown, lambda each: each.close_louder),
-        share("wrong law explained, of laws that show", shown, lambda each: each.wrongly_explained),
-        share("wrong law explained, of laws named", with_names, lambda each: each.wrongly_explained),
-        share("a name of the catalogue explained instead", shown, _is_explained_by_other_effect),
-        share("a law named where nothing is missing", nulls, lambda each: each.false_law),
-        share("a law named on decoys", others, lambda each: each.false_law),
-        statistic("median processor seconds, laws", [each.seconds for each in laws], np.median),
-        statistic("median processor seconds, nothing missing", [each.seconds for each in nulls], np.median),
+        share("laws that show", laws, lambda case: case.detectable),
+        share("of these a law is named", detectable, lambda case: bool(case.named)),
+        share("a law is named or a candidate", detectable, lambda case: bool(case.laws)),
+        share("structure right, named or a candidate", detectable, lambda case: case.structured),
+        share("structure right and named", detectable, lambda case: bool(case.named) and case.structured),
+        share("function within 5 % where it was visited", detectable, lambda case: case.close),
+        share("function within 5 % on louder commands", detectable, lambda case: case.close_louder),
+        share("wrong law explained, of laws that show", detectable, lambda case: case.wrongly_explained),
+        share("wrong law explained, of laws named", with_names, lambda case: case.wrongly_explained),
+        share("a name of the catalogue explained instead", detectable, _is_explained_by_other_effect),
+        share("a law named where nothing is missing", nulls, lambda case: case.false_law),
+        share("a law named on decoys", decoys, lambda case: case.false_law),
+        statistic("median processor seconds, laws", [case.seconds for case in laws], np.median),
+        statistic("median processor seconds, nothing missing", [case.seconds for case in nulls], np.median),
     )
-    return LawScore(figures, tuple(each for each in outcomes if each.missed))
+    return LawScore(figures, tuple(case for case in outcomes if case.missed))
 
 
 def _is_explained_by_other_effect(outcome: LawOutcome) -> bool:

@@ -22,51 +22,68 @@ class ReproductionError(ListedProblemsError):
 
 @dataclass(frozen=True, config=STRICT)
 class Finding:
-    """One finding of the paper, beside the reproduced value."""
+    """One finding of the paper, with the reproduced value."""
 
     what: str
-    published: Annotated[str, Field(description="What the paper reports; empty where it reports nothing.")]
-    here: Annotated[str, Field(description="What came out, in words.")]
-    value: Annotated[float | None, Field(description="The number behind `here`; null where there is none.")]
-    unit: Annotated[str, Field(description="Of `value`, SI or dB, deg, 1; empty without one.")]
+    published: Annotated[str, Field(description="Value in the paper, in words; empty where the paper reports none.")]
+    here: Annotated[str, Field(description="Reproduced value, in words.")]
+    value: Annotated[float | None, Field(description="Number on which `here` is based; null where there is none.")]
+    unit: Annotated[str, Field(description="Unit of `value`: SI, dB, deg or 1; empty without a value.")]
     as_published: Annotated[
         bool | None,
-        Field(description="By the rule that `rule` states; null where the paper gives nothing to compare with."),
+        Field(
+            description="Whether the finding agrees with the paper by `rule`; null where the paper reports nothing "
+            "to compare with."
+        ),
     ]
-    rule: Annotated[str, Field(description="When it counts as published; empty where nothing is compared.")] = ""
+    rule: Annotated[
+        str, Field(description="Rule by which the finding counts as published; empty where nothing is compared.")
+    ] = ""
 
 
 @dataclass(frozen=True, config=STRICT)
 class FigureFindings:
-    """One published figure beside its reproduction."""
+    """One published figure, with its reproduction."""
 
     figure: Annotated[int, Field(ge=1, le=5)]
     title: str
     source: Annotated[str, Field(description="Place in the paper.")]
-    published: Annotated[str, Field(description="What the figure shows there, in our words.")]
+    published: Annotated[str, Field(description="Content of the published figure, in our words.")]
     findings: tuple[Finding, ...]
-    differs: Annotated[tuple[str, ...], Field(description="What is different here, and why; one sentence or two each.")]
-    remarks: Annotated[tuple[str, ...], Field(description="What the analyses themselves noted.")] = ()
+    differs: Annotated[
+        tuple[str, ...],
+        Field(description="Differences from the publication, with their reasons; one or two sentences each."),
+    ]
+    remarks: Annotated[tuple[str, ...], Field(description="Remarks of the analyses.")] = ()
 
 
 @dataclass(frozen=True, config=STRICT)
 class PlayedRow:
-    """One way of driving the device, measured on its true acceleration over every line of the band."""
+    """One method of driving the device, measured by its true acceleration at all lines of the band."""
 
     name: str
     device: str
     place_mm: tuple[float, float, float]
     hand: Annotated[bool, Field(description="Whether a simulated hand held the handle.")]
-    signal: Annotated[Literal["sweep", "multisine"], Field(description="What was wanted, along one axis at a time.")]
+    signal: Annotated[Literal["sweep", "multisine"], Field(description="Wanted signal, along one axis at a time.")]
     flatness_db: Annotated[float, Field(description="Largest deviation of a wanted axis from the wanted level.")]
-    coupling_db: Annotated[float, Field(description="Largest off-axis response over the wanted axis's, worst line.")]
-    median_coupling_db: Annotated[float, Field(description="The same, of the median line.")]
+    coupling_db: Annotated[
+        float,
+        Field(description="Largest ratio of off-axis response to response along the wanted axis, at the worst line."),
+    ]
+    median_coupling_db: Annotated[float, Field(description="The same at the median line.")]
     axis_error_deg: Annotated[float, Field(description="Largest angle between wanted and played axis.")]
-    error: Annotated[float, Field(description="Root mean square of what differs from what was wanted, over it.")]
+    error: Annotated[
+        float,
+        Field(description="Root mean square of the difference from the wanted signal, relative to the wanted signal."),
+    ]
     peak_force_n: float
-    clipped_ticks: Annotated[int, Field(description="At which a cap cut the force off.")]
+    clipped_ticks: Annotated[int, Field(description="Number of ticks at which a cap limited the force.")]
     multiply_adds: Annotated[
-        int | None, Field(description="Per sample, of a form that runs sample by sample; null where it is not counted.")
+        int | None,
+        Field(
+            description="Operations per sample of a form that runs sample by sample; null where they are not counted."
+        ),
     ] = None
 
 
@@ -75,8 +92,12 @@ class UsedModel:
     """An identified model that drives the device, with the quality that its file stores."""
 
     name: str
-    expected_error: Annotated[float, Field(description="Relative, with misfit and scatter; not below the others.")]
-    held_out_error: Annotated[float | None, Field(description="On the held-out record; null without one.")]
+    expected_error: Annotated[
+        float, Field(description="Relative error, with misfit and scatter; not below the other errors.")
+    ]
+    held_out_error: Annotated[
+        float | None, Field(description="Error on the held-out record; null without such a record.")
+    ]
     held_out_noise: Annotated[
         float | None, Field(description="Noise of the held-out record; null where it is not known.")
     ]
@@ -89,22 +110,22 @@ class Reproduction:
     device: str
     subjects: int
     seed: int
-    band_hz: Annotated[tuple[float, float], Field(description="In which the device was equalized.")]
-    order: Annotated[int, Field(description="Of the identified models.")]
+    band_hz: Annotated[tuple[float, float], Field(description="Band in which the device was equalized.")]
+    order: Annotated[int, Field(description="Order of the identified models.")]
     figures: tuple[FigureFindings, ...]
     played: Annotated[tuple[PlayedRow, ...], Field(description="Rows of figure 5, and further rows for comparison.")]
     baselines: Annotated[
         tuple[PlayedRow, ...], Field(description="Other ways of driving the device: centre, edge, in a simulated hand.")
     ] = ()
     models: Annotated[
-        tuple[UsedModel, ...], Field(description="That drive the device; none in files of earlier versions.")
+        tuple[UsedModel, ...], Field(description="Models that drive the device; empty in files of earlier versions.")
     ] = ()
 
 
 def reproduction_to_json(reproduction: Reproduction) -> dict[str, Any]:
     """The document as plain values for JSON, without format and version."""
-    plain: dict[str, Any] = _ADAPTER.dump_python(reproduction, mode="json")
-    return plain
+    values: dict[str, Any] = _ADAPTER.dump_python(reproduction, mode="json")
+    return values
 
 
 def reproduction_from_json(document: dict[str, Any]) -> Reproduction:
@@ -114,7 +135,7 @@ def reproduction_from_json(document: dict[str, Any]) -> Reproduction:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
         raise ReproductionError(
-            tuple(f"{'.'.join(map(str, wrong['loc']))}: {wrong['msg']}" for wrong in error.errors())
+            tuple(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
         ) from error
 
 

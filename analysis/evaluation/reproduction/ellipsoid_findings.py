@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from analysis.evaluation.reproduction.document import FigureFindings, Finding
 from analysis.psychophysics.ellipsoid import EllipsoidResult
-from analysis.wording import number
+from analysis.wording import format_number
 
-ALIKE = 1.25
+MAX_COUPLING_RATIO = 1.25
 """Largest ratio of the largest to the smallest coupling that counts as "nearly the same"."""
 
 _DIFFERS = (
@@ -33,8 +33,8 @@ def ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
     }
     findings = (
         *(_find_coupling(result) for result in results),
-        _low_frequency_finding(coupling),
-        _high_frequency_finding(coupling),
+        _find_low_frequency_coupling(coupling),
+        _find_high_frequency_coupling(coupling),
     )
     return FigureFindings(
         figure=3,
@@ -51,18 +51,18 @@ def ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
 def _find_coupling(result: EllipsoidResult) -> Finding:
     """Coupling and shape of the ellipse at one frequency, without a judgement: the paper prints no number."""
     ratio, axes = result.phasor.off_axis_ratio, result.moments.normalised_axes
-    along = "" if ratio is None else f"off the direction over along it {100 * ratio:.0f} %; "
+    ratio_text = "" if ratio is None else f"off the direction over along it {100 * ratio:.0f} %; "
     return Finding(
         what=f"{result.frequency_hz:g} Hz",
         published="drawn, no number",
-        here=f"{along}mean squares: axes 1 : {axes[1]:.2f}, tilt {number(result.moments.tilt_deg, 0)}°",
+        here=f"{ratio_text}mean squares: axes 1 : {axes[1]:.2f}, tilt {format_number(result.moments.tilt_deg, 0)}°",
         value=ratio,
         unit="1",
         as_published=None,
     )
 
 
-def _low_frequency_finding(coupling: dict[float, float]) -> Finding | None:
+def _find_low_frequency_coupling(coupling: dict[float, float]) -> Finding | None:
     """Whether coupling is nearly the same at 5, 10 and 15 Hz. coupling: by frequency in Hz."""
     low = [coupling[f] for f in (5.0, 10.0, 15.0) if f in coupling]
     if len(low) < 2:
@@ -74,12 +74,12 @@ def _low_frequency_finding(coupling: dict[float, float]) -> Finding | None:
         here=f"largest over smallest {spread:.2f}",
         value=spread,
         unit="1",
-        as_published=spread <= ALIKE,
-        rule=f"largest over smallest at most {ALIKE:g}",
+        as_published=spread <= MAX_COUPLING_RATIO,
+        rule=f"largest over smallest at most {MAX_COUPLING_RATIO:g}",
     )
 
 
-def _high_frequency_finding(coupling: dict[float, float]) -> Finding | None:
+def _find_high_frequency_coupling(coupling: dict[float, float]) -> Finding | None:
     """Whether coupling at 35 Hz is less than at 25 Hz. coupling: by frequency in Hz."""
     if not {25.0, 35.0} <= coupling.keys():
         return None

@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.evaluation.reproduction.document import FigureFindings, Finding
 from analysis.evaluation.reproduction.played_response import PlayedResponse, describe_played
-from analysis.wording import number
+from analysis.wording import format_number
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 RESONANCE_HZ = (9.0, 14.0)
@@ -26,53 +26,54 @@ class EqualizedRows:
     """The rows of figure 5, all played with swept sines, and two rows on friction, played with a multisine. The
     responses without an equalizer are normalised by their mean gain (`normalise_gain`)."""
 
-    plain: PlayedResponse
+    unequalized: PlayedResponse
     """At the centre, without the equalizer."""
     equalized: PlayedResponse
     """At the centre, with the equalizer."""
-    edge_plain: PlayedResponse
+    edge_unequalized: PlayedResponse
     """Near the edge of the workspace, without the equalizer."""
     edge: PlayedResponse
     """Near the edge, equalized with the model of the centre."""
     edge_blended: PlayedResponse
     """Near the edge, with forces blended from the models of other places."""
-    broad: PlayedResponse
+    multisine: PlayedResponse
     """At the centre, equalized, all frequencies at once (multisine)."""
     frictionless: PlayedResponse
-    """As `broad`, on the device without friction, with a model identified on that device."""
+    """As `multisine`, on the device without friction, with a model identified on that device."""
 
     @property
-    def drawn(self) -> tuple[PlayedResponse, ...]:
+    def figure_rows(self) -> tuple[PlayedResponse, ...]:
         """The rows that are drawn as figure 5."""
-        return self.plain, self.equalized, self.edge, self.edge_blended
+        return self.unequalized, self.equalized, self.edge, self.edge_blended
 
     @property
-    def of_friction(self) -> tuple[PlayedResponse, ...]:
+    def friction_rows(self) -> tuple[PlayedResponse, ...]:
         """The rows of the figure on friction: swept sine, multisine, and multisine on the device without friction."""
-        return self.equalized, self.broad, self.frictionless
+        return self.equalized, self.multisine, self.frictionless
 
     @property
     def all(self) -> tuple[PlayedResponse, ...]:
         """All rows, in the order of the table."""
         return (
-            self.plain, self.equalized, self.edge_plain, self.edge, self.edge_blended, self.broad, self.frictionless,
+            self.unequalized, self.equalized, self.edge_unequalized, self.edge, self.edge_blended, self.multisine,
+            self.frictionless,
         )  # fmt: skip
 
 
-def find_equalized(
-    rows: EqualizedRows, held_out: tuple[float, float] | None, remarks: tuple[str, ...] = ()
+def make_equalized_findings(
+    rows: EqualizedRows, held_out_errors: tuple[float, float] | None, remarks: tuple[str, ...] = ()
 ) -> FigureFindings:
-    """Findings on figure 5. held_out: relative error of the centre's model on a multisine that was not fitted, and the
-    same for the device without friction; None = not computed. remarks: of the analyses."""
+    """Findings on figure 5. held_out_errors: relative error of the centre's model on a multisine that was not
+    fitted, and the same for the device without friction; None = not computed. remarks: of the analyses."""
     findings = (
-        _resonance(rows),
-        _peaks(rows),
-        _worst_coupling("Worst coupling of any line, centre", rows.plain, rows.equalized),
-        _edge_flat(rows),
-        _edge_coupling(rows),
+        _find_resonance(rows),
+        _find_peak_reduction(rows),
+        _find_worst_coupling("Worst coupling of any line, centre", rows.unequalized, rows.equalized),
+        _find_edge_flatness(rows),
+        _find_edge_coupling(rows),
         _find_blended_forces(rows),
-        _friction(rows),
-        _held_out_finding(held_out),
+        _find_friction_cost(rows),
+        _find_held_out_error(held_out_errors),
     )
     return FigureFindings(
         figure=5,
@@ -101,128 +102,133 @@ _DIFFERS = (
 )
 
 
-def _resonance(rows: EqualizedRows) -> Finding:
+def _find_resonance(rows: EqualizedRows) -> Finding:
     """Whether the resonance near 11 Hz is essentially removed: its height falls to at most `REMOVED` in dB."""
-    before, after = _height_db(rows.plain), _height_db(rows.equalized)
+    plain_db, equalized_db = _measure_height_db(rows.unequalized), _measure_height_db(rows.equalized)
     low, high = RESONANCE_HZ
     return Finding(
         what=f"Rise and fall along the axes, {low:g} to {high:g} Hz",
         published="the resonance near 11 Hz is essentially removed",
-        here=f"{number(before, 1)} dB without, {number(after, 1)} dB with the equalizer",
-        value=after,
+        here=f"{format_number(plain_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer",
+        value=equalized_db,
         unit="dB",
-        as_published=after <= REMOVED * before,
+        as_published=equalized_db <= REMOVED * plain_db,
         rule="at most a third of what it was, in dB",
     )
 
 
-def _peaks(rows: EqualizedRows) -> Finding:
+def _find_peak_reduction(rows: EqualizedRows) -> Finding:
     """Whether the largest reduction of a coupling peak at the centre is about an order of magnitude (`ORDER_DB`)."""
-    fall = _peaks_db(rows.plain.response) - _peaks_db(rows.equalized.response)
+    reduction_db = _measure_peaks_db(rows.unequalized.response) - _measure_peaks_db(rows.equalized.response)
     low, high = ORDER_DB
     return Finding(
         what="Fall of the coupling peaks, centre",
         published="up to an order of magnitude, that is 20 dB",
-        here=f"{number(fall.min(), 0)} to {number(fall.max(), 0)} dB, by channel",
-        value=float(fall.max()),
+        here=f"{format_number(reduction_db.min(), 0)} to {format_number(reduction_db.max(), 0)} dB, by channel",
+        value=float(reduction_db.max()),
         unit="dB",
-        as_published=bool(low <= fall.max() <= high),
+        as_published=bool(low <= reduction_db.max() <= high),
         rule=f"the largest is {low:g} to {high:g} dB",
     )
 
 
-def _worst_coupling(what: str, before: PlayedResponse, after: PlayedResponse) -> Finding:
-    first, second = describe_played(before).coupling_db, describe_played(after).coupling_db
+def _find_worst_coupling(title: str, unequalized: PlayedResponse, equalized: PlayedResponse) -> Finding:
+    plain_db, equalized_db = describe_played(unequalized).coupling_db, describe_played(equalized).coupling_db
     return Finding(
-        what=what,
+        what=title,
         published="",
-        here=f"{number(first, 1)} dB without, {number(second, 1)} dB with the equalizer",
-        value=second,
+        here=f"{format_number(plain_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer",
+        value=equalized_db,
         unit="dB",
         as_published=None,
     )
 
 
-def _edge_flat(rows: EqualizedRows) -> Finding:
+def _find_edge_flatness(rows: EqualizedRows) -> Finding:
     """Whether the model of the centre at least halves the deviation from flatness (dB) near the edge."""
-    before, after = describe_played(rows.edge_plain).flatness_db, describe_played(rows.edge).flatness_db
+    plain_db, equalized_db = describe_played(rows.edge_unequalized).flatness_db, describe_played(rows.edge).flatness_db
     return Finding(
         what="Flatness at the edge, model of the centre",
         published="remains fairly flat",
-        here=f"{number(before, 1)} dB without, {number(after, 1)} dB with the equalizer (centre: "
-        f"{number(describe_played(rows.equalized).flatness_db, 1)} dB)",
-        value=after,
+        here=f"{format_number(plain_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer "
+        f"(centre: {format_number(describe_played(rows.equalized).flatness_db, 1)} dB)",
+        value=equalized_db,
         unit="dB",
-        as_published=after <= before / 2,
+        as_published=equalized_db <= plain_db / 2,
         rule="at most half of what it is there without",
     )
 
 
-def _edge_coupling(rows: EqualizedRows) -> Finding:
+def _find_edge_coupling(rows: EqualizedRows) -> Finding:
     """Whether the reduction of coupling near the edge is positive, and less than half of that at the centre, in dB."""
-    before, after = describe_played(rows.edge_plain).coupling_db, describe_played(rows.edge).coupling_db
-    centre = describe_played(rows.plain).coupling_db - describe_played(rows.equalized).coupling_db
+    plain_db, equalized_db = describe_played(rows.edge_unequalized).coupling_db, describe_played(rows.edge).coupling_db
+    centre_reduction_db = describe_played(rows.unequalized).coupling_db - describe_played(rows.equalized).coupling_db
     return Finding(
         what="Coupling at the edge, model of the centre",
         published="still a minor improvement",
-        here=f"{number(before, 1)} dB without, {number(after, 1)} dB with the equalizer, worst line",
-        value=before - after,
+        here=f"{format_number(plain_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer, "
+        "worst line",
+        value=plain_db - equalized_db,
         unit="dB",
-        as_published=0 < before - after < centre / 2,
+        as_published=0 < plain_db - equalized_db < centre_reduction_db / 2,
         rule="better, but by less than half of the gain at the centre, in dB",
     )
 
 
 def _find_blended_forces(rows: EqualizedRows) -> Finding:
-    found = describe_played(rows.edge_blended)
+    blended = describe_played(rows.edge_blended)
     return Finding(
         what="The same place, forces blended between models of other places (ours)",
         published="named as a possibility, not tried",
-        here=f"flatness {number(found.flatness_db, 1)} dB, coupling {number(found.coupling_db, 1)} dB",
-        value=found.coupling_db,
+        here=f"flatness {format_number(blended.flatness_db, 1)} dB, "
+        f"coupling {format_number(blended.coupling_db, 1)} dB",
+        value=blended.coupling_db,
         unit="dB",
         as_published=None,
     )
 
 
-def _friction(rows: EqualizedRows) -> Finding:
-    with_it, without = describe_played(rows.broad), describe_played(rows.frictionless)
+def _find_friction_cost(rows: EqualizedRows) -> Finding:
+    with_friction, frictionless = describe_played(rows.multisine), describe_played(rows.frictionless)
     return Finding(
         what="What friction costs, all frequencies at once (ours)",
         published="",
-        here=f"flatness {number(with_it.flatness_db)} dB and coupling {number(with_it.coupling_db, 1)} dB with "
-        f"friction; {number(without.flatness_db)} dB and {number(without.coupling_db, 1)} dB on the twin without",
-        value=with_it.error,
+        here=f"flatness {format_number(with_friction.flatness_db)} dB and coupling "
+        f"{format_number(with_friction.coupling_db, 1)} dB with friction; "
+        f"{format_number(frictionless.flatness_db)} dB and "
+        f"{format_number(frictionless.coupling_db, 1)} dB on the twin without",
+        value=with_friction.error,
         unit="1",
         as_published=None,
     )
 
 
-def _held_out_finding(held_out: tuple[float, float] | None) -> Finding | None:
-    if held_out is None:
+def _find_held_out_error(held_out_errors: tuple[float, float] | None) -> Finding | None:
+    if held_out_errors is None:
         return None
-    error, without = held_out
+    error, frictionless_error = held_out_errors
     return Finding(
         what="Model of the centre on a multisine kept from it",
         published="",
-        here=f"error {100 * error:.1f} %; on the twin without friction, by the same steps, {100 * without:.1f} %",
+        here=f"error {100 * error:.1f} %; on the twin without friction, by the same steps, "
+        f"{100 * frictionless_error:.1f} %",
         value=error,
         unit="1",
         as_published=None,
     )
 
 
-def _height_db(played: PlayedResponse) -> float:
+def _measure_height_db(playback: PlayedResponse) -> float:
     """Height of the resonance in dB: range of the level within `RESONANCE_HZ` along an axis, of the worst axis."""
     low, high = RESONANCE_HZ
-    near = (played.frequency_hz >= low) & (played.frequency_hz <= high)
-    level = 20 * np.log10(np.abs(np.einsum("lii->li", played.response[near])))
+    in_range = (playback.frequency_hz >= low) & (playback.frequency_hz <= high)
+    level = 20 * np.log10(np.abs(np.einsum("lii->li", playback.response[in_range])))
     return float(np.ptp(level, axis=0).max())
 
 
-def _peaks_db(response: ComplexArray) -> FloatArray:
+def _measure_peaks_db(response: ComplexArray) -> FloatArray:
     """(axes (axes - 1),): largest magnitude of each off-axis channel over frequency, in dB. response: (lines, axes,
     axes)."""
-    off = ~np.eye(response.shape[1], dtype=bool)
-    peaks: FloatArray = 20 * np.log10(np.abs(response).max(axis=0)[off])
+    off_diagonal = ~np.eye(response.shape[1], dtype=bool)
+    peaks: FloatArray = 20 * np.log10(np.abs(response).max(axis=0)[off_diagonal])
     return peaks

@@ -43,7 +43,7 @@ class PlayedResponse:
     """Multiply-adds per sample of the inverse that computes the forces; None where they are not counted."""
 
 
-def make_wanted_wave(
+def make_target_wave(
     kind: SignalKind, band_hz: tuple[float, float], period: int, sample_rate_hz: float, seed: int
 ) -> FloatArray:
     """One period (period,) of the wanted signal, with a peak of 1 and without power outside the band. kind: logarithmic
@@ -56,8 +56,8 @@ def make_wanted_wave(
     spectrum = np.fft.rfft(log_sweep(0.9 * low, 1.06 * high, 1.0, period, sample_rate_hz))
     spectrum[~lines_of_band(band_hz, period, sample_rate_hz)] = 0
     wave = np.fft.irfft(spectrum, period)
-    peaked: FloatArray = wave / np.abs(wave).max()
-    return peaked
+    normalised: FloatArray = wave / np.abs(wave).max()
+    return normalised
 
 
 def lines_of_band(
@@ -69,55 +69,55 @@ def lines_of_band(
 
 
 def estimate_response(
-    wanted: FloatArray, delivered: Sequence[FloatArray], band_hz: tuple[float, float], sample_rate_hz: float
+    target: FloatArray, delivered: Sequence[FloatArray], band_hz: tuple[float, float], sample_rate_hz: float
 ) -> tuple[FloatArray, ComplexArray]:
-    """Frequencies in Hz (lines,) and response (lines, axes, axes), delivered over wanted. wanted: (axes, period), the
+    """Frequencies in Hz (lines,) and response (lines, axes, axes), delivered over wanted. target: (axes, period), the
     signal of each axis, played one axis at a time. delivered: for each of these, one steady period (period, axes)."""
-    period = wanted.shape[1]
-    used = lines_of_band(band_hz, period, sample_rate_hz)
+    period = target.shape[1]
+    in_band = lines_of_band(band_hz, period, sample_rate_hz)
     columns = [
-        np.fft.rfft(played, axis=0)[used] / np.fft.rfft(wave)[used][:, None]
-        for wave, played in zip(wanted, delivered, strict=True)
+        np.fft.rfft(period_samples, axis=0)[in_band] / np.fft.rfft(wave)[in_band][:, None]
+        for wave, period_samples in zip(target, delivered, strict=True)
     ]
-    frequency_hz = np.asarray(np.fft.rfftfreq(period, 1 / sample_rate_hz)[used], dtype=np.float64)
+    frequency_hz = np.asarray(np.fft.rfftfreq(period, 1 / sample_rate_hz)[in_band], dtype=np.float64)
     return frequency_hz, np.stack(columns, axis=2)
 
 
 def normalise_gain(response: ComplexArray) -> ComplexArray:
     """The response divided by the geometric mean of its diagonal gains over all lines and axes, an error that a static
     gain would correct."""
-    along = np.abs(np.einsum("lii->li", response))
-    level: ComplexArray = response / np.exp(np.log(along).mean())
-    return level
+    diagonal = np.abs(np.einsum("lii->li", response))
+    normalised: ComplexArray = response / np.exp(np.log(diagonal).mean())
+    return normalised
 
 
 def coupling_db(response: ComplexArray) -> FloatArray:
     """(lines,): largest ratio |T_ji| / |T_ii| with j != i in dB, of the worst wanted axis i; at least -240 dB."""
-    along = np.abs(np.einsum("lii->li", response))
-    off = np.abs(response) * (1 - np.eye(response.shape[1]))
-    ratio: FloatArray = 20 * np.log10(np.maximum((off.max(axis=1) / along).max(axis=1), 1e-12))
+    diagonal = np.abs(np.einsum("lii->li", response))
+    off_diagonal = np.abs(response) * (1 - np.eye(response.shape[1]))
+    ratio: FloatArray = 20 * np.log10(np.maximum((off_diagonal.max(axis=1) / diagonal).max(axis=1), 1e-12))
     return ratio
 
 
-def describe_played(played: PlayedResponse) -> PlayedRow:
+def describe_played(playback: PlayedResponse) -> PlayedRow:
     """The response's figures of merit as a row of the document. Its `error` is the rms over lines of the Frobenius norm
     of T - I, divided by the root of the number of axes."""
-    found = measure_quality(played.response)
-    axes = played.response.shape[1]
-    error = np.sqrt((np.abs(played.response - np.eye(axes)) ** 2).sum() / (axes * len(played.response)))
-    x, y, z = (1000 * place for place in played.place_m)
+    quality = measure_quality(playback.response)
+    axes = playback.response.shape[1]
+    error = np.sqrt((np.abs(playback.response - np.eye(axes)) ** 2).sum() / (axes * len(playback.response)))
+    x, y, z = (1000 * metres for metres in playback.place_m)
     return PlayedRow(
-        name=played.name,
-        device=played.device,
+        name=playback.name,
+        device=playback.device,
         place_mm=(x, y, z),
-        hand=played.hand,
-        signal=played.signal,
-        flatness_db=found.flatness_db,
-        coupling_db=max(found.coupling_db, -240.0),
-        median_coupling_db=float(np.median(coupling_db(played.response))),
-        axis_error_deg=found.axis_error_deg,
+        hand=playback.hand,
+        signal=playback.signal,
+        flatness_db=quality.flatness_db,
+        coupling_db=max(quality.coupling_db, -240.0),
+        median_coupling_db=float(np.median(coupling_db(playback.response))),
+        axis_error_deg=quality.axis_error_deg,
         error=float(error),
-        peak_force_n=played.peak_force_n,
-        clipped_ticks=played.clipped_ticks,
-        multiply_adds=played.multiply_adds,
+        peak_force_n=playback.peak_force_n,
+        clipped_ticks=playback.clipped_ticks,
+        multiply_adds=playback.multiply_adds,
     )

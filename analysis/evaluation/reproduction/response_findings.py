@@ -1,7 +1,7 @@
 """Findings on the published figures 4 and 1, from the transfer functions of the simulated device.
 
 Figure 4 shows the transfer functions from every force to every acceleration, figure 1 the frequency bands that follow
-from the onset of coupling and from the limit of direction perception. Frequencies are compared within `NEAR`.
+from the onset of coupling and from the limit of direction perception. Frequencies are compared within `TOLERANCE`.
 """
 
 from collections.abc import Sequence
@@ -16,11 +16,11 @@ from equalizer.identification.frequency_response.frequency_bands import Frequenc
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.resonances import COUPLING, Resonance
 
-NEAR = 0.2
+TOLERANCE = 0.2
 """Largest relative difference of two frequencies that count as near each other."""
 SLOPE_HZ = (4.5, 9.0)
 """Range below the resonance in which the slope along the axes is measured."""
-LARGE = 3.0
+LARGE_RATIO = 3.0
 """Ratio of the gain to its median from 15 to 60 Hz, above which a resonance counts as large."""
 
 _GEOMETRY = (
@@ -31,16 +31,16 @@ _GEOMETRY = (
 )
 
 
-def response_findings(
+def make_response_findings(
     response: FrequencyResponse, resonances: Sequence[Resonance], onset: CouplingOnset
 ) -> FigureFindings:
     """Findings on figure 4. response: transfer functions estimated from sweeps over the whole frequency range."""
     findings = (
-        _low_resonance(resonances),
-        _large_resonances(response, resonances),
-        _onset(onset),
-        _slope(response),
-        _unreliable(response),
+        _find_low_resonance(resonances),
+        _find_large_resonances(response, resonances),
+        _find_onset(onset),
+        _find_slope(response),
+        _find_lowest_line(response),
     )
     return FigureFindings(
         figure=4,
@@ -60,16 +60,18 @@ def response_findings(
     )
 
 
-def band_findings(bands: Sequence[FrequencyBand], limit_hz: float | None, used_limit_hz: float) -> FigureFindings:
+def make_band_findings(bands: Sequence[FrequencyBand], limit_hz: float | None, used_limit_hz: float) -> FigureFindings:
     """Findings on figure 1. limit_hz: limit of direction perception from the thresholds of figure 2, None where they
     give none. used_limit_hz: the limit that was drawn."""
     published = {"low": "up to about 10 Hz", "middle": "about 10 to 35 Hz", "high": "from 35 Hz on"}
-    edges = {"low": (None, 10.0), "middle": (10.0, 35.0), "high": (35.0, None)}
-    found = [_band(band, published[band.name], edges[band.name]) for band in bands]
-    found.append(_limit(limit_hz))
-    missing: tuple[str, ...] = ()
+    edges_hz = {"low": (None, 10.0), "middle": (10.0, 35.0), "high": (35.0, None)}
+    findings = [_find_band_edges(band, published[band.name], edges_hz[band.name]) for band in bands]
+    findings.append(_find_direction_limit(limit_hz))
+    limit_remarks: tuple[str, ...] = ()
     if limit_hz is None:
-        missing = (f"These thresholds give no limit of direction, so the published {used_limit_hz:g} Hz are drawn.",)
+        limit_remarks = (
+            f"These thresholds give no limit of direction, so the published {used_limit_hz:g} Hz are drawn.",
+        )
     return FigureFindings(
         figure=1,
         title="Which way of driving the device suits which frequencies",
@@ -77,89 +79,93 @@ def band_findings(bands: Sequence[FrequencyBand], limit_hz: float | None, used_l
         published="A drawing without measured values: rigid-body control below, equalization of all axes together in "
         "the middle, axis by axis above. The middle band reaches from the onset of coupling, about 10 Hz, to the limit "
         "of direction, 35 Hz; the model is then fitted from 5 Hz on, to be on the safe side.",
-        findings=tuple(found),
+        findings=tuple(findings),
         differs=(
             "The lower edge comes from the simulated device's transfer functions (figure 4), the upper one from the "
             "simulated participants' thresholds (figure 2), which are tested at five frequencies only. Both were set "
             "up to resemble the published ones.",
-            *missing,
+            *limit_remarks,
         ),
     )
 
 
-def _is_near(value: float, published: float) -> bool:
-    """Whether a value differs from the published one by at most the share `NEAR` of it."""
-    return abs(value - published) <= NEAR * published
+def _is_within_tolerance(value: float, published: float) -> bool:
+    """Whether a value differs from the published one by at most the share `TOLERANCE` of it."""
+    return abs(value - published) <= TOLERANCE * published
 
 
-def _low_resonance(resonances: Sequence[Resonance]) -> Finding:
+def _find_low_resonance(resonances: Sequence[Resonance]) -> Finding:
     """Whether there is a resonance near 11 Hz that couples the axes; the most prominent one counts."""
-    low = [resonance for resonance in resonances if _is_near(resonance.frequency_hz, 11.0)]
-    found = max(low, key=lambda each: each.prominence_db, default=None)
-    couples = found is not None and COUPLING in found.seen_in
-    here = "none was found"
-    if found is not None:
-        between = "{:.2f} to {:.2f} Hz".format(*found.frequency_interval_hz)
-        here = f"{found.frequency_hz:.2f} Hz ({between}), {'couples the axes' if couples else 'without coupling'}"
+    candidates = [resonance for resonance in resonances if _is_within_tolerance(resonance.frequency_hz, 11.0)]
+    strongest = max(candidates, key=lambda candidate: candidate.prominence_db, default=None)
+    couples = strongest is not None and COUPLING in strongest.seen_in
+    text = "none was found"
+    if strongest is not None:
+        interval_text = "{:.2f} to {:.2f} Hz".format(*strongest.frequency_interval_hz)
+        text = (
+            f"{strongest.frequency_hz:.2f} Hz ({interval_text}), "
+            f"{'couples the axes' if couples else 'without coupling'}"
+        )
     return Finding(
         what="Lowest resonance",
         published="near 11 Hz, couples the axes",
-        here=here,
-        value=None if found is None else found.frequency_hz,
+        here=text,
+        value=None if strongest is None else strongest.frequency_hz,
         unit="Hz",
         as_published=couples,
-        rule=f"within {NEAR:.0%} of 11 Hz, and a peak of what goes off axis",
+        rule=f"within {TOLERANCE:.0%} of 11 Hz, and a peak of what goes off axis",
     )
 
 
-def _large_resonances(response: FrequencyResponse, resonances: Sequence[Resonance]) -> Finding:
+def _find_large_resonances(response: FrequencyResponse, resonances: Sequence[Resonance]) -> Finding:
     """Whether the first large resonance is near 80 Hz. Gain: largest singular value of the response matrix."""
     gain = np.linalg.norm(response.response, ord=2, axis=(1, 2))
-    middle = (response.frequency_hz >= 15) & (response.frequency_hz <= 60) & response.reliable
-    level = float(np.median(gain[middle])) if middle.any() else np.inf
+    is_middle = (response.frequency_hz >= 15) & (response.frequency_hz <= 60) & response.reliable
+    level = float(np.median(gain[is_middle])) if is_middle.any() else np.inf
 
-    def height(resonance: Resonance) -> float:
-        near = np.abs(response.frequency_hz - resonance.frequency_hz) <= 0.02 * resonance.frequency_hz
-        return float(np.median(gain[near])) if near.any() else 0.0
+    def compute_height(resonance: Resonance) -> float:
+        is_at_resonance = np.abs(response.frequency_hz - resonance.frequency_hz) <= 0.02 * resonance.frequency_hz
+        return float(np.median(gain[is_at_resonance])) if is_at_resonance.any() else 0.0
 
-    large = [resonance for resonance in resonances if height(resonance) > LARGE * level]
-    first = min((each.frequency_hz for each in large), default=None)
+    large_resonances = [resonance for resonance in resonances if compute_height(resonance) > LARGE_RATIO * level]
+    lowest_hz = min((large_resonance.frequency_hz for large_resonance in large_resonances), default=None)
     return Finding(
         what="Large resonances",
         published="from about 80 Hz on",
-        here="none" if first is None else f"from {first:.1f} Hz on, {len(large)} of them",
-        value=first,
+        here="none" if lowest_hz is None else f"from {lowest_hz:.1f} Hz on, {len(large_resonances)} of them",
+        value=lowest_hz,
         unit="Hz",
-        as_published=first is not None and _is_near(first, 80.0),
-        rule=f"the first that rises to {LARGE:g} times the middle band's level lies within {NEAR:.0%} of 80 Hz",
+        as_published=lowest_hz is not None and _is_within_tolerance(lowest_hz, 80.0),
+        rule=f"the first that rises to {LARGE_RATIO:g} times the middle band's level lies within {TOLERANCE:.0%} "
+        "of 80 Hz",
     )
 
 
-def _onset(onset: CouplingOnset) -> Finding:
+def _find_onset(onset: CouplingOnset) -> Finding:
     """Whether coupling begins near 10 Hz."""
-    here = "no coupling was found"
+    text = "no coupling was found"
     if onset.frequency_hz is not None:
-        between = "" if onset.interval_hz is None else " (95 %: {:.2f} to {:.2f} Hz)".format(*onset.interval_hz)
-        here = f"{onset.frequency_hz:.2f} Hz{between}; {onset.rule}"
+        interval_text = "" if onset.interval_hz is None else " (95 %: {:.2f} to {:.2f} Hz)".format(*onset.interval_hz)
+        text = f"{onset.frequency_hz:.2f} Hz{interval_text}; {onset.rule}"
     return Finding(
         what="Onset of coupling",
         published="about 10 Hz",
-        here=here,
+        here=text,
         value=onset.frequency_hz,
         unit="Hz",
-        as_published=onset.frequency_hz is not None and _is_near(onset.frequency_hz, 10.0),
-        rule=f"within {NEAR:.0%} of 10 Hz",
+        as_published=onset.frequency_hz is not None and _is_within_tolerance(onset.frequency_hz, 10.0),
+        rule=f"within {TOLERANCE:.0%} of 10 Hz",
     )
 
 
-def _slope(response: FrequencyResponse) -> Finding | None:
+def _find_slope(response: FrequencyResponse) -> Finding | None:
     """Slope in dB per octave of the mean gain along the axes, by a line fit; None with fewer than 3 reliable lines."""
     lines = response.within(*SLOPE_HZ)
     lines = lines.of_lines(lines.reliable)
     if len(lines) < 3:
         return None
-    along = np.abs(np.einsum("lii->li", lines.response)).mean(axis=1)
-    slope = float(np.polyfit(np.log2(lines.frequency_hz), 20 * np.log10(along), 1)[0])
+    diagonal_gain = np.abs(np.einsum("lii->li", lines.response)).mean(axis=1)
+    slope = float(np.polyfit(np.log2(lines.frequency_hz), 20 * np.log10(diagonal_gain), 1)[0])
     low, high = SLOPE_HZ
     return Finding(
         what=f"Slope along the axes, {low:g} to {high:g} Hz",
@@ -172,26 +178,28 @@ def _slope(response: FrequencyResponse) -> Finding | None:
     )
 
 
-def _unreliable(response: FrequencyResponse) -> Finding | None:
+def _find_lowest_line(response: FrequencyResponse) -> Finding | None:
     """Whether the lowest reliable line is near 3.5 Hz; None without any reliable line."""
     if not response.reliable.any():
         return None
-    first = float(response.frequency_hz[response.reliable][0])
+    lowest_hz = float(response.frequency_hz[response.reliable][0])
     return Finding(
         what="Lowest line that is used",
         published="below 3.5 Hz there is too little energy",
-        here=f"{first:.2f} Hz",
-        value=first,
+        here=f"{lowest_hz:.2f} Hz",
+        value=lowest_hz,
         unit="Hz",
-        as_published=_is_near(first, 3.5),
-        rule=f"within {NEAR:.0%} of 3.5 Hz",
+        as_published=_is_within_tolerance(lowest_hz, 3.5),
+        rule=f"within {TOLERANCE:.0%} of 3.5 Hz",
     )
 
 
-def _band(band: FrequencyBand, published: str, edges: tuple[float | None, float | None]) -> Finding:
+def _find_band_edges(band: FrequencyBand, published: str, edges: tuple[float | None, float | None]) -> Finding:
     """Whether a band's edges are near the published ones. edges: published, in Hz; None = not compared."""
     low, high = edges
-    as_published = (low is None or _is_near(band.low_hz, low)) and (high is None or _is_near(band.high_hz, high))
+    as_published = (low is None or _is_within_tolerance(band.low_hz, low)) and (
+        high is None or _is_within_tolerance(band.high_hz, high)
+    )
     return Finding(
         what=f"{band.name.capitalize()} band: {band.method}",
         published=published,
@@ -199,11 +207,11 @@ def _band(band: FrequencyBand, published: str, edges: tuple[float | None, float 
         value=band.high_hz if band.name == "low" else band.low_hz,
         unit="Hz",
         as_published=as_published,
-        rule=f"edges within {NEAR:.0%}",
+        rule=f"edges within {TOLERANCE:.0%}",
     )
 
 
-def _limit(limit_hz: float | None) -> Finding:
+def _find_direction_limit(limit_hz: float | None) -> Finding:
     """Whether the limit of direction perception is near 35 Hz."""
     return Finding(
         what="Limit of direction",
@@ -211,6 +219,6 @@ def _limit(limit_hz: float | None) -> Finding:
         here=f"{'none found' if limit_hz is None else f'{limit_hz:g} Hz'}; {LIMIT_RULE}",
         value=limit_hz,
         unit="Hz",
-        as_published=limit_hz is not None and _is_near(limit_hz, 35.0),
-        rule=f"within {NEAR:.0%} of 35 Hz",
+        as_published=limit_hz is not None and _is_within_tolerance(limit_hz, 35.0),
+        rule=f"within {TOLERANCE:.0%} of 35 Hz",
     )

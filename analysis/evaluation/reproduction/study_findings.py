@@ -15,7 +15,7 @@ from analysis.wording import format_signed
 
 SIGNIFICANT_P = 0.05
 """Level of significance of the published analysis."""
-LIKE = 0.25
+MAX_MEAN_DIFFERENCE = 0.25
 """Largest difference of two means, as a share of the larger mean, that counts as "fairly similar"."""
 
 LIMIT_RULE = (
@@ -50,7 +50,7 @@ class _Means:
         names = (frequency_name(first_hz), frequency_name(second_hz))
         return next((p for p in self.analysis.comparisons.pairs if (p.first, p.second) == names), None)
 
-    def cut(self, frequency_hz: float) -> int:
+    def count_censored(self, frequency_hz: float) -> int:
         """Number of thresholds that the cap censored at this frequency."""
         table = self.analysis.table
         if frequency_hz not in table.frequencies_hz:
@@ -62,10 +62,10 @@ class _Means:
 def direction_limit_hz(analysis: StudyAnalysis) -> float | None:
     """Limit of direction perception in Hz by `LIMIT_RULE`; None where no tested frequency fulfils it."""
     means = _Means(analysis)
-    lowest, *others = analysis.table.frequencies_hz
-    for frequency_hz in others:
+    lowest, *higher_hz = analysis.table.frequencies_hz
+    for frequency_hz in higher_hz:
         pair = means.pair(lowest, frequency_hz)
-        if pair is not None and pair.difference > 0 and pair.p < SIGNIFICANT_P and means.cut(frequency_hz):
+        if pair is not None and pair.difference > 0 and pair.p < SIGNIFICANT_P and means.count_censored(frequency_hz):
             return frequency_hz
     return None
 
@@ -75,12 +75,12 @@ def study_findings(analysis: StudyAnalysis) -> FigureFindings:
     means = _Means(analysis)
     tested = analysis.table.frequencies_hz
     findings = [
-        *(_level(means, frequency_hz) for frequency_hz in tested),
-        _rise(means, 5.0, 15.0, "apparently up, not significant with ten participants", significant=False),
-        _rise(means, 15.0, 25.0, "apparently up, not significant", significant=False),
-        _rise(means, 5.0, 35.0, "significantly up at 35 Hz (p < 0.05)", significant=True),
+        *(_find_mean_threshold(means, frequency_hz) for frequency_hz in tested),
+        _find_rise(means, 5.0, 15.0, "apparently up, not significant with ten participants", significant=False),
+        _find_rise(means, 15.0, 25.0, "apparently up, not significant", significant=False),
+        _find_rise(means, 5.0, 35.0, "significantly up at 35 Hz (p < 0.05)", significant=True),
         _find_censoring(means, analysis),
-        _similar(means),
+        _find_similarity(means),
     ]
     return FigureFindings(
         figure=2,
@@ -96,34 +96,36 @@ def study_findings(analysis: StudyAnalysis) -> FigureFindings:
     )
 
 
-def _level(means: _Means, frequency_hz: float) -> Finding:
+def _find_mean_threshold(means: _Means, frequency_hz: float) -> Finding:
     """The mean threshold at one frequency, without a judgement: the paper prints no number."""
-    value, cut = means.mean_at(frequency_hz), means.cut(frequency_hz)
-    marks = f", {cut} of {len(means.analysis.table.subjects)} thresholds cut by the cap" if cut else ""
+    value, censored = means.mean_at(frequency_hz), means.count_censored(frequency_hz)
+    censored_text = (
+        f", {censored} of {len(means.analysis.table.subjects)} thresholds cut by the cap" if censored else ""
+    )
     return Finding(
         what=f"Mean threshold at {frequency_hz:g} Hz",
         published="",
-        here="no completed run" if value is None else f"{value:.2f} N{marks}",
+        here="no completed run" if value is None else f"{value:.2f} N{censored_text}",
         value=value,
         unit="N",
         as_published=None,
     )
 
 
-def _rise(means: _Means, low_hz: float, high_hz: float, published: str, significant: bool) -> Finding | None:
+def _find_rise(means: _Means, low_hz: float, high_hz: float, published: str, significant: bool) -> Finding | None:
     """Whether the mean rises between two frequencies, with the published significance at `SIGNIFICANT_P`."""
     pair, low, high = means.pair(low_hz, high_hz), means.mean_at(low_hz), means.mean_at(high_hz)
     if pair is None or low is None or high is None:
         return None
-    up = pair.difference > 0
+    rises = pair.difference > 0
     rule = f"up, and {'significant' if significant else 'not significant'} at 5 %, in all pairs at once"
     return Finding(
         what=f"From {low_hz:g} to {high_hz:g} Hz",
         published=published,
-        here=f"{format_signed(pair.difference)} N, p {_p_text(pair.p)} (all pairs at once)",
+        here=f"{format_signed(pair.difference)} N, p {_format_p(pair.p)} (all pairs at once)",
         value=pair.difference,
         unit="N",
-        as_published=up and (pair.p < SIGNIFICANT_P) == significant,
+        as_published=rises and (pair.p < SIGNIFICANT_P) == significant,
         rule=rule,
     )
 
@@ -132,34 +134,34 @@ def _find_censoring(means: _Means, analysis: StudyAnalysis) -> Finding | None:
     """Whether the cap censors some thresholds at 35 Hz, but not all."""
     if 35.0 not in analysis.table.frequencies_hz:
         return None
-    cut, all_of_them = means.cut(35.0), len(analysis.table.subjects)
+    censored, participants = means.count_censored(35.0), len(analysis.table.subjects)
     return Finding(
         what="Cut by the cap at 35 Hz",
         published="several participants, while others converge",
-        here=f"{cut} of {all_of_them}",
-        value=float(cut),
+        here=f"{censored} of {participants}",
+        value=float(censored),
         unit="1",
-        as_published=0 < cut < all_of_them,
+        as_published=0 < censored < participants,
         rule="some, but not all",
     )
 
 
-def _similar(means: _Means) -> Finding | None:
-    """Whether the means at 35 and 45 Hz are fairly similar (`LIKE`)."""
+def _find_similarity(means: _Means) -> Finding | None:
+    """Whether the means at 35 and 45 Hz are fairly similar (`MAX_MEAN_DIFFERENCE`)."""
     first, second = means.mean_at(35.0), means.mean_at(45.0)
     if first is None or second is None:
         return None
-    away = abs(first - second) / max(first, second)
+    difference = abs(first - second) / max(first, second)
     return Finding(
         what="35 and 45 Hz",
         published="fairly similar",
-        here=f"the means differ by {100 * away:.0f} % of the larger",
-        value=away,
+        here=f"the means differ by {100 * difference:.0f} % of the larger",
+        value=difference,
         unit="1",
-        as_published=away < LIKE,
-        rule=f"less than {LIKE:.0%} apart",
+        as_published=difference < MAX_MEAN_DIFFERENCE,
+        rule=f"less than {MAX_MEAN_DIFFERENCE:.0%} apart",
     )
 
 
-def _p_text(p: float) -> str:
+def _format_p(p: float) -> str:
     return "< 0.001" if p < 0.001 else f"= {p:.3f}"

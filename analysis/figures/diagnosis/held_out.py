@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from analysis.diagnosis.result.findings import TimeSeries
 from analysis.diagnosis.unit_wording import scale_of
-from analysis.figures.diagnosis.stage_style import AFTER, BEFORE, MEASURED, RETUNED, STAGES, Stage
+from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, GIVEN_STAGE, MEASURED, RETUNED_STAGE, STAGES, Stage
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREY, draw_no_data_note, new_figure, plain_axes, ratio_ticks
 from equalizer.signals.signal import FloatArray
@@ -25,9 +25,9 @@ _SHORTEST_S, _LONGEST_S = 0.1, 3.0
 """Bounds of the excerpt's length (s)."""
 _MARKERS = {"before": "s", "retuned": "D", "after": "o"}
 """Marker of each stage."""
-_STRETCHES = 60
+_CANDIDATES_PER_STRETCH = 60
 """Number of candidate excerpts per held-out stretch, evenly spaced."""
-_STANDING = 0.01
+_OFFSET_WEIGHT = 0.01
 """Weight of the mean square of a change against its variance in the choice of the excerpt (`_visibility`)."""
 
 ChannelErrors = Mapping[str, Mapping[str, float]]
@@ -50,9 +50,9 @@ def held_out_picture(
 ) -> Picture:
     """The figure with title, caption and alternative text. noise_rms: by channel, in the channel's SI unit."""
     excerpt = find_excerpt(time_series, noise_rms)
-    where = ""
+    excerpt_text = ""
     if excerpt is not None:
-        where = (
+        excerpt_text = (
             f"Left: {excerpt.series.channels[excerpt.channel]} in {excerpt.series.name}, where the effects found "
             "change the prediction most; below, the residual of each prediction, with plus and minus twice the noise "
             "(grey). "
@@ -60,8 +60,9 @@ def held_out_picture(
     return Picture(
         name="held-out",
         title="Held-out data: as given, re-tuned, with the effects found",
-        caption=f"{where}{'Right: e' if where else 'E'}rror of each channel over all held-out samples in units of its "
-        "noise; the line marks noise alone. These data were used neither for fitting nor for model selection.",
+        caption=f"{excerpt_text}{'Right: e' if excerpt_text else 'E'}rror of each channel over all held-out samples in "
+        "units of its noise; the line marks noise alone. These data were used neither for fitting nor for model "
+        "selection.",
         figure=draw_held_out(excerpt, noise_rms, errors),
         alternative=_alternative_text(errors),
     )
@@ -70,15 +71,15 @@ def held_out_picture(
 def find_excerpt(time_series: Sequence[TimeSeries], noise_rms: Mapping[str, float]) -> Excerpt | None:
     """The held-out excerpt and channel where the re-tuned and the final prediction differ most, in units of the noise;
     where these do not differ visibly, where the given and the final do. None where neither pair differs."""
-    for each in ("retuned", "before"):
+    for stage_name in ("retuned", "before"):
         best: tuple[float, Excerpt] | None = None
         for series in time_series:
             noise = np.array([noise_rms.get(name, np.nan) for name in series.channels])
-            change = np.nan_to_num((getattr(series, each) - series.after) / noise)
+            change = np.nan_to_num((getattr(series, stage_name) - series.after) / noise)
             for start, stop in series.tested:
-                found = _strongest_excerpt(series, change[start:stop], start)
-                if found is not None and (best is None or found[0] > best[0]):
-                    best = found
+                candidate = _strongest_excerpt(series, change[start:stop], start)
+                if candidate is not None and (best is None or candidate[0] > best[0]):
+                    best = candidate
         # A change counts as visible where `_visibility` is above a tenth of the noise's variance.
         if best is not None and best[0] > 0.1:
             return best[1]
@@ -99,16 +100,16 @@ def _strongest_excerpt(series: TimeSeries, change: FloatArray, start: int) -> tu
     cycle_s = 2 * np.pi * rms / max(speed * series.sample_rate_hz, 1e-12)
     length = int(np.clip(_CYCLES * cycle_s, _SHORTEST_S, _LONGEST_S) * series.sample_rate_hz)
     length = min(max(length, 8), len(signal))
-    places = np.unique(np.linspace(0, len(signal) - length, _STRETCHES).astype(int))
-    strengths = [float(_visibility(signal[at : at + length])) for at in places]
-    at = int(places[int(np.argmax(strengths))])
-    return max(strengths), Excerpt(series, channel, start + at, start + at + length)
+    offsets = np.unique(np.linspace(0, len(signal) - length, _CANDIDATES_PER_STRETCH).astype(int))
+    strengths = [float(_visibility(signal[offset : offset + length])) for offset in offsets]
+    offset = int(offsets[int(np.argmax(strengths))])
+    return max(strengths), Excerpt(series, channel, start + offset, start + offset + length)
 
 
 def _visibility(change: FloatArray) -> FloatArray:
-    """Visibility of a change, (channels,) or a number: its variance plus `_STANDING` times its squared mean, because a
-    varying change is easier to see in a plot than an offset."""
-    return np.asarray(np.var(change, axis=0) + _STANDING * np.mean(change, axis=0) ** 2)
+    """Visibility of a change, (channels,) or a number: its variance plus `_OFFSET_WEIGHT` times its squared mean,
+    because a varying change is easier to see in a plot than an offset."""
+    return np.asarray(np.var(change, axis=0) + _OFFSET_WEIGHT * np.mean(change, axis=0) ** 2)
 
 
 def draw_held_out(excerpt: Excerpt | None, noise_rms: Mapping[str, float], errors: ChannelErrors) -> Figure:
@@ -133,29 +134,32 @@ def draw_held_out(excerpt: Excerpt | None, noise_rms: Mapping[str, float], error
 
 def _draw_excerpt(above: Axes, below: Axes, excerpt: Excerpt, noise_rms: Mapping[str, float]) -> None:
     """Draw the measured and predicted channel above, and the residuals over twice the noise's rms below."""
-    series, part, k = excerpt.series, slice(excerpt.start, excerpt.stop), excerpt.channel
+    series, samples, k = excerpt.series, slice(excerpt.start, excerpt.stop), excerpt.channel
     name, unit = series.channels[k], series.units[k]
     seconds = np.arange(excerpt.start, excerpt.stop) / series.sample_rate_hz
-    measured = series.measured[part, k]
-    shown = scale_of(unit, float(np.max(np.abs(measured))))
-    left = [(stage, measured - getattr(series, stage.name)[part, k]) for stage in STAGES]
+    measured = series.measured[samples, k]
+    signal_scale = scale_of(unit, float(np.max(np.abs(measured))))
+    residuals = [(stage, measured - getattr(series, stage.name)[samples, k]) for stage in STAGES]
     # The residual of the given model does not set the scale: it may be so large that the others would look flat.
-    largest = max(float(np.max(np.abs(each))) for stage, each in left if stage is not BEFORE)
-    small = scale_of(unit, largest)
-    above.plot(seconds, shown.factor * measured, color=BLACK, linewidth=2.6, alpha=0.35)
-    for stage, residual in left:
-        for axes, values in ((above, shown.factor * (measured - residual)), (below, small.factor * residual)):
+    largest = max(float(np.max(np.abs(deviation))) for stage, deviation in residuals if stage is not GIVEN_STAGE)
+    residual_scale = scale_of(unit, largest)
+    above.plot(seconds, signal_scale.factor * measured, color=BLACK, linewidth=2.6, alpha=0.35)
+    for stage, residual in residuals:
+        for axes, values in (
+            (above, signal_scale.factor * (measured - residual)),
+            (below, residual_scale.factor * residual),
+        ):
             axes.plot(seconds, values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
-    noise = 2 * small.factor * noise_rms.get(name, 0.0)
+    noise = 2 * residual_scale.factor * noise_rms.get(name, 0.0)
     below.axhspan(-noise, noise, color=GREY, alpha=0.3, linewidth=0, zorder=0)
-    reach = 1.25 * max(small.factor * largest, 1.5 * noise)
+    reach = 1.25 * max(residual_scale.factor * largest, 1.5 * noise)
     below.set_ylim(-reach, reach)
     for axes in (above, below):
         plain_axes(axes)
     above.tick_params(labelbottom=False)
     above.set_xlim(float(seconds[0]), float(seconds[-1]))
-    above.set_ylabel(f"{name} ({shown.unit})", fontsize=9.5)
-    below.set_ylabel(f"residual ({small.unit})", fontsize=9.5)
+    above.set_ylabel(f"{name} ({signal_scale.unit})", fontsize=9.5)
+    below.set_ylabel(f"residual ({residual_scale.unit})", fontsize=9.5)
     below.set_xlabel("Time (s)", fontsize=9.5)
 
 
@@ -164,7 +168,7 @@ def _draw_errors(axes: Axes, errors: ChannelErrors) -> None:
     plain_axes(axes)
     channels = list(next(iter(errors.values())))
     rows = np.arange(len(channels), dtype=float)
-    for stage in (AFTER, RETUNED, BEFORE):
+    for stage in (COMPLETED_STAGE, RETUNED_STAGE, GIVEN_STAGE):
         values = [errors[stage.name].get(name, np.nan) for name in channels] if stage.name in errors else []
         if values:
             _draw_stage(axes, stage, np.array(values), rows)
@@ -184,9 +188,9 @@ def _draw_errors(axes: Axes, errors: ChannelErrors) -> None:
 
 def _draw_stage(axes: Axes, stage: Stage, values: FloatArray, rows: FloatArray) -> None:
     """Draw the errors of one stage as lines from the noise level (1); stages are offset within a channel's row."""
-    at = rows + 0.24 * (STAGES.index(stage) - 1)
-    axes.hlines(at, 1.0, values, color=stage.colour, linewidth=1.6, alpha=0.75)
-    axes.plot(values, at, _MARKERS[stage.name], color=stage.colour, markersize=5)
+    positions = rows + 0.24 * (STAGES.index(stage) - 1)
+    axes.hlines(positions, 1.0, values, color=stage.colour, linewidth=1.6, alpha=0.75)
+    axes.plot(values, positions, _MARKERS[stage.name], color=stage.colour, markersize=5)
 
 
 def _alternative_text(errors: ChannelErrors) -> str:

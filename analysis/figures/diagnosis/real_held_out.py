@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 
 from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, RealAnswer
 from analysis.diagnosis.unit_wording import scale_of
-from analysis.figures.diagnosis.stage_style import AFTER, MEASURED, RETUNED
+from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, MEASURED, RETUNED_STAGE
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREEN, GREY, ORANGE, draw_no_data_note, new_figure, plain_axes
 
-_LOWEST = 1e-4
+_LEAST_ERROR = 1e-4
 """Smallest error, relative to the signal, that is drawn; smaller ones are drawn at this value."""
 
 
@@ -37,14 +37,14 @@ def error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
     if answer.held_out is None:
         return []
     errors = answer.held_out
-    every = (
+    labelled_errors = (
         ("as given", errors.before, ORANGE),
-        ("re-tuned", errors.retuned, RETUNED.colour),
-        ("with the effects found", errors.after if answer.effects else None, AFTER.colour),
+        ("re-tuned", errors.retuned, RETUNED_STAGE.colour),
+        ("with the effects found", errors.after if answer.effects else None, COMPLETED_STAGE.colour),
         ("black box", answer.black_box, GREEN),
         ("noise alone", errors.noise, GREY),
     )
-    return [(name, value, colour) for name, value, colour in every if value is not None and value > 0]
+    return [(name, value, colour) for name, value, colour in labelled_errors if value is not None and value > 0]
 
 
 def _draw_answer(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]]) -> Figure:
@@ -55,7 +55,7 @@ def _draw_answer(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]
     grid = figure.add_gridspec(1, 2, width_ratios=[1.75, 1])
     _draw_excerpt(figure.add_subplot(grid[0, 0]), excerpt)
     _draw_errors(figure.add_subplot(grid[0, 1]), rows)
-    handles = [MEASURED, RETUNED.handle, AFTER.handle]
+    handles = [MEASURED, RETUNED_STAGE.handle, COMPLETED_STAGE.handle]
     figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=9, frameon=False)
     return figure
 
@@ -64,33 +64,35 @@ def _draw_excerpt(axes: Axes, excerpt: DrawnExcerpt) -> None:
     """Measured and predicted curves over time; the ordinate ends at 1.6 times the largest measured magnitude."""
     plain_axes(axes)
     measured = np.array(excerpt.measured)
-    shown = scale_of(excerpt.unit, float(np.max(np.abs(measured), initial=0.0)))
+    scale = scale_of(excerpt.unit, float(np.max(np.abs(measured), initial=0.0)))
     seconds = excerpt.start_s + excerpt.step_s * np.arange(len(measured))
-    axes.plot(seconds, shown.factor * measured, color=BLACK, linewidth=2.6, alpha=0.35)
-    for stage, values in ((RETUNED, excerpt.retuned), (AFTER, excerpt.after)):
-        drawn = shown.factor * np.array(values)
-        axes.plot(seconds, drawn, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
-    reach = 1.6 * shown.factor * max(float(np.max(np.abs(measured), initial=0.0)), np.finfo(float).tiny)
+    axes.plot(seconds, scale.factor * measured, color=BLACK, linewidth=2.6, alpha=0.35)
+    for stage, values in ((RETUNED_STAGE, excerpt.retuned), (COMPLETED_STAGE, excerpt.after)):
+        predicted = scale.factor * np.array(values)
+        axes.plot(seconds, predicted, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
+    reach = 1.6 * scale.factor * max(float(np.max(np.abs(measured), initial=0.0)), np.finfo(float).tiny)
     low, high = axes.get_ylim()
     axes.set_ylim(max(low, -reach), min(high, reach))
     axes.set_xlabel(f"Time in {excerpt.record} (s)", fontsize=9.5)
-    axes.set_ylabel(f"{excerpt.channel} ({shown.unit})", fontsize=9.5)
+    axes.set_ylabel(f"{excerpt.channel} ({scale.unit})", fontsize=9.5)
 
 
 def _draw_errors(axes: Axes, rows: list[tuple[str, float, str]]) -> None:
     """Horizontal bars of the errors, labelled in per cent of the signal. rows: as from `error_rows`."""
     plain_axes(axes)
-    at = np.arange(len(rows))
-    values = [max(value, _LOWEST) for _, value, _ in rows]
+    positions = np.arange(len(rows))
+    values = [max(value, _LEAST_ERROR) for _, value, _ in rows]
     low = 0.5 * min(values)
-    axes.barh(at, [value - low for value in values], left=low, height=0.6, color=[colour for _, _, colour in rows])
+    axes.barh(
+        positions, [value - low for value in values], left=low, height=0.6, color=[colour for _, _, colour in rows]
+    )
     axes.set_xscale("log")
     axes.set_xlim(low, 3.0 * max(values))
-    for row, value in zip(at, values, strict=True):
+    for row, value in zip(positions, values, strict=True):
         axes.annotate(
             f"{100 * value:.3g} %", (value, row), xytext=(3, 0), textcoords="offset points", va="center", fontsize=8.5
         )
-    axes.set_yticks(at, [name for name, _, _ in rows])
+    axes.set_yticks(positions, [name for name, _, _ in rows])
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.grid(False, axis="y")
     axes.set_xticks([])
@@ -99,4 +101,4 @@ def _draw_errors(axes: Axes, rows: list[tuple[str, float, str]]) -> None:
 
 def _plain_name(name: str) -> str:
     """The name with a hyphen for every character that is no letter or digit."""
-    return "".join(sign if sign.isalnum() else "-" for sign in name)
+    return "".join(character if character.isalnum() else "-" for character in name)

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from analysis.diagnosis.result.residual_spectrum import RemainderSpectrum
 from analysis.diagnosis.unit_wording import typeset_unit
-from analysis.figures.diagnosis.stage_style import AFTER, RETUNED
+from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, RETUNED_STAGE
 from analysis.figures.picture import Picture
 from analysis.figures.style import GREY, draw_no_data_note, new_figure, plain_axes, power_of_ten
 
@@ -31,7 +31,7 @@ def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
         caption="Amplitude densities in sixths of an octave. Where the solid line lies on the grey band, the "
         "residual is noise; where it lies above, a mismatch remains.",
         figure=draw_remainder(spectra),
-        alternative=" ".join(_alternative_text(each) for each in spectra),
+        alternative=" ".join(_alternative_text(spectrum) for spectrum in spectra),
     )
 
 
@@ -46,10 +46,10 @@ def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for axes in grid.ravel()[len(spectra) :]:
         axes.set_visible(False)
-    for axes, each in zip(grid.ravel(), spectra, strict=False):
-        _draw_panel(axes, each)
+    for axes, spectrum in zip(grid.ravel(), spectra, strict=False):
+        _draw_panel(axes, spectrum)
     figure.supxlabel("Frequency (Hz)", fontsize=9.5)
-    handles = [_SIGNAL, RETUNED.handle, AFTER.handle, _NOISE]
+    handles = [_SIGNAL, RETUNED_STAGE.handle, COMPLETED_STAGE.handle, _NOISE]
     figure.legend(handles=handles, loc="outside upper center", ncols=4, fontsize=9, frameon=False)
     return figure
 
@@ -60,7 +60,7 @@ def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
     axes.loglog(spectrum.frequency_hz, spectrum.measured, color=GREY, linewidth=0.9)
     if np.isfinite(spectrum.noise).any():
         axes.loglog(spectrum.frequency_hz, spectrum.noise, color=GREY, linewidth=4, alpha=0.4)
-    for stage, values in ((RETUNED, spectrum.retuned), (AFTER, spectrum.after)):
+    for stage, values in ((RETUNED_STAGE, spectrum.retuned), (COMPLETED_STAGE, spectrum.after)):
         axes.loglog(spectrum.frequency_hz, values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
     axes.set_title(f"{spectrum.channel} ({typeset_unit(spectrum.unit)}/√Hz)", fontsize=9, loc="left", pad=3)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -74,8 +74,8 @@ def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
 
 def _alternative_text(spectrum: RemainderSpectrum) -> str:
     """Largest ratio of the completed model's residual to the noise, and its frequency, in words."""
-    over = spectrum.after / spectrum.noise
-    if not np.isfinite(over).any():
+    ratio = spectrum.after / spectrum.noise
+    if not np.isfinite(ratio).any():
         return f"{spectrum.channel}: the noise is not known."
-    worst = int(np.nanargmax(over))
-    return f"{spectrum.channel}: at most {over[worst]:.2g} times the noise, at {spectrum.frequency_hz[worst]:.3g} Hz."
+    peak = int(np.nanargmax(ratio))
+    return f"{spectrum.channel}: at most {ratio[peak]:.2g} times the noise, at {spectrum.frequency_hz[peak]:.3g} Hz."

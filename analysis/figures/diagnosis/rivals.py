@@ -17,7 +17,7 @@ from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.figures.diagnosis.stage_style import AFTER, RETUNED
+from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, RETUNED_STAGE
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREY, draw_no_data_note, new_figure, plain_axes, ratio_ticks
 from equalizer.effects.placing import place_of_effect
@@ -25,8 +25,12 @@ from equalizer.signals.signal import FloatArray
 
 MOST_RIVALS = 8
 """Largest number of explanations that are drawn in a figure."""
-_SEEN = "Errors on the data that were used for fitting and model selection; rivals are not evaluated on held-out data."
-_BOTH = "Filled: data that were used for fitting and model selection; open: held-out data, which were used for neither."
+_TRAINING_NOTE = (
+    "Errors on the data that were used for fitting and model selection; rivals are not evaluated on held-out data."
+)
+_TRAINING_AND_TEST_NOTE = (
+    "Filled: data that were used for fitting and model selection; open: held-out data, which were used for neither."
+)
 _ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
 
@@ -36,7 +40,7 @@ class TriedExplanation:
 
     words: str
     """Effect and axis, in words."""
-    seen: float
+    training_error: float
     """Error on the data that were fitted to and chosen by."""
     test: float
     """Error on held-out data; NaN where not computed."""
@@ -46,80 +50,98 @@ def list_explanations(round_: Sequence[FittedCandidate], axes: Sequence[str]) ->
     """The best fit of each hypothesis of a round: first the round's choice, which may have a larger error than a less
     simple one; then the others, the smallest error first. axes: displayed names of the axes."""
     best: dict[object, TriedExplanation] = {}
-    for item in round_:
-        words = ", ".join(_claim_words(claim, axes) for claim in item.fitted.hypothesis.claims[-1:])
-        best.setdefault(item.fitted.hypothesis.key, _make_explanation(words, item.score))
-    chosen, others = list(best.values())[:1], list(best.values())[1:]
-    return (*chosen, *sorted(others, key=lambda each: each.seen))[:MOST_RIVALS]
+    for candidate in round_:
+        words = ", ".join(_claim_words(claim, axes) for claim in candidate.fitted.hypothesis.claims[-1:])
+        best.setdefault(candidate.fitted.hypothesis.key, _make_explanation(words, candidate.score))
+    chosen, alternatives = list(best.values())[:1], list(best.values())[1:]
+    return (*chosen, *sorted(alternatives, key=lambda rival: rival.training_error))[:MOST_RIVALS]
 
 
 def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Picture, ...]:
     """A picture per round in which several explanations were tried; folded where none of them was added."""
     retuned = _make_explanation("re-tuned, no physics", explanation.retuned.score)
     pictures = []
-    several = [number for number, round_ in enumerate(explanation.rounds, start=1) if len(round_) > 1]
-    for number in several[: len(_ORDINALS)]:
+    tested_rounds = [number for number, round_ in enumerate(explanation.rounds, start=1) if len(round_) > 1]
+    for number in tested_rounds[: len(_ORDINALS)]:
         round_ = explanation.rounds[number - 1]
-        tried, held = list_explanations(round_, axes), number <= len(explanation.steps)
-        if tried:
+        explanations, is_accepted = list_explanations(round_, axes), number <= len(explanation.steps)
+        if explanations:
             pictures.append(
                 Picture(
                     name=f"rivals-{number}",
-                    title=f"What was tried for the {_ORDINALS[several.index(number)]} effect"
-                    + ("" if held else "; none was accepted"),
+                    title=f"What was tried for the {_ORDINALS[tested_rounds.index(number)]} effect"
+                    + ("" if is_accepted else "; none was accepted"),
                     caption="Error in units of the noise, mean over the channels, of each explanation after its fit, "
                     "in addition to the effects found before. "
-                    + (_BOTH if any(np.isfinite(each.test) for each in tried) else _SEEN)
+                    + (
+                        _TRAINING_AND_TEST_NOTE
+                        if any(np.isfinite(rival.test) for rival in explanations)
+                        else _TRAINING_NOTE
+                    )
                     + " Dashed: the re-tuned model alone.",
-                    figure=draw_rivals(tried, retuned, held),
-                    folded=not held,
-                    bitmap=held,
-                    alternative=" ".join(_alternative_text(each) for each in tried),
+                    figure=draw_rivals(explanations, retuned, is_accepted),
+                    folded=not is_accepted,
+                    bitmap=is_accepted,
+                    alternative=" ".join(_alternative_text(rival) for rival in explanations),
                 )
             )
     return tuple(pictures)
 
 
-def draw_rivals(tried: Sequence[TriedExplanation], retuned: TriedExplanation, held: bool = True) -> Figure:
-    """Figure with a row per explanation, the chosen one on top. held: whether the chosen explanation was added, and is
-    marked."""
-    if not tried:
+def draw_rivals(
+    explanations: Sequence[TriedExplanation], retuned: TriedExplanation, is_accepted: bool = True
+) -> Figure:
+    """Figure with a row per explanation, the chosen one on top. is_accepted: whether the chosen explanation was added,
+    and is marked."""
+    if not explanations:
         return draw_no_data_note(new_figure(7.4, 1.4), "Nothing was tried.")
-    figure = new_figure(8.8, 1.05 + 0.3 * len(tried))
+    figure = new_figure(8.8, 1.05 + 0.3 * len(explanations))
     axes = figure.add_subplot()
     plain_axes(axes)
-    for row, item in enumerate(tried):
-        colour = AFTER.colour if row == 0 and held else GREY
-        axes.plot([item.seen, item.test], [row, row], color=colour, linewidth=1.2, zorder=2)
-        axes.plot(item.seen, row, "o", color=colour, markersize=6.5, zorder=3)
+    for row, item in enumerate(explanations):
+        colour = COMPLETED_STAGE.colour if row == 0 and is_accepted else GREY
+        axes.plot([item.training_error, item.test], [row, row], color=colour, linewidth=1.2, zorder=2)
+        axes.plot(item.training_error, row, "o", color=colour, markersize=6.5, zorder=3)
         if np.isfinite(item.test):
             axes.plot(item.test, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
-    axes.axvline(retuned.seen, color=RETUNED.colour, linestyle=RETUNED.dash, linewidth=RETUNED.width, zorder=1)
+    axes.axvline(
+        retuned.training_error,
+        color=RETUNED_STAGE.colour,
+        linestyle=RETUNED_STAGE.dash,
+        linewidth=RETUNED_STAGE.width,
+        zorder=1,
+    )
     axes.axvline(1, color=BLACK, linewidth=1.0, zorder=1)
     _draw_mark(axes, 1.0, "noise", "right")
-    _draw_mark(axes, retuned.seen, "re-tuned", "left")
-    axes.set_yticks(range(len(tried)), [each.words for each in tried])
-    if held:
+    _draw_mark(axes, retuned.training_error, "re-tuned", "left")
+    axes.set_yticks(range(len(explanations)), [rival.words for rival in explanations])
+    if is_accepted:
         axes.get_yticklabels()[0].set_fontweight("bold")
-    axes.set_ylim(len(tried) - 0.5, -0.5)
+    axes.set_ylim(len(explanations) - 0.5, -0.5)
     axes.grid(False, axis="y")
-    values = np.array([*(each.seen for each in tried), *(each.test for each in tried), retuned.seen])
+    values = np.array(
+        [
+            *(rival.training_error for rival in explanations),
+            *(rival.test for rival in explanations),
+            retuned.training_error,
+        ]
+    )
     _scale_axis(axes, values[np.isfinite(values)])
     axes.set_xlabel("Error / noise", fontsize=9.5)
     return figure
 
 
-def _draw_mark(axes: Axes, at: float, words: str, side: Literal["left", "right"]) -> None:
-    """A label above the axes at the abscissa `at`. side: horizontal alignment of the text, as in Matplotlib."""
+def _draw_mark(axes: Axes, position: float, label: str, side: Literal["left", "right"]) -> None:
+    """A label above the axes at the abscissa `position`. side: horizontal alignment of the text, as in Matplotlib."""
     axes.annotate(
-        words, (at, 1), xycoords=("data", "axes fraction"), xytext=(5 if side == "right" else -5, 2),
+        label, (position, 1), xycoords=("data", "axes fraction"), xytext=(5 if side == "right" else -5, 2),
         textcoords="offset points", ha=side, fontsize=8.5, annotation_clip=False,
     )  # fmt: skip
 
 
 def _alternative_text(rival: TriedExplanation) -> str:
-    held_out = f", held-out {rival.test:.3g}" if np.isfinite(rival.test) else ""
-    return f"{rival.words}: {rival.seen:.3g}{held_out}."
+    held_out_text = f", held-out {rival.test:.3g}" if np.isfinite(rival.test) else ""
+    return f"{rival.words}: {rival.training_error:.3g}{held_out_text}."
 
 
 def _scale_axis(axes: Axes, values: FloatArray) -> None:
@@ -142,8 +164,8 @@ def _claim_words(claim: Claim, axes: Sequence[str]) -> str:
 
 def _make_explanation(words: str, score: FitScore) -> TriedExplanation:
     """The explanation with the geometric means of its errors."""
-    seen = np.concatenate([score.fit, score.choose])
-    return TriedExplanation(words, _geometric_mean(seen), _geometric_mean(score.test))
+    training_errors = np.concatenate([score.fit, score.choose])
+    return TriedExplanation(words, _geometric_mean(training_errors), _geometric_mean(score.test))
 
 
 def _geometric_mean(values: FloatArray) -> float:

@@ -33,9 +33,9 @@ class Stage:
         return Line2D([], [], color=self.colour, linestyle=self.dash, linewidth=self.width, label=self.words)
 
 
-BEFORE = Stage("before", "as given", ORANGE, (0, (1.2, 1.2)), 1.4)
-RETUNED = Stage("retuned", "re-tuned", PURPLE, (0, (4, 1.6)), 1.4)
-AFTER = Stage("after", "with the effects found", BLUE, "-", 1.4)
-STAGES = (BEFORE, RETUNED, AFTER)
+GIVEN_STAGE = Stage("before", "as given", ORANGE, (0, (1.2, 1.2)), 1.4)
+RETUNED_STAGE = Stage("retuned", "re-tuned", PURPLE, (0, (4, 1.6)), 1.4)
+COMPLETED_STAGE = Stage("after", "with the effects found", BLUE, "-", 1.4)
+STAGES = (GIVEN_STAGE, RETUNED_STAGE, COMPLETED_STAGE)
 MEASURED = Line2D([], [], color=BLACK, linewidth=2.6, alpha=0.35, label="measured")
 """Legend entry of the measured signal."""

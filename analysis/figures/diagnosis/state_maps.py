@@ -13,13 +13,13 @@ from matplotlib.lines import Line2D
 
 from analysis.diagnosis.result.curves.state_maps import Loop, StateMaps, StateView
 from analysis.diagnosis.unit_wording import scale_of, share_text
-from analysis.figures.diagnosis.stage_style import AFTER, BEFORE, MEASURED
+from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, GIVEN_STAGE, MEASURED
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, new_figure, plain_axes
 from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
-_SEEN = 0.998
+_VISIBLE_SHARE = 0.998
 """Share of the samples within the limits of a panel, so that outliers do not compress all other samples."""
 
 
@@ -29,23 +29,23 @@ def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
     if not maps:
         return ()
     first = maps[0]
-    along = f" along {first.axis}" if len(maps) > 1 else ""
-    others = [f"{share_text(each.share)} along {each.axis}" for each in maps[1:]]
-    beside = f" Not drawn: {conjoin(others)}." if others else ""
-    left = f" Blue: mean of the residual force {first.completed}." if first.completed else ""
+    axis_text = f" along {first.axis}" if len(maps) > 1 else ""
+    other_axes = [f"{share_text(axis_maps.share)} along {axis_maps.axis}" for axis_maps in maps[1:]]
+    omitted_text = f" Not drawn: {conjoin(other_axes)}." if other_axes else ""
+    residual_text = f" Blue: mean of the residual force {first.completed}." if first.completed else ""
     states = Picture(
         name="state-map",
-        title=f"Missing force{along} over the states of motion",
+        title=f"Missing force{axis_text} over the states of motion",
         caption=f"Force on the device that {first.model} {'lack' if ' and ' in first.model else 'lacks'}; grey: "
-        f"single samples; black: mean per bin, with two standard errors.{left} A flat line at zero means that the "
-        f"missing force does not depend on that state. Rms: {share_text(first.share)} of the force.{beside}",
+        f"single samples; black: mean per bin, with two standard errors.{residual_text} A flat line at zero means that "
+        f"the missing force does not depend on that state. Rms: {share_text(first.share)} of the force.{omitted_text}",
         figure=_draw_states(first),
         alternative=" ".join(_alternative_text(view, first.unit) for view in first.views),
     )
     text = f", and {first.completed}" if first.completed else ""
     loops = Picture(
         name="state-loops",
-        title=f"Force{along} during part of the motion",
+        title=f"Force{axis_text} during part of the motion",
         caption="About one period, where the travel is largest: the measured force, and the force computed from "
         f"{first.model}{text}. The area inside a loop over the position is the dissipated work.",
         figure=_draw_loops(first),
@@ -58,7 +58,7 @@ def _draw_states(maps: StateMaps) -> Figure:
     """Four panels, one per state variable, with a common ordinate."""
     figure = new_figure(8.8, 5.6)
     scale = scale_of(maps.unit, max(float(np.abs(view.mean).max(initial=0.0)) for view in maps.views))
-    limits = _limits([np.concatenate([view.cloud, view.mean]) for view in maps.views], scale.factor)
+    limits = _ordinate_limits([np.concatenate([view.sample_force, view.mean]) for view in maps.views], scale.factor)
     for axes, view in zip(figure.subplots(2, 2, sharey=True).ravel(), maps.views, strict=True):
         plain_axes(axes)
         _draw_view(axes, view, scale.factor)
@@ -77,33 +77,41 @@ def _draw_states(maps: StateMaps) -> Figure:
 def _draw_view(axes: Axes, view: StateView, factor: float) -> None:
     """Samples, means with two standard errors, and the completed model's residual. factor: from SI to the shown
     unit."""
-    along = scale_of(view.unit, float(np.abs(view.cloud_at).max(initial=0.0)))
-    axes.plot(along.factor * view.cloud_at, factor * view.cloud, ".", color=GREY, markersize=2.2, alpha=0.35, zorder=1)
+    x_scale = scale_of(view.unit, float(np.abs(view.sample_abscissa).max(initial=0.0)))
+    axes.plot(
+        x_scale.factor * view.sample_abscissa,
+        factor * view.sample_force,
+        ".",
+        color=GREY,
+        markersize=2.2,
+        alpha=0.35,
+        zorder=1,
+    )
     axes.axhline(0, color=GREY, linewidth=0.8, zorder=2)
     axes.errorbar(
-        along.factor * view.at, factor * view.mean, yerr=2 * factor * view.error, fmt="o", color=BLACK, markersize=3.2,
-        elinewidth=0.9, capsize=1.5, zorder=4,
+        x_scale.factor * view.bin_abscissa, factor * view.mean, yerr=2 * factor * view.error, fmt="o", color=BLACK,
+        markersize=3.2, elinewidth=0.9, capsize=1.5, zorder=4,
     )  # fmt: skip
-    if len(view.left):
-        axes.plot(along.factor * view.at, factor * view.left, color=BLUE, linewidth=1.8, zorder=3)
-    axes.set_xlabel(f"{view.along.capitalize()} ({along.unit})", fontsize=9)
+    if len(view.mean_residual):
+        axes.plot(x_scale.factor * view.bin_abscissa, factor * view.mean_residual, color=BLUE, linewidth=1.8, zorder=3)
+    axes.set_xlabel(f"{view.abscissa_name.capitalize()} ({x_scale.unit})", fontsize=9)
     axes.locator_params(axis="x", nbins=6)
 
 
 def _draw_loops(maps: StateMaps) -> Figure:
     """Two panels with a common ordinate: measured force, and forces of the model before and after its completion."""
     figure = new_figure(8.8, 3.9)
-    every = [each for loop in maps.loops for each in (loop.measured, loop.before, loop.after)]
-    scale = scale_of(maps.unit, float(np.abs(np.concatenate(every)).max(initial=0.0)))
+    forces = [force for loop in maps.loops for force in (loop.measured, loop.model_force, loop.completed_force)]
+    scale = scale_of(maps.unit, float(np.abs(np.concatenate(forces)).max(initial=0.0)))
     for axes, loop in zip(figure.subplots(1, 2, sharey=True), maps.loops, strict=True):
         plain_axes(axes)
         _draw_loop(axes, loop, scale.factor)
     figure.supylabel(f"Force ({scale.unit})", fontsize=9.5)
-    before = BEFORE.handle
-    before.set_label(maps.model)
-    handles = [MEASURED, before]
+    given_handle = GIVEN_STAGE.handle
+    given_handle.set_label(maps.model)
+    handles = [MEASURED, given_handle]
     if maps.completed:
-        handles.append(AFTER.handle)
+        handles.append(COMPLETED_STAGE.handle)
         handles[-1].set_label(maps.completed)
     figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=9, frameon=False)
     return figure
@@ -111,33 +119,35 @@ def _draw_loops(maps: StateMaps) -> Figure:
 
 def _draw_loop(axes: Axes, loop: Loop, factor: float) -> None:
     """Forces of one loop over its state variable. factor: from SI to the shown unit of force."""
-    along = scale_of(loop.unit, float(np.abs(loop.at).max(initial=0.0)))
-    at = along.factor * loop.at
-    axes.plot(at, factor * loop.measured, color=BLACK, linewidth=2.6, alpha=0.35)
-    for stage, values in ((BEFORE, loop.before), (AFTER, loop.after)):
+    x_scale = scale_of(loop.unit, float(np.abs(loop.abscissa).max(initial=0.0)))
+    positions = x_scale.factor * loop.abscissa
+    axes.plot(positions, factor * loop.measured, color=BLACK, linewidth=2.6, alpha=0.35)
+    for stage, values in ((GIVEN_STAGE, loop.model_force), (COMPLETED_STAGE, loop.completed_force)):
         if len(values):
-            axes.plot(at, factor * values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
-    axes.set_xlabel(f"{loop.along.capitalize()} ({along.unit})", fontsize=9)
+            axes.plot(positions, factor * values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
+    axes.set_xlabel(f"{loop.abscissa_name.capitalize()} ({x_scale.unit})", fontsize=9)
     axes.locator_params(axis="x", nbins=6)
 
 
-def _limits(values: Sequence[FloatArray], factor: float) -> tuple[float, float]:
-    """Limits of the ordinate in the shown unit: quantiles that contain the share `_SEEN` of all values, and 0."""
-    whole = factor * np.concatenate(values)
-    low, high = np.quantile(whole, [(1 - _SEEN) / 2, (1 + _SEEN) / 2])
-    room = 0.06 * max(float(high - low), 1e-300)
-    return float(min(low, 0.0)) - room, float(max(high, 0.0)) + room
+def _ordinate_limits(values: Sequence[FloatArray], factor: float) -> tuple[float, float]:
+    """Limits of the ordinate in the shown unit: quantiles that contain the share `_VISIBLE_SHARE` of all values, and
+    0."""
+    all_values = factor * np.concatenate(values)
+    low, high = np.quantile(all_values, [(1 - _VISIBLE_SHARE) / 2, (1 + _VISIBLE_SHARE) / 2])
+    margin = 0.06 * max(float(high - low), 1e-300)
+    return float(min(low, 0.0)) - margin, float(max(high, 0.0)) + margin
 
 
 def _alternative_text(view: StateView, unit: str) -> str:
     """Smallest and largest mean of the missing force and where they occur, in words. unit: of the force, SI."""
     if not len(view.mean):
-        return f"Against {view.along}: too few samples."
+        return f"Against {view.abscissa_name}: too few samples."
     low, high = int(np.argmin(view.mean)), int(np.argmax(view.mean))
     ends = [
-        f"{typeset(f'{view.mean[k]:.3g}')} {unit} at {typeset(f'{view.at[k]:.3g}')} {view.unit}" for k in (low, high)
+        f"{typeset(f'{view.mean[k]:.3g}')} {unit} at {typeset(f'{view.bin_abscissa[k]:.3g}')} {view.unit}"
+        for k in (low, high)
     ]
-    return f"Against {view.along}: mean missing force from {ends[0]} to {ends[1]}."
+    return f"Against {view.abscissa_name}: mean missing force from {ends[0]} to {ends[1]}."
 
 
 def _loop_text(maps: StateMaps) -> str:
@@ -145,10 +155,10 @@ def _loop_text(maps: StateMaps) -> str:
     deviation, in words."""
     loop = maps.loops[0]
     size = max(float(np.std(loop.measured)), 1e-300)
-    kinds = ((maps.model, loop.before), (maps.completed, loop.after))
-    left = [
+    kinds = ((maps.model, loop.model_force), (maps.completed, loop.completed_force))
+    error_texts = [
         f"{words}: {share_text(float(np.sqrt(np.mean((values - loop.measured) ** 2))) / size)}"
         for words, values in kinds
         if len(values)
     ]
-    return f"Error of the computed force in this stretch, rms relative to the measured force: {'; '.join(left)}."
+    return f"Error of the computed force in this stretch, rms relative to the measured force: {'; '.join(error_texts)}."

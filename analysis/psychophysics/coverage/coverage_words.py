@@ -1,14 +1,14 @@
 """Measured coverage of each confidence interval near the force cap, as sentences for reports and as a table.
 
-Coverage is the share of simulated studies whose 95 % interval holds the true value. `measured_coverage` has the counts;
-a report shows the sentence with the interval it belongs to, docs/statistics.md has the table.
+Coverage is the share of simulated studies whose 95 % interval contains the true value. `measured_coverage` has the
+counts; a report shows the sentence with the interval it belongs to, docs/statistics.md has the table.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.psychophysics.catch_trials import wilson_interval
-from analysis.wording import conjoin, format_signed, number
+from analysis.wording import format_number, format_signed
 
 CASES_HZ = {25.0: "0.85 N", 35.0: "3 N, the cap", 45.0: "4 N, above the cap"}
 """Reported frequencies (Hz) of the simulated studies, and the true median threshold at each; at 5 Hz it is 0.35 N."""
@@ -19,7 +19,7 @@ NAMES = {
     "tukey": "difference to 5 Hz by reversal means, as published (Tukey), N",
     "run": "single threshold by likelihood, with the model's slopes",
     "single": "single threshold by likelihood, one participant alone",
-    "one-way": "type-1 error of the one-way analysis at equal medians of 2.2 N:",
+    "one-way": "type-1 error of the one-way analysis at equal medians of 2.2 N",
 }
 """Name of each analysis, and the text for its interval."""
 ONLY_BELOW = ("run", "single")
@@ -38,7 +38,7 @@ class MeasuredCoverage:
     bias_db: float | None
     """Mean error of the estimates, over the cases that have one; None for an analysis that gives none in dB."""
     covered: int
-    """Number of 95 % intervals that held the true value; for a type-1 error, of studies that found a difference."""
+    """Number of 95 % intervals that contain the true value; for a type-1 error, of studies that found a difference."""
     intervals: int
     """Number of all intervals; for a type-1 error, of all studies."""
 
@@ -47,12 +47,15 @@ class MeasuredCoverage:
         """Share of `covered` in per cent with Wilson's 95 % interval, such as: 94.0 % (92.4 to 95.3)."""
         lower, upper = wilson_interval(self.covered, self.intervals)
         share = 100 * self.covered / self.intervals
-        return f"{number(share, 1)} % ({number(100 * lower, 1)} to {number(100 * upper, 1)})"
+        return f"{format_number(share, 1)} % ({format_number(100 * lower, 1)} to {format_number(100 * upper, 1)})"
 
 
 def coverage_lines(rows: Sequence[MeasuredCoverage]) -> list[str]:
     """The table in Markdown, one line per row, ordered as `NAMES`."""
-    lines = ["| interval | median threshold | bias (dB), of what has a size | holds the truth |", "|---|---|---|---|"]
+    lines = [
+        "| interval | median threshold | bias of the estimates (dB) | contains the true value |",
+        "|---|---|---|---|",
+    ]
     for name, title in NAMES.items():
         for row in rows:
             if row.analysis == name:
@@ -67,15 +70,17 @@ def coverage_sentence(rows: Sequence[MeasuredCoverage], analysis: str) -> str:
     texts = []
     for row in rows:
         if row.analysis == analysis and row.frequency_hz:
-            known = row.bias_db is not None and analysis not in ONLY_BELOW
-            bias = f" (off by {format_signed(row.bias_db or 0.0, 1)} dB)" if known else ""
-            texts.append(f"{number(100 * row.covered / row.intervals, 0)} % at {CASES_HZ[row.frequency_hz]}{bias}")
+            has_bias = row.bias_db is not None and analysis not in ONLY_BELOW
+            bias = f" (bias {format_signed(row.bias_db or 0.0, 1)} dB)" if has_bias else ""
+            texts.append(
+                f"{format_number(100 * row.covered / row.intervals, 0)} % at {CASES_HZ[row.frequency_hz]}{bias}"
+            )
         elif row.analysis == analysis:
-            return f"{_SIMULATED}, {NAMES[analysis]} {row.percent}, where it says 5 %."
+            return f"{_SIMULATED}: the {NAMES[analysis]} is {row.percent}, nominally 5 %."
     if not texts:
         return ""
-    return f"{_SIMULATED}, the 95 % intervals of the {NAMES[analysis]}, held the truth: {conjoin(texts)}."
+    return f"{_SIMULATED}: the 95 % interval ({NAMES[analysis]}) contains the true value in {'; '.join(texts)}."
 
 
-_SIMULATED = "Measured near the cap, simulated with the published staircase"
+_SIMULATED = "Measured near the cap in simulated studies with the published staircase"
 """Beginning of every sentence."""

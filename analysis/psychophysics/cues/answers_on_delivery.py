@@ -29,11 +29,11 @@ from equalizer.signals.signal import FloatArray
 
 LOGITS_PER_D = 1.702
 """A logistic curve over this times z is a normal one within 0.01 (D. C. Haley, Stanford technical report 15, 1952)."""
-RELYING = LOGITS_PER_D / USUAL_NOISE_DB
+CUE_ONLY_SLOPE = LOGITS_PER_D / USUAL_NOISE_DB
 """Slope in logits per dB of a participant with the usual internal noise who goes by the cue alone."""
 STEPS, SETTLED = 50, 1e-8
 """Most Newton steps of the logistic regression, and relative change at which it has converged."""
-FLATTEST_DB = 1e-6
+LEAST_SD_DB = 1e-6
 """A residual that varies by less is rounding."""
 
 
@@ -56,7 +56,7 @@ class AnswersOnDelivery:
     @property
     def is_conclusive(self) -> bool:
         """Whether a participant who relied on the cue would have shown: the interval is narrower than that slope."""
-        return self.lower is not None and self.upper is not None and self.upper - self.lower < RELYING
+        return self.lower is not None and self.upper is not None and self.upper - self.lower < CUE_ONLY_SLOPE
 
 
 def answers_on_delivery(trials: DeliveredTrials) -> tuple[AnswersOnDelivery, ...]:
@@ -72,51 +72,60 @@ def _regress(
     trials: DeliveredTrials, cue: Cue, values_db: FloatArray, strength_db: FloatArray | None
 ) -> AnswersOnDelivery:
     """strength_db: asked beside the cue; None = it is the cue, or was not measured."""
-    residual, known = _residuals(trials, values_db)
-    n = int(known.sum())
+    residual, has_residual = _residuals(trials, values_db)
+    n = int(has_residual.sum())
     if n == 0:
         return AnswersOnDelivery(trials.frequency_hz, cue, 0, 0.0, None, None, None, None)
-    residual, person, side, answered = residual[known], trials.person[known], trials.side[known], trials.answer[known]
+    residual, person, side, answer = (
+        residual[has_residual],
+        trials.person[has_residual],
+        trials.side[has_residual],
+        trials.answer[has_residual],
+    )
     sd = float(residual.std())
     slope = error = None
-    if sd > FLATTEST_DB:
-        level = trials.nominal_db[known] - _means(trials.nominal_db[known], person)
+    if sd > LEAST_SD_DB:
+        level = trials.nominal_db[has_residual] - _group_means(trials.nominal_db[has_residual], person)
         people = (person[:, None] == np.unique(person)).astype(np.float64)
-        beside = _strength(trials, strength_db, known)
-        others = np.column_stack([np.ones(n), level, residual / sd, beside])
-        design = np.column_stack([people, side[:, None] * others, beside, residual / sd])
-        slope, error = _logistic_slope(design, answered > 0)
+        strength_terms = _strength_terms(trials, strength_db, has_residual)
+        side_terms = np.column_stack([np.ones(n), level, residual / sd, strength_terms])
+        design = np.column_stack([people, side[:, None] * side_terms, strength_terms, residual / sd])
+        slope, error = _logistic_slope(design, answer > 0)
     if slope is None or error is None:
         return AnswersOnDelivery(trials.frequency_hz, cue, n, sd, None, None, None, None)
-    half = float(norm.ppf(0.975)) * error
+    half_width = float(norm.ppf(0.975)) * error
     return AnswersOnDelivery(
-        trials.frequency_hz, cue, n, sd, slope / sd, (slope - half) / sd, (slope + half) / sd,
+        trials.frequency_hz, cue, n, sd, slope / sd, (slope - half_width) / sd, (slope + half_width) / sd,
         float(2.0 * norm.sf(abs(slope / error))),
     )  # fmt: skip
 
 
-def _strength(trials: DeliveredTrials, strength_db: FloatArray | None, known: NDArray[np.bool_]) -> FloatArray:
+def _strength_terms(
+    trials: DeliveredTrials, strength_db: FloatArray | None, has_residual: NDArray[np.bool_]
+) -> FloatArray:
     """(n, 1), standardised; (n, 0) where it was not measured or did not vary."""
-    residual = np.zeros(int(known.sum())) if strength_db is None else _residuals(trials, strength_db)[0][known]
+    residual = (
+        np.zeros(int(has_residual.sum())) if strength_db is None else _residuals(trials, strength_db)[0][has_residual]
+    )
     sd = float(residual.std())
-    return residual[:, None] / sd if sd > FLATTEST_DB else np.zeros((len(residual), 0))
+    return residual[:, None] / sd if sd > LEAST_SD_DB else np.zeros((len(residual), 0))
 
 
 def _residuals(trials: DeliveredTrials, values_db: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
     """(n,), and where they are known: not for a trial without the value, nor a participant with too few of them."""
-    residual, known = np.zeros(len(values_db)), np.zeros(len(values_db), dtype=np.bool_)
-    for number in range(len(trials.subjects)):
-        of_person = (trials.person == number) & np.isfinite(values_db)
+    residual, has_residual = np.zeros(len(values_db)), np.zeros(len(values_db), dtype=np.bool_)
+    for person in range(len(trials.subjects)):
+        of_person = (trials.person == person) & np.isfinite(values_db)
         fit = same_level_difference(values_db[of_person], trials.nominal_db[of_person], trials.side[of_person])
         if fit is not None:
-            residual[of_person], known[of_person] = fit.residual_db, True
-    return residual, known
+            residual[of_person], has_residual[of_person] = fit.residual_db, True
+    return residual, has_residual
 
 
-def _means(values: FloatArray, group: NDArray[np.intp]) -> FloatArray:
+def _group_means(values: FloatArray, group: NDArray[np.intp]) -> FloatArray:
     """Each entry's mean over its group."""
-    _, place = np.unique(group, return_inverse=True)
-    means: FloatArray = (np.bincount(place, weights=values) / np.bincount(place))[place]
+    _, group_index = np.unique(group, return_inverse=True)
+    means: FloatArray = (np.bincount(group_index, weights=values) / np.bincount(group_index))[group_index]
     return means
 
 
@@ -133,10 +142,12 @@ def _logistic_slope(design: FloatArray, answered: NDArray[np.bool_]) -> tuple[fl
         if np.linalg.cond(information) > 1e12:
             return None, None
         step = np.linalg.solve(information, design.T @ (answered - p))
-        share = 1.0
-        while (higher := _log_likelihood(design, answered, beta + share * step)) < value and share > 1e-3:
-            share /= 2.0
-        beta, gain, value = beta + share * step, higher - value, higher
+        step_fraction = 1.0
+        while (
+            trial_value := _log_likelihood(design, answered, beta + step_fraction * step)
+        ) < value and step_fraction > 1e-3:
+            step_fraction /= 2.0
+        beta, gain, value = beta + step_fraction * step, trial_value - value, trial_value
         if abs(gain) < SETTLED:
             return float(beta[-1]), math.sqrt(float(np.linalg.inv(information)[-1, -1]))
     return None, None

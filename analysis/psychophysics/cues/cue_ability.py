@@ -63,27 +63,27 @@ class CueAbility:
 def cue_abilities(trials: DeliveredTrials) -> tuple[CueAbility, ...]:
     """Discriminability by cue and participant, over the trials measured for the cue; participants with too few trials
     for a spread are left out."""
-    found = []
+    abilities = []
     for cue, values_db in trials.values_db.items():
-        for number, subject in enumerate(trials.subjects):
-            of_person = (trials.person == number) & np.isfinite(values_db)
+        for person, subject in enumerate(trials.subjects):
+            of_person = (trials.person == person) & np.isfinite(values_db)
             fit = same_level_difference(values_db[of_person], trials.nominal_db[of_person], trials.side[of_person])
             if fit is None:
                 continue
-            half = float(student.ppf(0.5 + CONFIDENCE / 2, fit.df)) * fit.error_db
-            found.append(
+            half_width = float(student.ppf(0.5 + CONFIDENCE / 2, fit.df)) * fit.error_db
+            abilities.append(
                 CueAbility(
                     subject=subject,
                     frequency_hz=trials.frequency_hz,
                     cue=cue,
                     trials=len(fit.residual_db),
                     difference_db=fit.difference_db,
-                    lower_db=fit.difference_db - half,
-                    upper_db=fit.difference_db + half,
+                    lower_db=fit.difference_db - half_width,
+                    upper_db=fit.difference_db + half_width,
                     spread_db=math.sqrt(float(fit.residual_db @ fit.residual_db) / fit.df),
                 )
             )
-    return tuple(found)
+    return tuple(abilities)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,15 +104,15 @@ def same_level_difference(values_db: FloatArray, nominal_db: FloatArray, side: F
     trials are left for a spread."""
     if len(set(side.tolist())) < 2:
         return None
-    away = nominal_db - nominal_db.mean()
-    design = np.column_stack([side / 2.0, np.ones(len(away)), away, away**2])
+    level_deviation = nominal_db - nominal_db.mean()
+    design = np.column_stack([side / 2.0, np.ones(len(level_deviation)), level_deviation, level_deviation**2])
     # Levels may be one or two: then the parabola is not determined, and need not be.
     inverse = np.linalg.pinv(design)
     rank = int(np.linalg.matrix_rank(design))
-    df = len(away) - rank
+    df = len(level_deviation) - rank
     if df < 1 or int(np.linalg.matrix_rank(design[:, 1:])) == rank:
         return None
-    fitted = inverse @ values_db
-    residual = values_db - design @ fitted
+    coefficients = inverse @ values_db
+    residual = values_db - design @ coefficients
     spread = math.sqrt(float(residual @ residual) / df)
-    return SameLevelFit(float(fitted[0]), spread * float(np.linalg.norm(inverse[0])), df, residual)
+    return SameLevelFit(float(coefficients[0]), spread * float(np.linalg.norm(inverse[0])), df, residual)

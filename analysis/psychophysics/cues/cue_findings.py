@@ -19,10 +19,10 @@ from analysis.psychophysics.cues.cue_ability import (
 )
 from analysis.psychophysics.cues.delivered_cues import Cue, CueGap, DeliveredTrials, select_delivered_trials
 from analysis.psychophysics.group_contrasts import holm_correction
-from analysis.wording import conjoin, format_signed, number, p_text
+from analysis.wording import conjoin, format_number, format_p_text, format_signed
 from protocols.trial import Trial
 
-LEVEL = 0.05
+SIGNIFICANCE_LEVEL = 0.05
 """Level of significance."""
 
 
@@ -53,8 +53,9 @@ class CueFinding:
 
     @property
     def followed(self) -> bool:
-        """Whether answers depended on the cue, at `LEVEL` after the correction; False where no test was possible."""
-        return self.p_holm is not None and self.p_holm < LEVEL
+        """Whether answers depended on the cue, at `SIGNIFICANCE_LEVEL` after the correction; False where no test was
+        possible."""
+        return self.p_holm is not None and self.p_holm < SIGNIFICANCE_LEVEL
 
 
 def cue_findings(trials: Iterable[Trial]) -> tuple[CueFinding, ...]:
@@ -66,15 +67,15 @@ def cue_findings(trials: Iterable[Trial]) -> tuple[CueFinding, ...]:
     ]
     tested = [regressed.p for _, _, regressed in parts if regressed.p is not None]
     corrected = iter(holm_correction(tested))
-    found = []
+    findings = []
     for group, abilities, regressed in parts:
         p_holm = next(corrected) if regressed.p is not None else None
-        if mine := tuple(each for each in abilities if each.cue is regressed.cue):
-            found.append(_finding(group, mine, regressed, p_holm))
-    return tuple(found)
+        if same_cue := tuple(ability for ability in abilities if ability.cue is regressed.cue):
+            findings.append(_make_finding(group, same_cue, regressed, p_holm))
+    return tuple(findings)
 
 
-def _finding(
+def _make_finding(
     group: DeliveredTrials, people: tuple[CueAbility, ...], regressed: AnswersOnDelivery, p_holm: float | None
 ) -> CueFinding:
     """The finding on the cue of `regressed`. people: abilities of all participants by this cue, at least one."""
@@ -82,12 +83,12 @@ def _finding(
         frequency_hz=group.frequency_hz,
         cue=regressed.cue,
         people=people,
-        difference_db=median([each.difference_db for each in people]),
-        largest_db=max((each.difference_db for each in people), key=abs),
-        spread_db=median([each.spread_db for each in people]),
-        abilities=tuple(median([each.ability(noise) for each in people]) for noise in INTERNAL_NOISE_DB),
+        difference_db=median([ability.difference_db for ability in people]),
+        largest_db=max((ability.difference_db for ability in people), key=abs),
+        spread_db=median([ability.spread_db for ability in people]),
+        abilities=tuple(median([ability.ability(noise) for ability in people]) for noise in INTERNAL_NOISE_DB),
         observed_d_prime=_average_d_prime(group),
-        noticed_by=tuple(each.subject for each in people if each.noticeable),
+        noticed_by=tuple(ability.subject for ability in people if ability.noticeable),
         answers=regressed,
         p_holm=p_holm,
     )
@@ -95,37 +96,37 @@ def _finding(
 
 def _average_d_prime(group: DeliveredTrials) -> float | None:
     """Mean of d' over participants; None where no participant was shown both directions."""
-    found = []
-    for place in range(len(group.subjects)):
-        mine = group.person == place
-        shown = [1 if side > 0 else 2 for side in group.side[mine]]
-        bias = response_bias(shown, [bool(right) for right in (group.answer == group.side)[mine]])
+    d_primes = []
+    for person in range(len(group.subjects)):
+        of_person = group.person == person
+        directions = [1 if side > 0 else 2 for side in group.side[of_person]]
+        bias = response_bias(directions, [bool(is_correct) for is_correct in (group.answer == group.side)[of_person]])
         if bias is not None:
-            found.append(bias.d_prime)
-    return fmean(found) if found else None
+            d_primes.append(bias.d_prime)
+    return fmean(d_primes) if d_primes else None
 
 
-def cue_warnings(found: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tuple[str, ...]:
+def cue_warnings(findings: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tuple[str, ...]:
     """Warnings for the interpretation of the thresholds; empty where no cue is notable. A gap is named only where some
     trials lack a measurement, not where all do, as in a study that measured no harmonics."""
-    noticed = [_describe_noticed(each) for each in found if each.noticed_by]
-    followed = [
-        f"{each.cue.value} at {each.frequency_hz:g} Hz ({format_signed(each.answers.slope or 0.0)} logits per dB, "
-        f"Holm's {p_text(each.p_holm)})"
-        for each in found
-        if each.followed
+    noticed_texts = [_describe_noticed(finding) for finding in findings if finding.noticed_by]
+    followed_texts = [
+        f"{finding.cue.value} at {finding.frequency_hz:g} Hz ({format_signed(finding.answers.slope or 0.0)} logits per "
+        f"dB, Holm's {format_p_text(finding.p_holm)})"
+        for finding in findings
+        if finding.followed
     ]
     sentences = []
-    if noticed:
+    if noticed_texts:
         sentences.append(
             f"The two directions differed in more than their direction, by what a participant with an internal "
-            f"noise of {USUAL_NOISE_DB:g} dB notices: {conjoin(noticed)}. So those answers need not be "
+            f"noise of {USUAL_NOISE_DB:g} dB notices: {conjoin(noticed_texts)}. So those answers need not be "
             "about the direction."
         )
-    if followed:
+    if followed_texts:
         sentences.append(
             f"Within a direction, answers followed what was delivered, so direction was not the only cue: "
-            f"{conjoin(followed)}."
+            f"{conjoin(followed_texts)}."
         )
     if sentence := gap_text([gap for gap in gaps if gap.missing < gap.trials]):
         sentences.append(sentence)
@@ -137,9 +138,9 @@ def gap_text(gaps: Sequence[CueGap]) -> str:
     if not gaps:
         return ""
     parts = [
-        f"{each.cue.value} at {each.frequency_hz:g} Hz in "
-        + ("any trial" if each.missing == each.trials else f"{each.missing} of {each.trials} trials")
-        for each in gaps
+        f"{gap.cue.value} at {gap.frequency_hz:g} Hz in "
+        + ("any trial" if gap.missing == gap.trials else f"{gap.missing} of {gap.trials} trials")
+        for gap in gaps
     ]
     return (
         f"Whether direction was the cue is judged by the trials measured for it. Not measured: {conjoin(parts)}. All "
@@ -150,9 +151,10 @@ def gap_text(gaps: Sequence[CueGap]) -> str:
 def _describe_noticed(finding: CueFinding) -> str:
     """Phrase on a cue with its difference, the participants who notice it, and the share Phi(d' / 2) right by it."""
     ability = finding.abilities[INTERNAL_NOISE_DB.index(USUAL_NOISE_DB)]
-    right = 100.0 * NormalDist().cdf(ability / 2.0)
+    percent_correct = 100.0 * NormalDist().cdf(ability / 2.0)
     return (
         f"{finding.cue.value} at {finding.frequency_hz:g} Hz ({format_signed(finding.difference_db, 1)} dB at the "
-        f"median, {len(finding.noticed_by)} of {len(finding.people)} participants; alone d' {number(ability, 1)}, "
-        f"{right:.0f} % right; the answers' d' {number(finding.observed_d_prime, 1)})"
+        f"median, {len(finding.noticed_by)} of {len(finding.people)} participants; alone d' "
+        f"{format_number(ability, 1)}, {percent_correct:.0f} % right; the answers' d' "
+        f"{format_number(finding.observed_d_prime, 1)})"
     )

@@ -66,26 +66,26 @@ class CueGap:
 def select_delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
     """The counted test trials with a measured acceleration, grouped by frequency, ascending; empty without any."""
     chosen = [t for t in trials if t.phase is Phase.TEST and t.counts and t.delivered_mps2 and t.level_n > 0]
-    turned = _find_turned_sessions(chosen)
-    found = []
+    swapped_sessions = _find_swapped_sessions(chosen)
+    groups = []
     for frequency_hz in sorted({trial.frequency_hz for trial in chosen}):
         rows = [trial for trial in chosen if trial.frequency_hz == frequency_hz]
         subjects = tuple(dict.fromkeys(trial.subject for trial in rows))
-        place = {subject: number for number, subject in enumerate(subjects)}
-        signs = np.array([-1.0 if (trial.subject, trial.session) in turned else 1.0 for trial in rows])
-        found.append(
+        person_index = {subject: index for index, subject in enumerate(subjects)}
+        signs = np.array([-1.0 if (trial.subject, trial.session) in swapped_sessions else 1.0 for trial in rows])
+        groups.append(
             DeliveredTrials(
                 frequency_hz=frequency_hz,
                 subjects=subjects,
-                person=np.array([place[trial.subject] for trial in rows]),
+                person=np.array([person_index[trial.subject] for trial in rows]),
                 side=signs * np.array([3.0 - 2.0 * trial.direction_shown for trial in rows]),
                 answer=signs * np.array([3.0 - 2.0 * (trial.answer or 0) for trial in rows]),
                 nominal_db=_db([trial.staircase_n for trial in rows]),
                 played_db=_db([trial.level_n for trial in rows]),
-                values_db={cue: _db(values) for cue, value in _VALUES.items() if (values := _known(rows, value))},
+                values_db={cue: _db(values) for cue, value in _VALUES.items() if (values := _cue_values(rows, value))},
             )
         )
-    return tuple(found)
+    return tuple(groups)
 
 
 def cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
@@ -101,7 +101,7 @@ def cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
     return tuple(gaps)
 
 
-def _find_turned_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
+def _find_swapped_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
     """Participant and session of each session in which label 1 is the direction at the larger angle. Labels belong to
     the session: they may be swapped when a participant comes again. A session with trials of one direction only is
     compared with the larger angle of all sessions."""
@@ -109,25 +109,25 @@ def _find_turned_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
     for trial in trials:
         if trial.angle_deg is not None:
             angles.setdefault((trial.subject, trial.session), {})[trial.direction_shown] = trial.angle_deg
-    pooled = {angle for known in angles.values() for angle in known.values()}
-    larger = max(pooled) if len(pooled) == 2 else None
-    return frozenset(name for name, known in angles.items() if _is_turned(known, larger))
+    pooled = {angle for session_angles in angles.values() for angle in session_angles.values()}
+    larger_deg = max(pooled) if len(pooled) == 2 else None
+    return frozenset(name for name, session_angles in angles.items() if _is_swapped(session_angles, larger_deg))
 
 
-def _is_turned(known: dict[int, float], larger: float | None) -> bool:
-    """Whether label 1 is the larger angle. known: angles of a session by label; larger: larger angle of the study's two
-    directions, None where their number is not two."""
-    if len(known) == 2:
-        return known[1] > known[2]
-    ((label, angle),) = known.items()
-    return larger is not None and (label == 1) == (angle == larger)
+def _is_swapped(session_angles: dict[int, float], larger_deg: float | None) -> bool:
+    """Whether label 1 is the larger angle. session_angles: angles of a session by label; larger_deg: larger angle of
+    the study's two directions, None where their number is not two."""
+    if len(session_angles) == 2:
+        return session_angles[1] > session_angles[2]
+    ((label, angle),) = session_angles.items()
+    return larger_deg is not None and (label == 1) == (angle == larger_deg)
 
 
-def _known(rows: list[Trial], value: Callable[[Trial], float | None]) -> list[float]:
+def _cue_values(rows: list[Trial], read_value: Callable[[Trial], float | None]) -> list[float]:
     """Value of each trial, NaN where it has none; empty where no trial has a value."""
-    values = [value(trial) for trial in rows]
-    known = any(each is not None for each in values)
-    return [math.nan if each is None else each for each in values] if known else []
+    values = [read_value(trial) for trial in rows]
+    is_measured = any(value is not None for value in values)
+    return [math.nan if value is None else value for value in values] if is_measured else []
 
 
 def _intensity(trial: Trial) -> float | None:

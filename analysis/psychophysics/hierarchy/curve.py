@@ -27,7 +27,7 @@ TARGET = 0.5 ** (1 / 3)
 """Share of right answers at a threshold: where one wrong and three right answers in a row are equally likely."""
 NEPER_PER_DB = math.log(10.0) / 20.0
 """Natural logarithm of an amplitude ratio of 1 dB."""
-SUREST = 30.0
+LARGEST_T = 30.0
 """t beyond which no answer of an attentive participant is wrong: exp(-exp(30)) is 0 in floating point."""
 
 
@@ -53,24 +53,24 @@ USUAL_SLOPE = {Family.WEIBULL: 2.0, Family.LOGISTIC: 3.0, Family.GAUSS: 1.9}
 
 def sensitivity(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
     """q(t) and its first two derivatives, each in the shape of t."""
-    log_rest, h1, h2 = _log_survival(np.minimum(t, SUREST), family)
+    log_survival, h1, h2 = _log_survival(np.minimum(t, LARGEST_T), family)
     # Phi(-q) = (1 - F) / 2. With w the logarithm of that: dq/dw = -M, M the Mills ratio Phi(-q) / phi(q).
-    q = -ndtri_exp(log_rest - math.log(2.0))
+    q = -ndtri_exp(log_survival - math.log(2.0))
     mills = math.sqrt(math.pi / 2) * erfcx(q / math.sqrt(2.0))
     return q, -mills * h1, mills * (q * mills - 1.0) * h1**2 - mills * h2
 
 
-def evidence_at(t: FloatArray, family: Family) -> FloatArray:
+def mean_evidence(t: FloatArray, family: Family) -> FloatArray:
     """q(t) without its derivatives, in the shape of t: a quarter of the time of `sensitivity`."""
-    t = np.minimum(t, SUREST)
+    t = np.minimum(t, LARGEST_T)
     match family:
         case Family.WEIBULL:
-            log_rest = -np.exp(t)
+            log_survival = -np.exp(t)
         case Family.LOGISTIC:
-            log_rest = -np.logaddexp(0.0, t)
+            log_survival = -np.logaddexp(0.0, t)
         case Family.GAUSS:
-            log_rest = log_ndtr(-t)
-    q: FloatArray = -ndtri_exp(log_rest - math.log(2.0))
+            log_survival = log_ndtr(-t)
+    q: FloatArray = -ndtri_exp(log_survival - math.log(2.0))
     return q
 
 
@@ -86,8 +86,8 @@ def _log_survival(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray
     """log(1 - F) and its first two derivatives by t."""
     match family:
         case Family.WEIBULL:
-            log_rest = -np.exp(t)
-            return log_rest, log_rest, log_rest
+            log_survival = -np.exp(t)
+            return log_survival, log_survival, log_survival
         case Family.LOGISTIC:
             p = 1.0 / (1.0 + np.exp(-t))
             return -np.logaddexp(0.0, t), -p, -p * (1.0 - p)

@@ -64,16 +64,16 @@ def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prio
     """Maximum a posteriori fit of the population parameters, with all persons' latent parameters integrated out: first
     by Laplace's method, then by quadrature. answers: of two persons at least. prior: None: the defaults of `Prior`."""
     objective = Objective(answers, family, prior or Prior())
-    found = Refinement(objective).maximum(maximise(objective, objective.begin).x)
+    maximum = Refinement(objective).maximum(maximise(objective, objective.start).x)
     return HierarchicalFit(
         answers=answers,
         family=family,
-        parameters=found.parameters,
-        latent=objective.marginal.centres(found.parameters)[0],
-        shared_means=found.moments.shared[:, 1:],
-        shared_errors=np.sqrt(np.diagonal(found.moments.covariance, axis1=1, axis2=2)[:, 1:]),
-        log_likelihood=found.log_likelihood,
-        scores=found.scores,
-        curvature=found.curvature,
-        converged=found.converged,
+        parameters=maximum.parameters,
+        latent=objective.marginal.find_modes(maximum.parameters)[0],
+        shared_means=maximum.moments.shared[:, 1:],
+        shared_errors=np.sqrt(np.diagonal(maximum.moments.covariance, axis1=1, axis2=2)[:, 1:]),
+        log_likelihood=maximum.log_likelihood,
+        scores=maximum.scores,
+        curvature=maximum.curvature,
+        converged=maximum.converged,
     )

@@ -43,19 +43,19 @@ def goodness_of_fit(fit: HierarchicalFit) -> GoodnessOfFit:
     share, cells = predict_shares(fit), fit.answers
     trials = cells.right + cells.wrong
     order = np.argsort(share, kind="stable")
-    place = np.minimum((np.cumsum(trials[order]) - 0.5) / trials.sum() * BINS, BINS - 1).astype(int)
+    bin_index = np.minimum((np.cumsum(trials[order]) - 0.5) / trials.sum() * BINS, BINS - 1).astype(int)
     bins = []
     for index in range(BINS):
-        chosen = order[place == index]
-        if len(chosen):
-            n, right, p = trials[chosen], cells.right[chosen], share[chosen]
-            expected, spread = float(n @ p), float(np.sqrt(n @ (p * (1.0 - p))))
+        in_bin = order[bin_index == index]
+        if len(in_bin):
+            n, correct, p = trials[in_bin], cells.right[in_bin], share[in_bin]
+            expected, standard_error = float(n @ p), float(np.sqrt(n @ (p * (1.0 - p))))
             bins.append(
                 ShareBin(
                     int(n.sum()),
                     expected / float(n.sum()),
-                    float(right.sum() / n.sum()),
-                    (float(right.sum()) - expected) / spread,
+                    float(correct.sum() / n.sum()),
+                    (float(correct.sum()) - expected) / standard_error,
                 )
             )
     return GoodnessOfFit(tuple(bins))

@@ -28,10 +28,10 @@ class Derivatives:
     second: FloatArray
     """(n, d, d): Hessian."""
     information: FloatArray
-    """(n, d, d): Fisher information at the levels played; positive semidefinite, unlike minus the Hessian."""
-    by_lapse: FloatArray
+    """(n, d, d): Fisher information at the levels played; always positive semidefinite, unlike the negative Hessian."""
+    lapse_derivative: FloatArray
     """(n,): derivative of the value by the lapse rate."""
-    first_by_lapse: FloatArray
+    gradient_lapse_derivative: FloatArray
     """(n, d): derivative of the gradient by the lapse rate."""
 
 
@@ -49,29 +49,29 @@ class TrialLikelihood:
     def evaluate(self, latent: FloatArray, lapse: float) -> Derivatives:
         """Values and derivatives at latent parameters (n, k + 2) and this lapse rate."""
         side, pace = self.answers.side, np.exp(latent[:, self.frequencies]) * NEPER_PER_DB
-        tau, a, q1, q2 = self._evidence(latent, pace)
+        tau, a, q1, q2 = self._compute_evidence(latent, pace)
         e = _Evidence(a, self.answers.right, self.answers.wrong, lapse)
         u, u1 = e.score, e.score_by_p
         slope, curvature = u * e.p1, u1 * e.p1**2 - u * a * e.p1
-        lapsed = u1 * e.p_by_lapse * e.p1 + u * e.p1_by_lapse
+        slope_by_lapse = u1 * e.p_by_lapse * e.p1 + u * e.p1_by_lapse
         lt, ltt, ltc = slope * q1, curvature * q1**2 + slope * q2, -side * curvature * q1
-        bent, wtt, wtc = ltt * tau + lt, e.weight * q1**2, -side * e.weight * q1
-        lapsed_t = lapsed * q1
+        ltb, wtt, wtc = ltt * tau + lt, e.weight * q1**2, -side * e.weight * q1
+        lt_by_lapse = slope_by_lapse * q1
         sums = self._sum_by_run([
             e.value, u * e.p_by_lapse,
             lt, lt * tau, -side * slope,
-            lapsed_t, lapsed_t * tau, -side * lapsed,
-            ltt, bent, ltc, bent * tau, ltc * tau, curvature,
+            lt_by_lapse, lt_by_lapse * tau, -side * slope_by_lapse,
+            ltt, ltb, ltc, ltb * tau, ltc * tau, curvature,
             wtt, wtt * tau, wtc, wtt * tau**2, wtc * tau, e.weight,
         ])  # fmt: skip
         p = pace[:, None]
         return Derivatives(
             value=sums[0].sum(axis=1),
-            first=_gradient(sums[2:5], p),
-            second=_hessian(sums[8:14], p),
-            information=_hessian(sums[14:20], p),
-            by_lapse=sums[1].sum(axis=1),
-            first_by_lapse=_gradient(sums[5:8], p),
+            first=_assemble_gradient(sums[2:5], p),
+            second=_assemble_hessian(sums[8:14], p),
+            information=_assemble_hessian(sums[14:20], p),
+            lapse_derivative=sums[1].sum(axis=1),
+            gradient_lapse_derivative=_assemble_gradient(sums[5:8], p),
         )
 
     def trace_derivatives(self, latent: FloatArray, lapse: float, inverse: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -79,25 +79,28 @@ class TrialLikelihood:
         the lapse rate (n,)."""
         k, run, person = self.frequencies, self.answers.run, self._person
         pace = np.exp(latent[:, k]) * NEPER_PER_DB
-        tau, a, q1, q2 = self._evidence(latent, pace)
+        tau, a, q1, q2 = self._compute_evidence(latent, pace)
         e = _Evidence(a, self.answers.right, self.answers.wrong, lapse)
-        p, places = pace[person], np.arange(k)
-        at, ab, ac = -p * q1, tau * q1, -self.answers.side
-        att, atb, abb = p**2 * q2, -p * (q2 * tau + q1), (q2 * tau + q1) * tau
-        tt, tb, tc = (inverse[:, places, other].ravel()[run] for other in (places, k, k + 1))
-        bb, bc, cc = (inverse[:, i, j][person] for i, j in ((k, k), (k, k + 1), (k + 1, k + 1)))
-        vt, vb = tt * at + tb * ab + tc * ac, tb * at + bb * ab + bc * ac
-        size = at * vt + ab * vb + ac * (tc * at + bc * ab + cc * ac)
-        grown = e.weight * (-2.0 * a - e.p1 / e.p + e.p1 / e.rest) * size
-        lapsed = e.weight * (-4.0 / (1.0 - 2.0 * lapse) - e.p_by_lapse / e.p + e.p_by_lapse / e.rest) * size
+        p, index = pace[person], np.arange(k)
+        a_t, a_b, a_c = -p * q1, tau * q1, -self.answers.side
+        a_tt, a_tb, a_bb = p**2 * q2, -p * (q2 * tau + q1), (q2 * tau + q1) * tau
+        v_tt, v_tb, v_tc = (inverse[:, index, column].ravel()[run] for column in (index, k, k + 1))
+        v_bb, v_bc, v_cc = (inverse[:, i, j][person] for i, j in ((k, k), (k, k + 1), (k + 1, k + 1)))
+        vt, vb = v_tt * a_t + v_tb * a_b + v_tc * a_c, v_tb * a_t + v_bb * a_b + v_bc * a_c
+        variance = a_t * vt + a_b * vb + a_c * (v_tc * a_t + v_bc * a_b + v_cc * a_c)
+        by_evidence = e.weight * (-2.0 * a - e.p1 / e.p + e.p1 / e.wrong_p) * variance
+        by_lapse = e.weight * (-4.0 / (1.0 - 2.0 * lapse) - e.p_by_lapse / e.p + e.p_by_lapse / e.wrong_p) * variance
         w = 2.0 * e.weight
         sums = self._sum_by_run([
-            grown * at + w * (vt * att + vb * atb), grown * ab + w * (vt * atb + vb * abb), grown * ac, lapsed
+            by_evidence * a_t + w * (vt * a_tt + vb * a_tb), by_evidence * a_b + w * (vt * a_tb + vb * a_bb),
+            by_evidence * a_c, by_lapse
         ])  # fmt: skip
-        own, rest = sums[0], sums[1:].sum(axis=2)
-        return np.concatenate([own, rest[:2].T], axis=1), rest[2]
+        by_threshold, by_shared = sums[0], sums[1:].sum(axis=2)
+        return np.concatenate([by_threshold, by_shared[:2].T], axis=1), by_shared[2]
 
-    def _evidence(self, latent: FloatArray, pace: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def _compute_evidence(
+        self, latent: FloatArray, pace: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Per cell (m,): t - t0, mean of the evidence q - side c, and the first two derivatives of q by t."""
         cells, k = self.answers, self.frequencies
         tau = pace[self._person] * (cells.level_db - latent[:, :k].ravel()[cells.run])
@@ -106,9 +109,9 @@ class TrialLikelihood:
 
     def _sum_by_run(self, rows: list[FloatArray]) -> FloatArray:
         """Sums over the cells of each run: (rows, n, k); 0 where a person has no answer at a frequency."""
-        summed = np.zeros((len(rows), self.persons * self.frequencies))
-        summed[:, self._runs] = np.add.reduceat(np.array(rows), self._starts, axis=1)
-        return summed.reshape(len(rows), self.persons, self.frequencies)
+        totals = np.zeros((len(rows), self.persons * self.frequencies))
+        totals[:, self._runs] = np.add.reduceat(np.array(rows), self._starts, axis=1)
+        return totals.reshape(len(rows), self.persons, self.frequencies)
 
 
 class _Evidence:
@@ -118,31 +121,32 @@ class _Evidence:
     def __init__(self, a: FloatArray, right: FloatArray, wrong: FloatArray, lapse: float) -> None:
         density, attentive = np.exp(-(a**2) / 2) / math.sqrt(2.0 * math.pi), 1.0 - 2.0 * lapse
         self.p = share_right(a, lapse)
-        self.rest = 1.0 - self.p
+        self.wrong_p = 1.0 - self.p
         self.p1 = attentive * density
         # 1 - 2 Phi(a), because 1 - 2 p = (1 - 2 lapse) (1 - 2 Phi(a)).
         self.p_by_lapse, self.p1_by_lapse = (1.0 - 2.0 * self.p) / attentive, -2.0 * density
-        self.value = right * np.log(self.p) + wrong * np.log(self.rest)
-        self.score = right / self.p - wrong / self.rest
-        self.score_by_p = -right / self.p**2 - wrong / self.rest**2
-        self.weight = (right + wrong) * self.p1**2 / (self.p * self.rest)
+        self.value = right * np.log(self.p) + wrong * np.log(self.wrong_p)
+        self.score = right / self.p - wrong / self.wrong_p
+        self.score_by_p = -right / self.p**2 - wrong / self.wrong_p**2
+        self.weight = (right + wrong) * self.p1**2 / (self.p * self.wrong_p)
 
 
-def _gradient(sums: FloatArray, pace: FloatArray) -> FloatArray:
-    """Gradient (n, d) from sums over cells (3, n, k) of derivatives by t, b and c. pace: -dt/dtheta (n, 1)."""
+def _assemble_gradient(sums: FloatArray, pace: FloatArray) -> FloatArray:
+    """Assemble the gradient (n, d) from sums over cells (3, n, k) of derivatives by t, b and c. pace: -dt/dtheta (n,
+    1)."""
     return np.concatenate([-pace * sums[0], sums[1:].sum(axis=2).T], axis=1)
 
 
-def _hessian(sums: FloatArray, pace: FloatArray) -> FloatArray:
-    """Hessian (n, d, d) from sums over cells (6, n, k) of second derivatives by tt, tb, tc, bb, bc, cc. pace: as in
-    `_gradient`."""
+def _assemble_hessian(sums: FloatArray, pace: FloatArray) -> FloatArray:
+    """Assemble the Hessian (n, d, d) from sums over cells (6, n, k) of second derivatives by tt, tb, tc, bb, bc, cc.
+    pace: as in `_assemble_gradient`."""
     _, n, k = sums.shape
-    out = np.zeros((n, k + 2, k + 2))
-    places = np.arange(k)
-    out[:, places, places] = pace**2 * sums[0]
-    for other in (0, 1):
-        out[:, places, k + other] = out[:, k + other, places] = -pace * sums[1 + other]
+    hessian = np.zeros((n, k + 2, k + 2))
+    index = np.arange(k)
+    hessian[:, index, index] = pace**2 * sums[0]
+    for shared in (0, 1):
+        hessian[:, index, k + shared] = hessian[:, k + shared, index] = -pace * sums[1 + shared]
     bb, bc, cc = sums[3:].sum(axis=2)
-    out[:, k, k], out[:, k + 1, k + 1] = bb, cc
-    out[:, k, k + 1] = out[:, k + 1, k] = bc
-    return out
+    hessian[:, k, k], hessian[:, k + 1, k + 1] = bb, cc
+    hessian[:, k, k + 1] = hessian[:, k + 1, k] = bc
+    return hessian

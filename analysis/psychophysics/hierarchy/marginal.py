@@ -26,7 +26,7 @@ from equalizer.signals.signal import FloatArray
 
 NEWTON_STEPS = 60
 """Maximum number of Newton steps to the mode of a person's latent parameters."""
-SETTLED = 1e-11
+DECREMENT_TOLERANCE = 1e-11
 """Newton decrement (gradient times step) of the log posterior at which a mode is found; the gradient of the marginal
 likelihood then has some six correct digits."""
 LOWEST_CURVATURE = 1e-5
@@ -72,22 +72,22 @@ class Marginal:
     def __init__(self, likelihood: TrialLikelihood, latent: FloatArray) -> None:
         self.likelihood, self.latent = likelihood, latent
         self.layout = Layout(likelihood.frequencies)
-        self._longest = np.array([LONGEST_STEP_DB] * likelihood.frequencies + [LONGEST_STEP_SLOPE, LONGEST_STEP_D])
+        self._max_steps = np.array([LONGEST_STEP_DB] * likelihood.frequencies + [LONGEST_STEP_SLOPE, LONGEST_STEP_D])
 
     def evaluate(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Log marginal likelihood of each person (n,), and its gradient (n, size). parameters: (size,)."""
         layout, k = self.layout, self.layout.k
-        precision, centre = prior_precision(parameters, k), _centre(parameters, k)
+        precision, prior_mean = compute_prior_precision(parameters, k), _compute_prior_mean(parameters, k)
         lapse = float(expit(parameters[layout.lapse]))
-        found = self._find_modes(precision, centre, lapse)
-        deviation = self.latent - centre
-        inverse = np.linalg.inv(precision + found.information).astype(np.float64)
-        by_latent, by_lapse = self.likelihood.trace_derivatives(self.latent, lapse, inverse)
+        derivatives = self._maximise_posterior(precision, prior_mean, lapse)
+        deviation = self.latent - prior_mean
+        inverse = np.linalg.inv(precision + derivatives.information).astype(np.float64)
+        trace_by_latent, trace_by_lapse = self.likelihood.trace_derivatives(self.latent, lapse, inverse)
         # The sensitivity of the mode depends on the observed curvature; the volume uses the expected one.
-        adjoint = np.linalg.solve(precision - found.second, by_latent[..., None])[..., 0]
+        adjoint = np.linalg.solve(precision - derivatives.second, trace_by_latent[..., None])[..., 0]
         weighted_deviation = deviation @ precision
         value = (
-            found.value
+            derivatives.value
             - 0.5 * np.einsum("na,na->n", deviation, weighted_deviation)
             + 0.5 * np.linalg.slogdet(precision)[1]
             + 0.5 * np.linalg.slogdet(inverse)[1]
@@ -95,97 +95,104 @@ class Marginal:
         scores = np.empty((len(value), layout.size))
         by_centre = weighted_deviation - 0.5 * adjoint @ precision
         scores[:, :k], scores[:, layout.slope] = by_centre[:, :k], by_centre[:, k]
-        for place, change, log_det in _precision_derivatives(parameters, k):
-            moved = deviation @ change
-            scores[:, place] = (
-                -0.5 * np.einsum("na,na->n", deviation, moved)
+        for index, precision_change, log_det in _differentiate_precision(parameters, k):
+            changed_deviation = deviation @ precision_change
+            scores[:, index] = (
+                -0.5 * np.einsum("na,na->n", deviation, changed_deviation)
                 + 0.5 * log_det
-                - 0.5 * np.einsum("nab,ab->n", inverse, change)
-                + 0.5 * np.einsum("na,na->n", adjoint, moved)
+                - 0.5 * np.einsum("nab,ab->n", inverse, precision_change)
+                + 0.5 * np.einsum("na,na->n", adjoint, changed_deviation)
             )
         scores[:, layout.lapse] = (lapse * (1.0 - lapse)) * (
-            found.by_lapse - 0.5 * by_lapse - 0.5 * np.einsum("na,na->n", adjoint, found.first_by_lapse)
+            derivatives.lapse_derivative
+            - 0.5 * trace_by_lapse
+            - 0.5 * np.einsum("na,na->n", adjoint, derivatives.gradient_lapse_derivative)
         )
         return value, scores
 
-    def centres(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mode of each person (n, k + 2), and the expected information of the answers there (n, k + 2, k + 2)."""
+    def find_modes(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mode of each person's latent parameters (n, k + 2), and the answers' expected information there (n, k + 2,
+        k + 2)."""
         k, lapse = self.layout.k, float(expit(parameters[self.layout.lapse]))
-        found = self._find_modes(prior_precision(parameters, k), _centre(parameters, k), lapse)
-        return self.latent, found.information
+        derivatives = self._maximise_posterior(
+            compute_prior_precision(parameters, k), _compute_prior_mean(parameters, k), lapse
+        )
+        return self.latent, derivatives.information
 
-    def _find_modes(self, precision: FloatArray, centre: FloatArray, lapse: float) -> Derivatives:
+    def _maximise_posterior(self, precision: FloatArray, prior_mean: FloatArray, lapse: float) -> Derivatives:
         """Newton's method for all persons at once; a step that lowers a person's log posterior is divided by 3."""
         latent = self.latent.copy()
-        now = self.likelihood.evaluate(latent, lapse)
-        height = _log_posterior(now, latent - centre, precision)
+        current = self.likelihood.evaluate(latent, lapse)
+        log_posterior = _compute_log_posterior(current, latent - prior_mean, precision)
         for _ in range(NEWTON_STEPS):
-            slope = now.first - (latent - centre) @ precision
+            gradient = current.first - (latent - prior_mean) @ precision
             step = np.linalg.solve(
-                _positive_curvature(precision - now.second, precision + now.information), slope[..., None]
+                _choose_curvature(precision - current.second, precision + current.information), gradient[..., None]
             )[..., 0]
-            gain = np.einsum("na,na->n", slope, step)
-            if gain.max() < SETTLED:
+            gain = np.einsum("na,na->n", gradient, step)
+            if gain.max() < DECREMENT_TOLERANCE:
                 break
-            longest = np.abs(step / self._longest).max(axis=1)
-            share = np.where(gain < SETTLED, 0.0, 1.0 / np.maximum(1.0, longest))
+            step_ratio = np.abs(step / self._max_steps).max(axis=1)
+            step_fraction = np.where(gain < DECREMENT_TOLERANCE, 0.0, 1.0 / np.maximum(1.0, step_ratio))
             for _ in range(12):
-                tried = latent + share[:, None] * step
-                then = self.likelihood.evaluate(tried, lapse)
-                higher = _log_posterior(then, tried - centre, precision)
-                worse = higher < height - 1e-10 * np.abs(height)
-                if not worse.any():
+                trial_latent = latent + step_fraction[:, None] * step
+                trial = self.likelihood.evaluate(trial_latent, lapse)
+                trial_log_posterior = _compute_log_posterior(trial, trial_latent - prior_mean, precision)
+                is_lower = trial_log_posterior < log_posterior - 1e-10 * np.abs(log_posterior)
+                if not is_lower.any():
                     break
-                share = np.where(worse, share / 3.0, share)
-            latent, now, height = tried, then, higher
+                step_fraction = np.where(is_lower, step_fraction / 3.0, step_fraction)
+            latent, current, log_posterior = trial_latent, trial, trial_log_posterior
         self.latent = latent
-        return now
+        return current
 
 
-def _log_posterior(found: Derivatives, deviation: FloatArray, precision: FloatArray) -> FloatArray:
+def _compute_log_posterior(derivatives: Derivatives, deviation: FloatArray, precision: FloatArray) -> FloatArray:
     """(n,): log-likelihood plus log prior, without the prior's constant."""
-    height: FloatArray = found.value - 0.5 * np.einsum("na,ab,nb->n", deviation, precision, deviation)
-    return height
+    log_posterior: FloatArray = derivatives.value - 0.5 * np.einsum("na,ab,nb->n", deviation, precision, deviation)
+    return log_posterior
 
 
-def _positive_curvature(observed: FloatArray, expected: FloatArray) -> FloatArray:
+def _choose_curvature(observed: FloatArray, expected: FloatArray) -> FloatArray:
     """(n, d, d): the observed curvature, or the expected curvature for persons whose observed curvature is not
-    positive definite, as may be far from a mode: the Newton step then still leads uphill."""
+    positive definite, as may be far from a mode: the Newton step is then still an ascent direction."""
     lowest = np.linalg.eigvalsh(observed)[:, 0]
     if lowest.min() > LOWEST_CURVATURE:
         return observed
     return np.where((lowest > LOWEST_CURVATURE)[:, None, None], observed, expected)
 
 
-def _centre(parameters: FloatArray, k: int) -> FloatArray:
-    """(k + 2,): prior means of the thresholds, the log-slope and the criterion (0)."""
+def _compute_prior_mean(parameters: FloatArray, k: int) -> FloatArray:
+    """(k + 2,): prior means of the thresholds (dB), the log-slope and the criterion (0)."""
     return np.concatenate([parameters[:k], [parameters[k + 2], 0.0]])
 
 
-def prior_precision(parameters: FloatArray, k: int) -> FloatArray:
+def compute_prior_precision(parameters: FloatArray, k: int) -> FloatArray:
     """Inverse covariance of the latent parameters, (k + 2, k + 2): a person has a deviation shared by all frequencies,
     and another at each frequency."""
-    shared, own = math.exp(2.0 * parameters[k]), math.exp(2.0 * parameters[k + 1])
-    out = np.zeros((k + 2, k + 2))
+    shared_variance, interaction_variance = math.exp(2.0 * parameters[k]), math.exp(2.0 * parameters[k + 1])
+    precision = np.zeros((k + 2, k + 2))
     mean = np.full((k, k), 1.0 / k)
-    out[:k, :k] = (np.eye(k) - mean) / own + mean / (own + k * shared)
-    out[k, k], out[k + 1, k + 1] = math.exp(-2.0 * parameters[k + 3]), math.exp(-2.0 * parameters[k + 4])
-    return out
+    precision[:k, :k] = (np.eye(k) - mean) / interaction_variance + mean / (interaction_variance + k * shared_variance)
+    precision[k, k], precision[k + 1, k + 1] = math.exp(-2.0 * parameters[k + 3]), math.exp(-2.0 * parameters[k + 4])
+    return precision
 
 
-def _precision_derivatives(parameters: FloatArray, k: int) -> list[tuple[int, FloatArray, float]]:
+def _differentiate_precision(parameters: FloatArray, k: int) -> list[tuple[int, FloatArray, float]]:
     """For each log SD: its index, the derivative of the precision, and that of the precision's log determinant."""
-    shared, own = math.exp(2.0 * parameters[k]), math.exp(2.0 * parameters[k + 1])
-    together = own + k * shared
+    shared_variance, interaction_variance = math.exp(2.0 * parameters[k]), math.exp(2.0 * parameters[k + 1])
+    total_variance = interaction_variance + k * shared_variance
     mean = np.full((k, k), 1.0 / k)
-    by_shared, by_own, by_slope, by_criterion = (np.zeros((k + 2, k + 2)) for _ in range(4))
-    by_shared[:k, :k] = -2.0 * k * shared / together**2 * mean
-    by_own[:k, :k] = -2.0 / own * (np.eye(k) - mean) - 2.0 * own / together**2 * mean
+    by_shared, by_interaction, by_slope, by_criterion = (np.zeros((k + 2, k + 2)) for _ in range(4))
+    by_shared[:k, :k] = -2.0 * k * shared_variance / total_variance**2 * mean
+    by_interaction[:k, :k] = (
+        -2.0 / interaction_variance * (np.eye(k) - mean) - 2.0 * interaction_variance / total_variance**2 * mean
+    )
     by_slope[k, k] = -2.0 * math.exp(-2.0 * parameters[k + 3])
     by_criterion[k + 1, k + 1] = -2.0 * math.exp(-2.0 * parameters[k + 4])
     return [
-        (k, by_shared, -2.0 * k * shared / together),
-        (k + 1, by_own, -2.0 * (k - 1) - 2.0 * own / together),
+        (k, by_shared, -2.0 * k * shared_variance / total_variance),
+        (k + 1, by_interaction, -2.0 * (k - 1) - 2.0 * interaction_variance / total_variance),
         (k + 3, by_slope, -2.0),
         (k + 4, by_criterion, -2.0),
     ]

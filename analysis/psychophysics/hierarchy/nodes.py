@@ -18,7 +18,7 @@ from itertools import product
 import numpy as np
 from scipy.special import expit
 
-from analysis.psychophysics.hierarchy.marginal import prior_precision
+from analysis.psychophysics.hierarchy.marginal import compute_prior_precision
 from equalizer.signals.signal import FloatArray
 
 
@@ -85,7 +85,7 @@ class Population:
     """(k,): mean threshold at each frequency, dB."""
     shared_sd: float
     """Standard deviation between people of the deviation u that a person has at all frequencies, dB."""
-    own_sd: float
+    interaction_sd: float
     """Standard deviation of a person's further deviation at each single frequency, dB."""
     slope: float
     """Mean of the log-slope b."""
@@ -97,82 +97,90 @@ class Population:
     """Lapse rate, the same for all people."""
 
     @staticmethod
-    def of(parameters: FloatArray, k: int) -> "Population":
+    def from_parameters(parameters: FloatArray, k: int) -> "Population":
         """The population of transformed parameters (k + 6,), in which standard deviations are logarithms and the lapse
         rate is a logit (`marginal.Layout`)."""
-        shared, own, slope_sd, criterion_sd = (math.exp(parameters[k + place]) for place in (0, 1, 3, 4))
+        shared_sd, interaction_sd, slope_sd, criterion_sd = (
+            math.exp(parameters[k + offset]) for offset in (0, 1, 3, 4)
+        )
         lapse = float(expit(parameters[k + 5]))
-        return Population(parameters[:k], shared, own, float(parameters[k + 2]), slope_sd, criterion_sd, lapse)
+        return Population(
+            parameters[:k], shared_sd, interaction_sd, float(parameters[k + 2]), slope_sd, criterion_sd, lapse
+        )
 
 
 def laplace_moments(parameters: FloatArray, mode: FloatArray, information: FloatArray) -> Moments:
     """Posterior moments of each person by Laplace's method. mode: (n, k + 2), posterior mode; information: (n, k + 2,
     k + 2), expected information of the answers there."""
     k = mode.shape[1] - 2
-    population, places = Population.of(parameters, k), np.arange(k)
-    own, shared = population.own_sd**2, population.shared_sd**2
-    # u given all thresholds is normal: its mean is `drawn` times the sum of their deviations from the population means,
-    # its variance is `rest`.
-    rest = 1.0 / (1.0 / shared + k / own)
-    drawn = rest / own
+    population, index = Population.from_parameters(parameters, k), np.arange(k)
+    interaction_variance, shared_variance = population.interaction_sd**2, population.shared_sd**2
+    # u given all thresholds is normal: its mean is `u_weight` times the sum of their deviations from the population
+    # means, its variance is `u_variance`.
+    u_variance = 1.0 / (1.0 / shared_variance + k / interaction_variance)
+    u_weight = u_variance / interaction_variance
     weights = np.zeros((3, k + 2))
-    weights[0, :k], weights[1, k], weights[2, k + 1] = drawn, 1.0, 1.0
-    covariance = weights @ np.linalg.inv(prior_precision(parameters, k) + information) @ weights.T
-    covariance[:, 0, 0] += rest
-    middle = mode @ weights.T
-    middle[:, 0] -= drawn * population.means.sum()
-    variance = 1.0 / (information[:, places, places] + 1.0 / own)
-    tied = np.concatenate([np.full((len(mode), k, 1), 1.0 / own), -information[:, :k, k:]], axis=2)
-    return Moments(middle, covariance, mode[:, :k], tied * variance[..., None], variance)
+    weights[0, :k], weights[1, k], weights[2, k + 1] = u_weight, 1.0, 1.0
+    covariance = weights @ np.linalg.inv(compute_prior_precision(parameters, k) + information) @ weights.T
+    covariance[:, 0, 0] += u_variance
+    shared_means = mode @ weights.T
+    shared_means[:, 0] -= u_weight * population.means.sum()
+    variance = 1.0 / (information[:, index, index] + 1.0 / interaction_variance)
+    coupling = np.concatenate([np.full((len(mode), k, 1), 1.0 / interaction_variance), -information[:, :k, k:]], axis=2)
+    return Moments(shared_means, covariance, mode[:, :k], coupling * variance[..., None], variance)
 
 
 def place_nodes(moments: Moments, counts: Counts) -> Nodes:
     """Nodes with log weights for each person: outer nodes for u, b and c, inner nodes for each threshold, both scaled
     by the moments. counts: number of nodes by latent parameter."""
-    root = np.linalg.cholesky(moments.covariance)
-    places, log_weights = _outer_rule(counts)
-    steps = np.einsum("nab,qb->nqa", root, places)
+    cholesky = np.linalg.cholesky(moments.covariance)
+    positions, log_weights = _product_rule(counts)
+    steps = np.einsum("nab,qb->nqa", cholesky, positions)
     centre = moments.threshold[:, None] + np.einsum("nka,nqa->nqk", moments.regression, steps)
-    inner_places, inner_weights = _rule(counts.threshold)
+    inner_positions, inner_weights = _gauss_hermite_rule(counts.threshold)
     sd = np.sqrt(moments.variance)[:, None, :, None]
     return Nodes(
         shared=moments.shared[:, None] + steps,
-        log_weight=log_weights + np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)[:, None],
-        threshold=centre[..., None] + sd * inner_places,
+        log_weight=log_weights + np.log(np.diagonal(cholesky, axis1=1, axis2=2)).sum(axis=1)[:, None],
+        threshold=centre[..., None] + sd * inner_positions,
         log_weight_inside=inner_weights + np.log(sd),
     )
 
 
-def weigh_nodes(nodes: Nodes, weight: FloatArray, inside: FloatArray) -> Moments:
-    """Posterior moments by the nodes. weight: (n, q), posterior probabilities of the outer nodes; inside: (n, q, k, r),
-    those of the inner nodes at each outer node."""
+def posterior_moments(nodes: Nodes, weight: FloatArray, inner_weight: FloatArray) -> Moments:
+    """Posterior moments by the nodes. weight: (n, q), posterior probabilities of the outer nodes; inner_weight: (n, q,
+    k, r), those of the inner nodes at each outer node."""
     shared = np.einsum("nq,nqa->na", weight, nodes.shared)
-    away = nodes.shared - shared[:, None]
-    covariance = np.einsum("nq,nqa,nqb->nab", weight, away, away)
+    deviation = nodes.shared - shared[:, None]
+    covariance = np.einsum("nq,nqa,nqb->nab", weight, deviation, deviation)
     covariance += LEAST_SHARE * np.einsum("na,ab->nab", nodes.shared.var(axis=1), np.eye(3))
-    means = np.einsum("nqkr,nqkr->nqk", inside, nodes.threshold)
+    means = np.einsum("nqkr,nqkr->nqk", inner_weight, nodes.threshold)
     threshold = np.einsum("nq,nqk->nk", weight, means)
-    off = means - threshold[:, None]
-    regression = np.einsum("nq,nqa,nqk->nka", weight, away, off) @ np.linalg.pinv(covariance, hermitian=True)
-    left = off - np.einsum("nka,nqa->nqk", regression, away)
-    spread = np.einsum("nqkr,nqkr->nqk", inside, (nodes.threshold - means[..., None]) ** 2)
-    variance = np.einsum("nq,nqk->nk", weight, spread + left**2)
+    threshold_deviation = means - threshold[:, None]
+    regression = np.einsum("nq,nqa,nqk->nka", weight, deviation, threshold_deviation) @ np.linalg.pinv(
+        covariance, hermitian=True
+    )
+    residual = threshold_deviation - np.einsum("nka,nqa->nqk", regression, deviation)
+    spread = np.einsum("nqkr,nqkr->nqk", inner_weight, (nodes.threshold - means[..., None]) ** 2)
+    variance = np.einsum("nq,nqk->nk", weight, spread + residual**2)
     variance += LEAST_SHARE * nodes.threshold.var(axis=3).mean(axis=1)
     return Moments(shared, covariance, threshold, regression, variance)
 
 
 @cache
-def _rule(count: int) -> tuple[FloatArray, FloatArray]:
+def _gauss_hermite_rule(count: int) -> tuple[FloatArray, FloatArray]:
     """Gauss-Hermite positions x, and log(w / sum of w) + x² / 2: the sum of exp(log weight) f(x) is then the integral
     of f over the real line, divided by sqrt(2 pi), the constant of the normal prior densities."""
-    places, weights = np.polynomial.hermite_e.hermegauss(count)
-    return places, np.log(weights / weights.sum()) + places**2 / 2.0
+    positions, weights = np.polynomial.hermite_e.hermegauss(count)
+    return positions, np.log(weights / weights.sum()) + positions**2 / 2.0
 
 
 @cache
-def _outer_rule(counts: Counts) -> tuple[FloatArray, FloatArray]:
+def _product_rule(counts: Counts) -> tuple[FloatArray, FloatArray]:
     """Product rule over u, b and c: standard positions (q, 3) and log weights (q,)."""
-    rules = [list(zip(*_rule(count), strict=True)) for count in (counts.shared, counts.slope, counts.criterion)]
+    rules = [
+        list(zip(*_gauss_hermite_rule(count), strict=True)) for count in (counts.shared, counts.slope, counts.criterion)
+    ]
     nodes = list(product(*rules))
-    places = np.array([[place for place, _ in node] for node in nodes])
-    return places, np.array([sum(weight for _, weight in node) for node in nodes])
+    positions = np.array([[position for position, _ in node] for node in nodes])
+    return positions, np.array([sum(weight for _, weight in node) for node in nodes])

@@ -27,12 +27,12 @@ class Prior:
     """Beta distribution of the lapse rate, as a density of its logit: as if one lapse had been seen in 41 trials far
     above threshold. Attentive adults lapse in 0 to 5 %; some hundred trials above threshold outweigh the prior."""
     spread: float = 1.0
-    """Factor of the log SD in the log prior of each standard deviation: the gamma distribution of shape 2 and rate
-    towards 0 of Y. Chung et al., Psychometrika 78 (2013), 685-709. It moves an estimate that would be 0 by about one
-    standard error."""
+    """The log prior of each standard deviation is spread * log SD. With 1.0 it is the limit, for a rate towards 0, of a
+    gamma distribution with shape 2 (Y. Chung et al., Psychometrika 78 (2013), 685-709), which moves an estimate that
+    would be 0 by about one standard error."""
     mean_sd_db: float = 30.0
-    """SD of a normal distribution of each mean around the average level played. It keeps a mean finite that the answers
-    do not determine (all guess at the cap); a mean 10 dB away from that level moves by 0.01 dB."""
+    """SD (dB) of a normal distribution of each mean around the average level played. It keeps a mean finite that the
+    answers do not determine (all guess at the cap); a mean 10 dB away from that level moves by 0.01 dB."""
 
 
 LOG_SD_BOUNDS = ((-5.0, 3.5), (-5.0, 3.5), (-5.0, 0.7), (-5.0, 1.1))
@@ -48,47 +48,47 @@ class Objective:
     def __init__(self, answers: Answers, family: Family, prior: Prior) -> None:
         self.answers, self.family = answers, family
         self.prior, self.layout = prior, Layout(len(answers.frequencies_hz))
-        begin = find_starting_parameters(answers, family)
+        start = find_starting_parameters(answers, family)
         k = self.layout.k
-        latent = np.tile(np.concatenate([begin[:k], [begin[self.layout.slope], 0.0]]), (answers.persons, 1))
+        latent = np.tile(np.concatenate([start[:k], [start[self.layout.slope], 0.0]]), (answers.persons, 1))
         self.marginal = Marginal(TrialLikelihood(answers, family), latent)
-        self.begin = begin
-        self._middle_db = float(np.average(answers.level_db, weights=answers.right + answers.wrong))
+        self.start = start
+        self._mean_level_db = float(np.average(answers.level_db, weights=answers.right + answers.wrong))
 
     def __call__(self, parameters: FloatArray) -> tuple[float, FloatArray]:
         """Value and gradient (size,) at the parameters (size,) of `Layout`."""
         value, scores = self.marginal.evaluate(parameters)
-        penalty, slope = self.penalty(parameters)
-        return -float(value.sum()) - penalty, -scores.sum(axis=0) - slope
+        log_prior, prior_gradient = self.log_prior(parameters)
+        return -float(value.sum()) - log_prior, -scores.sum(axis=0) - prior_gradient
 
-    def penalty(self, parameters: FloatArray) -> tuple[float, FloatArray]:
+    def log_prior(self, parameters: FloatArray) -> tuple[float, FloatArray]:
         """Log density of the prior up to a constant, and its gradient (size,)."""
         layout, prior = self.layout, self.prior
         lapse = float(expit(parameters[layout.lapse]))
-        slope = np.zeros(layout.size)
-        slope[layout.log_sds] = prior.spread
-        away = parameters[: layout.k] - self._middle_db
-        slope[: layout.k] = -away / prior.mean_sd_db**2
-        slope[layout.lapse] = prior.lapse_wrong * (1.0 - lapse) - prior.lapse_right * lapse
+        gradient = np.zeros(layout.size)
+        gradient[layout.log_sds] = prior.spread
+        deviation = parameters[: layout.k] - self._mean_level_db
+        gradient[: layout.k] = -deviation / prior.mean_sd_db**2
+        gradient[layout.lapse] = prior.lapse_wrong * (1.0 - lapse) - prior.lapse_right * lapse
         value = prior.lapse_wrong * np.log(lapse) + prior.lapse_right * np.log1p(-lapse)
-        value -= 0.5 * float(away @ away) / prior.mean_sd_db**2
-        return float(value + prior.spread * parameters[layout.log_sds].sum()), slope
+        value -= 0.5 * float(deviation @ deviation) / prior.mean_sd_db**2
+        return float(value + prior.spread * parameters[layout.log_sds].sum()), gradient
 
-    def penalty_hessian(self, parameters: FloatArray) -> FloatArray:
+    def log_prior_hessian(self, parameters: FloatArray) -> FloatArray:
         """(size, size): Hessian of the log density of the prior, which is diagonal."""
         layout, prior = self.layout, self.prior
         lapse = float(expit(parameters[layout.lapse]))
-        bent = np.zeros(layout.size)
-        bent[: layout.k] = -1.0 / prior.mean_sd_db**2
-        bent[layout.lapse] = -(prior.lapse_wrong + prior.lapse_right) * lapse * (1.0 - lapse)
-        return np.diag(bent)
+        diagonal = np.zeros(layout.size)
+        diagonal[: layout.k] = -1.0 / prior.mean_sd_db**2
+        diagonal[layout.lapse] = -(prior.lapse_wrong + prior.lapse_right) * lapse * (1.0 - lapse)
+        return np.diag(diagonal)
 
     @property
     def bounds(self) -> list[tuple[float | None, float | None]]:
         """Lower and upper bound of each parameter, None = unbounded; a new list, which the caller may change."""
         bounds: list[tuple[float | None, float | None]] = [(None, None)] * self.layout.size
-        for place, both in zip(self.layout.log_sds, LOG_SD_BOUNDS, strict=True):
-            bounds[place] = both
+        for index, limits in zip(self.layout.log_sds, LOG_SD_BOUNDS, strict=True):
+            bounds[index] = limits
         bounds[self.layout.lapse] = LAPSE_BOUNDS
         return bounds
 
@@ -97,21 +97,28 @@ def find_starting_parameters(answers: Answers, family: Family) -> FloatArray:
     """Starting values of the population parameters (k + 6,): means from the levels played, else usual values."""
     k = len(answers.frequencies_hz)
     trials = answers.right + answers.wrong
-    place = answers.run % k
-    played = np.bincount(place, weights=trials, minlength=k)
-    total = np.bincount(place, weights=trials * answers.level_db, minlength=k)
-    means = np.where(played > 0, total / np.maximum(played, 1), total.sum() / played.sum())
+    frequency_index = answers.run % k
+    answer_counts = np.bincount(frequency_index, weights=trials, minlength=k)
+    level_sums = np.bincount(frequency_index, weights=trials * answers.level_db, minlength=k)
+    means = np.where(
+        answer_counts > 0, level_sums / np.maximum(answer_counts, 1), level_sums.sum() / answer_counts.sum()
+    )
     # SDs of 2.5 dB (persons), 2.0 dB (person x frequency), 0.30 (log-slope) and 0.20 d' (criterion); lapse rate 2 %.
     return np.concatenate([means, [0.9, 0.7, np.log(USUAL_SLOPE[family]), -1.2, -1.6, logit(0.02)]])
 
 
-def maximise(objective: Objective, begin: FloatArray, held: int | None = None) -> OptimizeResult:
-    """Maximise the penalised likelihood from `begin` (size,), first clipped to the bounds. held: index of a parameter
-    that is fixed at its value in `begin` (profile likelihood)."""
+def maximise(objective: Objective, start: FloatArray, fixed_index: int | None = None) -> OptimizeResult:
+    """Maximise the penalised likelihood from `start` (size,), first clipped to the bounds. fixed_index: index of a
+    parameter that is fixed at its value in `start` (profile likelihood)."""
     bounds = objective.bounds
-    if held is not None:
-        bounds[held] = (float(begin[held]), float(begin[held]))
+    if fixed_index is not None:
+        bounds[fixed_index] = (float(start[fixed_index]), float(start[fixed_index]))
     # The search by quadrature continues from here, so an error of some hundredths of a standard error is acceptable.
     options = {"maxiter": 300, "ftol": 1e-7, "gtol": 1e-3, "maxcor": 20}
-    begin = np.clip(begin, *np.array([(-np.inf if a is None else a, np.inf if b is None else b) for a, b in bounds]).T)
-    return minimize(objective, begin, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
+    start = np.clip(
+        start,
+        *np.array(
+            [(-np.inf if lower is None else lower, np.inf if upper is None else upper) for lower, upper in bounds]
+        ).T,
+    )
+    return minimize(objective, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options)

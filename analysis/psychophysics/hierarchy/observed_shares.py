@@ -59,44 +59,52 @@ class ObservedShare:
         return self.right / self.trials
 
 
-def shares_of_person(answers: Answers, person: int, place: int) -> tuple[ObservedShare, ...]:
-    """Observed shares of a person at one frequency, by bins of levels in dB re 1 N, ascending. person, place: indices
-    of the person and the frequency. Empty without answers."""
-    return _shares(answers, answers.run == person * len(answers.frequencies_hz) + place, answers.level_db)
+def compute_person_shares(answers: Answers, person: int, frequency_index: int) -> tuple[ObservedShare, ...]:
+    """Compute the observed shares of a person at one frequency, by bins of levels in dB re 1 N, ascending. person,
+    frequency_index: indices of the person and the frequency. Empty without answers."""
+    return _bin_shares(answers, answers.run == person * len(answers.frequencies_hz) + frequency_index, answers.level_db)
 
 
-def shares_of_people(answers: Answers, fit: FittedCurves, place: int) -> tuple[ObservedShare, ...]:
-    """Observed shares of all people at one frequency, over levels in dB re each person's own threshold by the model.
+def compute_group_shares(answers: Answers, fit: FittedCurves, frequency_index: int) -> tuple[ObservedShare, ...]:
+    """Compute the observed shares of all people at one frequency, over levels in dB re each person's fitted threshold.
 
     Over absolute levels the shares would be nearly constant: a staircase keeps each person near 79 %, so that low
     levels come from sensitive people and high levels from insensitive people.
     """
-    thresholds_db = np.array([to_db(person.thresholds_n[place]) for person in fit.persons])
-    chosen = answers.run % len(answers.frequencies_hz) == place
-    return _shares(answers, chosen, answers.level_db - thresholds_db[answers.person])
+    thresholds_db = np.array([to_db(person.thresholds_n[frequency_index]) for person in fit.persons])
+    at_frequency = answers.run % len(answers.frequencies_hz) == frequency_index
+    return _bin_shares(answers, at_frequency, answers.level_db - thresholds_db[answers.person])
 
 
-def people_curve(above_db: FloatArray, answers: Answers, fit: FittedCurves, place: int) -> FloatArray:
+def average_person_curves(
+    above_db: FloatArray, answers: Answers, fit: FittedCurves, frequency_index: int
+) -> FloatArray:
     """Mean of the persons' curves at one frequency, weighted by their trials there. above_db: re the threshold."""
-    chosen = answers.run % len(answers.frequencies_hz) == place
-    trials = np.bincount(answers.person[chosen], (answers.right + answers.wrong)[chosen], minlength=answers.persons)
-    mean: FloatArray = np.average([person_curve(above_db, each, fit) for each in fit.persons], axis=0, weights=trials)
+    at_frequency = answers.run % len(answers.frequencies_hz) == frequency_index
+    trials = np.bincount(
+        answers.person[at_frequency], (answers.right + answers.wrong)[at_frequency], minlength=answers.persons
+    )
+    mean: FloatArray = np.average(
+        [evaluate_person_curve(above_db, person, fit) for person in fit.persons], axis=0, weights=trials
+    )
     return mean
 
 
-def person_curve(above_db: FloatArray, person: PersonEstimate, fit: FittedCurves) -> FloatArray:
+def evaluate_person_curve(above_db: FloatArray, person: PersonEstimate, fit: FittedCurves) -> FloatArray:
     """Probability of a right answer, the mean over both directions. above_db: levels re the threshold, any shape."""
     q = sensitivity(AT_THRESHOLD[fit.family] + person.slope * NEPER_PER_DB * above_db, fit.family)[0]
     return (share_right(q - person.criterion, fit.lapse) + share_right(q + person.criterion, fit.lapse)) / 2.0
 
 
-def _shares(answers: Answers, chosen: NDArray[np.bool_], level_db: FloatArray) -> tuple[ObservedShare, ...]:
-    """Shares of the chosen cells by bins of `level_db`. chosen, level_db: (m,), an entry per cell."""
-    level, right, trials = level_db[chosen], answers.right[chosen], (answers.right + answers.wrong)[chosen]
-    bins, found = np.round(level / BIN_DB), []
-    for number in np.unique(bins):
-        inside = bins == number
-        given, good = int(trials[inside].sum()), int(right[inside].sum())
-        middle = float(np.average(level[inside], weights=trials[inside]))
-        found.append(ObservedShare(middle, given, good, *wilson_interval(good, given)))
-    return tuple(found)
+def _bin_shares(answers: Answers, selected: NDArray[np.bool_], level_db: FloatArray) -> tuple[ObservedShare, ...]:
+    """Shares of the chosen cells by bins of `level_db`. selected, level_db: (m,), an entry per cell."""
+    level, correct, trials = level_db[selected], answers.right[selected], (answers.right + answers.wrong)[selected]
+    bins, shares = np.round(level / BIN_DB), []
+    for bin_number in np.unique(bins):
+        in_bin = bins == bin_number
+        answer_count, correct_count = int(trials[in_bin].sum()), int(correct[in_bin].sum())
+        mean_level_db = float(np.average(level[in_bin], weights=trials[in_bin]))
+        shares.append(
+            ObservedShare(mean_level_db, answer_count, correct_count, *wilson_interval(correct_count, answer_count))
+        )
+    return tuple(shares)

@@ -14,9 +14,9 @@ from analysis.psychophysics.hierarchy.goodness import GoodnessOfFit, goodness_of
 from analysis.psychophysics.hierarchy.inference import (
     DirectionLimit,
     MedianThreshold,
-    direction_limit,
-    median_thresholds,
-    pseudo_thresholds,
+    compute_pseudo_thresholds,
+    estimate_direction_limit,
+    estimate_medians,
 )
 from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelihood, run_likelihoods
 from analysis.psychophysics.repeated_measures import RepeatedMeasures, repeated_measures
@@ -28,7 +28,7 @@ CONFIDENCE = 0.95
 FAR_ABOVE_DB = 6.0
 """Of two medians that both lie this far above the cap no difference is reported: the right answers are hardly more than
 chance at all levels, the sizes are extrapolated, and their differences have no known error."""
-FAR_ABOVE = "Two medians or more lie at more than twice the cap: their differences are not known."
+FAR_ABOVE_NOTE = "Two medians or more lie at more than twice the cap: their differences are not known."
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,15 +91,15 @@ def primary_analysis(
     declared_hz: the declared contrast's frequencies, first minus second, or none."""
     if answers is None or answers.persons < 2:
         return None
-    asked_hz, answers = answers.frequencies_hz, at_played_frequencies(answers)
+    requested_hz, answers = answers.frequencies_hz, drop_unanswered_frequencies(answers)
     if len(answers.frequencies_hz) < 2:
         return None
     fit = fit_hierarchy(answers, family)
     cap_db, frequencies = to_db(cap_n), answers.frequencies_hz
     parameters, k, sds = fit.parameters, fit.layout.k, np.exp(fit.parameters[fit.layout.log_sds])
     persons = estimate_persons(answers.subjects, np.hstack([fit.latent[:, :-2], fit.shared_means]), cap_db)
-    medians, compared = median_thresholds(fit, cap_db, confidence), _compare(fit, cap_db, confidence, declared_hz)
-    above = [m.frequency_hz for m in medians if m.above_cap and m.lower_db is not None and m.lower_db > cap_db]
+    medians, compared = estimate_medians(fit, cap_db, confidence), _compare(fit, cap_db, confidence, declared_hz)
+    above_hz = [m.frequency_hz for m in medians if m.above_cap and m.lower_db is not None and m.lower_db > cap_db]
     return PrimaryAnalysis(
         family=family,
         trials=answers.trials,
@@ -108,24 +108,24 @@ def primary_analysis(
         medians=medians,
         overall=compared.overall,
         contrasts=compared.contrasts,
-        limit=direction_limit(frequencies, pseudo_thresholds(fit), cap_db, confidence, answers.played, above),
+        limit=estimate_direction_limit(frequencies, compute_pseudo_thresholds(fit), cap_db, confidence,
+                              answers.has_enough_answers, above_hz),
         persons=persons,
         runs=run_likelihoods(answers, _nuisances(fit, persons), cap_db, family, confidence),
         person_sd_db=float(sds[0]), frequency_sd_db=float(sds[1]),
         slope=float(np.exp(parameters[k + 2])),
-        slope_log_sd=float(sds[2]),
-        criterion_sd=float(sds[3]),
+        slope_log_sd=float(sds[2]), criterion_sd=float(sds[3]),
         lapse=fit.lapse,
         goodness=goodness_of_fit(fit),
         converged=fit.converged and compared.converged,
-        missing_hz=tuple(frequency_hz for frequency_hz in asked_hz if frequency_hz not in frequencies),
+        missing_hz=tuple(frequency_hz for frequency_hz in requested_hz if frequency_hz not in frequencies),
         declared_contrast=compared.declared,
         far_above_hz=compared.far_above_hz,
     )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
-class _Compared:
+class _FrequencyComparison:
     """Differences between frequencies."""
 
     overall: RepeatedMeasures
@@ -136,53 +136,61 @@ class _Compared:
     """Whether the fit of the analysis of variance found its end."""
 
 
-def _compare(fit: HierarchicalFit, cap_db: float, confidence: float, declared_hz: Sequence[float]) -> _Compared:
-    frequencies, played, pseudo = fit.answers.frequencies_hz, fit.answers.played, pseudo_thresholds(fit)
-    far = fit.means_db > cap_db + FAR_ABOVE_DB
-    far_hz = tuple(frequency_hz for frequency_hz, is_far in zip(frequencies, far, strict=True) if is_far)
+def _compare(
+    fit: HierarchicalFit, cap_db: float, confidence: float, declared_hz: Sequence[float]
+) -> _FrequencyComparison:
+    frequencies, sufficient, pseudo = (
+        fit.answers.frequencies_hz,
+        fit.answers.has_enough_answers,
+        compute_pseudo_thresholds(fit),
+    )
+    far_above = fit.means_db > cap_db + FAR_ABOVE_DB
+    far_above_hz = tuple(
+        frequency_hz for frequency_hz, is_far_above in zip(frequencies, far_above, strict=True) if is_far_above
+    )
     # The first is the reference: from one far above the cap, another such has no difference.
-    determined = ~(far & far[0]) | (np.arange(len(far)) == 0)
+    determined = ~(far_above & far_above[0]) | (np.arange(len(far_above)) == 0)
     declared = None
-    if not set(declared_hz) <= set(far_hz):
-        declared = pair_contrast(frequencies, pseudo, declared_hz, confidence, played)
-    overall, converged = _overall(fit.answers, pseudo, fit.family, far)
-    return _Compared(
+    if not set(declared_hz) <= set(far_above_hz):
+        declared = pair_contrast(frequencies, pseudo, declared_hz, confidence, sufficient)
+    overall, converged = _test_overall(fit.answers, pseudo, fit.family, far_above)
+    return _FrequencyComparison(
         overall=overall,
-        contrasts=contrasts(frequencies, pseudo, confidence, played & determined),
+        contrasts=contrasts(frequencies, pseudo, confidence, sufficient & determined),
         declared=declared,
-        far_above_hz=far_hz,
+        far_above_hz=far_above_hz,
         converged=converged,
     )
 
 
-def _overall(
-    answers: Answers, pseudo: FloatArray, family: Family, far: NDArray[np.bool_]
+def _test_overall(
+    answers: Answers, pseudo: FloatArray, family: Family, far_above: NDArray[np.bool_]
 ) -> tuple[RepeatedMeasures, bool]:
     """Analysis of variance within participants, and whether its own fit found its end; none where two medians or more
     lie far above the cap: the difference between these is one of those it tests. Of those without answers at some
     frequency a pseudo-threshold there says nothing: they are left out, and the model is fitted to the others alone."""
-    if far.sum() > 1:
+    if far_above.sum() > 1:
         empty = repeated_measures((), ())
-        return replace(empty, participants=answers.persons, conditions=len(far), notes=(FAR_ABOVE,)), True
-    whole: NDArray[np.bool_] = np.asarray(answers.played.all(axis=1))
+        return replace(empty, participants=answers.persons, conditions=len(far_above), notes=(FAR_ABOVE_NOTE,)), True
+    is_complete: NDArray[np.bool_] = np.asarray(answers.has_enough_answers.all(axis=1))
     values, converged = np.full(pseudo.shape, np.nan), True
-    if whole.all():
+    if is_complete.all():
         values = pseudo
-    elif whole.sum() > 1:
-        fit = fit_hierarchy(answers_of(answers, whole), family)
-        values[whole], converged = pseudo_thresholds(fit), fit.converged
+    elif is_complete.sum() > 1:
+        fit = fit_hierarchy(select_persons(answers, is_complete), family)
+        values[is_complete], converged = compute_pseudo_thresholds(fit), fit.converged
     return repeated_measures(answers.subjects, values.tolist()), converged
 
 
-def answers_of(answers: Answers, chosen: NDArray[np.bool_]) -> Answers:
+def select_persons(answers: Answers, chosen: NDArray[np.bool_]) -> Answers:
     """Answers of some of the persons. chosen: (persons,)."""
     k, cells = len(answers.frequencies_hz), chosen[answers.person]
-    subjects = tuple(subject for subject, kept in zip(answers.subjects, chosen, strict=True) if kept)
-    number = np.cumsum(chosen) - 1
+    subjects = tuple(subject for subject, is_chosen in zip(answers.subjects, chosen, strict=True) if is_chosen)
+    new_index = np.cumsum(chosen) - 1
     return Answers(
         subjects=subjects,
         frequencies_hz=answers.frequencies_hz,
-        run=(number[answers.person] * k + answers.run % k)[cells],
+        run=(new_index[answers.person] * k + answers.run % k)[cells],
         level_db=answers.level_db[cells],
         side=answers.side[cells],
         right=answers.right[cells],
@@ -198,12 +206,12 @@ def _nuisances(fit: HierarchicalFit, persons: Sequence[PersonEstimate]) -> list[
     ]
 
 
-def at_played_frequencies(answers: Answers) -> Answers:
+def drop_unanswered_frequencies(answers: Answers) -> Answers:
     """The same answers without the frequencies that have none: a mean without data would have no estimate."""
     k = len(answers.frequencies_hz)
-    played, place = np.unique(answers.run % k, return_inverse=True)
-    frequencies_hz = tuple(answers.frequencies_hz[index] for index in played)
-    return replace(answers, frequencies_hz=frequencies_hz, run=answers.run // k * len(played) + place)
+    answered, new_index = np.unique(answers.run % k, return_inverse=True)
+    frequencies_hz = tuple(answers.frequencies_hz[index] for index in answered)
+    return replace(answers, frequencies_hz=frequencies_hz, run=answers.run // k * len(answered) + new_index)
 
 
 def estimate_persons(subjects: Sequence[str], latent: FloatArray, cap_db: float) -> tuple[PersonEstimate, ...]:

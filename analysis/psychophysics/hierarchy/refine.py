@@ -25,7 +25,7 @@ LEAST_CURVATURE = 1e-3
 """Least curvature for a Newton step: below it the step's length is undetermined."""
 SAME_HEIGHT = 0.03
 """Rise of the cost up to which a step is accepted: the nodes move from step to step, and the value with them."""
-SHORTER = 3
+STEP_ATTEMPTS = 3
 """Number of attempts per step, each a quarter as long as the one before."""
 
 
@@ -60,71 +60,76 @@ class Refinement:
     def maximum(self, parameters: FloatArray) -> Refined:
         """The maximum by fine nodes; `converged` is False where no search settled. parameters: maximum by Laplace's
         method."""
-        coarse = self._climb(self._begin(parameters, COARSE), COARSE)
-        fine = self._climb(self._evaluate(coarse.parameters, coarse.moments, FINE), FINE)
+        coarse = self._search(self._evaluate_start(parameters, COARSE), COARSE)
+        fine = self._search(self._evaluate(coarse.parameters, coarse.moments, FINE), FINE)
         if fine.converged:
             return fine
-        return self._climb(self._evaluate(fine.parameters, fine.moments, FIXED), FIXED)
+        return self._search(self._evaluate(fine.parameters, fine.moments, FIXED), FIXED)
 
-    def lowest_cost(self, parameters: FloatArray, held: int | None = None) -> float:
-        """Lowest cost near these parameters, by coarse nodes. held: index of a parameter that keeps its value (profile
-        likelihood)."""
-        found = self._climb(self._begin(parameters, COARSE), COARSE, held)
-        if not found.converged:
-            laplace = maximise(self.objective, parameters, held).x
-            found = self._climb(self._begin(laplace, COARSE), COARSE, held)
+    def lowest_cost(self, parameters: FloatArray, fixed_index: int | None = None) -> float:
+        """Lowest cost near these parameters, by coarse nodes. fixed_index: index of a parameter that keeps its value
+        (profile likelihood)."""
+        minimum = self._search(self._evaluate_start(parameters, COARSE), COARSE, fixed_index)
+        if not minimum.converged:
+            laplace = maximise(self.objective, parameters, fixed_index).x
+            minimum = self._search(self._evaluate_start(laplace, COARSE), COARSE, fixed_index)
         # The quadratic approximation gives the rest of the way to the minimum: half the Newton decrement.
-        return found.cost + 0.5 * float(found.slope @ self._newton_step(found, held))
+        return minimum.cost + 0.5 * float(minimum.slope @ self._newton_step(minimum, fixed_index))
 
-    def _begin(self, parameters: FloatArray, counts: Counts) -> Refined:
+    def _evaluate_start(self, parameters: FloatArray, counts: Counts) -> Refined:
         """Evaluation at the parameters, clipped to their bounds, with nodes placed by Laplace's method."""
         parameters = np.clip(parameters, self._lower, self._upper)
-        moments = laplace_moments(parameters, *self.objective.marginal.centres(parameters))
+        moments = laplace_moments(parameters, *self.objective.marginal.find_modes(parameters))
         return self._evaluate(parameters, moments, counts)
 
-    def _climb(self, at: Refined, counts: Counts, held: int | None = None) -> Refined:
-        """Newton's method from `at` until the decrement is below `SETTLED`; `converged` is False where it is not."""
+    def _search(self, current: Refined, counts: Counts, fixed_index: int | None = None) -> Refined:
+        """Newton's method from `current` until the decrement is below `SETTLED`; `converged` is False where it is
+        not."""
         for _ in range(NEWTON_STEPS):
-            step = self._newton_step(at, held)
-            if -float(at.slope @ step) < SETTLED[counts]:
-                return at
-            share = 1.0 / max(1.0, float(np.abs(step / self._longest).max()))
-            for _ in range(SHORTER):
-                then = self._evaluate(
-                    np.clip(at.parameters + share * step, self._lower, self._upper), at.moments, counts
+            step = self._newton_step(current, fixed_index)
+            if -float(current.slope @ step) < SETTLED[counts]:
+                return current
+            step_fraction = 1.0 / max(1.0, float(np.abs(step / self._longest).max()))
+            for _ in range(STEP_ATTEMPTS):
+                trial = self._evaluate(
+                    np.clip(current.parameters + step_fraction * step, self._lower, self._upper),
+                    current.moments,
+                    counts,
                 )
-                if then.cost <= at.cost + SAME_HEIGHT:
+                if trial.cost <= current.cost + SAME_HEIGHT:
                     break
-                share /= 4.0
+                step_fraction /= 4.0
             else:
                 # No step lowers the cost, because the nodes do not fit the posterior yet: place them anew, by the
                 # moments of the last evaluation, without a step.
-                then = self._evaluate(at.parameters, at.moments, counts)
-            at = replace(then, moments=at.moments) if counts is FIXED else then
-        return replace(at, converged=False)
+                trial = self._evaluate(current.parameters, current.moments, counts)
+            current = replace(trial, moments=current.moments) if counts is FIXED else trial
+        return replace(current, converged=False)
 
-    def _newton_step(self, at: Refined, held: int | None) -> FloatArray:
+    def _newton_step(self, current: Refined, fixed_index: int | None) -> FloatArray:
         """Newton step (size,); 0 for the held parameter, and for parameters at a bound that the step would cross."""
-        pushed = ((at.parameters <= self._lower) & (at.slope > 0)) | ((at.parameters >= self._upper) & (at.slope < 0))
-        free = (np.arange(len(at.parameters)) != held) & ~pushed
-        values, vectors = np.linalg.eigh(at.curvature[np.ix_(free, free)])
-        step = np.zeros(len(at.parameters))
+        at_bound = ((current.parameters <= self._lower) & (current.slope > 0)) | (
+            (current.parameters >= self._upper) & (current.slope < 0)
+        )
+        free = (np.arange(len(current.parameters)) != fixed_index) & ~at_bound
+        values, vectors = np.linalg.eigh(current.curvature[np.ix_(free, free)])
+        step = np.zeros(len(current.parameters))
         # Eigenvalues by magnitude: the step lowers the cost also where the curvature is negative.
-        step[free] = -vectors @ ((vectors.T @ at.slope[free]) / np.maximum(np.abs(values), LEAST_CURVATURE))
+        step[free] = -vectors @ ((vectors.T @ current.slope[free]) / np.maximum(np.abs(values), LEAST_CURVATURE))
         return step
 
     def _evaluate(self, parameters: FloatArray, moments: Moments, counts: Counts) -> Refined:
         """Cost with derivatives at the parameters, by nodes placed by the moments."""
-        found = integrate(self._quadrature, parameters, moments, counts)
-        penalty, slope = self.objective.penalty(parameters)
-        value = float(found.value.sum())
+        integrals = integrate(self._quadrature, parameters, moments, counts)
+        penalty, slope = self.objective.log_prior(parameters)
+        value = float(integrals.value.sum())
         return Refined(
             parameters=parameters,
             cost=-value - penalty,
             log_likelihood=value,
-            scores=found.scores,
-            curvature=-found.hessian - self.objective.penalty_hessian(parameters),
-            slope=-found.scores.sum(axis=0) - slope,
-            moments=found.moments,
+            scores=integrals.scores,
+            curvature=-integrals.hessian - self.objective.log_prior_hessian(parameters),
+            slope=-integrals.scores.sum(axis=0) - slope,
+            moments=integrals.moments,
             converged=True,
         )

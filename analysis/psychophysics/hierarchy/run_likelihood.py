@@ -1,8 +1,9 @@
-"""Maximum-likelihood threshold of each single run, with a likelihood interval.
+"""Maximum-likelihood threshold of each participant at each frequency, with a likelihood interval.
 
-One run of some 60 trials does not determine a slope. The likelihood of the threshold is therefore averaged over a
+The answers of all runs of a participant at a frequency are pooled; most have one run there. Some 60 trials do not
+determine a slope. The likelihood of the threshold is therefore averaged over a
 distribution of slope, criterion and lapse rate (`Nuisance`), from the model of all answers or from usual values. No
-prior of the threshold enters: estimate and interval rest on the run's answers alone, without shrinkage.
+prior of the threshold enters: estimate and interval rest on these answers alone, without shrinkage.
 
 After right answers only, the likelihood rises towards low thresholds without a maximum: there is no estimate, only an
 upper bound. Where the estimate is above the cap there is only a lower bound. Each bound is that end of the two-sided
@@ -24,17 +25,18 @@ from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity, share_right
 from equalizer.signals.signal import FloatArray
 
-GRID_DB, BEYOND_DB = 0.1, 30.0
+GRID_STEP_DB, GRID_MARGIN_DB = 0.1, 30.0
 """Step of the grid of thresholds (dB), and its reach below the lowest level and above the highest level or the cap."""
-NODES = 7
-"""Nodes of the Gauss-Hermite rule that averages over slopes, or over criteria."""
-SAME_HEIGHT = 1e-9
-"""Log-likelihoods closer than this differ by rounding alone."""
+QUADRATURE_NODES = 7
+"""Number of nodes of the Gauss-Hermite quadrature over slopes, and of that over criteria."""
+ROUNDING = 1e-9
+"""Difference of log-likelihoods below which they count as equal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Nuisance:
-    """Parameters that a run itself does not determine: distributions of slope, criterion and lapse rate."""
+    """Nuisance parameters, which the answers at a frequency do not determine: distributions of slope, criterion and
+    lapse rate."""
 
     slope: float
     """Median slope, in the units of `curve`."""
@@ -49,18 +51,18 @@ class Nuisance:
 
 @dataclass(frozen=True, slots=True)
 class RunLikelihood:
-    """Threshold of one person at one frequency by those answers alone, in dB re 1 N. The interval holds all thresholds
-    whose log-likelihood is within half the chi-squared quantile (1 degree of freedom) of the maximum."""
+    """Threshold of a participant at a frequency by the answers there alone, in dB re 1 N. The interval holds all
+    thresholds whose log-likelihood is within half the chi-squared quantile (1 degree of freedom) of the maximum."""
 
     subject: str
     frequency_hz: float
     trials: int
     """Number of answers, of all runs of the person at this frequency together."""
     db: float | None
-    """Maximum-likelihood estimate. None where it is above the cap: `lower_db` is then a one-sided bound. Also None
-    where `below` is True: `upper_db` is then a one-sided bound."""
+    """Maximum-likelihood estimate. None where it is above the cap: only the lower bound `lower_db` is then reported.
+    Also None where `below` is True: only the upper bound `upper_db` is then reported."""
     lower_db: float | None
-    """Lower end; None: no lower end within `BEYOND_DB` below the levels played."""
+    """Lower end; None: no lower end within `GRID_MARGIN_DB` below the levels played."""
     upper_db: float | None
     """Upper end; None: the answers do not contradict a participant who feels no direction at all, or `db` is None
     because it is above the cap."""
@@ -70,62 +72,66 @@ class RunLikelihood:
 
 def run_likelihoods(
     answers: Answers,
-    people: Sequence[Nuisance],
+    nuisances: Sequence[Nuisance],
     cap_db: float,
     family: Family = Family.WEIBULL,
     confidence: float = 0.95,
 ) -> tuple[RunLikelihood, ...]:
-    """Threshold and interval of each person at each frequency with answers, in the order of the runs' indices. people:
-    an entry per subject of the answers. cap_db: cap in dB re 1 N. confidence: of the two-sided interval."""
+    """Threshold and interval of each participant at each frequency with answers, in the order of `Answers.run`.
+    nuisances: an entry per subject of the answers. cap_db: cap in dB re 1 N. confidence: of the two-sided interval."""
     k = len(answers.frequencies_hz)
-    found = []
-    for run in np.unique(answers.run):
-        person, place = divmod(int(run), k)
-        grid, height = _likelihood(answers, int(run), people[person], cap_db, family)
-        trials = int((answers.right + answers.wrong)[answers.run == run].sum())
-        ends = _profile_interval(grid, height, cap_db, confidence)
-        found.append(RunLikelihood(answers.subjects[person], answers.frequencies_hz[place], trials, *ends))
-    return tuple(found)
+    likelihoods = []
+    for run_index in np.unique(answers.run):
+        person_index, frequency_index = divmod(int(run_index), k)
+        grid, log_likelihood = _likelihood_on_grid(answers, int(run_index), nuisances[person_index], cap_db, family)
+        trials = int((answers.right + answers.wrong)[answers.run == run_index].sum())
+        estimate_and_ends = _find_likelihood_interval(grid, log_likelihood, cap_db, confidence)
+        likelihoods.append(
+            RunLikelihood(
+                answers.subjects[person_index], answers.frequencies_hz[frequency_index], trials, *estimate_and_ends
+            )
+        )
+    return tuple(likelihoods)
 
 
-def _likelihood(
-    answers: Answers, run: int, person: Nuisance, cap_db: float, family: Family
+def _likelihood_on_grid(
+    answers: Answers, run_index: int, nuisance: Nuisance, cap_db: float, family: Family
 ) -> tuple[FloatArray, FloatArray]:
     """Grid of thresholds (g,) in dB, and the logarithm of the likelihood at each, averaged over slope, criterion and
     lapse rate."""
-    cells = answers.run == run
+    cells = answers.run == run_index
     level, side = answers.level_db[cells], answers.side[cells]
-    grid = np.arange(level.min() - BEYOND_DB, max(level.max(), cap_db) + BEYOND_DB, GRID_DB)
-    heights, weights = [], []
-    for u, by_slope in _nodes(person.slope_log_sd):
-        t = AT_THRESHOLD[family] + person.slope * math.exp(u) * NEPER_PER_DB * (level[None, :] - grid[:, None])
+    grid = np.arange(level.min() - GRID_MARGIN_DB, max(level.max(), cap_db) + GRID_MARGIN_DB, GRID_STEP_DB)
+    log_likelihoods, weights = [], []
+    for u, slope_weight in _gauss_hermite_nodes(nuisance.slope_log_sd):
+        t = AT_THRESHOLD[family] + nuisance.slope * math.exp(u) * NEPER_PER_DB * (level[None, :] - grid[:, None])
         q = sensitivity(t, family)[0]
-        for c, by_criterion in _nodes(person.criterion_sd):
-            for lapse in person.lapses:
-                p = share_right(q - side * (person.criterion + c), lapse)
-                heights.append(np.log(p) @ answers.right[cells] + np.log1p(-p) @ answers.wrong[cells])
-                weights.append(by_slope * by_criterion / len(person.lapses))
-    return grid, logsumexp(heights, axis=0, b=np.array(weights)[:, None])
+        for c, criterion_weight in _gauss_hermite_nodes(nuisance.criterion_sd):
+            for lapse in nuisance.lapses:
+                p = share_right(q - side * (nuisance.criterion + c), lapse)
+                log_likelihoods.append(np.log(p) @ answers.right[cells] + np.log1p(-p) @ answers.wrong[cells])
+                weights.append(slope_weight * criterion_weight / len(nuisance.lapses))
+    return grid, logsumexp(log_likelihoods, axis=0, b=np.array(weights)[:, None])
 
 
-def _nodes(sd: float) -> list[tuple[float, float]]:
+def _gauss_hermite_nodes(sd: float) -> list[tuple[float, float]]:
     """Positions and weights of Gauss-Hermite quadrature for a normal distribution with mean 0 and this sd."""
     if sd == 0.0:
         return [(0.0, 1.0)]
-    places, weights = np.polynomial.hermite_e.hermegauss(NODES)
-    return list(zip(sd * places, weights / weights.sum(), strict=True))
+    positions, weights = np.polynomial.hermite_e.hermegauss(QUADRATURE_NODES)
+    return list(zip(sd * positions, weights / weights.sum(), strict=True))
 
 
-def _profile_interval(
-    grid: FloatArray, height: FloatArray, cap_db: float, confidence: float
+def _find_likelihood_interval(
+    grid: FloatArray, log_likelihood: FloatArray, cap_db: float, confidence: float
 ) -> tuple[float | None, float | None, float | None, bool]:
     """Estimate, lower end, upper end, and whether the maximum is at the lower end of the grid (`RunLikelihood`). grid,
-    height: (g,)."""
-    best = float(grid[height.argmax()])
-    below, above = bool(height[0] >= height.max() - SAME_HEIGHT), best > cap_db
-    inside = np.flatnonzero(height >= height.max() - chi2.ppf(confidence, 1) / 2)
-    lower = float(grid[inside[0]]) if inside[0] > 0 else None
-    upper = float(grid[inside[-1]]) if inside[-1] < len(grid) - 1 else None
+    log_likelihood: (g,)."""
+    best = float(grid[log_likelihood.argmax()])
+    below, above = bool(log_likelihood[0] >= log_likelihood.max() - ROUNDING), best > cap_db
+    in_interval = np.flatnonzero(log_likelihood >= log_likelihood.max() - chi2.ppf(confidence, 1) / 2)
+    lower = float(grid[in_interval[0]]) if in_interval[0] > 0 else None
+    upper = float(grid[in_interval[-1]]) if in_interval[-1] < len(grid) - 1 else None
     if below:
         return None, None, upper, True
     return (None, lower, None, False) if above else (best, lower, upper, False)

@@ -19,7 +19,12 @@ from scipy.stats import beta
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import USUAL_SLOPE, Family
 from analysis.psychophysics.hierarchy.objective import LAPSE_BOUNDS, Objective, Prior
-from analysis.psychophysics.hierarchy.primary import CONFIDENCE, PersonEstimate, at_played_frequencies, estimate_persons
+from analysis.psychophysics.hierarchy.primary import (
+    CONFIDENCE,
+    PersonEstimate,
+    drop_unanswered_frequencies,
+    estimate_persons,
+)
 from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelihood, run_likelihoods
 from protocols.procedure.staircase import to_db
 
@@ -29,7 +34,7 @@ simulated people of `hapteq power`."""
 LAPSE_QUANTILES = (1 / 6, 1 / 2, 5 / 6)
 """Quantiles of the lapse rate's prior over which a run's likelihood is averaged: the medians of three equally probable
 parts."""
-FREE_DB = 30.0
+THRESHOLD_SD_DB = 30.0
 """SD (dB) of the prior of each threshold around the mean level played: keeps a threshold finite that the answers do not
 bound."""
 
@@ -53,12 +58,12 @@ def fit_single_persons(
 ) -> SinglePersons:
     """Most probable thresholds, slopes and criteria at the most probable lapse rate, and the likelihood interval of
     each run. cap_n: highest level that could be played, N."""
-    answers, cap_db, prior = at_played_frequencies(answers), to_db(cap_n), Prior()
+    answers, cap_db, prior = drop_unanswered_frequencies(answers), to_db(cap_n), Prior()
     objective = Objective(answers, family, prior)
-    parameters, layout = objective.begin.copy(), objective.layout
+    parameters, layout = objective.start.copy(), objective.layout
     parameters[: layout.k] = np.average(answers.level_db, weights=answers.right + answers.wrong)
     # In the order of `Layout.log_sds`. The part common to all frequencies (SD 1 dB) is negligible.
-    parameters[layout.log_sds] = [0.0, math.log(FREE_DB), math.log(SLOPE_LOG_SD), math.log(CRITERION_SD)]
+    parameters[layout.log_sds] = [0.0, math.log(THRESHOLD_SD_DB), math.log(SLOPE_LOG_SD), math.log(CRITERION_SD)]
 
     def cost(logit_lapse: float) -> float:
         parameters[layout.lapse] = logit_lapse

@@ -21,10 +21,10 @@ from analysis.psychophysics.power.simulated_study import Crowd
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS
 from equalizer.signals.signal import FloatArray
 from protocols.definition.staircase_rule import BayesianPlacement, StaircaseRule, StepChange
-from protocols.procedure.psi import estimate, posterior
+from protocols.procedure.psi import compute_posterior, estimate_threshold
 from protocols.procedure.staircase import (
     StaircaseState,
-    begin,
+    begin_staircase,
     is_complete,
     is_finished,
     level_n,
@@ -77,41 +77,41 @@ def list_compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
         StepChange.AT_NEXT_REVERSAL: "staircase, one reversal later",
     }
     up_down = replace(rule, bayesian=BayesianPlacement())
-    found = {name: replace(up_down, step_change=change) for change, name in names.items()}
+    rules = {name: replace(up_down, step_change=change) for change, name in names.items()}
     for trials in (30, 60):
-        found[f"Psi, {trials} trials"] = replace(rule, bayesian=BayesianPlacement(trials))
-    return found
+        rules[f"Psi, {trials} trials"] = replace(rule, bayesian=BayesianPlacement(trials))
+    return rules
 
 
 def compare_rules(crowd: Crowd, rules: Mapping[str, StaircaseRule], people: int, seed: int) -> tuple[RuleResult, ...]:
     """One run of each person under every rule; the people are drawn from the crowd's first frequency."""
-    return tuple(_result(name, rule, crowd, people, seed) for name, rule in rules.items())
+    return tuple(_rule_result(name, rule, crowd, people, seed) for name, rule in rules.items())
 
 
-def _result(name: str, rule: StaircaseRule, crowd: Crowd, people: int, seed: int) -> RuleResult:
+def _rule_result(name: str, rule: StaircaseRule, crowd: Crowd, people: int, seed: int) -> RuleResult:
     """Result of one rule over all people."""
     errors, trials, highest = [], [], 0.0
     for number in range(people):
-        true_db, state, top_n = play(crowd, rule, (seed, _KEY, number))
+        true_db, state, top_n = simulate_person(crowd, rule, (seed, _KEY, number))
         trials.append(state.trials)
         highest = max(highest, top_n)
         if is_complete(rule, state):
             errors.append(estimate_db(rule, state) - true_db)
-    found = np.array(errors) if errors else np.array([math.nan])
-    error = float(np.sqrt((found**2).mean()))
+    error_array = np.array(errors) if errors else np.array([math.nan])
+    error = float(np.sqrt((error_array**2).mean()))
     return RuleResult(
         rule=name,
         runs=len(errors),
         trials=float(np.mean(trials)),
-        bias_db=float(found.mean()),
-        sd_db=float(found.std()),
+        bias_db=float(error_array.mean()),
+        sd_db=float(error_array.std()),
         error_db=error,
         error_per_trial_db=error * math.sqrt(float(np.mean(trials))),
         highest_n=highest,
     )
 
 
-def play(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> tuple[float, StaircaseState, float]:
+def simulate_person(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> tuple[float, StaircaseState, float]:
     """Simulate a run of a person drawn from the crowd. key: seeds the draws. Returns the true threshold (dB re 1 N),
     the last state, and the highest level played (N)."""
     random = np.random.default_rng(key)
@@ -130,28 +130,29 @@ def answer_trials(
 ) -> tuple[StaircaseState, list[float]]:
     """The run's last state, and the level of each trial as played (N). draws: (trials, 3) in [0, 1), for the
     direction, the answer, and the amplitude where levels are roved; Psi plays its levels as they are."""
-    state, played = begin(rule), list[float]()
+    state, played_n = begin_staircase(rule), list[float]()
     rove_db = 0.0 if rule.is_bayesian else crowd.rove_db
     while not is_finished(rule, state) and state.trials < len(draws):
         draw = draws[state.trials]
-        due_n = level_n(rule, state)
-        played.append(to_newton(to_db(due_n) + rove_db * (float(draw[2]) - 0.5)) if rove_db else due_n)
-        steps = person.slope * (to_db(played[-1]) - person.threshold_db)
-        state = step(rule, state, _is_right(crowd, steps, person.criterion, draw))
-    return state, played
+        staircase_n = level_n(rule, state)
+        played_n.append(to_newton(to_db(staircase_n) + rove_db * (float(draw[2]) - 0.5)) if rove_db else staircase_n)
+        scaled_db = person.slope * (to_db(played_n[-1]) - person.threshold_db)
+        state = step(rule, state, _is_correct(crowd, scaled_db, person.criterion, draw))
+    return state, played_n
 
 
-def _is_right(crowd: Crowd, steps: float, criterion: float, draw: FloatArray) -> bool:
-    """Whether a trial is answered right. steps: slope times dB above the threshold; draw: (3,), of `answer_trials`."""
-    q = float(sensitivity(np.array([AT_THRESHOLD[crowd.family] + NEPER_PER_DB * steps]), crowd.family)[0][0])
+def _is_correct(crowd: Crowd, scaled_db: float, criterion: float, draw: FloatArray) -> bool:
+    """Whether a trial is answered right. scaled_db: slope times dB above the threshold; draw: (3,), of
+    `answer_trials`."""
+    q = float(sensitivity(np.array([AT_THRESHOLD[crowd.family] + NEPER_PER_DB * scaled_db]), crowd.family)[0][0])
     side = 1.0 if draw[0] < 0.5 else -1.0
-    right = crowd.lapse + (1.0 - 2.0 * crowd.lapse) * NormalDist().cdf(q - side * criterion)
-    return bool(draw[1] < right)
+    p_correct = crowd.lapse + (1.0 - 2.0 * crowd.lapse) * NormalDist().cdf(q - side * criterion)
+    return bool(draw[1] < p_correct)
 
 
 def estimate_db(rule: StaircaseRule, state: StaircaseState) -> float:
     """Threshold of a complete run, in dB re 1 N, estimated as in the analysis of a session."""
     if rule.is_bayesian:
         cap_db = to_db(rule.cap_n)
-        return min(estimate(posterior(state.answered, cap_db), cap_db).mean_db, cap_db)
+        return min(estimate_threshold(compute_posterior(state.answered, cap_db), cap_db).mean_db, cap_db)
     return float(np.mean(state.reversal_levels_db[-rule.averaged_reversals :]))

@@ -45,24 +45,31 @@ def felt_delivery(
         raise ValueError(f"no measured trials of both directions at {', '.join(missing)}")
     return FeltDelivery(
         tuple(
-            (_table(groups[frequency_hz], 1.0, flawless), _table(groups[frequency_hz], -1.0, flawless))
+            (
+                _delivery_table(groups[frequency_hz], 1.0, flawless),
+                _delivery_table(groups[frequency_hz], -1.0, flawless),
+            )
             for frequency_hz, flawless in zip(frequencies_hz, flawless_mps2_per_n, strict=True)
         )
     )
 
 
-def _table(group: DeliveredTrials, side: float, flawless: float) -> Table:
+def _delivery_table(group: DeliveredTrials, side: float, flawless: float) -> Table:
     # Over the level that was played: that of the staircase differs from it where levels were roved.
     over_played_db = group.values_db[Cue.INTENSITY] + group.nominal_db - group.played_db
     strength = 10.0 ** (over_played_db / 20.0) / flawless
-    columns = (strength, strength * _share(group, Cue.COUPLING), strength * _share(group, Cue.SPECTRUM))
+    columns = (
+        strength,
+        strength * _amplitude_ratio(group, Cue.COUPLING),
+        strength * _amplitude_ratio(group, Cue.SPECTRUM),
+    )
     rounded = np.round(group.played_db)
     rows: list[Row] = []
     for level_db in np.unique(rounded[group.side == side]):
         of_level = (group.side == side) & (rounded == level_db)
-        along, across, harmonics = (_median(column[of_level]) for column in columns)
-        if along is not None:
-            rows.append((float(level_db), along, across or 0.0, harmonics or 0.0))
+        on_axis, off_axis, harmonics = (_median(column[of_level]) for column in columns)
+        if on_axis is not None:
+            rows.append((float(level_db), on_axis, off_axis or 0.0, harmonics or 0.0))
     return tuple(rows)
 
 
@@ -72,7 +79,7 @@ def _median(values: FloatArray) -> float | None:
     return float(np.median(measured)) if len(measured) else None
 
 
-def _share(group: DeliveredTrials, cue: Cue) -> FloatArray:
+def _amplitude_ratio(group: DeliveredTrials, cue: Cue) -> FloatArray:
     """Amplitude over that along the direction (n,), of which the cue holds the sum; NaN where it was not measured."""
     values_db = group.values_db.get(cue)
     return np.full(len(group.side), np.nan) if values_db is None else 10.0 ** (values_db / 20.0) - 1.0

@@ -18,7 +18,7 @@ from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.catch_trials import wilson_interval
 from analysis.psychophysics.group_contrasts import pair_contrast
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
-from analysis.psychophysics.hierarchy.inference import pseudo_thresholds
+from analysis.psychophysics.hierarchy.inference import compute_pseudo_thresholds
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from protocols.definition.staircase_rule import StaircaseRule
 
@@ -86,7 +86,7 @@ def judge_study(
     pair_hz = find_judged_pair(crowd.frequencies_hz, contrast_hz)
     first, second = (crowd.frequencies_hz.index(frequency_hz) for frequency_hz in pair_hz)
     true_db = true_difference_db(crowd, contrast_hz)
-    pseudo = pseudo_thresholds(fit_hierarchy(study.answers))
+    pseudo = compute_pseudo_thresholds(fit_hierarchy(study.answers))
     primary, means = (
         pair_contrast(crowd.frequencies_hz, values, pair_hz, CONFIDENCE) for values in (pseudo, study.threshold_db)
     )
@@ -144,7 +144,7 @@ def power_point(verdicts: Sequence[StudyVerdict]) -> PowerPoint:
     )
 
 
-def _wilson_share(found: Sequence[bool]) -> Share:
+def _wilson_share(outcomes: Sequence[bool]) -> Share:
     """Share of true values, with Wilson's 95 % interval."""
-    lower, upper = wilson_interval(sum(found), len(found))
-    return Share(sum(found) / len(found), lower, upper)
+    lower, upper = wilson_interval(sum(outcomes), len(outcomes))
+    return Share(sum(outcomes) / len(outcomes), lower, upper)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, RunFound, Track, give_answer
+from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, SimulatedRun, Track, give_answer
 from equalizer.signals.signal import FloatArray
 from protocols.definition.staircase_rule import StaircaseRule
 from protocols.procedure.psi import SAME_BITS, SLOPES, levels_db, share_right, thresholds_db
@@ -38,7 +38,7 @@ class PackedPsi(NamedTuple):
     """(1 + levels, cells): probability of a right answer."""
     log_shares: FloatArray
     """(2, 1 + levels, cells): natural logarithms of the probabilities of a wrong and of a right answer."""
-    known: FloatArray
+    negative_entropy: FloatArray
     """(1 + levels, cells): sum over both answers of s log s, with s the probability of the answer."""
     trials: int
     """Most trials of a run."""
@@ -51,11 +51,13 @@ def pack_psi(rule: StaircaseRule) -> PackedPsi:
     """The grid and the tables of a rule whose levels the Psi method chooses."""
     cap_db = to_db(rule.cap_n)
     levels = np.array([to_db(rule.start_n), *levels_db(cap_db)])
-    right = share_right(levels, cap_db).reshape(len(levels), -1)
-    logs = np.log(np.array([1.0 - right, right]))
-    known = right * logs[1] + (1.0 - right) * logs[0]
+    p_correct = share_right(levels, cap_db).reshape(len(levels), -1)
+    logs = np.log(np.array([1.0 - p_correct, p_correct]))
+    negative_entropy = p_correct * logs[1] + (1.0 - p_correct) * logs[0]
     cells_db = np.repeat(thresholds_db(cap_db), len(SLOPES))
-    return PackedPsi(levels, cells_db, cap_db, right, logs, known, rule.bayesian.trials, rule.bayesian.spread_db)
+    return PackedPsi(
+        levels, cells_db, cap_db, p_correct, logs, negative_entropy, rule.bayesian.trials, rule.bayesian.spread_db
+    )
 
 
 @njit(cache=True)
@@ -67,38 +69,38 @@ def to_probability(log_p: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def best_level(psi: PackedPsi, probability: FloatArray) -> int:
+def choose_level(psi: PackedPsi, probability: FloatArray) -> int:
     """Index of the level with the least expected posterior entropy (nats), the lowest of those within `SAME_BITS` of
     it. probability: (cells,)."""
-    chances, left = psi.right @ probability, -(psi.known @ probability)
-    least = math.inf
-    for level in range(1, len(left)):
-        chance = chances[level]
-        left[level] += chance * math.log(chance) + (1.0 - chance) * math.log(1.0 - chance)
-        least = min(least, left[level])
-    for level in range(1, len(left)):
-        if left[level] <= least + SAME_BITS:
+    correct_chances, expected_entropy = psi.right @ probability, -(psi.negative_entropy @ probability)
+    lowest_entropy = math.inf
+    for level in range(1, len(expected_entropy)):
+        chance = correct_chances[level]
+        expected_entropy[level] += chance * math.log(chance) + (1.0 - chance) * math.log(1.0 - chance)
+        lowest_entropy = min(lowest_entropy, expected_entropy[level])
+    for level in range(1, len(expected_entropy)):
+        if expected_entropy[level] <= lowest_entropy + SAME_BITS:
             return level
-    return len(left) - 1
+    return len(expected_entropy) - 1
 
 
 @njit(cache=True)
-def play_psi(psi: PackedPsi, person: Participant, seed: int, track: Track) -> RunFound:
+def play_psi(psi: PackedPsi, person: Participant, seed: int, track: Track) -> SimulatedRun:
     """Simulate a run until it ends, and fill the track except its reversals. The result has the mean of the threshold's
     posterior, and the probability that the threshold lies above the cap."""
     np.random.seed(seed)
     log_p = np.zeros(len(psi.cells_db))
     probability = to_probability(log_p)
-    place, trials, repeats, spread_db, mean_db = 0, 0, person.repeats, math.inf, 0.0
+    level_index, trials, repeats, spread_db, mean_db = 0, 0, person.repeats, math.inf, 0.0
     while trials < min(psi.trials, MOST_TRIALS) and not spread_db <= psi.spread_db:
-        level = psi.levels_db[place]
-        side, right, repeats = give_answer(person, level, trials, repeats)
-        track.level_db[trials], track.side[trials], track.right[trials] = level, side, right
+        level = psi.levels_db[level_index]
+        side, is_correct, repeats = give_answer(person, level, trials, repeats)
+        track.level_db[trials], track.side[trials], track.right[trials] = level, side, is_correct
         trials += 1
-        log_p += psi.log_shares[1 if right else 0, place]
+        log_p += psi.log_shares[1 if is_correct else 0, level_index]
         probability = to_probability(log_p)
         mean_db = (probability * psi.cells_db).sum()
         spread_db = math.sqrt((probability * (psi.cells_db - mean_db) ** 2).sum())
-        place = best_level(psi, probability)
-    above = probability[psi.cells_db > psi.cap_db].sum()
-    return RunFound(trials, 0, mean_db, above)
+        level_index = choose_level(psi, probability)
+    p_above_cap = probability[psi.cells_db > psi.cap_db].sum()
+    return SimulatedRun(trials, 0, mean_db, p_above_cap)

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.psychophysics.hierarchy.answers import Answers, tally
+from analysis.psychophysics.hierarchy.answers import Answers, count_cells
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, USUAL_SLOPE, Family
 from analysis.psychophysics.power.felt_delivery import FeltDelivery
 from analysis.psychophysics.power.psi_kernel import pack_psi, play_psi
@@ -21,21 +21,21 @@ from analysis.psychophysics.power.staircase_kernel import (
     MOST_TRIALS,
     SAME_DB,
     Participant,
-    RunFound,
+    SimulatedRun,
     Track,
-    pack,
+    pack_rule,
     play_run,
 )
-from analysis.psychophysics.thresholds import MAYBE_ABOVE
+from analysis.psychophysics.thresholds import CUT_PROBABILITY
 from equalizer.signals.signal import FloatArray
 from protocols.definition.staircase_rule import StaircaseRule
 from protocols.procedure.staircase import to_db
 
-_HABITS = 0x4AB1
-"""Last word of the seed from which habits (guessing, drift, order of runs) are drawn, so that all other draws are the
+_HABIT_SEED = 0x4AB1
+"""Last number of the seed from which habits (guessing, drift, order of runs) are drawn: all other draws are then the
 same as in a study without habits."""
 FAMILIES = (Family.WEIBULL, Family.LOGISTIC, Family.GAUSS)
-"""Families of curves in the order of the kernel's numbers (`staircase_kernel.evidence`)."""
+"""Families of curves in the order of the kernel's numbers (`staircase_kernel.compute_evidence`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,19 +110,19 @@ def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[i
     rng, k = np.random.default_rng(seed), len(crowd.frequencies_hz)
     true_db, participants = _draw_people(crowd, people, rng)
     seeds = rng.integers(0, 2**32, size=(people, k), dtype=np.uint64)
-    tracks = _empty_tracks(people * k, rule.reversals)
-    found = _play_sessions(crowd, rule, participants, seeds.ravel(), tracks, (*seed, _HABITS))
-    counts = np.array([run.trials for run in found])
-    played = np.arange(MOST_TRIALS) < counts[:, None]
-    answers = tally(
+    tracks = _allocate_tracks(people * k, rule.reversals)
+    run_results = _simulate_sessions(crowd, rule, participants, seeds.ravel(), tracks, (*seed, _HABIT_SEED))
+    counts = np.array([run.trials for run in run_results])
+    within_run = np.arange(MOST_TRIALS) < counts[:, None]
+    answers = count_cells(
         tuple(f"S{number + 1:03d}" for number in range(people)),
         crowd.frequencies_hz,
         np.repeat(np.arange(people * k), counts),
-        tracks.level_db[played],
-        tracks.side[played],
-        tracks.right[played].astype(np.bool_),
+        tracks.level_db[within_run],
+        tracks.side[within_run],
+        tracks.right[within_run].astype(np.bool_),
     )
-    runs = (_posterior_means if rule.is_bayesian else _reversal_means)(rule, tracks, found)
+    runs = (_compute_posterior_means if rule.is_bayesian else _compute_reversal_means)(rule, tracks, run_results)
     return SimulatedStudy(
         answers=answers,
         threshold_n=runs.newton.reshape(people, k),
@@ -137,81 +137,90 @@ def _draw_people(crowd: Crowd, people: int, rng: np.random.Generator) -> tuple[F
     """Draw people from the crowd. Returns true thresholds (people, frequencies) in dB re 1 N, and a participant for
     each run, person by person."""
     k = len(crowd.frequencies_hz)
-    own = np.broadcast_to(np.asarray(crowd.frequency_sd_db, dtype=np.float64), (k,))
+    interaction_sd_db = np.broadcast_to(np.asarray(crowd.frequency_sd_db, dtype=np.float64), (k,))
     true_db = 20.0 * np.log10(np.asarray(crowd.medians_n)) + crowd.person_sd_db * rng.standard_normal((people, 1))
-    true_db = true_db + own * rng.standard_normal((people, k))
+    true_db = true_db + interaction_sd_db * rng.standard_normal((people, k))
     slopes = (crowd.slope or USUAL_SLOPE[crowd.family]) * np.exp(crowd.slope_log_sd * rng.standard_normal(people))
     criteria = crowd.criterion_sd * rng.standard_normal(people)
     t0, family = AT_THRESHOLD[crowd.family], FAMILIES.index(crowd.family)
     return true_db, [
-        Participant(t0, slopes[person] * NEPER_PER_DB, true_db[person, place], crowd.lapse, criteria[person], family)
+        Participant(
+            t0, slopes[person] * NEPER_PER_DB, true_db[person, frequency_index], crowd.lapse, criteria[person], family
+        )
         for person in range(people)
-        for place in range(k)
+        for frequency_index in range(k)
     ]
 
 
-def _reversal_means(rule: StaircaseRule, tracks: Track, found: Sequence[RunFound]) -> _RunThresholds:
+def _compute_reversal_means(rule: StaircaseRule, tracks: Track, run_results: Sequence[SimulatedRun]) -> _RunThresholds:
     """Means of the averaged reversals of each run; NaN where a run did not reach all its reversals."""
     averaged = tracks.reversal_db[:, -rule.averaged_reversals :]
-    whole = np.where(np.array([run.reversals for run in found]) == rule.reversals, 1.0, math.nan)
+    nan_unless_complete = np.where(np.array([run.reversals for run in run_results]) == rule.reversals, 1.0, math.nan)
     newtons = np.minimum(10.0 ** (averaged / 20.0), rule.cap_n)
     at_cap = averaged >= to_db(rule.cap_n) - SAME_DB
     return _RunThresholds(
-        newtons.mean(axis=1) * whole, averaged.mean(axis=1) * whole, at_cap.sum(axis=1).astype(np.float64)
+        newtons.mean(axis=1) * nan_unless_complete,
+        averaged.mean(axis=1) * nan_unless_complete,
+        at_cap.sum(axis=1).astype(np.float64),
     )
 
 
-def _posterior_means(rule: StaircaseRule, tracks: Track, found: Sequence[RunFound]) -> _RunThresholds:
+def _compute_posterior_means(rule: StaircaseRule, tracks: Track, run_results: Sequence[SimulatedRun]) -> _RunThresholds:
     """Posterior means of Psi, limited by the cap and marked as cut by it as in `thresholds.threshold_of`."""
-    db = np.minimum([run.mean_db for run in found], to_db(rule.cap_n))
-    cut = np.array([run.above_cap for run in found]) > MAYBE_ABOVE
+    db = np.minimum([run.mean_db for run in run_results], to_db(rule.cap_n))
+    cut = np.array([run.above_cap for run in run_results]) > CUT_PROBABILITY
     return _RunThresholds(np.minimum(10.0 ** (db / 20.0), rule.cap_n), db, cut.astype(np.float64))
 
 
-def _feel_delivery(participant: Participant, delivery: FeltDelivery | None, place: int) -> Participant:
-    """The participant with the stimuli that the device delivers at the frequency of index `place`; unchanged without a
-    delivery: the commands are then felt as they are."""
+def _apply_delivery(participant: Participant, delivery: FeltDelivery | None, frequency_index: int) -> Participant:
+    """Return the participant with the stimuli that the device delivers at the frequency of index `frequency_index`;
+    unchanged without a delivery: the commands are then felt as they are."""
     if delivery is None:
         return participant
-    first, second = (np.array(table) * (1.0, 1.0, 1.0, delivery.masking) for table in delivery.tables[place])
+    felt_1, felt_2 = (np.array(table) * (1.0, 1.0, 1.0, delivery.masking) for table in delivery.tables[frequency_index])
     return participant._replace(
-        felt_1=first,
-        felt_2=second,
+        felt_1=felt_1,
+        felt_2=felt_2,
         adaptation_db=delivery.adaptation_db,
         adaptation_trials=delivery.adaptation_trials,
     )
 
 
-def _empty_tracks(runs: int, reversals: int) -> Track:
+def _allocate_tracks(runs: int, reversals: int) -> Track:
     """Empty tracks of all runs together, each with a leading axis (runs,)."""
-    levels, sides, rights = (np.empty((runs, MOST_TRIALS)) for _ in range(3))
-    return Track(levels, sides, rights, np.full((runs, reversals), np.nan))
+    levels, sides, correct = (np.empty((runs, MOST_TRIALS)) for _ in range(3))
+    return Track(levels, sides, correct, np.full((runs, reversals), np.nan))
 
 
-def _play_sessions(
+def _simulate_sessions(
     crowd: Crowd,
     rule: StaircaseRule,
     participants: list[Participant],
     seeds: NDArray[np.uint64],
     tracks: Track,
-    key: tuple[int, ...],
-) -> list[RunFound]:
+    habit_seed: tuple[int, ...],
+) -> list[SimulatedRun]:
     """Fill the tracks, person by person, with the runs of each person in random order. Returns the result of each run,
     in the order of the tracks. seeds: (runs,); key: seed of the habits."""
-    habits, k = np.random.default_rng(key), len(crowd.frequencies_hz)
-    play = partial(play_psi, pack_psi(rule)) if rule.is_bayesian else partial(play_run, pack(rule, crowd.rove_db))
-    found = [RunFound(0, 0)] * len(participants)
-    for first in range(0, len(participants), k):
-        guesses, drift = habits.random() < crowd.guessers, 0.01 * crowd.criterion_drift_sd * habits.standard_normal()
-        before = 0
-        for place in habits.permutation(k):
-            run = first + int(place)
-            participant = _feel_delivery(participants[run], crowd.delivery, int(place))._replace(
-                criterion_per_trial=drift, trials_before=before, unsure=crowd.unsure, repeats=crowd.repeats
+    habit_rng, k = np.random.default_rng(habit_seed), len(crowd.frequencies_hz)
+    simulate_run = (
+        partial(play_psi, pack_psi(rule)) if rule.is_bayesian else partial(play_run, pack_rule(rule, crowd.rove_db))
+    )
+    run_results = [SimulatedRun(0, 0)] * len(participants)
+    for first_run in range(0, len(participants), k):
+        is_guesser, drift = (
+            habit_rng.random() < crowd.guessers,
+            0.01 * crowd.criterion_drift_sd * habit_rng.standard_normal(),
+        )
+        trials_before = 0
+        for frequency_index in habit_rng.permutation(k):
+            run = first_run + int(frequency_index)
+            participant = _apply_delivery(participants[run], crowd.delivery, int(frequency_index))._replace(
+                criterion_per_trial=drift, trials_before=trials_before, unsure=crowd.unsure, repeats=crowd.repeats
             )
-            if guesses:
+            if is_guesser:
                 participant = participant._replace(lapse=0.5)
             track = Track(*(rows[run] for rows in tracks))
-            found[run] = RunFound(*play(participant, int(seeds[run]), track))
-            before += found[run].trials
-    return found
+            run_results[run] = SimulatedRun(*simulate_run(participant, int(seeds[run]), track))
+            trials_before += run_results[run].trials
+    return run_results

@@ -1,6 +1,7 @@
-"""One staircase run of a simulated participant, compiled: no device, no session, no file.
+"""Compiled simulation of one staircase run of a participant, for power analyses (`simulated_study`).
 
-The rule is that of `protocols.procedure.staircase.step`, number by number; tests hold the two equal.
+The rule is that of `protocols.procedure.staircase.step`; tests check that both give identical runs. Levels are in dB re
+1 N.
 """
 
 import math
@@ -14,15 +15,16 @@ from protocols.definition.staircase_rule import StaircaseRule, StepChange
 from protocols.procedure.staircase import to_db
 
 MOST_TRIALS = 2000
-"""A run is cut here: a guesser needs about 110 trials under the published rule, and 262 at the most in 500 runs."""
+"""Largest number of trials of a run. A guesser needs about 110 trials under the published rule; the longest of 500
+simulated runs took 262."""
 SAME_DB = 1e-9
-"""Difference below which two levels are the same, rounding apart."""
-SUREST = (3.2, 25.0, 6.7)
-"""t of each family where 1 - F is 1e-11 to 2e-11: beyond it no answer is wrong but by a lapse."""
+"""Tolerance (dB) within which two levels count as equal: covers rounding errors."""
+LARGEST_T = (3.2, 25.0, 6.7)
+"""t of each family at which 1 - F is 1e-11 to 2e-11. For a larger t, wrong answers occur practically by lapses only."""
 
 
 class PackedRule(NamedTuple):
-    """A `StaircaseRule` as numbers."""
+    """A `StaircaseRule` as numbers for compiled code; levels in dB re 1 N."""
 
     start_db: float
     cap_db: float
@@ -30,19 +32,22 @@ class PackedRule(NamedTuple):
     up_after_wrong: int
     down_after_right: int
     steps_db: FloatArray
-    """(reversals + 2,): size of the step by how many reversals count towards the schedule."""
+    """Step size (dB) by the number of reversals that count towards the schedule; as long as the schedule's phases have
+    reversals, plus 3."""
     step_change: int
-    """How many reversals are taken off the count that includes the one being made: 0 or 1; 2 = those before it."""
+    """Which reversals count towards the schedule at a reversal. 0: all, including the present one. 1: all but one. 2:
+    the earlier ones only."""
     reversals: int
     averaged: int
-    initial: bool
+    has_initial_phase: bool
     trial_limit: int
     rove_db: float = 0.0
-    """Range from which the amplitude of each trial is drawn evenly, with the level of the staircase in its middle."""
+    """Width (dB) of the range from which the level of each trial is drawn uniformly; its centre is the staircase's
+    level."""
 
 
-def pack(rule: StaircaseRule, rove_db: float = 0.0) -> PackedRule:
-    """The numbers of a staircase rule for the compiled kernel, with levels in dB re 1 N."""
+def pack_rule(rule: StaircaseRule, rove_db: float = 0.0) -> PackedRule:
+    """Convert a staircase rule for the compiled kernel, with levels in dB re 1 N."""
     sizes = [phase.step_db for phase in rule.steps for _ in range(phase.reversals)]
     change = {StepChange.AT_REVERSAL: 0, StepChange.AT_NEXT_REVERSAL: 1, StepChange.AFTER_REVERSAL: 2}
     return PackedRule(
@@ -61,9 +66,11 @@ def pack(rule: StaircaseRule, rove_db: float = 0.0) -> PackedRule:
     )
 
 
-AS_COMMANDED = np.empty((0, 4))
+EMPTY_TABLE = np.empty((0, 4))
+"""Table of felt stimuli of an ideal device: the felt level is the commanded level."""
 NO_DIRECTION_DB = -400.0
-"""Felt of a motion that is a circle."""
+"""Change of the equivalent level (dB) for a motion with no preferred direction, off-axis at least as large as
+on-axis."""
 
 
 class Participant(NamedTuple):
@@ -72,153 +79,170 @@ class Participant(NamedTuple):
     t0: float
     """`AT_THRESHOLD` of the family."""
     pace_per_db: float
+    """Slope: change of t per dB."""
     threshold_db: float
+    """True threshold, dB re 1 N."""
     lapse: float
+    """Lapse rate: probability of a wrong answer at the highest levels."""
     criterion: float
+    """Response criterion, in units of d'."""
     family: int
+    """Number of the family of curves, see `compute_evidence`."""
     criterion_per_trial: float = 0.0
+    """Drift of the criterion per trial, in units of d'."""
     trials_before: int = 0
-    """Trials of the session before this run, from which a drifting criterion continues."""
+    """Number of trials of the session before this run; the drift of the criterion continues from it."""
     unsure: float = 0.0
-    """Asks for the same trial again where the average of all presentations lies within this many standard errors of the
-    criterion."""
+    """The participant asks for the same trial again while the mean evidence of its presentations lies within this many
+    standard errors of the criterion."""
     repeats: int = 0
-    """Most repeats in this run."""
-    felt_1: FloatArray = AS_COMMANDED
-    """(n, 4): what is felt of direction 1, a `felt_delivery.Table` whose harmonics are weighted by how they mask."""
-    felt_2: FloatArray = AS_COMMANDED
+    """Largest number of repeats in this run."""
+    felt_1: FloatArray = EMPTY_TABLE
+    """(n, 4): delivered stimulus by commanded level in direction 1: a `felt_delivery.Table` whose harmonics are
+    multiplied by their masking weight."""
+    felt_2: FloatArray = EMPTY_TABLE
+    """The same in direction 2."""
     adaptation_db: float = 0.0
-    """Rise of the threshold in a long run."""
+    """Asymptotic rise of the threshold by adaptation within a run (dB)."""
     adaptation_trials: float = 1.0
+    """Exponential time constant of that rise (trials)."""
 
 
 class Track(NamedTuple):
-    """Arrays that a run fills in."""
+    """Trials and reversals of a run: arrays that the run fills in."""
 
     level_db: FloatArray
-    """(MOST_TRIALS,), as the next two: levels as played."""
+    """(MOST_TRIALS,): levels played (dB re 1 N)."""
     side: FloatArray
+    """(MOST_TRIALS,): 1 for direction 1, -1 for direction 2."""
     right: FloatArray
+    """(MOST_TRIALS,): 1 for a correct answer, else 0."""
     reversal_db: FloatArray
-    """(reversals,): levels of the staircase; not filled by Psi."""
+    """(reversals,): levels of the staircase at its reversals (dB re 1 N); not filled by Psi."""
 
 
 @njit(cache=True)
-def evidence(t: float, family: int) -> float:
-    """q(t) with Phi(q) = 1/2 + F(t)/2. family: 0 Weibull, 1 logistic, 2 Gauss."""
-    t = min(t, SUREST[family])
+def compute_evidence(t: float, family: int) -> float:
+    """Evidence q(t) in units of d', with Phi(q) = 1/2 + F(t)/2. family: 0 Weibull, 1 logistic, 2 Gauss."""
+    t = min(t, LARGEST_T[family])
     if family == 0:
-        rest = math.exp(-math.exp(t))
+        survival = math.exp(-math.exp(t))
     elif family == 1:
-        rest = 1.0 / (1.0 + math.exp(t))
+        survival = 1.0 / (1.0 + math.exp(t))
     else:
-        rest = 0.5 * math.erfc(t / math.sqrt(2.0))
-    tail = 0.5 * rest
-    # Abramowitz and Stegun 26.2.23, then three steps of Newton's method on the tail: right to the last digits.
-    r = math.sqrt(-2.0 * math.log(tail))
+        survival = 0.5 * math.erfc(t / math.sqrt(2.0))
+    upper_tail = 0.5 * survival
+    # Abramowitz and Stegun 26.2.23, then three steps of Newton's method on the tail, to machine precision.
+    r = math.sqrt(-2.0 * math.log(upper_tail))
     q = r - (2.515517 + r * (0.802853 + r * 0.010328)) / (1.0 + r * (1.432788 + r * (0.189269 + r * 0.001308)))
     for _ in range(3):
-        excess = 0.5 * math.erfc(q / math.sqrt(2.0)) - tail
+        excess = 0.5 * math.erfc(q / math.sqrt(2.0)) - upper_tail
         q += excess * math.sqrt(2.0 * math.pi) * math.exp(q * q / 2.0)
     return q
 
 
 @njit(cache=True)
-def felt_db(person: Participant, level_db: float, first: bool, trial: int) -> float:
-    """The commanded level (dB) that is felt as much without a flaw and before any adaptation. trial: of the run."""
-    table = person.felt_1 if first else person.felt_2
-    felt = level_db
+def compute_equivalent_level_db(person: Participant, level_db: float, is_direction_1: bool, trial: int) -> float:
+    """Level (dB) that on an ideal device, without adaptation, would be felt like this level on the given device. trial:
+    index of the trial in the run."""
+    table = person.felt_1 if is_direction_1 else person.felt_2
+    equivalent_db = level_db
     if len(table) > 0:
-        place = min(max(int(np.searchsorted(table[:, 0], level_db)), 1), len(table) - 1)
-        low, high = table[max(place - 1, 0)], table[place]
+        row = min(max(int(np.searchsorted(table[:, 0], level_db)), 1), len(table) - 1)
+        low, high = table[max(row - 1, 0)], table[row]
         share = (level_db - low[0]) / (high[0] - low[0]) if high[0] > low[0] else 0.0
         share = min(max(share, 0.0), 1.0)
-        along, across, harmonics = low[1:] + share * (high[1:] - low[1:])
-        directed = along**2 - across**2
-        felt += 10.0 * math.log10(directed) if directed > 0.0 else NO_DIRECTION_DB
-        felt -= 10.0 * math.log10(1.0 + harmonics**2 * 10.0 ** ((level_db - person.threshold_db) / 10.0))
+        on_axis, off_axis, harmonics = low[1:] + share * (high[1:] - low[1:])
+        directed_square = on_axis**2 - off_axis**2
+        equivalent_db += 10.0 * math.log10(directed_square) if directed_square > 0.0 else NO_DIRECTION_DB
+        equivalent_db -= 10.0 * math.log10(1.0 + harmonics**2 * 10.0 ** ((level_db - person.threshold_db) / 10.0))
     if person.adaptation_db > 0.0:
-        felt += person.adaptation_db * math.expm1(-trial / person.adaptation_trials)
-    return felt
+        equivalent_db += person.adaptation_db * math.expm1(-trial / person.adaptation_trials)
+    return equivalent_db
 
 
-MOST_LOOKS = 5
-"""At one trial, as `study.participants.unsure`."""
+MOST_PRESENTATIONS = 5
+"""Largest number of presentations of a trial, as in `study.participants.unsure_repeater`."""
 
 
 @njit(cache=True)
-def look_again(middle: float, lapse: float, unsure: float, left: int) -> tuple[bool, int]:
-    """Whether the answer is right, and how many repeats are left. middle: mean of the evidence for what was shown."""
+def answer_with_repeats(mean_evidence: float, lapse: float, unsure: float, repeats_left: int) -> tuple[bool, int]:
+    """Simulate an answer with repeats. Returns whether it is right, and the number of repeats left. mean_evidence: mean
+    of the evidence for the direction shown, in units of d'."""
     if np.random.random() < 2.0 * lapse:
-        return np.random.random() < 0.5, left
-    looks, total = 1, middle + np.random.normal()
-    while abs(total) < unsure * math.sqrt(looks) and left > 0 and looks < MOST_LOOKS:
-        looks, total, left = looks + 1, total + middle + np.random.normal(), left - 1
-    return total > 0.0, left
+        return np.random.random() < 0.5, repeats_left
+    presentations, total = 1, mean_evidence + np.random.normal()
+    while abs(total) < unsure * math.sqrt(presentations) and repeats_left > 0 and presentations < MOST_PRESENTATIONS:
+        presentations, total, repeats_left = (
+            presentations + 1,
+            total + mean_evidence + np.random.normal(),
+            repeats_left - 1,
+        )
+    return total > 0.0, repeats_left
 
 
-class RunFound(NamedTuple):
+class SimulatedRun(NamedTuple):
     """Result of a simulated run."""
 
     trials: int
     reversals: int
     mean_db: float = math.nan
-    """Mean of the threshold's posterior (dB re 1 N), for a run by Psi only, as the next."""
+    """Posterior mean of the threshold (dB re 1 N); NaN unless Psi chooses the levels, as for the next."""
     above_cap: float = math.nan
     """Probability that the threshold lies above the cap."""
 
 
 @njit(cache=True)
-def give_answer(person: Participant, level_db: float, trial: int, left: int) -> tuple[float, bool, int]:
+def give_answer(person: Participant, level_db: float, trial: int, repeats_left: int) -> tuple[float, bool, int]:
     """Simulate the answer at a trial. Returns the direction shown (1 or -1), whether the answer is right, and the
     number of repeats that are left."""
-    s = 1.0 if np.random.random() < 0.5 else -1.0
-    felt = felt_db(person, level_db, s > 0.0, trial)
-    a = evidence(person.t0 + person.pace_per_db * (felt - person.threshold_db), person.family) - s * (
-        person.criterion + person.criterion_per_trial * (person.trials_before + trial)
-    )
+    side = 1.0 if np.random.random() < 0.5 else -1.0
+    equivalent_db = compute_equivalent_level_db(person, level_db, side > 0.0, trial)
+    mean_evidence = compute_evidence(
+        person.t0 + person.pace_per_db * (equivalent_db - person.threshold_db), person.family
+    ) - side * (person.criterion + person.criterion_per_trial * (person.trials_before + trial))
     if person.unsure > 0.0:
-        answer, left = look_again(a, person.lapse, person.unsure, left)
-        return s, answer, left
-    p = person.lapse + (1.0 - 2.0 * person.lapse) * 0.5 * math.erfc(-a / math.sqrt(2.0))
-    return s, np.random.random() < p, left
+        is_correct, repeats_left = answer_with_repeats(mean_evidence, person.lapse, person.unsure, repeats_left)
+        return side, is_correct, repeats_left
+    correct_probability = person.lapse + (1.0 - 2.0 * person.lapse) * 0.5 * math.erfc(-mean_evidence / math.sqrt(2.0))
+    return side, np.random.random() < correct_probability, repeats_left
 
 
 @njit(cache=True)
-def play_around(level_db: float, rove_db: float) -> float:
-    """The level that is played (dB), drawn around that of the staircase where the protocol roves."""
+def rove_level(level_db: float, rove_db: float) -> float:
+    """Draw the level that is played (dB) around the staircase's level; unchanged where rove_db is 0."""
     return level_db + rove_db * (np.random.random() - 0.5) if rove_db > 0.0 else level_db
 
 
 @njit(cache=True)
-def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> RunFound:
-    """Plays until the run ends, and fills the track."""
+def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> SimulatedRun:
+    """Simulate trials until the run ends, and fill the track."""
     np.random.seed(seed)
     level, heading, right_in_row, wrong_in_row, trials, reversals = rule.start_db, 0, 0, 0, 0, 0
-    left = person.repeats
-    limit = min(rule.trial_limit, MOST_TRIALS) if rule.trial_limit > 0 else MOST_TRIALS
-    while reversals < rule.reversals and trials < limit:
-        played = play_around(level, rule.rove_db)
-        s, answer, left = give_answer(person, played, trials, left)
-        track.level_db[trials], track.side[trials], track.right[trials] = played, s, answer
+    repeats_left = person.repeats
+    trial_limit = min(rule.trial_limit, MOST_TRIALS) if rule.trial_limit > 0 else MOST_TRIALS
+    while reversals < rule.reversals and trials < trial_limit:
+        played_db = rove_level(level, rule.rove_db)
+        side, is_correct, repeats_left = give_answer(person, played_db, trials, repeats_left)
+        track.level_db[trials], track.side[trials], track.right[trials] = played_db, side, is_correct
         trials += 1
-        right_in_row, wrong_in_row = (right_in_row + 1, 0) if answer else (0, wrong_in_row + 1)
-        early = rule.initial and reversals == 0
-        if wrong_in_row >= (1 if early else rule.up_after_wrong):
-            turn = 1
-        elif right_in_row >= (1 if early else rule.down_after_right):
-            turn = -1
+        right_in_row, wrong_in_row = (right_in_row + 1, 0) if is_correct else (0, wrong_in_row + 1)
+        in_initial_phase = rule.has_initial_phase and reversals == 0
+        if wrong_in_row >= (1 if in_initial_phase else rule.up_after_wrong):
+            direction = 1
+        elif right_in_row >= (1 if in_initial_phase else rule.down_after_right):
+            direction = -1
         else:
             continue
         right_in_row = wrong_in_row = 0
-        if turn == 1 and level >= rule.cap_db - SAME_DB:
+        if direction == 1 and level >= rule.cap_db - SAME_DB:
             continue
-        turned = heading != 0 and turn != heading
-        counted = reversals if rule.step_change == 2 else reversals + int(turned) - rule.step_change
-        size = rule.steps_db[max(0, counted)]
-        if turned:
+        is_reversal = heading != 0 and direction != heading
+        reversal_count = reversals if rule.step_change == 2 else reversals + int(is_reversal) - rule.step_change
+        step_db = rule.steps_db[max(0, reversal_count)]
+        if is_reversal:
             track.reversal_db[reversals] = level
             reversals += 1
-        heading = turn
-        level = min(level + turn * size, rule.cap_db)
-    return RunFound(trials, reversals, math.nan, math.nan)
+        heading = direction
+        level = min(level + direction * step_db, rule.cap_db)
+    return SimulatedRun(trials, reversals, math.nan, math.nan)

@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from equalizer.effects.effect import AxisForce, JointForce, PlacedEffect, Structure
 from equalizer.effects.simulation.command_path import ActuatorForce
-from equalizer.effects.simulation.mechanism_kernel import LAWS, law_address, no_force
+from equalizer.effects.simulation.mechanism_kernel import MAX_LAWS, law_address, no_force
 from equalizer.effects.simulation.stepping import Forces, Stepping, step_with_forces, step_without_forces
-from equalizer.plant.linear_simulation import LinearSteps, driven_axes, linear_steps
+from equalizer.plant.linear_simulation import LinearSteps, discretise_model, driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
@@ -29,7 +29,7 @@ class Bodies:
     """Number of driven axes."""
     ports: FloatArray
     """(n, r): the directions along which forces act; the driven axes first, then joints."""
-    acts: tuple[AxisForce | JointForce, ...]
+    actions: tuple[AxisForce | JointForce, ...]
     """Action (law and its settings) of each force."""
     port: tuple[int, ...]
     """Index of the port at which each force acts."""
@@ -37,42 +37,42 @@ class Bodies:
     """Parameters of each force's law."""
 
     @property
-    def sees(self) -> bool:
+    def reads_all_axes(self) -> bool:
         """Whether any law reads the motion of all axes and the commands."""
-        return any(isinstance(act, AxisForce) and act.sees for act in self.acts)
+        return any(isinstance(act, AxisForce) and act.reads_all_axes for act in self.actions)
 
 
-def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies:
+def build_bodies(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies:
     """Bodies of a model with those of the effects that change the structure or add a motion-dependent force. Raises
     ValueError for an axis that is not there."""
     structure = model
     for placed in effects:
-        for site in placed.sites if isinstance(placed.effect.acts, (Structure, AxisForce, JointForce)) else ():
+        for site in placed.sites if isinstance(placed.effect.action, (Structure, AxisForce, JointForce)) else ():
             if not 0 <= site < model.inputs:
                 raise ValueError(f"{placed.effect.name} is placed at axis {site + 1}; the model has {model.inputs}")
-        if isinstance(placed.effect.acts, Structure):
+        if isinstance(placed.effect.action, Structure):
             for site in placed.sites:
-                structure = placed.effect.acts.change(structure, site, placed.values)
+                structure = placed.effect.action.change(structure, site, placed.values)
     ports = list(driven_axes(structure).T)
-    acts: list[AxisForce | JointForce] = []
-    where: list[int] = []
+    actions: list[AxisForce | JointForce] = []
+    port_indices: list[int] = []
     parameters: list[FloatArray] = []
     # Joints first: the parameters of forces at an axis are then packed for the structure with joints.
-    for placed in sorted(effects, key=lambda effect: isinstance(effect.effect.acts, AxisForce)):
-        act = placed.effect.acts
-        for site in placed.sites if isinstance(act, (AxisForce, JointForce)) else ():
-            assert isinstance(act, (AxisForce, JointForce))
-            parameters.append(np.asarray(act.pack(structure, site, placed.values), dtype=np.float64))
-            acts.append(act)
-            if isinstance(act, JointForce):
-                structure, along = act.change(structure, site, placed.values)
-                ports.append(along)
-            where.append(len(ports) - 1 if isinstance(act, JointForce) else site)
+    for placed in sorted(effects, key=lambda effect: isinstance(effect.effect.action, AxisForce)):
+        action = placed.effect.action
+        for site in placed.sites if isinstance(action, (AxisForce, JointForce)) else ():
+            assert isinstance(action, (AxisForce, JointForce))
+            parameters.append(np.asarray(action.pack(structure, site, placed.values), dtype=np.float64))
+            actions.append(action)
+            if isinstance(action, JointForce):
+                structure, direction = action.change(structure, site, placed.values)
+                ports.append(direction)
+            port_indices.append(len(ports) - 1 if isinstance(action, JointForce) else site)
     # Ports that were found before a joint added coordinates are padded with zeros.
-    aligned = np.zeros((structure.coordinates, len(ports)))
-    for number, port in enumerate(ports):
-        aligned[: len(port), number] = port
-    return Bodies(structure, model.inputs, aligned, tuple(acts), tuple(where), tuple(parameters))
+    padded_ports = np.zeros((structure.coordinates, len(ports)))
+    for index, port in enumerate(ports):
+        padded_ports[: len(port), index] = port
+    return Bodies(structure, model.inputs, padded_ports, tuple(actions), tuple(port_indices), tuple(parameters))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,41 +102,46 @@ def simulate_bodies(
         np.empty((size[0], output.shape[1])),
         np.zeros((size[0], bodies.ports.shape[1] if motion else 0)),
     )
-    inner, rows = len(output) - driven.end.shape[1], stepping.rows
-    drive, last = driven.mean.reshape(size[0] * rows, -1), driven.end[stride - 1 :: stride]
-    spare = np.zeros((min(stepping.block, size[0]) * rows, len(output)))
+    force_columns, rows = len(output) - driven.end.shape[1], stepping.rows
+    drive, end_force = driven.mean.reshape(size[0] * rows, -1), driven.end[stride - 1 :: stride]
+    buffer = np.zeros((min(stepping.block, size[0]) * rows, len(output)))
     # Overflow is no error: a fit may try an unstable model.
     with np.errstate(over="ignore", invalid="ignore"):
         for first, end in _blocks(size[0], stepping.block, restarts):
             if restarts is not None and first in restarts.at:
                 state = restarts.states[np.searchsorted(restarts.at, first)]
-                stepping.begin(extend_state(bodies.structure, state, bodies.ports[:, bodies.axes :]))
-            rows_of_block = spare[: (end - first) * rows]
-            np.matmul(drive[first * rows : end * rows], stepping.into, out=rows_of_block[:, :inner])
+                stepping.set_state(extend_state(bodies.structure, state, bodies.ports[:, bodies.axes :]))
+            rows_of_block = buffer[: (end - first) * rows]
+            np.matmul(drive[first * rows : end * rows], stepping.input_matrix, out=rows_of_block[:, :force_columns])
             stepping.run(rows_of_block, first)
             inputs = rows_of_block[::rows]
             # An acceleration depends on the actuator force at the instant itself, not on the mean over the last step.
-            inputs[0, inner:], inputs[1:, inner:] = last[first - 1] if first else 0.0, last[first : end - 1]
+            inputs[0, force_columns:], inputs[1:, force_columns:] = (
+                end_force[first - 1] if first else 0.0,
+                end_force[first : end - 1],
+            )
             np.matmul(inputs, output, out=motion_rows[first:end])
             if motion:
-                added[first:end, list(ports)] = inputs[:, len(stepping.outward) : inner]
+                added[first:end, list(ports)] = inputs[:, len(stepping.outward) : force_columns]
     return motion_rows, added
 
 
 def simulate_states(
-    bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float, at: npt.NDArray[np.int64]
+    bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float, sample_indices: npt.NDArray[np.int64]
 ) -> FloatArray:
-    """(k, 2n): positions and velocities of the structure's coordinates just before the samples `at` (k,), simulated
-    from rest. Other arguments as for `simulate_bodies`."""
+    """(k, 2n): positions and velocities of the structure's coordinates just before the samples `sample_indices` (k,),
+    simulated from rest. Other arguments as for `simulate_bodies`."""
     _, stepping, _ = _prepare_steps(bodies, driven, size, step_s)
-    states, rows = np.zeros((len(at), len(stepping.outward))), stepping.rows
+    states, rows = np.zeros((len(sample_indices), len(stepping.outward))), stepping.rows
     drive = driven.mean.reshape(size[0] * rows, -1)
     with np.errstate(over="ignore", invalid="ignore"):
         for first, end in _blocks(size[0], stepping.block, None):
-            rows_of_block = np.ascontiguousarray(drive[first * rows : end * rows] @ stepping.into)
+            rows_of_block = np.ascontiguousarray(drive[first * rows : end * rows] @ stepping.input_matrix)
             stepping.run(rows_of_block, first)
-            here = (at >= first) & (at < end)
-            states[here] = rows_of_block[(at[here] - first) * rows, : len(stepping.outward)] @ stepping.outward.T
+            in_block = (sample_indices >= first) & (sample_indices < end)
+            states[in_block] = (
+                rows_of_block[(sample_indices[in_block] - first) * rows, : len(stepping.outward)] @ stepping.outward.T
+            )
     return states
 
 
@@ -144,20 +149,20 @@ def _prepare_steps(
     bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float
 ) -> tuple[LinearSteps, Stepping, tuple[int, ...]]:
     """Matrices of a linear step, the stepping function, and the ports at which forces act or are read."""
-    linear = linear_steps(bodies.structure, step_s, bodies.ports)
-    ports = tuple(sorted({*bodies.port, *range(bodies.axes if bodies.sees else 0)}))
+    linear = discretise_model(bodies.structure, step_s, bodies.ports)
+    ports = tuple(sorted({*bodies.port, *range(bodies.axes if bodies.reads_all_axes else 0)}))
     steps, stride = size[1], len(driven.mean) // size[0]
     if not ports:
         return linear, step_without_forces(linear, steps, stride), ports
-    commanded = driven.mean if driven.commanded is None else driven.commanded
-    return linear, step_with_forces(linear, kernel_forces(bodies, ports), steps, stride, commanded), ports
+    commands = driven.mean if driven.commanded is None else driven.commanded
+    return linear, step_with_forces(linear, kernel_forces(bodies, ports), steps, stride, commands), ports
 
 
 def _blocks(n: int, longest: int, restarts: Restarts | None) -> Iterator[tuple[int, int]]:
     """Ranges (first, end) of samples of at most `longest`, in order; a block begins at each restart."""
     edges = sorted({0, *restarts.at[restarts.at < n].tolist()}) if restarts is not None else [0]
-    for begin, stop in zip(edges, (*edges[1:], n), strict=True):
-        for first in range(begin, stop, longest):
+    for start, stop in zip(edges, (*edges[1:], n), strict=True):
+        for first in range(start, stop, longest):
             yield first, min(first + longest, stop)
 
 
@@ -168,46 +173,55 @@ def extend_state(structure: MechanicalModel, state: FloatArray, joints: FloatArr
     The added coordinates take the static equilibrium with zero travel of the joints, in the sense of least squares
     (minimum norm where it is not unique), and move with it.
     """
-    known, n = len(state) // 2, structure.coordinates
-    if n == known:
+    model_coordinates, n = len(state) // 2, structure.coordinates
+    if n == model_coordinates:
         return state
-    rows = np.vstack([structure.stiffness[known:], joints.T])
-    held, tied = rows[:, known:], rows[:, :known]
-    follows = -np.linalg.lstsq(held, tied, rcond=None)[0]
-    positions, velocities = state[:known], state[known:]
-    return np.concatenate([positions, follows @ positions, velocities, follows @ velocities])
+    rows = np.vstack([structure.stiffness[model_coordinates:], joints.T])
+    added_stiffness, coupling = rows[:, model_coordinates:], rows[:, :model_coordinates]
+    added_per_model = -np.linalg.lstsq(added_stiffness, coupling, rcond=None)[0]
+    positions, velocities = state[:model_coordinates], state[model_coordinates:]
+    return np.concatenate([positions, added_per_model @ positions, velocities, added_per_model @ velocities])
 
 
 def _output_matrix(linear: LinearSteps, outward: FloatArray, ports: tuple[int, ...], motion: bool) -> FloatArray:
     """(s + f + m, rows): from state, forces at the f ports and commands at an instant to the rows that
     `simulate_bodies` returns."""
     p, (m, r) = len(linear.position), (linear.by_command.shape[1], linear.by_axis_force.shape[1])
-    first = 0 if motion else 3 * r
-    of_state = np.vstack((linear.motion, linear.response, linear.position))[first:]
-    of_force = np.vstack((linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((p, r))))[first:]
-    of_command = np.vstack((linear.motion_by_command, linear.response_by_command, np.zeros((p, m))))[first:]
+    first_row = 0 if motion else 3 * r
+    of_state = np.vstack((linear.motion, linear.response, linear.position))[first_row:]
+    of_force = np.vstack((linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((p, r))))[first_row:]
+    of_command = np.vstack((linear.motion_by_command, linear.response_by_command, np.zeros((p, m))))[first_row:]
     return np.vstack([(of_state @ outward).T, of_force.T[list(ports)], of_command.T])
 
 
 def kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
     """The forces in the form of the compiled kernel: each distinct law once, and for every force the indices of its law
-    and port and the ranges of its parameters and memory. Raises ValueError for more than `LAWS` distinct laws."""
+    and port and the ranges of its parameters and memory. Raises ValueError for more than `MAX_LAWS` distinct laws."""
     laws: list[object] = []
-    places: list[tuple[int, ...]] = []
-    used = kept = 0
-    for act, port, parameters in zip(bodies.acts, bodies.port, bodies.parameters, strict=True):
-        if act.law not in laws:
-            laws.append(act.law)
-        places.append((laws.index(act.law), ports.index(port), used, used + len(parameters), kept, kept + act.memory))
-        used, kept = used + len(parameters), kept + act.memory
-    if len(laws) > LAWS:
-        raise ValueError(f"{len(laws)} different force laws act at once; simulate at most {LAWS}")
+    force_rows: list[tuple[int, ...]] = []
+    parameter_count = memory_count = 0
+    for action, port, parameters in zip(bodies.actions, bodies.port, bodies.parameters, strict=True):
+        if action.law not in laws:
+            laws.append(action.law)
+        force_rows.append(
+            (
+                laws.index(action.law),
+                ports.index(port),
+                parameter_count,
+                parameter_count + len(parameters),
+                memory_count,
+                memory_count + action.memory,
+            )
+        )
+        parameter_count, memory_count = parameter_count + len(parameters), memory_count + action.memory
+    if len(laws) > MAX_LAWS:
+        raise ValueError(f"{len(laws)} different force laws act at once; simulate at most {MAX_LAWS}")
     return Forces(
         ports,
-        tuple(law_address(law) for law in (*laws, *(no_force,) * (LAWS - len(laws)))),
-        np.array(places, dtype=np.int64).reshape(-1, 6),
+        tuple(law_address(law) for law in (*laws, *(no_force,) * (MAX_LAWS - len(laws)))),
+        np.array(force_rows, dtype=np.int64).reshape(-1, 6),
         np.concatenate([*bodies.parameters, [0.0]]),
-        np.zeros(kept + 1),
-        any(act.acceleration for act in bodies.acts),
-        bodies.sees,
+        np.zeros(memory_count + 1),
+        any(action.acceleration for action in bodies.actions),
+        bodies.reads_all_axes,
     )

@@ -31,7 +31,7 @@ class ActuatorForce:
 
 def moves_between_samples(model: MechanicalModel, effects: Sequence[PlacedEffect], hold: Hold) -> bool:
     """Whether the actuator force changes between two samples, so that several steps per sample are needed."""
-    fine = any(isinstance(placed.effect.acts, OnCommand) and placed.effect.acts.fine for placed in effects)
+    fine = any(isinstance(placed.effect.action, OnCommand) and placed.effect.action.fine for placed in effects)
     return fine or hold is not Hold.ZERO_ORDER or model.actuator.delay_s > 0 or model.actuator.bandwidth_hz > 0
 
 
@@ -44,31 +44,31 @@ def drive_actuators(
     Raises ValueError where an effect acts on a channel that is not there.
     """
     mean, end = commands.mean, commands.end
-    if any(isinstance(placed.effect.acts, OnCommand) for placed in effects):
+    if any(isinstance(placed.effect.action, OnCommand) for placed in effects):
         mean, end = mean.copy(), end.copy()
     for placed in effects:
-        acts, values = placed.effect.acts, placed.values
-        before = mean.copy() if isinstance(acts, OnCommand) and acts.of_all is not None else mean
-        for site in placed.sites if isinstance(acts, OnCommand) else ():
-            assert isinstance(acts, OnCommand)
+        action, values = placed.effect.action, placed.values
+        unchanged = mean.copy() if isinstance(action, OnCommand) and action.of_all is not None else mean
+        for site in placed.sites if isinstance(action, OnCommand) else ():
+            assert isinstance(action, OnCommand)
             if not 0 <= site < mean.shape[1]:
                 raise ValueError(f"{placed.effect.name} is placed at axis {site + 1}; there are {mean.shape[1]}")
-            if acts.of_all is not None:
-                mean[:, site], end[:, site] = acts.of_all(before, site, step_s, values)
+            if action.of_all is not None:
+                mean[:, site], end[:, site] = action.of_all(unchanged, site, step_s, values)
                 continue
-            at_end = acts.change if acts.at_end is None else acts.at_end
-            last = at_end(end[:, site] if acts.at_end is None else mean[:, site], step_s, values)
-            mean[:, site], end[:, site] = acts.change(mean[:, site], step_s, values), last
-    known = model.actuator
-    if known.bandwidth_hz > 0:
-        time_constant_s = 1 / (2 * np.pi * known.bandwidth_hz)
+            at_end = action.change if action.at_end is None else action.at_end
+            end_force = at_end(end[:, site] if action.at_end is None else mean[:, site], step_s, values)
+            mean[:, site], end[:, site] = action.change(mean[:, site], step_s, values), end_force
+    actuator = model.actuator
+    if actuator.bandwidth_hz > 0:
+        time_constant_s = 1 / (2 * np.pi * actuator.bandwidth_hz)
         mean, end = lag_mean(mean, step_s, time_constant_s), lag_at_end(mean, step_s, time_constant_s)
-    if known.delay_s > 0:
+    if actuator.delay_s > 0:
         # After a lag, the force is not held over a step: within one, it is interpolated between the ends.
-        delay_end = delay_mean if known.bandwidth_hz > 0 else delay_at_end
-        mean, end = delay_mean(mean, step_s, known.delay_s), delay_end(end, step_s, known.delay_s)
-    if known.limit > 0:
-        mean, end = np.clip(mean, -known.limit, known.limit), np.clip(end, -known.limit, known.limit)
+        delay_end = delay_mean if actuator.bandwidth_hz > 0 else delay_at_end
+        mean, end = delay_mean(mean, step_s, actuator.delay_s), delay_end(end, step_s, actuator.delay_s)
+    if actuator.limit > 0:
+        mean, end = np.clip(mean, -actuator.limit, actuator.limit), np.clip(end, -actuator.limit, actuator.limit)
     return ActuatorForce(mean, end, commands.mean)
 
 
@@ -76,13 +76,14 @@ def subdivide_commands(commands: FloatArray, steps: int, hold: Hold) -> Actuator
     """Commands (n, m) divided into `steps` per sample, with the course between samples that `hold` states."""
     if steps == 1 or hold is Hold.ZERO_ORDER:
         commands = np.asarray(commands, dtype=np.float64)
-        held = np.repeat(commands, steps, axis=0) if steps > 1 else commands
-        return ActuatorForce(held, held)
+        held_commands = np.repeat(commands, steps, axis=0) if steps > 1 else commands
+        return ActuatorForce(held_commands, held_commands)
     if hold is Hold.LINEAR:
         change = np.diff(commands, axis=0, append=commands[-1:])
-        places = (np.arange(steps) + 0.5) / steps, (np.arange(steps) + 1.0) / steps
+        step_positions = (np.arange(steps) + 0.5) / steps, (np.arange(steps) + 1.0) / steps
         mean, end = (
-            (commands[:, None] + share[:, None] * change[:, None]).reshape(-1, commands.shape[1]) for share in places
+            (commands[:, None] + step_position[:, None] * change[:, None]).reshape(-1, commands.shape[1])
+            for step_position in step_positions
         )
         return ActuatorForce(mean, end)
     # Imported here: SciPy takes longer to import than a diagnosis that does not need it.
@@ -99,9 +100,9 @@ def lag_mean(commands: FloatArray, step_s: float, time_constant_s: float) -> Flo
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
     at_end = _filter_one_pole(commands, decay)
-    before = np.concatenate([np.zeros_like(at_end[:1]), at_end[:-1]])
-    left = (1 - decay) * time_constant_s / step_s
-    return np.asarray(commands + (before - commands) * left)
+    start_force = np.concatenate([np.zeros_like(at_end[:1]), at_end[:-1]])
+    transient_share = (1 - decay) * time_constant_s / step_s
+    return np.asarray(commands + (start_force - commands) * transient_share)
 
 
 def lag_at_end(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
@@ -114,18 +115,20 @@ def lag_at_end(commands: FloatArray, step_s: float, time_constant_s: float) -> F
 
 def _filter_one_pole(commands: FloatArray, decay: float) -> FloatArray:
     """Commands (n, …) through a first-order low pass with the pole `decay`."""
-    out = np.empty(commands.shape)
-    filter_one_pole(np.asarray(commands, dtype=np.float64).reshape(len(commands), -1), decay, out.reshape(len(out), -1))
-    return out
+    filtered = np.empty(commands.shape)
+    filter_one_pole(
+        np.asarray(commands, dtype=np.float64).reshape(len(commands), -1), decay, filtered.reshape(len(filtered), -1)
+    )
+    return filtered
 
 
 def delay_mean(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
     """Held commands (n, …) delayed by delay_s, mean over each step; zero before the first."""
-    whole, part = divmod(max(delay_s, 0.0) / step_s, 1.0)
-    late = np.zeros((len(commands) + 1, *commands.shape[1:]))
-    shift = min(int(whole) + 1, len(late))
-    late[shift:] = commands[: len(late) - shift]
-    return np.asarray((1 - part) * late[1:] + part * late[:-1])
+    whole_steps, step_fraction = divmod(max(delay_s, 0.0) / step_s, 1.0)
+    delayed = np.zeros((len(commands) + 1, *commands.shape[1:]))
+    shift = min(int(whole_steps) + 1, len(delayed))
+    delayed[shift:] = commands[: len(delayed) - shift]
+    return np.asarray((1 - step_fraction) * delayed[1:] + step_fraction * delayed[:-1])
 
 
 def delay_at_end(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:

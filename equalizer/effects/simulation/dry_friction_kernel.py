@@ -15,22 +15,22 @@ import numpy as np
 from numba import njit, types
 
 from equalizer.effects.simulation.instant import F_END, STEP_S, V_FREE, V_PER_N, V
-from equalizer.laws.kernel import UNCOUNTED
+from equalizer.laws.kernel import NO_REFERENCE_COUNTS
 from equalizer.signals.signal import FloatArray
 
 LONGEST_M = 50e-9
 """z_max (m): deflection at which the bristle slips."""
-DAMPED = 0.5
+BRISTLE_DAMPING = 0.5
 """Damping of the bristle over sqrt(stiffness * mass), with the mass that it holds: twice the damping ratio."""
 PARTS = 12
 """Maximum number of parts into which a step is divided while the bristle is deflected."""
-STUCK = 0.3
+TRAVEL_PER_PART = 0.3
 """Intended travel per part, in units of z_max: sets the number of parts."""
-BENT = 1 - 1e-6
+SLIDING_SHARE = 1 - 1e-6
 """Share of the full deflection above which the bristle counts as sliding."""
 ITERATIONS = 12
 """Maximum number of Newton iterations for the travel of one part."""
-NEAR = 3e-3
+TRAVEL_TOLERANCE = 3e-3
 """Residual of the travel equation, in units of z_max, at which the iteration ends: the last linear correction reduces
 it to about its square."""
 _VECTOR = types.float64[::1]
@@ -48,29 +48,29 @@ def _deflect(
     """
     # Newton's method for off(travel) = travel - free + compliance * mean force = 0; rate: d ahead / d travel.
     travel = free / (1.0 + compliance * (1.0 + damping))
-    ahead, rate, off = bend, 0.0, 0.0
+    end_deflection, rate, residual = bend, 0.0, 0.0
     for _ in range(ITERATIONS):
-        far = full[0] if travel > 0.0 else -full[1]
-        if far == 0.0:
-            ahead, rate = 0.0, 0.0
+        full_deflection = full[0] if travel > 0.0 else -full[1]
+        if full_deflection == 0.0:
+            end_deflection, rate = 0.0, 0.0
         else:
-            slip = np.exp(-travel / far)
-            ahead = far + (bend - far) * slip
-            rate = max(slip * (1.0 - bend / far), 0.0)
-        off = travel - free + compliance * (0.5 * (bend + ahead) + damping * (ahead - bend))
-        correction = off / (1.0 + compliance * (0.5 + damping) * rate)
+            slip = np.exp(-travel / full_deflection)
+            end_deflection = full_deflection + (bend - full_deflection) * slip
+            rate = max(slip * (1.0 - bend / full_deflection), 0.0)
+        residual = travel - free + compliance * (0.5 * (bend + end_deflection) + damping * (end_deflection - bend))
+        correction = residual / (1.0 + compliance * (0.5 + damping) * rate)
         travel -= correction
-        if abs(off) < NEAR:
-            ahead -= rate * correction
+        if abs(residual) < TRAVEL_TOLERANCE:
+            end_deflection -= rate * correction
             break
-    return ahead, 0.5 * (bend + ahead) + damping * (ahead - bend)
+    return end_deflection, 0.5 * (bend + end_deflection) + damping * (end_deflection - bend)
 
 
 @njit(
     types.float64(types.float64, types.float64, types.float64, _VECTOR, _VECTOR),
     cache=True,
     error_model="numpy",
-    **UNCOUNTED,
+    **NO_REFERENCE_COUNTS,
 )
 def friction_force(forward: float, backward: float, start: float, memory: FloatArray, at: FloatArray) -> float:
     """Mean friction force (N) over a step, with the level (N) `forward` where v > 0 and `backward` where v < 0.
@@ -85,29 +85,29 @@ def friction_force(forward: float, backward: float, start: float, memory: FloatA
     sliding = -forward if speed > 0 else backward
     # The velocity does not reverse within the step and the bristle slips already: the force is constant.
     full = -sliding / level
-    if speed * (at[V_FREE] + per_newton * sliding) > 0 and start * full > BENT * full * full:
+    if speed * (at[V_FREE] + per_newton * sliding) > 0 and start * full > SLIDING_SHARE * full * full:
         memory[0], at[F_END] = full, sliding
         return sliding
     # From here on: lengths in units of z_max, times of the step, forces of the level. give: stiffness step² / mass.
     step_s = at[STEP_S]
-    v, free_change, give = (
+    v, free_change, relative_compliance = (
         speed * step_s / LONGEST_M,
         (at[V_FREE] - speed) * step_s / LONGEST_M,
         per_newton * level * step_s / LONGEST_M,
     )
-    damping = DAMPED / np.sqrt(give)
-    moved = abs(v) + 0.5 * abs(free_change - give * start)
-    parts = min(PARTS, 1 + int(min(moved / STUCK, PARTS)))
+    damping = BRISTLE_DAMPING / np.sqrt(relative_compliance)
+    travel_estimate = abs(v) + 0.5 * abs(free_change - relative_compliance * start)
+    parts = min(PARTS, 1 + int(min(travel_estimate / TRAVEL_PER_PART, PARTS)))
     share = 1.0 / parts
-    free, compliance = 0.5 * free_change * share**2, 0.5 * give * share**2
+    free, compliance = 0.5 * free_change * share**2, 0.5 * relative_compliance * share**2
     bend, impulse = start, 0.0
-    ends = (forward / level, backward / level)
+    full_deflections = (forward / level, backward / level)
     for _ in range(parts):
-        bend, force = _deflect(bend, v * share + free, compliance, damping * parts, ends)
-        v += (free_change - give * force) * share
+        bend, force = _deflect(bend, v * share + free, compliance, damping * parts, full_deflections)
+        v += (free_change - relative_compliance * force) * share
         impulse += force
-    far = ends[0] if v > 0 else ends[1]
-    memory[0], at[F_END] = bend, -level * (bend + (damping * (v - abs(v) * bend / far) if far > 0 else 0.0))
+    end_full = full_deflections[0] if v > 0 else full_deflections[1]
+    memory[0], at[F_END] = bend, -level * (bend + (damping * (v - abs(v) * bend / end_full) if end_full > 0 else 0.0))
     return -level * impulse * share
 
 

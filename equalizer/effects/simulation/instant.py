@@ -11,9 +11,9 @@ X, V = 0, 1
 X_FREE, V_FREE = 2, 3
 """Position and velocity at the step's end without this force."""
 X_PER_N, V_PER_N = 4, 5
-"""What 1 N over the step adds to position and velocity at its end."""
+"""Change of position and velocity at the step's end per 1 N held over the step."""
 A_FREE, A_PER_N = 6, 7
-"""Acceleration at the start without this force, and what 1 N adds to it; NaN unless the effect declares that its law
+"""Acceleration at the start without this force, and its change per 1 N; NaN unless the effect declares that its law
 reads accelerations."""
 STEP_S, TIME_S = 8, 9
 """Length of the step, and time of its start since the first sample, in s."""
@@ -22,10 +22,10 @@ F_END = 10
 mean over the step is used."""
 LENGTH = 11
 """Length of `at` without the block below."""
-SEEN_X, SEEN_V, SEEN_X_END, SEEN_V_END, SEEN_X_PER_N, SEEN_V_PER_N, SEEN_A, SEEN_A_PER_N, SEEN_COMMAND = range(9)
-"""Block of each driven axis, for effects that declare that their law reads all axes (`AxisForce.sees`): position and
-velocity at the start and, without this force, at the end of the step; what 1 N of this force adds to those at the end;
-acceleration at the start without this force, and what 1 N adds to it; command. Blocks follow each other from index
-LENGTH on."""
-SEEN = 9
-"""Numbers per block."""
+AXIS_X, AXIS_V, AXIS_X_END, AXIS_V_END, AXIS_X_PER_N, AXIS_V_PER_N, AXIS_A, AXIS_A_PER_N, AXIS_COMMAND = range(9)
+"""Indices within the block of a driven axis, for effects that declare that their law reads all axes
+(`AxisForce.reads_all_axes`): position and velocity at the start and, without this force, at the end of the step; change
+of those at the end per 1 N of this force; acceleration at the start without this force, and its change per 1 N;
+command. Blocks follow each other from index LENGTH on."""
+BLOCK_SIZE = 9
+"""Number of values per block."""

@@ -9,24 +9,24 @@ can then stick. A law that reads an acceleration has w = 1.
 from numba import njit
 
 from equalizer.effects.simulation.instant import (
+    AXIS_A,
+    AXIS_A_PER_N,
+    AXIS_COMMAND,
+    AXIS_V,
+    AXIS_V_END,
+    AXIS_V_PER_N,
+    AXIS_X,
+    AXIS_X_END,
+    AXIS_X_PER_N,
+    BLOCK_SIZE,
     F_END,
     LENGTH,
-    SEEN,
-    SEEN_A,
-    SEEN_A_PER_N,
-    SEEN_COMMAND,
-    SEEN_V,
-    SEEN_V_END,
-    SEEN_V_PER_N,
-    SEEN_X,
-    SEEN_X_END,
-    SEEN_X_PER_N,
     STEP_S,
     TIME_S,
 )
 from equalizer.effects.simulation.mechanism_kernel import compile_law
-from equalizer.laws.kernel import BEGUN, END, START, commit_step, run
-from equalizer.laws.program import DEEPEST
+from equalizer.laws.kernel import END, START, STARTED, commit_step, run
+from equalizer.laws.program import STACK_SIZE
 from equalizer.signals.signal import FloatArray
 
 AXES, ACCELERATION, CONDITIONS, SAMPLES, RATE_HZ, TABLE = range(6)
@@ -36,7 +36,7 @@ sample. The law's program follows them."""
 PER_AXIS = 4
 """Signals per driven axis: position, velocity, acceleration, command. The time precedes those of all axes, the
 conditions follow them."""
-CLOSE = 1e-7
+FORCE_TOLERANCE = 1e-7
 """Tolerance of the implicit equation, relative to the forces of its first evaluations."""
 TRIES = 60
 """Most iterations of the root search (regula falsi and bisection in turn) for a law's force at the end of a step."""
@@ -44,33 +44,33 @@ TRIES = 60
 
 @njit(inline="always")
 def _law_value(
-    parameters: FloatArray, memory: FloatArray, at: FloatArray, phase: int, force: float, ahead: float
+    parameters: FloatArray, memory: FloatArray, at: FloatArray, phase: int, force: float, extrapolate: float
 ) -> float:
     """The law's force (N) at the step's start or end (`phase`), if `force` acted over the step. Accelerations are means
-    over the step; with ahead = 1 they are extrapolated linearly to its end."""
+    over the step; with extrapolate = 1 they are extrapolated linearly to its end."""
     axes, conditions, step_s = int(parameters[AXES]), int(parameters[CONDITIONS]), at[STEP_S]
     count = 1 + PER_AXIS * axes + conditions
-    signals = memory[DEEPEST : DEEPEST + count]
+    signals = memory[STACK_SIZE : STACK_SIZE + count]
     time_s = at[TIME_S] + (step_s if phase == END else 0.0)
     signals[0] = time_s
     for axis in range(axes):
-        begin, to = LENGTH + SEEN * axis, 1 + PER_AXIS * axis
-        v, v_end = at[begin + SEEN_V], at[begin + SEEN_V_END] + at[begin + SEEN_V_PER_N] * force
-        signals[to], signals[to + 1], signals[to + 2] = at[begin + SEEN_X], v, (v_end - v) / step_s
+        block, target = LENGTH + BLOCK_SIZE * axis, 1 + PER_AXIS * axis
+        v, v_end = at[block + AXIS_V], at[block + AXIS_V_END] + at[block + AXIS_V_PER_N] * force
+        signals[target], signals[target + 1], signals[target + 2] = at[block + AXIS_X], v, (v_end - v) / step_s
         if phase == END:
-            signals[to] = at[begin + SEEN_X_END] + at[begin + SEEN_X_PER_N] * force
-            signals[to + 1] = v_end
-        if ahead != 0.0:
-            signals[to + 2] += signals[to + 2] - at[begin + SEEN_A] - at[begin + SEEN_A_PER_N] * force
-        signals[to + 3] = at[begin + SEEN_COMMAND]
+            signals[target] = at[block + AXIS_X_END] + at[block + AXIS_X_PER_N] * force
+            signals[target + 1] = v_end
+        if extrapolate != 0.0:
+            signals[target + 2] += signals[target + 2] - at[block + AXIS_A] - at[block + AXIS_A_PER_N] * force
+        signals[target + 3] = at[block + AXIS_COMMAND]
     samples = int(parameters[SAMPLES])
     if conditions > 0:
         # Sampled at the middle of the step, which lies in the right sample even when the ends are rounded.
-        now = max(min(int((at[TIME_S] + 0.5 * step_s) * parameters[RATE_HZ]), samples - 1), 0)
+        sample = max(min(int((at[TIME_S] + 0.5 * step_s) * parameters[RATE_HZ]), samples - 1), 0)
         for k in range(conditions):
-            signals[count - conditions + k] = parameters[TABLE + now * conditions + k]
+            signals[count - conditions + k] = parameters[TABLE + sample * conditions + k]
     program = parameters[TABLE + samples * conditions :]
-    return float(run(program, signals, memory[DEEPEST + count :], memory[:DEEPEST], phase, time_s, step_s))
+    return float(run(program, signals, memory[STACK_SIZE + count :], memory[:STACK_SIZE], phase, time_s, step_s))
 
 
 @njit(inline="always")
@@ -78,8 +78,8 @@ def _end_share(start: float, first: float, second: float) -> float:
     """Weight w of the step's end: (1 + s) / 2, limited to 1/2 to 1, with the slope s = -dF_end/dF as a difference
     quotient. first: the end's force if that of the start acted; second: the end's force if `first` acted."""
     change = first - start
-    steep = (first - second) / change if change != 0.0 else 0.0
-    return min(0.5 * (1.0 + max(steep, 0.0)), 1.0)
+    slope = (first - second) / change if change != 0.0 else 0.0
+    return min(0.5 * (1.0 + max(slope, 0.0)), 1.0)
 
 
 @compile_law
@@ -89,35 +89,42 @@ def law_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> flo
     parameters: in the order of `AXES` to `TABLE`, then the conditions' samples and the program. memory: stack, signals,
     and the operators' memory, which is advanced to the step's end. at: see `instant`; F_END is written.
     """
-    heavy = parameters[ACCELERATION] != 0.0
+    reads_acceleration = parameters[ACCELERATION] != 0.0
     start = low = _law_value(parameters, memory, at, START, 0.0, 0.0)
     conditions = int(parameters[CONDITIONS])
-    kept = memory[DEEPEST + 1 + PER_AXIS * int(parameters[AXES]) + conditions :]
-    kept[0] = BEGUN
+    operator_memory = memory[STACK_SIZE + 1 + PER_AXIS * int(parameters[AXES]) + conditions :]
+    operator_memory[0] = STARTED
     end = first = high = _law_value(parameters, memory, at, END, low, 0.0)
     second = _law_value(parameters, memory, at, END, high, 0.0)
-    late = 1.0 if heavy else _end_share(start, first, second)
-    low_off, high_off = low - (1 - late) * start - late * first, high - (1 - late) * start - late * second
-    near, force = CLOSE * (abs(start) + abs(first) + abs(second)), high
+    end_weight = 1.0 if reads_acceleration else _end_share(start, first, second)
+    low_residual, high_residual = (
+        low - (1 - end_weight) * start - end_weight * first,
+        high - (1 - end_weight) * start - end_weight * second,
+    )
+    tolerance, force = FORCE_TOLERANCE * (abs(start) + abs(first) + abs(second)), high
     # Every second step bisects if the root is bracketed; the others are secant steps.
-    for turn in range(TRIES):
-        across = high_off - low_off
-        within = (low_off < 0) != (high_off < 0)
-        if turn % 2 == 1 and within:
+    for iteration in range(TRIES):
+        residual_change = high_residual - low_residual
+        is_bracketed = (low_residual < 0) != (high_residual < 0)
+        if iteration % 2 == 1 and is_bracketed:
             force = 0.5 * (low + high)
         else:
-            force = high - high_off * (high - low) / across if across != 0.0 else high
+            force = high - high_residual * (high - low) / residual_change if residual_change != 0.0 else high
         end = _law_value(parameters, memory, at, END, force, 0.0)
-        off = force - (1 - late) * start - late * end
-        if not abs(off) > near or abs(high - low) <= 1e-2 * near:
+        residual = force - (1 - end_weight) * start - end_weight * end
+        if not abs(residual) > tolerance or abs(high - low) <= 1e-2 * tolerance:
             break
-        if within and (off < 0) == (low_off < 0):
-            low, low_off = force, off
+        if is_bracketed and (residual < 0) == (low_residual < 0):
+            low, low_residual = force, residual
         else:
-            if not within:
-                low, low_off = high, high_off
-            high, high_off = force, off
+            if not is_bracketed:
+                low, low_residual = high, high_residual
+            high, high_residual = force, residual
     # While sticking, the end's force lies between those of the two sliding directions: solved for, not evaluated.
-    at[F_END] = _law_value(parameters, memory, at, END, force, 1.0) if heavy else (force - (1 - late) * start) / late
-    commit_step(parameters[TABLE + int(parameters[SAMPLES]) * conditions :], kept, at[TIME_S] + at[STEP_S])
+    at[F_END] = (
+        _law_value(parameters, memory, at, END, force, 1.0)
+        if reads_acceleration
+        else (force - (1 - end_weight) * start) / end_weight
+    )
+    commit_step(parameters[TABLE + int(parameters[SAMPLES]) * conditions :], operator_memory, at[TIME_S] + at[STEP_S])
     return float(force)

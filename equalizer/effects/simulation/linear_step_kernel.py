@@ -16,27 +16,27 @@ _MATRIX = types.float64[:, ::1]
 
 
 @njit(types.void(_MATRIX, _VECTOR, _VECTOR), cache=True, nogil=True, fastmath=FAST)
-def _advance_dense(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
-    """One step with a full matrix, in place. advance: (s, s), transposed; added: (s, ...); state: (s,)."""
-    before = state.copy()
-    state[:] = added[: state.shape[0]]
+def _advance_dense(advance: FloatArray, contribution: FloatArray, state: FloatArray) -> None:
+    """One step with a full matrix, in place. advance: (s, s), transposed; contribution: (s, ...); state: (s,)."""
+    start_state = state.copy()
+    state[:] = contribution[: state.shape[0]]
     for j in range(state.shape[0]):
         for i in range(state.shape[0]):
-            state[i] += advance[j, i] * before[j]
+            state[i] += advance[j, i] * start_state[j]
 
 
 @njit(inline="always")
-def advance_state(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
-    """One step of the state (s,), in place. advance: (4, s / 2) or (s, s), see `modal_form.StepForm`. added: (s, ...),
-    contribution of the commands; only its first s numbers are used."""
+def advance_state(advance: FloatArray, contribution: FloatArray, state: FloatArray) -> None:
+    """One step of the state (s,), in place. advance: (4, s / 2) or (s, s), see `modal_form.StepForm`. contribution:
+    (s, ...), of the commands; only its first s numbers are used."""
     half = state.shape[0] // 2
     if advance.shape[1] != half:
-        _advance_dense(advance, added, state)
+        _advance_dense(advance, contribution, state)
         return
     for i in range(half):
         first, second = state[i], state[half + i]
-        state[i] = advance[0, i] * first + advance[1, i] * second + added[i]
-        state[half + i] = advance[2, i] * first + advance[3, i] * second + added[half + i]
+        state[i] = advance[0, i] * first + advance[1, i] * second + contribution[i]
+        state[half + i] = advance[2, i] * first + advance[3, i] * second + contribution[half + i]
 
 
 @njit(types.void(_MATRIX, _MATRIX, _VECTOR), cache=True, nogil=True, fastmath=FAST)
@@ -44,9 +44,9 @@ def advance_unforced(advance: FloatArray, rows: FloatArray, state: FloatArray) -
     """Motion under the commands alone. rows: (n, s ...), contribution of the commands over each step; overwritten by
     the state before each step. state: (s,), overwritten by the state at the end."""
     size = state.shape[0]
-    added = np.empty(size)
+    contribution = np.empty(size)
     for k in range(rows.shape[0]):
         for i in range(size):
-            added[i] = rows[k, i]
+            contribution[i] = rows[k, i]
             rows[k, i] = state[i]
-        advance_state(advance, added, state)
+        advance_state(advance, contribution, state)

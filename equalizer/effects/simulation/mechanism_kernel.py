@@ -17,18 +17,18 @@ from numba.core.errors import NumbaExperimentalFeatureWarning
 from equalizer.effects.simulation.instant import (
     A_FREE,
     A_PER_N,
+    AXIS_A,
+    AXIS_A_PER_N,
+    AXIS_COMMAND,
+    AXIS_V,
+    AXIS_V_END,
+    AXIS_V_PER_N,
+    AXIS_X,
+    AXIS_X_END,
+    AXIS_X_PER_N,
+    BLOCK_SIZE,
     F_END,
     LENGTH,
-    SEEN,
-    SEEN_A,
-    SEEN_A_PER_N,
-    SEEN_COMMAND,
-    SEEN_V,
-    SEEN_V_END,
-    SEEN_V_PER_N,
-    SEEN_X,
-    SEEN_X_END,
-    SEEN_X_PER_N,
     STEP_S,
     TIME_S,
     V_FREE,
@@ -39,36 +39,37 @@ from equalizer.effects.simulation.instant import (
     X,
 )
 from equalizer.effects.simulation.linear_step_kernel import FAST, advance_state
-from equalizer.laws.kernel import UNCOUNTED
+from equalizer.laws.kernel import NO_REFERENCE_COUNTS
 from equalizer.signals.signal import FloatArray
 
 # Laws are passed as function values, so that a changed law is never run from a stale cached kernel; numba warns that
 # this feature is experimental. The filter is set once for the process, because `catch_warnings` is not thread-safe.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
-LAWS = 6
+MAX_LAWS = 6
 """Largest number of different laws that can act at once."""
-SWEEPS = 12
-"""Most Gauss-Seidel sweeps per step over several forces: each is solved again with the newest values of the others."""
-SETTLED = 1e-7
-"""Relative change of a force below which the others are not solved again. The motion then differs by at most 1e-6
-(relative) from the converged motion, for a joint with friction and an axis with friction."""
-OWN_ROWS = 4
+MAX_SWEEPS = 12
+"""Largest number of Gauss-Seidel sweeps per step over several forces: each is solved again with the newest values of
+the others."""
+FORCE_TOLERANCE = 1e-7
+"""Tolerance of the sweeps: relative change of a force below which the others are not solved again. The motion then
+differs by at most 1e-6 (relative) from the converged motion, for a joint with friction and an axis with friction."""
+FORCE_ROWS = 4
 """Rows of the table of forces: mean over the step, mean over the step before, force at the step's end, and whether the
 force is to be solved again because another force has changed (1 or 0)."""
-_MEAN, _MEAN_BEFORE, _ENDS, _STALE = range(OWN_ROWS)
+_MEAN, _MEAN_BEFORE, _END, _STALE = range(FORCE_ROWS)
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 READ_ONLY = types.Array(types.float64, 2, "C", readonly=True)
-_PLACES = types.int64[:, ::1]
+_TABLE = types.int64[:, ::1]
 LAW = types.float64(_VECTOR, _VECTOR, _VECTOR)
 """Signature that every force law is compiled with."""
 
 Integers = npt.NDArray[np.int64]
-Four = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+StepMatrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
-_FOUR = types.UniTuple(_MATRIX, 4)  # type: ignore[no-untyped-call]
-_LAWS = types.UniTuple(types.FunctionType(LAW), LAWS)  # type: ignore[no-untyped-call]
+_MATRICES = types.UniTuple(_MATRIX, 4)  # type: ignore[no-untyped-call]
+_LAWS = types.UniTuple(types.FunctionType(LAW), MAX_LAWS)  # type: ignore[no-untyped-call]
 _COUNT = types.UniTuple(types.int64, 3)  # type: ignore[no-untyped-call]
 _NOW_X, _NOW_V, _NEXT_X, _NEXT_V, _A, _FORCE, _FORCE_END = range(7)
 PORT_ROWS = 7
@@ -79,7 +80,7 @@ without forces; forces over the step and at its end."""
 def compile_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> Any:
     """The law, compiled for calls from the kernel. numba caches its machine code next to the file that defines the
     law."""
-    return njit(LAW, cache=True, error_model="numpy", **UNCOUNTED)(law)
+    return njit(LAW, cache=True, error_model="numpy", **NO_REFERENCE_COUNTS)(law)
 
 
 class LawAddress(types.WrapperAddressProtocol):
@@ -120,13 +121,13 @@ def _predict_ports(output: FloatArray, state: FloatArray, ports: FloatArray) -> 
 
 
 @njit(inline="always")
-def _apply_forces(by_force: FloatArray, state: FloatArray, ports: FloatArray) -> None:
+def _apply_forces(force_effects: FloatArray, state: FloatArray, ports: FloatArray) -> None:
     """Add the forces' effect to the state, and move the ports to the step's end. by_force: (r, s)"""
     for port in range(ports.shape[1]):
         ports[_NOW_X, port], ports[_NOW_V, port] = ports[_NEXT_X, port], ports[_NEXT_V, port]
         force = ports[_FORCE, port]
         for i in range(state.shape[0]):
-            state[i] += by_force[port, i] * force
+            state[i] += force_effects[port, i] * force
 
 
 @njit(inline="always")
@@ -156,28 +157,28 @@ def _add_force(per_newton: FloatArray, port: int, mean: float, end: float, ports
     count = ports.shape[1]
     ports[_FORCE, port] += mean
     ports[_FORCE_END, port] += end
-    for other in range(count):
-        ports[_NEXT_X, other] += per_newton[port, other] * mean
-        ports[_NEXT_V, other] += per_newton[port, count + other] * mean
-        ports[_A, other] += per_newton[port, 2 * count + other] * mean
+    for target in range(count):
+        ports[_NEXT_X, target] += per_newton[port, target] * mean
+        ports[_NEXT_V, target] += per_newton[port, count + target] * mean
+        ports[_A, target] += per_newton[port, 2 * count + target] * mean
 
 
 @njit(inline="always")
-def _write_seen_ports(per_newton: FloatArray, port: int, ports: FloatArray, at: FloatArray) -> None:
+def _write_axis_blocks(per_newton: FloatArray, port: int, ports: FloatArray, at: FloatArray) -> None:
     """Write the motion of all ports into `at`, for the force at one of them."""
     count = ports.shape[1]
-    for other in range(count):
-        begin = LENGTH + SEEN * other
-        at[begin + SEEN_X], at[begin + SEEN_V] = ports[_NOW_X, other], ports[_NOW_V, other]
-        at[begin + SEEN_X_END], at[begin + SEEN_V_END] = ports[_NEXT_X, other], ports[_NEXT_V, other]
-        at[begin + SEEN_X_PER_N] = per_newton[port, other]
-        at[begin + SEEN_V_PER_N] = per_newton[port, count + other]
-        at[begin + SEEN_A], at[begin + SEEN_A_PER_N] = ports[_A, other], per_newton[port, 2 * count + other]
+    for axis in range(count):
+        block = LENGTH + BLOCK_SIZE * axis
+        at[block + AXIS_X], at[block + AXIS_V] = ports[_NOW_X, axis], ports[_NOW_V, axis]
+        at[block + AXIS_X_END], at[block + AXIS_V_END] = ports[_NEXT_X, axis], ports[_NEXT_V, axis]
+        at[block + AXIS_X_PER_N] = per_newton[port, axis]
+        at[block + AXIS_V_PER_N] = per_newton[port, count + axis]
+        at[block + AXIS_A], at[block + AXIS_A_PER_N] = ports[_A, axis], per_newton[port, 2 * count + axis]
 
 
 @compile_law
 def no_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Law without force (0 N), which fills the unused of the kernel's `LAWS` places."""
+    """Law without force (0 N), which fills the unused ones of the kernel's `MAX_LAWS` arguments."""
     return 0.0
 
 
@@ -194,7 +195,7 @@ def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
     at[A_FREE], at[A_PER_N] = ports[_A, port], per_newton[port, 2 * count + port]
     at[F_END] = np.nan
     if at.shape[0] > LENGTH:
-        _write_seen_ports(per_newton, port, ports, at)
+        _write_axis_blocks(per_newton, port, ports, at)
     mean = law(parameters, memory, at)
     end = mean if np.isnan(at[F_END]) else at[F_END]
     _add_force(per_newton, port, mean, end, ports)
@@ -202,52 +203,58 @@ def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
 
 
 @njit(
-    types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _VECTOR),
-    cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED,
+    types.void(_LAWS, _TABLE, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _VECTOR),
+    cache=True, nogil=True, error_model="numpy", fastmath=FAST, **NO_REFERENCE_COUNTS,
 )  # fmt: skip
 def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
-    laws: Any, places: Integers, parameters: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
-    own: FloatArray, at: FloatArray, before: FloatArray,
+    laws: Any, table: Integers, parameters: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
+    forces: FloatArray, at: FloatArray, memory_before: FloatArray,
 ) -> None:  # fmt: skip
-    """Solve for several forces in turn (Gauss-Seidel), starting from the extrapolation of their means over the last two
-    steps. A force is solved again only if another has changed. own: (OWN_ROWS, items). before: scratch, like memory."""
+    """Solve for several forces in turn (Gauss-Seidel), extrapolating their means over the last two steps. A force
+    is solved again only if another has changed. forces: (FORCE_ROWS, items); memory_before: work space, as memory."""
     for i in range(memory.shape[0]):
-        before[i] = memory[i]
-    for item in range(places.shape[0]):
-        mean = own[_MEAN, item]
-        own[_MEAN, item] += mean - own[_MEAN_BEFORE, item]
-        own[_MEAN_BEFORE, item], own[_ENDS, item], own[_STALE, item] = mean, 0.0, 1.0
-        _add_force(per_newton, places[item, 1], own[_MEAN, item], 0.0, ports)
-    for sweep in range(SWEEPS):
-        for item in range(places.shape[0]):
-            if own[_STALE, item] == 0.0:
+        memory_before[i] = memory[i]
+    for item in range(table.shape[0]):
+        mean = forces[_MEAN, item]
+        forces[_MEAN, item] += mean - forces[_MEAN_BEFORE, item]
+        forces[_MEAN_BEFORE, item], forces[_END, item], forces[_STALE, item] = mean, 0.0, 1.0
+        _add_force(per_newton, table[item, 1], forces[_MEAN, item], 0.0, ports)
+    for sweep in range(MAX_SWEEPS):
+        for item in range(table.shape[0]):
+            if forces[_STALE, item] == 0.0:
                 continue
-            port, kept, end, mean = places[item, 1], places[item, 4], places[item, 5], own[_MEAN, item]
-            _add_force(per_newton, port, -mean, -own[_ENDS, item], ports)
+            port, memory_start, memory_end, mean = table[item, 1], table[item, 4], table[item, 5], forces[_MEAN, item]
+            _add_force(per_newton, port, -mean, -forces[_END, item], ports)
             if sweep > 0:
-                for i in range(kept, end):
-                    memory[i] = before[i]
-            begin, law = places[item, 2], laws[places[item, 0]]
-            own[_MEAN, item], own[_ENDS, item] = _solve_force(
-                law, parameters[begin : places[item, 3]], memory[kept:end], port, per_newton, ports, at
+                for i in range(memory_start, memory_end):
+                    memory[i] = memory_before[i]
+            parameter_start, law = table[item, 2], laws[table[item, 0]]
+            forces[_MEAN, item], forces[_END, item] = _solve_force(
+                law,
+                parameters[parameter_start : table[item, 3]],
+                memory[memory_start:memory_end],
+                port,
+                per_newton,
+                ports,
+                at,
             )
-            if not abs(own[_MEAN, item] - mean) <= SETTLED * abs(mean):
-                for other in range(places.shape[0]):
-                    own[_STALE, other] = 1.0
-            own[_STALE, item] = 0.0
+            if not abs(forces[_MEAN, item] - mean) <= FORCE_TOLERANCE * abs(mean):
+                for force_index in range(table.shape[0]):
+                    forces[_STALE, force_index] = 1.0
+            forces[_STALE, item] = 0.0
 
 
 @njit(
     types.void(
-        _LAWS, _PLACES, _VECTOR, _VECTOR, _FOUR, _MATRIX, READ_ONLY, _MATRIX, _VECTOR, _COUNT, types.float64,
+        _LAWS, _TABLE, _VECTOR, _VECTOR, _MATRICES, _MATRIX, READ_ONLY, _MATRIX, _VECTOR, _COUNT, types.float64,
         _VECTOR, _VECTOR, _MATRIX, _VECTOR,
     ),
-    cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED,
+    cache=True, nogil=True, error_model="numpy", fastmath=FAST, **NO_REFERENCE_COUNTS,
 )  # fmt: skip
 def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
-    laws: Any, places: Integers, parameters: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,
+    laws: Any, table: Integers, parameters: FloatArray, memory: FloatArray, step: StepMatrices, rows: FloatArray,
     commands: FloatArray, ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
-    added: FloatArray, at: FloatArray, own: FloatArray, before: FloatArray,
+    added: FloatArray, at: FloatArray, forces: FloatArray, memory_before: FloatArray,
 ) -> None:  # fmt: skip
     """Motion under commands and motion-dependent forces; rows, ports and state are overwritten.
 
@@ -255,38 +262,38 @@ def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
     at its start; a sample's first row becomes the state before it and the forces (r,) at that instant. commands: (n
     stride, m), or (0, 0) where no law reads them. ports: (PORT_ROWS, r) and state: (s,) become those of the end.
 
-    places: (items, 6) law, port, begin and end in `parameters`, begin and end in `memory`. step: matrix that advances
+    table: (items, 6) law, port, begin and end in `parameters`, begin and end in `memory`. step: matrix that advances
     the state; output matrix of the ports' positions and velocities (2 r, s), with accelerations (3 r, s) where a law
     reads them; effect of the forces on the state (r, s); and `per_newton`. count: steps per sample; stride (1 where
     commands are held over all steps, else the number of steps); number of the first sample.
 
-    added (s + r,), at (LENGTH or more,), own (OWN_ROWS, items), before (like memory): scratch of the caller; `own`
-    keeps the forces from block to block.
+    added (s + r,), at (LENGTH or more,), forces (FORCE_ROWS, items), memory_before (like memory): work space of the
+    caller; `forces` keeps the forces from block to block.
     """
-    advance, output, by_force, per_newton = step
-    steps, stride, begun = count
-    size, r = state.shape[0], ports.shape[1]
-    law = laws[places[0, 0]]
-    its, its_memory = parameters[places[0, 2] : places[0, 3]], memory[places[0, 4] : places[0, 5]]
+    advance, output, force_effects, per_newton = step
+    steps, stride, first_sample = count
+    states, r = state.shape[0], ports.shape[1]
+    law = laws[table[0, 0]]
+    law_parameters, law_memory = parameters[table[0, 2] : table[0, 3]], memory[table[0, 4] : table[0, 5]]
     at[STEP_S] = step_s
     for port in range(r):
         ports[_A, port] = np.nan
     for k in range(rows.shape[0] // stride):
-        for now in range(steps):
-            if now == 0 or stride > 1:
-                for i in range(size + r):
-                    added[i] = rows[k * stride + now, i]
+        for step_index in range(steps):
+            if step_index == 0 or stride > 1:
+                for i in range(states + r):
+                    added[i] = rows[k * stride + step_index, i]
                 for axis in range(commands.shape[1]):
-                    at[LENGTH + SEEN * axis + SEEN_COMMAND] = commands[k * stride + now, axis]
-            if now == 0:
+                    at[LENGTH + BLOCK_SIZE * axis + AXIS_COMMAND] = commands[k * stride + step_index, axis]
+            if step_index == 0:
                 _store_row(state, ports, rows[k * stride])
             if output.shape[0] > 2 * r:
                 _predict_accelerations(output, added, state, ports)
             advance_state(advance, added, state)
             _predict_ports(output, state, ports)
-            at[TIME_S] = ((begun + k) * steps + now) * step_s
-            if places.shape[0] == 1:
-                _solve_force(law, its, its_memory, places[0, 1], per_newton, ports, at)
+            at[TIME_S] = ((first_sample + k) * steps + step_index) * step_s
+            if table.shape[0] == 1:
+                _solve_force(law, law_parameters, law_memory, table[0, 1], per_newton, ports, at)
             else:
-                _solve_forces(laws, places, parameters, memory, per_newton, ports, own, at, before)
-            _apply_forces(by_force, state, ports)
+                _solve_forces(laws, table, parameters, memory, per_newton, ports, forces, at, memory_before)
+            _apply_forces(force_effects, state, ports)

@@ -48,31 +48,33 @@ def step_form(advance: FloatArray) -> StepForm:
     basis = np.stack(list(_planes(balanced)), axis=2).reshape(size, size)
     if not np.linalg.cond(basis) < LARGEST_CONDITION:
         return dense
-    back = np.linalg.inv(basis)
-    moved = back @ balanced @ basis
+    inverse = np.linalg.inv(basis)
+    transformed = inverse @ balanced @ basis
     half = np.arange(size // 2)
     first, second = half, half + size // 2
-    blocks = np.array([moved[first, first], moved[first, second], moved[second, first], moved[second, second]])
+    blocks = np.array(
+        [transformed[first, first], transformed[first, second], transformed[second, first], transformed[second, second]]
+    )
     for rows, columns in ((first, first), (first, second), (second, first), (second, second)):
-        moved[rows, columns] = 0.0
-    if np.abs(moved).max() > LARGEST_REST:
+        transformed[rows, columns] = 0.0
+    if np.abs(transformed).max() > LARGEST_REST:
         return dense
-    return StepForm(blocks, scale[0][:, None] * basis, back / scale[0])
+    return StepForm(blocks, scale[0][:, None] * basis, inverse / scale[0])
 
 
 def _planes(advance: FloatArray) -> Iterator[FloatArray]:
     """(s, 2) each: orthonormal basis of the invariant plane of a pair of eigenvalues."""
     values, vectors = np.linalg.eig(advance)
-    turning = np.flatnonzero(values.imag > 0)
-    real = np.flatnonzero(values.imag == 0)
-    real = real[np.argsort(values[real].real)]
-    pairs = [(vectors[:, i].real, vectors[:, i].imag, values[i], values[i].conj()) for i in turning]
+    complex_pairs = np.flatnonzero(values.imag > 0)
+    real_values = np.flatnonzero(values.imag == 0)
+    real_values = real_values[np.argsort(values[real_values].real)]
+    pairs = [(vectors[:, i].real, vectors[:, i].imag, values[i], values[i].conj()) for i in complex_pairs]
     pairs += [
         (vectors[:, i].real, vectors[:, j].real, values[i], values[j])
-        for i, j in zip(real[::2], real[1::2], strict=False)
+        for i, j in zip(real_values[::2], real_values[1::2], strict=False)
     ]
-    for each, other, first, second in pairs:
-        plane, sizes, _ = np.linalg.svd(np.column_stack([each, other]), full_matrices=False)
+    for first_vector, second_vector, first, second in pairs:
+        plane, sizes, _ = np.linalg.svd(np.column_stack([first_vector, second_vector]), full_matrices=False)
         if sizes[1] < NEARLY_ONE * sizes[0]:
             # Null space of (A - a I)(A - b I), for the eigenvalues a and b of nearly parallel eigenvectors.
             square = advance @ advance - (first + second).real * advance + (first * second).real * np.eye(len(advance))

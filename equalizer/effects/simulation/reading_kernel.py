@@ -25,7 +25,7 @@ Flags = npt.NDArray[np.bool_]
 
 
 @njit(types.void(_IN, types.float64, types.float64, _IN, types.float64, _MATRIX), cache=True, nogil=True)
-def read_at(
+def resample_at(
     samples: FloatArray,
     per_sample: float,
     offset: float,
@@ -41,18 +41,18 @@ def read_at(
     phases, taps = filter_table.shape[0] - 1, filter_table.shape[1]
     weights = np.empty(taps)
     for k in range(n):
-        at = min(max(k * per_sample + offset, 0.0), n - 1.0)
-        whole = min(int(at), n - 2)
-        fraction = at - whole
+        position = min(max(k * per_sample + offset, 0.0), n - 1.0)
+        sample = min(int(position), n - 2)
+        fraction = position - sample
         row = min(int(fraction * phases), phases - 1)
-        beyond_row = fraction * phases - row
+        row_fraction = fraction * phases - row
         for tap in range(taps):
             weights[tap] = (1 - linear_share) * (
-                (1 - beyond_row) * filter_table[row, tap] + beyond_row * filter_table[row + 1, tap]
+                (1 - row_fraction) * filter_table[row, tap] + row_fraction * filter_table[row + 1, tap]
             )
         weights[taps // 2 - 1] += linear_share * (1 - fraction)
         weights[taps // 2] += linear_share * fraction
-        first = whole - taps // 2 + 1
+        first = sample - taps // 2 + 1
         for c in range(p):
             total = 0.0
             for tap in range(taps):
@@ -81,9 +81,9 @@ def repeat_as_measured(
     n, p = samples.shape
     out[0] = samples[0]
     for k in range(1, n):
-        better = 0.0
+        likelihood_gain = 0.0
         for c in range(p):
-            fresh, old = measured[k, c] - samples[k, c], measured[k, c] - out[k - 1, c]
-            better += (fresh * fresh - old * old) / (noise[c] * noise[c])
-        lost[k] = better > log_odds_against
+            kept_error, repeated_error = measured[k, c] - samples[k, c], measured[k, c] - out[k - 1, c]
+            likelihood_gain += (kept_error * kept_error - repeated_error * repeated_error) / (noise[c] * noise[c])
+        lost[k] = likelihood_gain > log_odds_against
         out[k] = out[k - 1] if lost[k] else samples[k]

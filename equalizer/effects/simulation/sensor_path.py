@@ -16,11 +16,11 @@ _IN = types.Array(types.float64, 2, "A", readonly=True)
 @njit(types.void(_IN, types.float64, types.float64[:, ::1]), cache=True, nogil=True)
 def filter_one_pole(samples: FloatArray, decay: float, out: FloatArray) -> None:
     """Fill out (n, c) with samples (n, c) through a first-order low pass, from zero. decay: its pole, 0 to 1."""
-    now, share = np.zeros(out.shape[1]), 1 - decay
+    filtered, share = np.zeros(out.shape[1]), 1 - decay
     for k in range(out.shape[0]):
         for channel in range(out.shape[1]):
-            now[channel] = share * samples[k, channel] + decay * now[channel]
-            out[k, channel] = now[channel]
+            filtered[channel] = share * samples[k, channel] + decay * filtered[channel]
+            out[k, channel] = filtered[channel]
 
 
 def low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -> FloatArray:
@@ -28,9 +28,9 @@ def low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -
     if bandwidth_hz <= 0:
         return response
     decay = float(np.exp(-2 * np.pi * bandwidth_hz / sample_rate_hz))
-    passed = np.empty(response.shape)
-    filter_one_pole(response.reshape(len(response), -1), decay, passed.reshape(len(passed), -1))
-    return passed
+    filtered = np.empty(response.shape)
+    filter_one_pole(response.reshape(len(response), -1), decay, filtered.reshape(len(filtered), -1))
+    return filtered
 
 
 def undo_low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -> FloatArray:
@@ -38,9 +38,9 @@ def undo_low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: flo
     if bandwidth_hz <= 0:
         return response
     decay = float(np.exp(-2 * np.pi * bandwidth_hz / sample_rate_hz))
-    before = np.array(response, dtype=np.float64)
-    before[1:] -= decay * response[:-1]
-    return np.asarray(before / (1 - decay))
+    unfiltered = np.array(response, dtype=np.float64)
+    unfiltered[1:] -= decay * response[:-1]
+    return np.asarray(unfiltered / (1 - decay))
 
 
 def clip_to_range(response: FloatArray, limit: float) -> FloatArray:

@@ -1,9 +1,8 @@
 """Simulates a mechanical model with its effects under commands: actuator, mechanism and hand, sensor, in this order.
 
 Main function: `simulate_mechanism`. Variants: `simulate_response` without the motion of the axes, faster;
-`simulate_windows` with restarts from given states, for multiple shooting; `states_before` for these states. Sizes: n
-samples, m driven axes, p response channels (n also the model's coordinates in states).
-"""
+`simulate_windows` with restarts from given states, for multiple shooting; `simulate_states_before` for these states.
+Sizes: n samples, m driven axes, p response channels (n also the model's coordinates in states)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from equalizer.effects.effect import STEPS, OnResponse, PlacedEffect
-from equalizer.effects.simulation.bodies import Bodies, Restarts, bodies_of, simulate_bodies, simulate_states
+from equalizer.effects.simulation.bodies import Bodies, Restarts, build_bodies, simulate_bodies, simulate_states
 from equalizer.effects.simulation.command_path import (
     ActuatorForce,
     drive_actuators,
@@ -35,7 +34,7 @@ class Measurement:
     """(p,): rms of the noise, in the unit of the response."""
     position: FloatArray | None = None
     """(n, p): measured position of each response channel."""
-    whole: int = 0
+    full_length: int = 0
     """Length in samples of the recording whose beginning this is; 0 = this is the whole recording."""
 
 
@@ -83,8 +82,8 @@ def simulate_response(
     measurement: Measurement | None = None,
 ) -> SimulationResult:
     """Simulate the response as `simulate_mechanism` does, faster: without the driven axes, whose arrays are (n, 0)."""
-    played = _simulate_motion(model, commands, (sample_rate_hz, hold), effects, axes=False)
-    return _apply_sensor(model, played, sample_rate_hz, effects, measurement)
+    motion = _simulate_motion(model, commands, (sample_rate_hz, hold), effects, axes=False)
+    return _apply_sensor(model, motion, sample_rate_hz, effects, measurement)
 
 
 def simulate_windows(
@@ -102,28 +101,28 @@ def simulate_windows(
     )
 
 
-def states_before(
+def simulate_states_before(
     model: MechanicalModel,
     commands: FloatArray,
     sampled: tuple[float, Hold],
     effects: Sequence[PlacedEffect],
-    at: npt.NDArray[np.int64],
+    sample_indices: npt.NDArray[np.int64],
 ) -> FloatArray:
-    """(k, 2n): positions, then velocities, of the model's own coordinates just before the samples `at` (k,), simulated
-    from rest; coordinates that effects add are left out."""
+    """(k, 2n): positions, then velocities, of the model's own coordinates just before the samples `sample_indices`
+    (k,), simulated from rest; coordinates that effects add are left out."""
     bodies, driven, steps = _drive_bodies(model, commands, sampled, effects)
-    states = simulate_states(bodies, driven, (len(commands), steps), 1 / (sampled[0] * steps), at)
-    n, known = bodies.structure.coordinates, model.coordinates
-    return np.hstack([states[:, :known], states[:, n : n + known]])
+    states = simulate_states(bodies, driven, (len(commands), steps), 1 / (sampled[0] * steps), sample_indices)
+    n, model_coordinates = bodies.structure.coordinates, model.coordinates
+    return np.hstack([states[:, :model_coordinates], states[:, n : n + model_coordinates]])
 
 
 def _drive_bodies(
     model: MechanicalModel, commands: FloatArray, sampled: tuple[float, Hold], effects: Sequence[PlacedEffect]
 ) -> tuple[Bodies, ActuatorForce, int]:
     """The bodies, the actuator force that drives them, and the number of integration steps per sample."""
-    bodies, (rate_hz, hold) = bodies_of(model, effects), sampled
+    bodies, (rate_hz, hold) = build_bodies(model, effects), sampled
     moves = moves_between_samples(model, effects, hold)
-    steps = max((acts.steps for acts in bodies.acts), default=STEPS if moves else 1)
+    steps = max((action.steps for action in bodies.actions), default=STEPS if moves else 1)
     fine = steps if moves else 1
     return (
         bodies,
@@ -142,65 +141,75 @@ def _simulate_motion(
 ) -> SimulationResult:
     """The simulated motion, with the true response before the sensor. axes: whether to output the driven axes."""
     bodies, driven, steps = _drive_bodies(model, commands, sampled, effects)
-    looked, added = simulate_bodies(bodies, driven, (len(commands), steps), 1 / (sampled[0] * steps), axes, restarts)
+    motion, added = simulate_bodies(bodies, driven, (len(commands), steps), 1 / (sampled[0] * steps), axes, restarts)
     m, p, ports = bodies.axes if axes else 0, bodies.structure.outputs, bodies.ports.shape[1]
-    rows = looked[:, 3 * ports if axes else 0 :]
-    return SimulationResult(rows[:, :p], rows[:, p:], looked[:, :m], looked[:, ports : ports + m], added[:, :m])
+    rows = motion[:, 3 * ports if axes else 0 :]
+    return SimulationResult(rows[:, :p], rows[:, p:], motion[:, :m], motion[:, ports : ports + m], added[:, :m])
 
 
 def _apply_sensor(
     model: MechanicalModel,
-    played: SimulationResult,
+    motion: SimulationResult,
     sample_rate_hz: float,
     effects: Sequence[PlacedEffect],
     measurement: Measurement | None,
 ) -> SimulationResult:
     """The result as the sensor reads it: low pass of each channel, effects in the order of their stages, range."""
-    on_response = [(placed.effect.acts, placed) for placed in effects if isinstance(placed.effect.acts, OnResponse)]
+    on_response = [(placed.effect.action, placed) for placed in effects if isinstance(placed.effect.action, OnResponse)]
     on_response.sort(key=lambda item: item[0].stage)
-    bandwidths = _bandwidths(model, played.response.shape[1], on_response)
-    response, position = _low_pass_channels(played.response, sample_rate_hz, bandwidths), played.position
-    for acts, placed in on_response:
-        before = response
-        if measurement is not None and acts.given is not None:
-            response = acts.given(response, measurement.response, measurement.noise, placed.sites, placed.values)
+    bandwidths = _bandwidths(model, motion.response.shape[1], on_response)
+    response, position = _low_pass_channels(motion.response, sample_rate_hz, bandwidths), motion.position
+    for action, placed in on_response:
+        previous_response = response
+        if measurement is not None and action.conditioned is not None:
+            response = action.conditioned(
+                response, measurement.response, measurement.noise, placed.sites, placed.values
+            )
         else:
-            response = _change_response(acts, placed, response, sample_rate_hz, measurement)
-        if acts.on_position is not None:
-            position = acts.on_position(position, sample_rate_hz, placed.values)
-        if measurement is not None and measurement.position is not None and acts.given_position is not None:
-            position = acts.given_position(before, response, position, measurement.position)
+            response = _change_response(action, placed, response, sample_rate_hz, measurement)
+        if action.on_position is not None:
+            position = action.on_position(position, sample_rate_hz, placed.values)
+        if measurement is not None and measurement.position is not None and action.conditioned_position is not None:
+            position = action.conditioned_position(previous_response, response, position, measurement.position)
     response = clip_to_range(response, model.sensor.range)
-    return SimulationResult(response, position, played.axis_position, played.axis_velocity, played.axis_force)
+    return SimulationResult(response, position, motion.axis_position, motion.axis_velocity, motion.axis_force)
 
 
 def _change_response(
-    acts: OnResponse, placed: PlacedEffect, response: FloatArray, sample_rate_hz: float, measurement: Measurement | None
+    action: OnResponse,
+    placed: PlacedEffect,
+    response: FloatArray,
+    sample_rate_hz: float,
+    measurement: Measurement | None,
 ) -> FloatArray:
     """The response after an effect. For an effect that depends on the recording's length, an excerpt is first extended
     to that length by its last sample."""
-    left_out = measurement.whole - len(response) if acts.of_whole and measurement is not None else 0
-    if left_out <= 0:
-        return acts.change(response, sample_rate_hz, placed.sites, placed.values)
-    whole = np.pad(response, ((0, left_out), (0, 0)), mode="edge")
-    return acts.change(whole, sample_rate_hz, placed.sites, placed.values)[: len(response)]
+    missing_samples = (
+        measurement.full_length - len(response) if action.needs_full_length and measurement is not None else 0
+    )
+    if missing_samples <= 0:
+        return action.change(response, sample_rate_hz, placed.sites, placed.values)
+    full_response = np.pad(response, ((0, missing_samples), (0, 0)), mode="edge")
+    return action.change(full_response, sample_rate_hz, placed.sites, placed.values)[: len(response)]
 
 
 def _low_pass_channels(response: FloatArray, sample_rate_hz: float, bandwidths_hz: Sequence[float]) -> FloatArray:
     """The response (n, p) through the low pass of each channel."""
     if len(set(bandwidths_hz)) == 1:
         return low_pass(response, sample_rate_hz, bandwidths_hz[0])
-    each = [low_pass(row, sample_rate_hz, hz) for row, hz in zip(response.T, bandwidths_hz, strict=True)]
-    return np.stack(each, axis=1)
+    filtered = [
+        low_pass(row, sample_rate_hz, bandwidth_hz) for row, bandwidth_hz in zip(response.T, bandwidths_hz, strict=True)
+    ]
+    return np.stack(filtered, axis=1)
 
 
 def _bandwidths(
     model: MechanicalModel, channels: int, on_response: Sequence[tuple[OnResponse, PlacedEffect]]
 ) -> list[float]:
     """Bandwidth in Hz of each channel's low pass: that of the model, replaced by effects; 0 = no low pass."""
-    found = [model.sensor.bandwidth_hz] * channels
-    for acts, placed in on_response:
-        for channel in placed.sites if acts.bandwidth_hz is not None else ():
-            assert acts.bandwidth_hz is not None
-            found[channel] = acts.bandwidth_hz(found[channel], placed.values)
-    return found
+    bandwidths_hz = [model.sensor.bandwidth_hz] * channels
+    for action, placed in on_response:
+        for channel in placed.sites if action.bandwidth_hz is not None else ():
+            assert action.bandwidth_hz is not None
+            bandwidths_hz[channel] = action.bandwidth_hz(bandwidths_hz[channel], placed.values)
+    return bandwidths_hz

@@ -10,6 +10,8 @@ on the state within the step: each force law is evaluated at the position, veloc
 corrected for its own effect (`per_newton`), step by step in compiled code (`mechanism_kernel`). Many samples are
 stepped per call, because a call of compiled code costs as much as many steps.
 
+Sizes: n coordinates, m commands, s states in modal form, r ports with forces, L samples.
+
 Reference: Van Loan, IEEE Trans. Autom. Control 23:395 (1978) (integrals of the matrix exponential).
 """
 
@@ -18,9 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.effects.simulation.instant import LENGTH, SEEN
+from equalizer.effects.simulation.instant import BLOCK_SIZE, LENGTH
 from equalizer.effects.simulation.linear_step_kernel import advance_unforced
-from equalizer.effects.simulation.mechanism_kernel import OWN_ROWS, PORT_ROWS, Integers, step_mechanism
+from equalizer.effects.simulation.mechanism_kernel import FORCE_ROWS, PORT_ROWS, Integers, step_mechanism
 from equalizer.effects.simulation.modal_form import step_form
 from equalizer.plant.linear_simulation import LinearSteps
 from equalizer.signals.signal import FloatArray
@@ -46,7 +48,7 @@ class Forces:
     """Initial state variables of all forces, one after another."""
     acceleration: bool
     """Whether a law reads accelerations."""
-    sees: bool
+    reads_all_axes: bool
     """Whether a law reads the motion of all axes and the commands."""
 
 
@@ -56,74 +58,77 @@ class Stepping:
 
     rows: int
     """Rows per sample of the drive (inputs columns) and of the array that `run` takes."""
-    into: FloatArray
-    """(inputs, s + r): from a row of the drive to its contributions to the state, and to the accelerations of the ports
-    with forces."""
+    input_matrix: FloatArray
+    """(inputs, s + r): from a row of the drive to its contributions to the state, and to the accelerations of the r
+    ports with forces."""
     outward: FloatArray
     """(2n, s): from the stepped coordinates to positions and velocities."""
     block: int
     """Samples stepped per call."""
     run: Callable[[FloatArray, int], None]
-    """Steps one block, in succession from rest. Arguments: rows of the block (block rows, s + r ...), index of its
-    first sample. On entry a row holds the contributions of its step; on return, the first row of each sample holds the
-    state and the forces just before the sample."""
-    begin: Callable[[FloatArray], None]
-    """Continues from the given state (2n,) at the next block."""
+    """Advances the state by one block; the first block starts from rest, each later one where the previous one ended.
+    Arguments: rows of the block (block * rows, at least s + r), and the index of its first sample. On entry a row holds
+    the contributions of its step; on return, the first row of each sample holds the state and the forces just before
+    the sample."""
+    set_state: Callable[[FloatArray], None]
+    """Sets the state (2n,), positions then velocities, from which the next block starts."""
 
 
 def step_without_forces(linear: LinearSteps, steps: int, stride: int) -> Stepping:
     """Stepping without motion-dependent forces, a whole sample at once. steps: steps of `linear` per sample; stride:
     commands per sample, 1 where a command is held over all steps."""
-    pushes = [linear.by_command]
+    responses = [linear.by_command]
     for _ in range(steps - 1):
-        pushes.append(linear.advance @ pushes[-1])
-    by_command = np.hstack(pushes[::-1]) if stride > 1 else np.sum(pushes, axis=0)
+        responses.append(linear.advance @ responses[-1])
+    by_command = np.hstack(responses[::-1]) if stride > 1 else np.sum(responses, axis=0)
     form = step_form(np.linalg.matrix_power(linear.advance, steps))
     state = np.zeros(len(form.inward))
 
     def run(rows: FloatArray, first: int) -> None:
         advance_unforced(form.advance, rows, state)
 
-    def begin(from_: FloatArray) -> None:
-        state[:] = form.inward @ from_
+    def set_state(initial_state: FloatArray) -> None:
+        state[:] = form.inward @ initial_state
 
-    return Stepping(1, (form.inward @ by_command).T, form.outward, BLOCK, run, begin)
+    return Stepping(1, (form.inward @ by_command).T, form.outward, BLOCK, run, set_state)
 
 
-def step_with_forces(linear: LinearSteps, forces: Forces, steps: int, stride: int, commanded: FloatArray) -> Stepping:
-    """Stepping under motion-dependent forces. steps, stride: as above. commanded: (n * stride, m), the commands, for
-    laws that read them."""
+def step_with_forces(linear: LinearSteps, forces: Forces, steps: int, stride: int, commands: FloatArray) -> Stepping:
+    """Stepping under motion-dependent forces. steps: steps of `linear` per sample; stride: commands per sample, 1 where
+    a command is held over all steps. commands: (L * stride, m), for laws that read them."""
     form = step_form(linear.advance)
-    where, r = np.array(forces.ports), linear.by_axis_force.shape[1]
-    output = linear.motion[np.concatenate([where, r + where, 2 * r + where])]
-    by_force = linear.by_axis_force[:, where]
+    port_indices, axis_count = np.array(forces.ports), linear.by_axis_force.shape[1]
+    output = linear.motion[np.concatenate([port_indices, axis_count + port_indices, 2 * axis_count + port_indices])]
+    by_force = linear.by_axis_force[:, port_indices]
     per_newton = output @ by_force
-    per_newton[2 * len(where) :] = linear.motion_by_axis_force[2 * r + where][:, where]
-    asked = output if forces.acceleration else output[: 2 * len(where)]
-    outward, inward = asked @ form.outward, (form.inward @ by_force).T
-    step = (form.advance, _contiguous(outward), _contiguous(inward), _contiguous(per_newton.T))
-    into = np.hstack([(form.inward @ linear.by_command).T, linear.motion_by_command[2 * r + where].T])
-    commands = np.ascontiguousarray(commanded, dtype=np.float64) if forces.sees else np.empty((0, 0))
-    state, ports, memory = np.zeros(len(form.inward)), np.zeros((PORT_ROWS, len(where))), forces.memory.copy()
+    per_newton[2 * len(port_indices) :] = linear.motion_by_axis_force[2 * axis_count + port_indices][:, port_indices]
+    law_output = output if forces.acceleration else output[: 2 * len(port_indices)]
+    outward, inward = law_output @ form.outward, (form.inward @ by_force).T
+    step_matrices = (form.advance, _contiguous(outward), _contiguous(inward), _contiguous(per_newton.T))
+    input_matrix = np.hstack(
+        [(form.inward @ linear.by_command).T, linear.motion_by_command[2 * axis_count + port_indices].T]
+    )
+    read_commands = np.ascontiguousarray(commands, dtype=np.float64) if forces.reads_all_axes else np.empty((0, 0))
+    state, ports, memory = np.zeros(len(form.inward)), np.zeros((PORT_ROWS, len(port_indices))), forces.memory.copy()
 
-    own = np.zeros((OWN_ROWS, len(forces.places)))
-    at = np.zeros(LENGTH + SEEN * len(where) if forces.sees else LENGTH)
-    scratch = np.zeros(len(state) + len(where)), at, own, np.zeros_like(memory)
+    force_history = np.zeros((FORCE_ROWS, len(forces.places)))
+    at = np.zeros(LENGTH + BLOCK_SIZE * len(port_indices) if forces.reads_all_axes else LENGTH)
+    scratch = np.zeros(len(state) + len(port_indices)), at, force_history, np.zeros_like(memory)
 
     def run(rows: FloatArray, first: int) -> None:
         step_mechanism(
-            forces.laws, forces.places, forces.parameters, memory, step, rows,
-            commands[first * stride : first * stride + len(rows)], ports, state, (steps, stride, first),
+            forces.laws, forces.places, forces.parameters, memory, step_matrices, rows,
+            read_commands[first * stride : first * stride + len(rows)], ports, state, (steps, stride, first),
             linear.step_s, *scratch,
         )  # fmt: skip
 
-    def begin(from_: FloatArray) -> None:
-        state[:] = form.inward @ from_
+    def set_state(initial_state: FloatArray) -> None:
+        state[:] = form.inward @ initial_state
         # No extrapolation from the forces before the restart. The laws' memory is kept.
-        own[:] = 0.0
-        ports[:2] = (output[: 2 * len(where)] @ from_).reshape(2, -1)
+        force_history[:] = 0.0
+        ports[:2] = (output[: 2 * len(port_indices)] @ initial_state).reshape(2, -1)
 
-    return Stepping(stride, into, form.outward, BLOCK_UNDER_FORCES, run, begin)
+    return Stepping(stride, input_matrix, form.outward, BLOCK_UNDER_FORCES, run, set_state)
 
 
 def _contiguous(matrix: FloatArray) -> FloatArray:

@@ -24,31 +24,31 @@ from equalizer.signals.spectral_density import cross_density, spectral_density
 
 WINDOW_S = 2.0
 """Window of the spectra (s): lines 0.5 Hz apart."""
-DRIVEN = 1e-4
+LEAST_POWER_SHARE = 1e-4
 """Least power of a line that is used, relative to the largest line. By hand."""
-CHANCE = 0.02
+CHANCE_SHARE = 0.02
 """Share of the missing force's power that the best of all trials explains by chance. By hand."""
-DEPENDENT = 1e-9
+RANK_TOLERANCE = 1e-9
 """Relative singular value, or norm, below which vectors count as linearly dependent (rounding)."""
 
 
 def with_oscillator(
-    model: MechanicalModel, along: FloatArray, mass: float, damping: float, stiffness: float
+    model: MechanicalModel, direction: FloatArray, mass: float, damping: float, stiffness: float
 ) -> MechanicalModel:
     """The model with an oscillator as its last coordinate; unchanged for mass 0 or below.
 
-    along: (n,), direction in the model's coordinates along which it is attached. mass, damping, stiffness: SI.
+    direction: (n,), direction in the model's coordinates along which it is attached. mass, damping, stiffness: SI.
     """
     if mass <= 0:
         return model
-    tie = np.append(-along, 1.0)
-    grown = {name: np.pad(getattr(model, name), ((0, 1), (0, 1))) for name in ("mass", "damping", "stiffness")}
-    grown["mass"][-1, -1] = mass
+    relative_direction = np.append(-direction, 1.0)
+    matrices = {name: np.pad(getattr(model, name), ((0, 1), (0, 1))) for name in ("mass", "damping", "stiffness")}
+    matrices["mass"][-1, -1] = mass
     return replace(
         model,
-        mass=grown["mass"],
-        damping=grown["damping"] + damping * np.outer(tie, tie),
-        stiffness=grown["stiffness"] + stiffness * np.outer(tie, tie),
+        mass=matrices["mass"],
+        damping=matrices["damping"] + damping * np.outer(relative_direction, relative_direction),
+        stiffness=matrices["stiffness"] + stiffness * np.outer(relative_direction, relative_direction),
         input=np.pad(model.input, ((0, 1), (0, 0))),
         output=np.pad(model.output, ((0, 0), (0, 1))),
     )
@@ -68,15 +68,15 @@ class MissingForceSpectra:
 
 def missing_force_spectra(evidence: Evidence, axis: int) -> MissingForceSpectra:
     """Welch spectra of the acceleration of an axis and of the missing force at all axes, at the lines below 0.45 of the
-    sample rate where the acceleration has more than `DRIVEN` of its largest power."""
+    sample rate where the acceleration has more than `LEAST_POWER_SHARE` of its largest power."""
     rate, used = evidence.sample_rate_hz, evidence.used[:, None]
     acceleration = np.gradient(evidence.axis_velocity, 1 / rate, axis=0) * used
     window = min(int(WINDOW_S * rate), len(used))
-    own, force = acceleration[:, axis], (evidence.axis_force * used).T
-    frequency, power = spectral_density(own, rate, window)
-    cross = np.array([cross_density(own, row, rate, window)[1] for row in force]).T
-    inside = (frequency > 0) & (frequency < 0.45 * rate) & (power > DRIVEN * power.max())
-    return MissingForceSpectra(frequency[inside], power[inside], cross[inside])
+    axis_acceleration, force = acceleration[:, axis], (evidence.axis_force * used).T
+    frequency, power = spectral_density(axis_acceleration, rate, window)
+    cross = np.array([cross_density(axis_acceleration, row, rate, window)[1] for row in force]).T
+    selected = (frequency > 0) & (frequency < 0.45 * rate) & (power > LEAST_POWER_SHARE * power.max())
+    return MissingForceSpectra(frequency[selected], power[selected], cross[selected])
 
 
 def oscillator_reaction(frequency_hz: FloatArray, natural_hz: float | FloatArray, damping_ratio: float) -> ComplexArray:
@@ -95,7 +95,7 @@ class AttachedOscillator:
     damping_ratio: float
     mass: float
     """kg; kg m² on a rotational axis."""
-    explained: float
+    explained_share: float
     """Share, 0 to 1, of the missing force's power on its axis that it explains beyond the model's linear parameters."""
     by_axis: FloatArray
     """(m,): its force on each axis relative to that on its own axis."""
@@ -104,7 +104,7 @@ class AttachedOscillator:
 def _orthonormal_basis(columns: FloatArray) -> FloatArray:
     """Orthonormal basis of the columns' span."""
     directions, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
-    return np.asarray(directions[:, sizes > DEPENDENT * sizes[0]])
+    return np.asarray(directions[:, sizes > RANK_TOLERANCE * sizes[0]])
 
 
 def likely_oscillators(
@@ -112,9 +112,8 @@ def likely_oscillators(
 ) -> list[AttachedOscillator]:
     """An oscillator for each pair of a damping ratio and a natural frequency (Hz), the one that explains most first.
 
-    Left out are those of negative mass, those that explain no more than `CHANCE`, and natural frequencies above the
-    highest line. axis: index of the axis to which they are attached.
-    """
+    Left out are those of negative mass, those that explain no more than `CHANCE_SHARE`, and natural frequencies above
+    the highest line. axis: index of the axis to which they are attached."""
     if not len(missing.frequency_hz):
         return []
     root = np.sqrt(np.maximum(missing.power, np.finfo(float).tiny))
@@ -125,28 +124,35 @@ def likely_oscillators(
     basis = _orthonormal_basis(np.vstack([linear.real, linear.imag]))
     unexplained = target - basis @ (basis.T @ target)
     power = max(float(unexplained[:, axis] @ unexplained[:, axis]), np.finfo(float).tiny)
-    natural = np.array([item for item in natural_hz if item < missing.frequency_hz[-1]])
-    found = []
+    trial_frequencies_hz = np.array([value for value in natural_hz if value < missing.frequency_hz[-1]])
+    oscillators = []
     for ratio in damping_ratios:
-        shape = oscillator_reaction(missing.frequency_hz[:, None], natural, ratio) * root[:, None]
+        shape = oscillator_reaction(missing.frequency_hz[:, None], trial_frequencies_hz, ratio) * root[:, None]
         shapes = np.vstack([shape.real, shape.imag])
         # Projected orthogonally to the linear terms (Frisch-Waugh): each shape can then be fitted by itself.
-        own = shapes - basis @ (basis.T @ shapes)
-        size = np.einsum("lt,lt->t", own, own)
-        independent = size > DEPENDENT**2 * np.einsum("lt,lt->t", shapes, shapes)
-        reactions = own[:, independent].T @ unexplained
-        for each, reaction, square in zip(
-            natural[independent].tolist(), reactions, size[independent].tolist(), strict=True
+        projected = shapes - basis @ (basis.T @ shapes)
+        square_norms = np.einsum("lt,lt->t", projected, projected)
+        independent = square_norms > RANK_TOLERANCE**2 * np.einsum("lt,lt->t", shapes, shapes)
+        reactions = projected[:, independent].T @ unexplained
+        for frequency_hz, reaction, square_norm in zip(
+            trial_frequencies_hz[independent].tolist(), reactions, square_norms[independent].tolist(), strict=True
         ):
             if reaction[axis] > 0:
-                explained = float(reaction[axis]) ** 2 / square / power
+                explained = float(reaction[axis]) ** 2 / square_norm / power
                 by_axis = reaction / reaction[axis]
-                found.append(AttachedOscillator(each, ratio, float(reaction[axis]) / square, explained, by_axis))
-    return sorted((item for item in found if item.explained > CHANCE), key=lambda item: -item.explained)
+                oscillators.append(
+                    AttachedOscillator(frequency_hz, ratio, float(reaction[axis]) / square_norm, explained, by_axis)
+                )
+    return sorted(
+        (value for value in oscillators if value.explained_share > CHANCE_SHARE),
+        key=lambda value: -value.explained_share,
+    )
 
 
-def subtract_oscillator(missing: MissingForceSpectra, each: AttachedOscillator) -> MissingForceSpectra:
+def subtract_oscillator(missing: MissingForceSpectra, oscillator: AttachedOscillator) -> MissingForceSpectra:
     """The spectra with the force of an oscillator subtracted from the missing force."""
-    relative = oscillator_reaction(missing.frequency_hz, each.natural_hz, each.damping_ratio)
-    reaction = missing.power * each.mass * relative
-    return MissingForceSpectra(missing.frequency_hz, missing.power, missing.cross - reaction[:, None] * each.by_axis)
+    relative = oscillator_reaction(missing.frequency_hz, oscillator.natural_hz, oscillator.damping_ratio)
+    reaction = missing.power * oscillator.mass * relative
+    return MissingForceSpectra(
+        missing.frequency_hz, missing.power, missing.cross - reaction[:, None] * oscillator.by_axis
+    )

@@ -17,7 +17,7 @@ LEAST_SHARE = 1e-3
 """Least share of the missing force's sum of squares that a value must explain to become a starting value."""
 SHIFTS = (0, 1)
 """Delays of the effect's force that are tried, in samples."""
-CLOSE = 3e-3
+LOG_TOLERANCE = 3e-3
 """Relative tolerance of the parameter in the golden-section search."""
 GOLDEN = (5**0.5 - 1) / 2
 """Golden ratio less 1: the share by which golden-section search shrinks its interval."""
@@ -41,17 +41,17 @@ def likeliest_value(
     forces = [_force_and_basis(evidence, axis, nonlinear) for axis in axes]
     used = np.flatnonzero(evidence.used > 0)
 
-    def left(value: float) -> float:
+    def remaining_misfit(value: float) -> float:
         total = 0.0
         for axis, (force, basis) in zip(axes, forces, strict=True):
             commanded = evidence.command[:, axis]
-            added = change(commanded, step_s, value) - commanded
-            total += min(_misfit(force - np.roll(added, shift)[used], basis) for shift in SHIFTS)
+            change_of_force = change(commanded, step_s, value) - commanded
+            total += min(_misfit(force - np.roll(change_of_force, shift)[used], basis) for shift in SHIFTS)
         return total
 
     if not len(grid):
         return None
-    best, misfit = best_on_grid(left, grid)
+    best, misfit = best_on_grid(remaining_misfit, grid)
     return best if misfit < (1 - LEAST_SHARE) * sum(_misfit(force, basis) for force, basis in forces) else None
 
 
@@ -59,7 +59,7 @@ def fit_square_law(evidence: Evidence, site: int) -> tuple[float, float] | None:
     """(square, reference in N) of `square_law_force` by regression of the missing force on u and u |u|; None where the
     quadratic term explains too little. Coefficients are averaged over the axes of the site."""
     axes = range(evidence.command.shape[1]) if site == ALL_SITES else (site,)
-    used, linear, squared, gained = np.flatnonzero(evidence.used > 0), [], [], 0.0
+    used, linear, squared, explained_share = np.flatnonzero(evidence.used > 0), [], [], 0.0
     for axis in axes:
         force, basis = _force_and_basis(evidence, axis, True)
         u = evidence.command[used, axis]
@@ -70,17 +70,20 @@ def fit_square_law(evidence: Evidence, site: int) -> tuple[float, float] | None:
         linear.append(1 + float(weights[0]))
         squared.append(float(weights[1]))
         # Sums of squares without and with the quadratic term.
-        none, left = (float(np.sum((force - rows[:, : len(part)] @ part) ** 2)) for part in (gain, weights))
-        gained += (none - left) / max(none, 1e-300) / len(axes)
+        linear_misfit, square_misfit = (
+            float(np.sum((force - rows[:, : len(coefficients)] @ coefficients) ** 2))
+            for coefficients in (gain, weights)
+        )
+        explained_share += (linear_misfit - square_misfit) / max(linear_misfit, 1e-300) / len(axes)
     first, second = float(np.mean(linear)), float(np.mean(squared))
     peak = float(np.abs(evidence.command[:, list(axes)]).max(initial=0.0))
-    whole = first + second * peak
-    if gained < LEAST_SHARE or whole <= 0:
+    peak_force = first + second * peak
+    if explained_share < LEAST_SHARE or peak_force <= 0:
         return None
     # Force and command agree at the reference. If that lies outside the range of commands, the gain is wrong as well;
     # the peak command is then the reference.
-    agrees = (1 - first) / second if second else 0.0
-    share, reference = (1 - first, agrees) if 0 < agrees < 10 * peak else (second * peak / whole, peak)
+    equal_force = (1 - first) / second if second else 0.0
+    share, reference = (1 - first, equal_force) if 0 < equal_force < 10 * peak else (second * peak / peak_force, peak)
     return (share, reference) if share and -1 <= share <= 1 else None
 
 
@@ -89,24 +92,24 @@ def best_on_grid(misfit: Callable[[float], float], grid: Sequence[float]) -> tup
     values = [misfit(value) for value in grid]
     best = int(np.argmin(values))
     low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    finer = _golden_section(misfit, float(np.log(low)), float(np.log(high)))
-    return finer if finer[1] < values[best] else (grid[best], values[best])
+    refined = _golden_section(misfit, float(np.log(low)), float(np.log(high)))
+    return refined if refined[1] < values[best] else (grid[best], values[best])
 
 
 def _golden_section(misfit: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
     """Minimum between two values, given by their logarithms, and its misfit: golden-section search (Kiefer 1953, Proc.
     AMS 4:502)."""
-    places = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
-    values = [misfit(float(np.exp(place))) for place in places]
-    while high - low > 2 * CLOSE:
+    points = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
+    values = [misfit(float(np.exp(point))) for point in points]
+    while high - low > 2 * LOG_TOLERANCE:
         if values[0] <= values[1]:
-            high, added = places[1], places[1] - GOLDEN * (places[1] - low)
-            places, values = [added, places[0]], [misfit(float(np.exp(added))), values[0]]
+            high, new_point = points[1], points[1] - GOLDEN * (points[1] - low)
+            points, values = [new_point, points[0]], [misfit(float(np.exp(new_point))), values[0]]
         else:
-            low, added = places[0], places[0] + GOLDEN * (high - places[0])
-            places, values = [places[1], added], [values[1], misfit(float(np.exp(added)))]
+            low, new_point = points[0], points[0] + GOLDEN * (high - points[0])
+            points, values = [points[1], new_point], [values[1], misfit(float(np.exp(new_point)))]
     best = int(np.argmin(values))
-    return float(np.exp(places[best])), values[best]
+    return float(np.exp(points[best])), values[best]
 
 
 def grid_of_peaks(evidence: Evidence, site: int, count: int = 12) -> list[float]:
@@ -127,7 +130,7 @@ def _force_and_basis(evidence: Evidence, axis: int, nonlinear: bool) -> tuple[Fl
     return force, np.linalg.qr(motion / np.maximum(np.linalg.norm(motion, axis=0), np.finfo(float).tiny))[0]
 
 
-def _misfit(rest: FloatArray, basis: FloatArray) -> float:
-    """Sum of squares of `rest` (k,) after projection on an orthonormal basis (k, columns)."""
-    along = basis.T @ rest
-    return float(rest @ rest - along @ along)
+def _misfit(force: FloatArray, basis: FloatArray) -> float:
+    """Sum of squares of `force` (k,) after projection on an orthonormal basis (k, columns)."""
+    projection = basis.T @ force
+    return float(force @ force - projection @ projection)

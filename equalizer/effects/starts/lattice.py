@@ -9,13 +9,13 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 
-CLOSE = 0.02
+LATTICE_TOLERANCE = 0.02
 """Largest deviation of a value from the lattice, in steps. Rounding to single precision causes less."""
 NEARLY_ALL = 0.999
 """Share of the values that must exceed this for a lattice."""
 LEAST_VALUES, MOST_VALUES = 3, 0.2
 """Least number of occupied lattice points, and the largest, as a share of the number of samples."""
-PEAK = 12.0
+PEAK_RATIO = 12.0
 """Least ratio of a peak in the histogram's spectrum to the median around it."""
 BIN_SHARE = 0.2
 """Width of a bin of the histogram, relative to the rms noise."""
@@ -26,10 +26,10 @@ def lattice_offset(values: FloatArray, step: float) -> float | None:
     where the values do not lie on such a lattice."""
     if step <= 0:
         return None
-    turn = np.exp(2j * np.pi * values / step)
-    offset = float(np.angle(turn.mean()) / (2 * np.pi) * step)
-    away = np.abs((values - offset) / step - np.round((values - offset) / step))
-    return offset if float(np.mean(away < CLOSE)) > NEARLY_ALL else None
+    phasors = np.exp(2j * np.pi * values / step)
+    offset = float(np.angle(phasors.mean()) / (2 * np.pi) * step)
+    distances = np.abs((values - offset) / step - np.round((values - offset) / step))
+    return offset if float(np.mean(distances < LATTICE_TOLERANCE)) > NEARLY_ALL else None
 
 
 def lattice_step(values: FloatArray) -> float | None:
@@ -54,11 +54,17 @@ def lattice_step(values: FloatArray) -> float | None:
     return step if lattice_offset(values, step) is not None else None
 
 
-def confirm_lattice_step(values: FloatArray, other: float) -> float:
-    """The step of the lattice on which values (n,) lie; 0 = no lattice. other: a step to test where no lattice is found
-    from the values alone, for instance because there are too many different values."""
-    own = lattice_step(values)
-    return own if own is not None else other if lattice_offset(values, other) is not None else 0.0
+def confirm_lattice_step(values: FloatArray, candidate_step: float) -> float:
+    """The step of the lattice on which values (n,) lie; 0 = no lattice. candidate_step: a step to test where no lattice
+    is found from the values alone, for instance because there are too many different values."""
+    detected_step = lattice_step(values)
+    return (
+        detected_step
+        if detected_step is not None
+        else candidate_step
+        if lattice_offset(values, candidate_step) is not None
+        else 0.0
+    )
 
 
 def staircase_step(values: FloatArray, noise: float) -> float | None:
@@ -75,11 +81,13 @@ def staircase_step(values: FloatArray, noise: float) -> float | None:
     per_unit = np.fft.rfftfreq(padded, width)
     # Slow components belong to the distribution of the response; noise smooths ripples shorter than about 3 times its
     # rms.
-    inside = (per_unit > 10 / span) & (per_unit < 0.3 / noise)
-    if not inside.any():
+    in_band = (per_unit > 10 / span) & (per_unit < 0.3 / noise)
+    if not in_band.any():
         return None
-    top = int(np.flatnonzero(inside)[np.argmax(spectrum[inside])])
-    around = (np.abs(per_unit - per_unit[top]) < 20 / span) & inside & (np.abs(per_unit - per_unit[top]) > 2 / span)
-    if not around.any() or spectrum[top] < PEAK * float(np.median(spectrum[around])):
+    peak = int(np.flatnonzero(in_band)[np.argmax(spectrum[in_band])])
+    neighbours = (
+        (np.abs(per_unit - per_unit[peak]) < 20 / span) & in_band & (np.abs(per_unit - per_unit[peak]) > 2 / span)
+    )
+    if not neighbours.any() or spectrum[peak] < PEAK_RATIO * float(np.median(spectrum[neighbours])):
         return None
-    return float(1 / per_unit[top])
+    return float(1 / per_unit[peak])

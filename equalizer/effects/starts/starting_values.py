@@ -29,7 +29,7 @@ class AxisMotion:
     force: FloatArray
     """The missing force."""
 
-    def where(self, keep: npt.NDArray[np.bool_]) -> "AxisMotion":
+    def select(self, keep: npt.NDArray[np.bool_]) -> "AxisMotion":
         """The samples where `keep` (n,) is true; their times need not be evenly spaced."""
         return AxisMotion(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
@@ -40,7 +40,7 @@ class LawFit:
 
     strengths: FloatArray
     """(k,): factor of each law."""
-    explained: float
+    explained_share: float
     """Power that the laws explain, relative to that of the force after the nuisance regressors were projected out."""
 
 
@@ -49,17 +49,17 @@ def axis_motion(evidence: Evidence, axis: int) -> AxisMotion:
     central differences of velocity."""
     time_s = np.arange(len(evidence.command)) / evidence.sample_rate_hz
     acceleration = np.gradient(evidence.axis_velocity[:, axis], 1 / evidence.sample_rate_hz)
-    every = AxisMotion(
+    all_samples = AxisMotion(
         time_s, evidence.axis_position[:, axis], evidence.axis_velocity[:, axis], acceleration,
         evidence.axis_force[:, axis],
     )  # fmt: skip
-    return every.where(evidence.used > 0)
+    return all_samples.select(evidence.used > 0)
 
 
 def select_sliding_motion(evidence: Evidence, axis: int) -> AxisMotion:
     """Motion of an axis at the samples whose speed exceeds `SLOW` times its rms velocity."""
     motion = axis_motion(evidence, axis)
-    return motion.where(np.abs(motion.velocity) > SLOW * np.sqrt(np.mean(motion.velocity**2)))
+    return motion.select(np.abs(motion.velocity) > SLOW * np.sqrt(np.mean(motion.velocity**2)))
 
 
 def linear_part(motion: AxisMotion, constant: bool = True) -> FloatArray:
@@ -74,15 +74,15 @@ class PartialRegression:
     def __init__(self, force: FloatArray, nuisances: FloatArray) -> None:
         """force: (n,); nuisances: (n, k), regressors to be projected out. Linearly dependent ones are permitted."""
         scale = np.linalg.norm(nuisances, axis=0)
-        left, sizes, _ = np.linalg.svd(nuisances / np.where(scale > 0, scale, 1.0), full_matrices=False)
-        self._known = left[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), np.finfo(float).tiny)]
+        left_vectors, sizes, _ = np.linalg.svd(nuisances / np.where(scale > 0, scale, 1.0), full_matrices=False)
+        self._basis = left_vectors[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), np.finfo(float).tiny)]
         self.force = self._residual_without(force)
         """(n,): residual of the force after projection on the nuisance regressors."""
         self._power = max(float(self.force @ self.force), np.finfo(float).tiny)
 
     def _residual_without(self, shapes: FloatArray) -> FloatArray:
         """Component of shapes (n,) or (n, k) orthogonal to the nuisance regressors."""
-        return np.asarray(shapes - self._known @ (self._known.T @ shapes))
+        return np.asarray(shapes - self._basis @ (self._basis.T @ shapes))
 
     def fit(self, *laws: FloatArray) -> LawFit:
         """Least-squares fit of laws to the force, with the nuisance regressors projected out of both. laws: (n,) each,
@@ -95,20 +95,20 @@ class PartialRegression:
         return LawFit(strengths / np.where(size > 0, size, 1.0), float(products @ strengths) / self._power)
 
 
-def regress_beside_linear(motion: AxisMotion, constant: bool = True) -> PartialRegression:
+def regress_out_linear_terms(motion: AxisMotion, constant: bool = True) -> PartialRegression:
     """Regression of the missing force with the regressors of `linear_part` projected out."""
     return PartialRegression(motion.force, linear_part(motion, constant))
 
 
 def best_trial(
-    beside: PartialRegression, trials: Sequence[float], laws: Callable[[float], tuple[FloatArray, ...]]
+    regression: PartialRegression, trials: Sequence[float], laws: Callable[[float], tuple[FloatArray, ...]]
 ) -> tuple[float, LawFit]:
     """The trial value of a nonlinear parameter whose laws explain most, and its fit. laws: from a trial value to (n,)
     each. Raises ValueError without trials."""
-    fits = [(trial, beside.fit(*laws(trial))) for trial in trials]
-    return max(fits, key=lambda item: item[1].explained)
+    fits = [(trial, regression.fit(*laws(trial))) for trial in trials]
+    return max(fits, key=lambda item: item[1].explained_share)
 
 
-def value_along(matrix: FloatArray, direction: FloatArray) -> float:
+def quadratic_form(matrix: FloatArray, direction: FloatArray) -> float:
     """Quadratic form d' M d of a mass, damping or stiffness matrix M (n, n) and a direction d (n,)."""
     return float(direction @ matrix @ direction)

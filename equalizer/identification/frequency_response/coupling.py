@@ -14,9 +14,9 @@ def worst_coupling(response: ComplexArray) -> FloatArray:
     """
     require_equal_axes(response)
     power = np.abs(response) ** 2
-    along = np.einsum("...ii->...i", power)
-    across = np.maximum(power.sum(axis=-2) - along, 0.0)
-    ratio: FloatArray = np.sqrt(across / np.maximum(along, np.finfo(np.float64).tiny)).max(axis=-1)
+    on_axis = np.einsum("...ii->...i", power)
+    off_axis = np.maximum(power.sum(axis=-2) - on_axis, 0.0)
+    ratio: FloatArray = np.sqrt(off_axis / np.maximum(on_axis, np.finfo(np.float64).tiny)).max(axis=-1)
     return ratio
 
 

@@ -65,7 +65,7 @@ def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -
     rule = rule or OnsetRule()
     require_equal_axes(response.response)
     lines = response.of_lines(response.reliable)
-    local = LocalPolynomial.over(lines, rule.neighbours, 2)
+    local = LocalPolynomial.from_response(lines, rule.neighbours, 2)
     smooth = local.apply(lines.response)
     above_noise = _is_above_noise(lines, local, smooth, rule)
     if not above_noise.any():
@@ -73,19 +73,23 @@ def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -
             f"coupling cannot be judged: at no line is the noise small compared with {100 * rule.threshold:g} % of "
             "the response; record more periods, or with a stronger excitation"
         )
-    found = _find_onset(lines.frequency_hz[above_noise], worst_coupling(smooth[above_noise]), rule)
-    if found is None:
+    onset_hz = _find_onset(lines.frequency_hz[above_noise], worst_coupling(smooth[above_noise]), rule)
+    if onset_hz is None:
         return CouplingOnset(None, None, False, rule.threshold, rule.sentence)
-    near = lines.frequency_hz <= max(_HIGHEST_RESAMPLED * found, lines.frequency_hz[2 * rule.neighbours])
-    known = bool(np.isfinite(lines.noise_variance).all())
-    drawn = _bootstrap_onsets(lines.of_lines(near), smooth[near], above_noise[near], rule) if known else None
+    near_onset = lines.frequency_hz <= max(_HIGHEST_RESAMPLED * onset_hz, lines.frequency_hz[2 * rule.neighbours])
+    has_noise = bool(np.isfinite(lines.noise_variance).all())
+    drawn_onsets = (
+        _bootstrap_onsets(lines.of_lines(near_onset), smooth[near_onset], above_noise[near_onset], rule)
+        if has_noise
+        else None
+    )
     interval = (
         None
-        if drawn is None
-        else _widen_by_resolution(_bias_corrected_interval(found, drawn), lines.frequency_hz, found)
+        if drawn_onsets is None
+        else _widen_by_resolution(_bias_corrected_interval(onset_hz, drawn_onsets), lines.frequency_hz, onset_hz)
     )
     return CouplingOnset(
-        found, interval, bool(found == lines.frequency_hz[above_noise][0]), rule.threshold, rule.sentence
+        onset_hz, interval, bool(onset_hz == lines.frequency_hz[above_noise][0]), rule.threshold, rule.sentence
     )
 
 
@@ -93,9 +97,9 @@ def _is_above_noise(
     lines: FrequencyResponse, local: LocalPolynomial, smooth: ComplexArray, rule: OnsetRule
 ) -> BoolArray:
     """(lines,): where the smoothed noise is below a quarter of the threshold. Elsewhere noise alone may pass it."""
-    noise = np.sqrt(np.nan_to_num(local.power(lines.noise_variance)))
-    along = np.maximum(np.einsum("lii->li", np.abs(smooth)), np.finfo(np.float64).tiny)
-    above_noise: BoolArray = (np.linalg.norm(noise, axis=1) / along).max(axis=1) < rule.threshold / 4
+    noise = np.sqrt(np.nan_to_num(local.propagate_variance(lines.noise_variance)))
+    on_axis = np.maximum(np.einsum("lii->li", np.abs(smooth)), np.finfo(np.float64).tiny)
+    above_noise: BoolArray = (np.linalg.norm(noise, axis=1) / on_axis).max(axis=1) < rule.threshold / 4
     return above_noise
 
 
@@ -108,9 +112,9 @@ def _find_onset(frequency_hz: FloatArray, coupling: FloatArray, rule: OnsetRule)
 def _octave_average(frequency_hz: FloatArray, coupling: FloatArray, octaves: float) -> FloatArray:
     """Running mean over the lines within half of `octaves` to either side."""
     first = np.searchsorted(frequency_hz, frequency_hz * 2 ** (-octaves / 2))
-    after = np.searchsorted(frequency_hz, frequency_hz * 2 ** (octaves / 2), side="right")
+    stop = np.searchsorted(frequency_hz, frequency_hz * 2 ** (octaves / 2), side="right")
     total = np.concatenate([[0.0], np.cumsum(coupling)])
-    mean: FloatArray = (total[after] - total[first]) / (after - first)
+    mean: FloatArray = (total[stop] - total[first]) / (stop - first)
     return mean
 
 
@@ -127,28 +131,28 @@ def _bootstrap_onsets(
     lines: FrequencyResponse, smooth: ComplexArray, above_noise: BoolArray, rule: OnsetRule
 ) -> FloatArray:
     """(draws,): onsets of a parametric bootstrap: noise of the measured size is added to the smoothed curve."""
-    local = LocalPolynomial.over(lines, rule.neighbours, 2)
+    local = LocalPolynomial.from_response(lines, rule.neighbours, 2)
     size = np.sqrt(lines.noise_variance / 2)
     generator = np.random.default_rng(rule.seed)
     onsets = []
     for _ in range(rule.draws):
         noise = generator.standard_normal((2, *size.shape)) * size
-        drawn = smooth + local.apply(noise[0] + 1j * noise[1])
-        onset = _find_onset(lines.frequency_hz[above_noise], worst_coupling(drawn[above_noise]), rule)
+        noisy_response = smooth + local.apply(noise[0] + 1j * noise[1])
+        onset = _find_onset(lines.frequency_hz[above_noise], worst_coupling(noisy_response[above_noise]), rule)
         onsets.append(float(lines.frequency_hz[-1]) if onset is None else onset)
     return np.array(onsets)
 
 
 def _widen_by_resolution(
-    interval_hz: tuple[float, float], frequency_hz: FloatArray, found: float
+    interval_hz: tuple[float, float], frequency_hz: FloatArray, onset_hz: float
 ) -> tuple[float, float]:
-    at = int(np.clip(np.searchsorted(frequency_hz, found), 1, len(frequency_hz) - 1))
-    half = float(frequency_hz[at] - frequency_hz[at - 1]) / 2
+    line = int(np.clip(np.searchsorted(frequency_hz, onset_hz), 1, len(frequency_hz) - 1))
+    half = float(frequency_hz[line] - frequency_hz[line - 1]) / 2
     return interval_hz[0] - half, interval_hz[1] + half
 
 
-def _bias_corrected_interval(found: float, onsets: FloatArray) -> tuple[float, float]:
+def _bias_corrected_interval(onset_hz: float, onsets: FloatArray) -> tuple[float, float]:
     """Bias-corrected percentile interval (Efron 1981), because noise lets a curve pass the threshold earlier."""
-    below = np.clip(np.mean(onsets < found), 0.5 / len(onsets), 1 - 0.5 / len(onsets))
+    below = np.clip(np.mean(onsets < onset_hz), 0.5 / len(onsets), 1 - 0.5 / len(onsets))
     low, high = np.quantile(onsets, ndtr(2 * ndtri(below) + ndtri(np.array([0.025, 0.975]))))
     return float(low), float(high)

@@ -75,28 +75,36 @@ def periodic_experiments(recordings: Sequence[Recording]) -> ExperimentSet:
     is no other, or, where a period lasts at least twice `TRANSIENT_S`, with its transient replaced (`borrowed`).
     Periods with missing samples are dropped."""
     experiments: list[Experiment] = []
-    alone, gaps = 0, 0
+    single_period_segments, missing_periods = 0, 0
     for recording in recordings:
         for segment in recording.segments:
             if segment.kind not in BROADBAND_KINDS or segment.period < 4 or segment.role == "test":
                 continue
             starts = range(segment.start, segment.stop - segment.period + 1, segment.period)
-            whole = [start for start in starts if _is_whole(recording, start, segment.period)]
-            gaps += len(starts) - len(whole)
-            counted = [start for start in whole if start != segment.start] or whole
-            alone += counted == [segment.start]
-            if counted:
-                experiment = _make_experiment(recording, counted, segment.period, np.ones(segment.period))
-                over = round(TRANSIENT_S * recording.sample_rate_hz)
-                first_too = segment.start in whole and counted != whole and segment.period >= 2 * over
+            complete_starts = [start for start in starts if _has_all_samples(recording, start, segment.period)]
+            missing_periods += len(starts) - len(complete_starts)
+            period_starts = [start for start in complete_starts if start != segment.start] or complete_starts
+            single_period_segments += period_starts == [segment.start]
+            if period_starts:
+                experiment = _make_experiment(recording, period_starts, segment.period, np.ones(segment.period))
+                transient_samples = round(TRANSIENT_S * recording.sample_rate_hz)
+                add_first = (
+                    segment.start in complete_starts
+                    and period_starts != complete_starts
+                    and segment.period >= 2 * transient_samples
+                )
                 experiments.append(
-                    _add_first_period(recording, experiment, counted, segment.start, over) if first_too else experiment
+                    _add_first_period(recording, experiment, period_starts, segment.start, transient_samples)
+                    if add_first
+                    else experiment
                 )
     remarks = []
-    if alone:
-        remarks.append(f"{_count_segments(alone)} had one usable period only: it was kept, with its transient.")
-    if gaps:
-        remarks.append(f"{_count_periods(gaps)} left out, because samples are missing in it.")
+    if single_period_segments:
+        remarks.append(
+            f"{_count_segments(single_period_segments)} had one usable period only: it was kept, with its transient."
+        )
+    if missing_periods:
+        remarks.append(f"{_count_periods(missing_periods)} left out, because samples are missing in it.")
     return ExperimentSet(tuple(experiments), tuple(remarks), periodic=True)
 
 
@@ -110,9 +118,9 @@ def window_experiments(recordings: Sequence[Recording], window_s: float) -> Expe
         window = window / np.sqrt(np.mean(window**2))
         for segment in _driven_segments(recording):
             starts = range(segment.start, segment.stop - length + 1, length // 2)
-            whole = [start for start in starts if _is_whole(recording, start, length)]
+            complete_starts = [start for start in starts if _has_all_samples(recording, start, length)]
             # Windows, unlike periods, do not contain the same excitation: each is an experiment of its own.
-            experiments += [_make_experiment(recording, [start], length, window) for start in whole]
+            experiments += [_make_experiment(recording, [start], length, window) for start in complete_starts]
     remark = f"No periodic excitation: averaged over Hann windows of {window_s:g} s (H1), which blur narrow resonances."
     return ExperimentSet(tuple(experiments), (remark,), periodic=False)
 
@@ -123,10 +131,10 @@ def _driven_segments(recording: Recording) -> list[Segment]:
     return [segment for segment in recording.segments if segment.kind in _DRIVEN_KINDS and segment.role != "test"]
 
 
-def _is_whole(recording: Recording, start: int, length: int) -> bool:
-    there = slice(start, start + length)
+def _has_all_samples(recording: Recording, start: int, length: int) -> bool:
+    rows = slice(start, start + length)
     signals = (recording.command.samples, recording.response.samples, instrument_signal(recording))
-    return all(bool(np.isfinite(samples[there]).all()) for samples in signals)
+    return all(bool(np.isfinite(samples[rows]).all()) for samples in signals)
 
 
 def _make_experiment(recording: Recording, starts: Sequence[int], length: int, window: FloatArray) -> Experiment:
@@ -145,15 +153,17 @@ def _make_experiment(recording: Recording, starts: Sequence[int], length: int, w
 
 
 def _add_first_period(
-    recording: Recording, experiment: Experiment, counted: Sequence[int], first: int, over: int
+    recording: Recording, experiment: Experiment, period_starts: Sequence[int], first: int, transient_samples: int
 ) -> Experiment:
-    """Add the first period, its first `over` samples (the transient) replaced by the mean of the other periods: for a
-    linear plant, command and response are then those of the steady state throughout. first: index of its start;
-    counted: starts of the other periods."""
+    """Add the first period, its first `transient_samples` samples (the transient) replaced by the mean of the other
+    periods: for a linear plant, command and response are then those of the steady state throughout. first: index of its
+    start; period_starts: starts of the other periods."""
 
     def spectra(samples: FloatArray) -> ComplexArray:
         period = samples[first : first + experiment.length].copy()
-        period[:over] = np.mean([samples[start : start + over] for start in counted], axis=0)
+        period[:transient_samples] = np.mean(
+            [samples[start : start + transient_samples] for start in period_starts], axis=0
+        )
         spectrum = (
             np.fft.rfft(period - period.mean(axis=0), axis=0)[1 : (experiment.length + 1) // 2] / experiment.length
         )
@@ -164,7 +174,7 @@ def _add_first_period(
         np.concatenate([experiment.command, spectra(recording.command.samples)]),
         np.concatenate([experiment.response, spectra(recording.response.samples)]),
         np.concatenate([experiment.instrument, spectra(instrument_signal(recording))]),
-        borrowed=over / experiment.length,
+        borrowed=transient_samples / experiment.length,
     )
 
 

@@ -33,63 +33,63 @@ class LocalPolynomial:
     """Order of the polynomial."""
 
     @classmethod
-    def over(cls, response: FrequencyResponse, neighbours: int, order: int) -> Self:
+    def from_response(cls, response: FrequencyResponse, neighbours: int, order: int) -> Self:
         """Weights for the lines of a response. neighbours: lines on either side. Raises ValueError for a negative
         order, for fewer than order + 2 lines in a neighbourhood, or for fewer lines in the response than in a
         neighbourhood."""
-        taken, lines = 2 * neighbours + 1, len(response)
+        width, lines = 2 * neighbours + 1, len(response)
         if order < 0:
             raise ValueError(f"order is {order}; a polynomial has order 0 or above")
-        if taken < order + 2:
-            raise ValueError(f"a polynomial of order {order} needs more than {taken} lines; increase neighbours")
-        if lines < taken:
+        if width < order + 2:
+            raise ValueError(f"a polynomial of order {order} needs more than {width} lines; increase neighbours")
+        if lines < width:
             raise ValueError(
-                f"smoothing takes {taken} lines at a time, but there are {lines}; widen the band, or reduce neighbours"
+                f"smoothing takes {width} lines at a time, but there are {lines}; widen the band, or reduce neighbours"
             )
-        window = np.clip(np.arange(lines) - neighbours, 0, lines - taken)[:, None] + np.arange(taken)
-        weight = _weights(response)[window]
-        powers = _powers(response.frequency_hz, window, order)
-        fitted = np.linalg.pinv(powers * weight[:, :, None])[:, 0, :] * weight
-        return cls(window, fitted, order)
+        window = np.clip(np.arange(lines) - neighbours, 0, lines - width)[:, None] + np.arange(width)
+        weight = _compute_line_weights(response)[window]
+        powers = _compute_powers(response.frequency_hz, window, order)
+        weights = np.linalg.pinv(powers * weight[:, :, None])[:, 0, :] * weight
+        return cls(window, weights, order)
 
     def apply(self, values: ComplexArray) -> ComplexArray:
         """Smoothed values, (lines, ...), of values of the same shape."""
         smooth: ComplexArray = np.einsum("lk,lk...->l...", self.weights, values[self.window])
         return smooth
 
-    def power(self, powers: FloatArray) -> FloatArray:
-        """(lines, ...): variance after smoothing of errors that are independent between lines and have the variances
-        `powers` (lines, ...)."""
-        smooth: FloatArray = np.einsum("lk,lk...->l...", self.weights**2, powers[self.window])
-        return smooth
+    def propagate_variance(self, variances: FloatArray) -> FloatArray:
+        """(lines, ...): variance after smoothing of errors that are independent between lines. variances: (lines, ...),
+        before smoothing."""
+        smoothed_variance: FloatArray = np.einsum("lk,lk...->l...", self.weights**2, variances[self.window])
+        return smoothed_variance
 
 
 def smooth_response(
-    response: FrequencyResponse, neighbours: int = 8, order: int = 2, about: ComplexArray | None = None
+    response: FrequencyResponse, neighbours: int = 8, order: int = 2, baseline: ComplexArray | None = None
 ) -> FrequencyResponse:
     """Smooth each line over itself and `neighbours` lines on either side; near the ends of the band over the same
     number of lines, of which more lie towards its middle.
 
-    about: (lines, outputs, inputs), response of an approximate model: only the difference from it is smoothed, so that
-    a resonance narrower than the neighbourhood is not blunted.
+    baseline: (lines, outputs, inputs), response of an approximate model: only the difference from it is smoothed, so
+    that a resonance narrower than the neighbourhood is not flattened.
 
     The noise variance of the result is that of the weighted sum or, where that is larger, follows from the scatter of
     the lines about the polynomial, so that lack of fit is included. Errors of adjacent lines are then no longer
-    independent. Raises ValueError as `LocalPolynomial.over` does.
+    independent. Raises ValueError as `LocalPolynomial.from_response` does.
     """
-    local = LocalPolynomial.over(response, neighbours, order)
-    known = 0.0 if about is None else about
-    rest = replace(response, response=np.asarray(response.response - known, dtype=np.complex128))
-    smooth = np.asarray(local.apply(rest.response) + known, dtype=np.complex128)
-    noise = local.power(response.noise_variance)
-    scatter = _scatter(rest, local) * np.sum(local.weights**2, axis=1)[:, None, None]
+    local = LocalPolynomial.from_response(response, neighbours, order)
+    subtracted = 0.0 if baseline is None else baseline
+    difference = replace(response, response=np.asarray(response.response - subtracted, dtype=np.complex128))
+    smooth = np.asarray(local.apply(difference.response) + subtracted, dtype=np.complex128)
+    noise = local.propagate_variance(response.noise_variance)
+    scatter = _estimate_scatter(difference, local) * np.sum(local.weights**2, axis=1)[:, None, None]
     remark = f"Smoothed: order {order} over {2 * neighbours + 1} lines."
     return replace(
         response, response=smooth, noise_variance=np.fmax(noise, scatter), remarks=(*response.remarks, remark)
     )
 
 
-def _weights(response: FrequencyResponse) -> FloatArray:
+def _compute_line_weights(response: FrequencyResponse) -> FloatArray:
     """(lines,): least-squares weights, 1 / standard deviation of the noise over all outputs and inputs, at most 1; all
     1 where the noise of a line is not known or zero."""
     power = response.noise_variance.sum(axis=(1, 2))
@@ -99,19 +99,19 @@ def _weights(response: FrequencyResponse) -> FloatArray:
     return weights
 
 
-def _powers(frequency_hz: FloatArray, window: npt.NDArray[np.int64], order: int) -> FloatArray:
+def _compute_powers(frequency_hz: FloatArray, window: npt.NDArray[np.int64], order: int) -> FloatArray:
     """(lines, taken, order + 1): powers 0 to `order` of the frequency difference from the line, scaled to at most 1."""
-    away = frequency_hz[window] - frequency_hz[:, None]
-    powers: FloatArray = (away / np.abs(away).max(axis=1, keepdims=True))[:, :, None] ** np.arange(order + 1)
+    offset_hz = frequency_hz[window] - frequency_hz[:, None]
+    powers: FloatArray = (offset_hz / np.abs(offset_hz).max(axis=1, keepdims=True))[:, :, None] ** np.arange(order + 1)
     return powers
 
 
-def _scatter(response: FrequencyResponse, local: LocalPolynomial) -> FloatArray:
+def _estimate_scatter(response: FrequencyResponse, local: LocalPolynomial) -> FloatArray:
     """(lines, outputs, inputs): residual variance of an unweighted polynomial fit in each window, per degree of
     freedom."""
-    basis, _ = np.linalg.qr(_powers(response.frequency_hz, local.window, local.order))
+    basis, _ = np.linalg.qr(_compute_powers(response.frequency_hz, local.window, local.order))
     values = response.response[local.window]
-    explained = np.abs(np.einsum("lko,lkpm->lopm", basis, values)) ** 2
-    residual_power = np.sum(np.abs(values) ** 2, axis=1) - np.sum(explained, axis=1)
+    explained_power = np.abs(np.einsum("lko,lkpm->lopm", basis, values)) ** 2
+    residual_power = np.sum(np.abs(values) ** 2, axis=1) - np.sum(explained_power, axis=1)
     power: FloatArray = np.maximum(residual_power, 0.0) / (values.shape[1] - local.order - 1)
     return power

@@ -24,8 +24,8 @@ _THIRD_DIFFERENCE_GAIN = 20.0
 def period_variance(residuals: ComplexArray) -> FloatArray:
     """Noise power of a single period, (lines, outputs): the sample variance over periods. residuals: (periods, lines,
     outputs), at least two periods."""
-    around = residuals - residuals.mean(axis=0)
-    power: FloatArray = np.sum(np.abs(around) ** 2, axis=0) / (len(residuals) - 1)
+    deviations = residuals - residuals.mean(axis=0)
+    power: FloatArray = np.sum(np.abs(deviations) ** 2, axis=0) / (len(residuals) - 1)
     return power
 
 
@@ -74,8 +74,8 @@ def rest_powers(recording: Recording, samples: FloatArray, length: int) -> list[
     window = np.sqrt(8 / 3) * hann(length)[:, None]
     powers = []
     for start, stop in rest_intervals(recording, SETTLING_S):
-        for at in range(start, stop - length + 1, length // 2):
-            part = samples[at : at + length]
+        for window_start in range(start, stop - length + 1, length // 2):
+            part = samples[window_start : window_start + length]
             if np.isfinite(part).all():
                 spectrum = np.fft.rfft((part - part.mean(axis=0)) * window, axis=0)[1 : length // 2]
                 powers.append(np.abs(spectrum) ** 2 / length)
@@ -94,6 +94,6 @@ def interpolate_rest(mean: FloatArray, lines_hz: FloatArray, frequency_hz: Float
 def rest_intervals(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
     """Intervals (start, stop) of samples without excitation, after settling_s seconds; an interval at the very start
     counts from sample 0, because recordings begin at rest."""
-    rests = runs_of((instrument_signal(recording) == 0).all(axis=1))
+    idle_runs = runs_of((instrument_signal(recording) == 0).all(axis=1))
     settling = round(settling_s * recording.sample_rate_hz)
-    return [(start + (settling if start else 0), stop) for start, stop in rests]
+    return [(start + (settling if start else 0), stop) for start, stop in idle_runs]

@@ -51,13 +51,15 @@ def judge_lines(
         )
     unexcited = ~excited & ~by_spring
     if unexcited.any():
-        remarks.append(f"Not reliable, because not every direction was excited: {_spans(frequency_hz, unexcited)}.")
+        remarks.append(
+            f"Not reliable, because not every direction was excited: {_describe_spans(frequency_hz, unexcited)}."
+        )
     worst = np.min(np.where(np.isnan(coherence), 1.0, coherence), axis=1, initial=1.0)
     noisy = (worst < rules.least_coherence) & excited & ~by_spring
     if noisy.any():
         remarks.append(
             f"Not reliable, because noise is more than {100 * (1 - rules.least_coherence):g} % of an output's power: "
-            f"{_spans(frequency_hz, noisy)}."
+            f"{_describe_spans(frequency_hz, noisy)}."
         )
     return Judgement(~(by_spring | unexcited | noisy), tuple(remarks))
 
@@ -68,38 +70,38 @@ def find_excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least
     excitation: spectra (lines, inputs, experiments). Returns a mask (lines,): where the smallest singular value of the
     strong excitations, each of unit length, exceeds `_LEAST_INDEPENDENCE`.
     """
-    least = 10 ** (least_energy_db / 10)
+    least_power = 10 ** (least_energy_db / 10)
     power = np.sum(np.abs(excitation) ** 2, axis=1)
     per_octave = power * frequency_hz[:, None]
-    strong = (power >= least * power.max(axis=0)) | (per_octave >= least * per_octave.max(axis=0))
+    is_strong = (power >= least_power * power.max(axis=0)) | (per_octave >= least_power * per_octave.max(axis=0))
     length = np.sqrt(np.maximum(power, np.finfo(np.float64).tiny))
-    directions = np.where(strong[:, None, :], excitation / length[:, None, :], 0.0)
+    directions = np.where(is_strong[:, None, :], excitation / length[:, None, :], 0.0)
     spans_inputs: BoolArray = np.linalg.svd(directions, compute_uv=False)[:, -1] > _LEAST_INDEPENDENCE
     return spans_inputs
 
 
 def spring_frequency_hz(metas: Sequence[Mapping[str, Any]]) -> float:
     """Highest natural frequency of a virtual spring named in the recordings' meta data; 0 where there is none."""
-    found = [0.0]
+    frequencies_hz = [0.0]
     for meta in metas:
         feedback = meta.get("feedback")
-        named = feedback.get("natural_frequency_hz") if isinstance(feedback, Mapping) else None
-        if isinstance(named, int | float) and np.isfinite(named):
-            found.append(float(named))
-    return max(found)
+        natural_hz = feedback.get("natural_frequency_hz") if isinstance(feedback, Mapping) else None
+        if isinstance(natural_hz, int | float) and np.isfinite(natural_hz):
+            frequencies_hz.append(float(natural_hz))
+    return max(frequencies_hz)
 
 
-def _spans(frequency_hz: FloatArray, chosen: BoolArray) -> str:
+def _describe_spans(frequency_hz: FloatArray, chosen: BoolArray) -> str:
     """The chosen lines as text: up to three spans, such as "1 to 4 Hz and from 38 Hz on", else their number and
     range."""
     spans = runs_of(chosen)
     if len(spans) > 3:
         first, last = frequency_hz[chosen][[0, -1]]
         return f"{int(chosen.sum())} lines between {first:.4g} and {last:.4g} Hz"
-    return " and ".join(_span(frequency_hz, first, stop - 1) for first, stop in spans)
+    return " and ".join(_describe_span(frequency_hz, first, stop - 1) for first, stop in spans)
 
 
-def _span(frequency_hz: FloatArray, first: int, last: int) -> str:
+def _describe_span(frequency_hz: FloatArray, first: int, last: int) -> str:
     if last == len(frequency_hz) - 1 and first > 0:
         return f"from {frequency_hz[first]:.4g} Hz on"
     return f"{frequency_hz[first]:.4g} to {frequency_hz[last]:.4g} Hz"

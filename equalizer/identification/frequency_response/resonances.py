@@ -68,21 +68,21 @@ def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None 
     search = search or ResonanceSearch()
     if not response.reliable.any():
         return ()
-    ends = np.flatnonzero(response.reliable)[[0, -1]]
-    lines = response.of_lines(np.isin(np.arange(len(response)), np.arange(ends[0], ends[1] + 1)))
-    found: list[Resonance] = []
+    end_lines = np.flatnonzero(response.reliable)[[0, -1]]
+    lines = response.of_lines(np.isin(np.arange(len(response)), np.arange(end_lines[0], end_lines[1] + 1)))
+    resonances: list[Resonance] = []
     for peak in sorted(
         _find_peaks(octave_bins(lines, search.bin_octaves), search), key=lambda peak: -peak.prominence_db
     ):
         resonance = _fit_resonance(lines, peak, search)
         if resonance is None:
             continue
-        known = next((other for other in found if _is_same_mode(other, resonance)), None)
-        if known is None:
-            found.append(resonance)
-        elif peak.seen_in not in known.seen_in:
-            found[found.index(known)] = _add_evidence(known, peak.seen_in)
-    return tuple(sorted(found, key=lambda resonance: resonance.frequency_hz))
+        same_mode = next((accepted for accepted in resonances if _is_same_mode(accepted, resonance)), None)
+        if same_mode is None:
+            resonances.append(resonance)
+        elif peak.seen_in not in same_mode.seen_in:
+            resonances[resonances.index(same_mode)] = _add_evidence(same_mode, peak.seen_in)
+    return tuple(sorted(resonances, key=lambda resonance: resonance.frequency_hz))
 
 
 def _find_peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
@@ -91,21 +91,21 @@ def _find_peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
     if binned.response.shape[1] == binned.response.shape[2]:
         off_axis = binned.response * (1 - np.eye(binned.response.shape[1]))
         curves[COUPLING] = np.linalg.norm(off_axis, axis=(1, 2))
-    found = []
+    peaks = []
     for name, curve in curves.items():
         level_db = 20 * np.log10(np.maximum(curve, np.finfo(np.float64).tiny))
-        places, facts = find_peaks(level_db, prominence=search.prominence_db)
-        for place, prominence_db in zip(places, facts["prominences"], strict=True):
-            found.append(_Peak(float(binned.frequency_hz[place]), float(prominence_db), name))
-    return found
+        bin_indices, properties = find_peaks(level_db, prominence=search.prominence_db)
+        for bin_index, prominence_db in zip(bin_indices, properties["prominences"], strict=True):
+            peaks.append(_Peak(float(binned.frequency_hz[bin_index]), float(prominence_db), name))
+    return peaks
 
 
 def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearch) -> Resonance | None:
     """Fit a mode to a peak; None where no single mode fits, or where it is not distinct from noise."""
     factor = 2**search.reach_octaves
-    near = lines.within(peak.frequency_hz / factor, peak.frequency_hz * factor)
+    peak_lines = lines.within(peak.frequency_hz / factor, peak.frequency_hz * factor)
     # A hundred points suffice for a single mode: more lines are averaged in bins, which saves time.
-    binned = octave_bins(near, 2 * search.reach_octaves / 100) if len(near) >= 6 else None
+    binned = octave_bins(peak_lines, 2 * search.reach_octaves / 100) if len(peak_lines) >= 6 else None
     if binned is None or len(binned.frequency_hz) < 6:
         return None
     entries = binned.response.reshape(1, len(binned.frequency_hz), -1)
@@ -114,8 +114,8 @@ def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearc
     if not np.isfinite(natural[0]):
         return None
     parts = np.random.default_rng(search.seed).standard_normal((2, search.draws, *entries.shape[1:]))
-    drawn = entries + np.sqrt(noise / 2) * (parts[0] + 1j * parts[1])
-    natural_drawn, damping_drawn = fit_single_mode(binned.frequency_hz, drawn)
+    noisy_entries = entries + np.sqrt(noise / 2) * (parts[0] + 1j * parts[1])
+    natural_drawn, damping_drawn = fit_single_mode(binned.frequency_hz, noisy_entries)
     # Where more than 5 % of the noisy refits find no mode, the peak is not distinct from noise.
     if np.isnan(natural_drawn).mean() > 0.05:
         return None
@@ -130,9 +130,9 @@ def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearc
     )
 
 
-def _interval(drawn: FloatArray) -> tuple[float, float]:
+def _interval(draws: FloatArray) -> tuple[float, float]:
     """95 % interval of draws (draws,); NaN is left out."""
-    low, high = np.nanquantile(drawn, (0.025, 0.975))
+    low, high = np.nanquantile(draws, (0.025, 0.975))
     return float(low), float(high)
 
 
@@ -142,5 +142,5 @@ def _is_same_mode(first: Resonance, second: Resonance) -> bool:
     return abs(first.frequency_hz - second.frequency_hz) < max(first.width_hz, second.width_hz) / 3
 
 
-def _add_evidence(resonance: Resonance, where: str) -> Resonance:
-    return replace(resonance, seen_in=tuple(sorted((*resonance.seen_in, where))))
+def _add_evidence(resonance: Resonance, curve: str) -> Resonance:
+    return replace(resonance, seen_in=tuple(sorted((*resonance.seen_in, curve))))

@@ -61,13 +61,18 @@ def solve_shared_lines(
     """Estimate at the given lines. experiments: all with exactly these lines. rest_density: (lines, outputs), by
     `rest_floor`, a lower bound where the noise is estimated from the scatter of lines. noise_lines: lines over which
     noise is averaged. Lines at which the experiments are not independent are left out."""
-    every = _columns(experiments)
-    kept = _has_full_rank(every)
-    columns = _Columns(every.command[kept], every.response[kept], every.instrument[kept], every.power[kept])
+    all_columns = _stack_columns(experiments)
+    is_solvable = _has_full_rank(all_columns)
+    columns = _Columns(
+        all_columns.command[is_solvable],
+        all_columns.response[is_solvable],
+        all_columns.instrument[is_solvable],
+        all_columns.power[is_solvable],
+    )
     adjoint = np.conj(columns.instrument.swapaxes(1, 2))
     solution = adjoint @ np.linalg.inv(columns.command @ adjoint)
     response = columns.response @ solution
-    density = _density_from_periods(experiments, kept, response)
+    density = _density_from_periods(experiments, is_solvable, response)
     if density is None:
         density = _density_from_residuals(columns, response)
     if density is not None:
@@ -78,14 +83,14 @@ def solve_shared_lines(
         variance = smooth_over_lines(line_scatter(response), noise_lines)
         if rest_density is not None:
             gain = np.sum(np.abs(solution) ** 2, axis=1)
-            variance = np.fmax(variance, rest_density[kept][:, :, None] * gain[:, None, :])
+            variance = np.fmax(variance, rest_density[is_solvable][:, :, None] * gain[:, None, :])
         noise = np.einsum("lpm,lme->lp", variance, np.abs(columns.command) ** 2)
     with np.errstate(invalid="ignore", divide="ignore"):  # NaN for an output that is always zero
         coherence = np.clip(1 - noise / smooth_over_lines(columns.power, noise_lines), 0.0, 1.0)
-    return SharedLines(frequency_hz[kept], response, variance, coherence, columns.instrument)
+    return SharedLines(frequency_hz[is_solvable], response, variance, coherence, columns.instrument)
 
 
-def _columns(experiments: Sequence[Experiment]) -> _Columns:
+def _stack_columns(experiments: Sequence[Experiment]) -> _Columns:
     """Weighted mean spectra of the experiments as the columns of U, Y and R."""
 
     def stack(name: str) -> ComplexArray:
@@ -102,32 +107,34 @@ def _columns(experiments: Sequence[Experiment]) -> _Columns:
 def _has_full_rank(columns: _Columns) -> BoolArray:
     """(lines,): whether the excitations R and the commands U both have full rank, which is the number of inputs."""
     inputs, experiments = columns.command.shape[1:]
-    kept = np.full(len(columns.command), experiments >= inputs)
-    if experiments >= inputs and len(kept):
+    has_full_rank = np.full(len(columns.command), experiments >= inputs)
+    if experiments >= inputs and len(has_full_rank):
         for stack in (columns.instrument, columns.command):
             strengths = np.linalg.svd(stack, compute_uv=False)
-            kept &= strengths[:, -1] > _RANK_TOLERANCE * strengths.max()
-    return kept
+            has_full_rank &= strengths[:, -1] > _RANK_TOLERANCE * strengths.max()
+    return has_full_rank
 
 
 def _density_from_periods(
-    experiments: Sequence[Experiment], kept: BoolArray, response: ComplexArray
+    experiments: Sequence[Experiment], is_solvable: BoolArray, response: ComplexArray
 ) -> FloatArray | None:
     """Noise density (lines, outputs, experiments) from the variance of the residuals Y - G U between periods. An
     experiment with a single period takes the mean of the others; None where all experiments have a single period."""
-    found: list[FloatArray | None] = []
+    densities: list[FloatArray | None] = []
     for experiment in experiments:
-        residuals = experiment.response[:, kept] - np.einsum("lpm,klm->klp", response, experiment.command[:, kept])
-        found.append(
+        residuals = experiment.response[:, is_solvable] - np.einsum(
+            "lpm,klm->klp", response, experiment.command[:, is_solvable]
+        )
+        densities.append(
             experiment.length * period_variance(residuals) / experiment.observed_noise_share
             if experiment.periods > 1
             else None
         )
-    known = [density for density in found if density is not None]
-    if not known:
+    estimated = [density for density in densities if density is not None]
+    if not estimated:
         return None
-    mean = np.mean(known, axis=0)
-    return np.stack([mean if density is None else density for density in found], axis=2)
+    mean = np.mean(estimated, axis=0)
+    return np.stack([mean if density is None else density for density in densities], axis=2)
 
 
 def _density_from_residuals(columns: _Columns, response: ComplexArray) -> FloatArray | None:

@@ -50,29 +50,33 @@ def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSetting
     is no recording, the recordings differ in rate, channels or units, no segment is broadband and whole, an output is
     constant, or there are fewer independent experiments than inputs."""
     settings = settings or EstimateSettings()
-    _check_alike(recordings)
-    found = _collect_experiments(recordings, settings)
-    if not found.experiments:
+    _check_compatible(recordings)
+    experiment_set = _collect_experiments(recordings, settings)
+    if not experiment_set.experiments:
         raise TransferEstimateError(
             "no segment drives the device with more than single sinusoids for a whole period or window; "
             "record a sweep or a multisine along every axis"
         )
-    _refuse_still_outputs(recordings)
+    _refuse_constant_outputs(recordings)
     rate_hz = recordings[0].sample_rate_hz
     parts = []
-    for frequency_hz, experiments in _group_by_lines(found.experiments, rate_hz):
-        rest = rest_floor(recordings, frequency_hz)
-        parts.append(solve_shared_lines(experiments, frequency_hz, rest, settings.noise_lines))
-    return _join_parts([part for part in parts if len(part.frequency_hz)], recordings, found, settings)
+    for frequency_hz, experiments in _group_by_lines(experiment_set.experiments, rate_hz):
+        rest_density = rest_floor(recordings, frequency_hz)
+        parts.append(solve_shared_lines(experiments, frequency_hz, rest_density, settings.noise_lines))
+    return _join_parts([part for part in parts if len(part.frequency_hz)], recordings, experiment_set, settings)
 
 
 def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSettings) -> ExperimentSet:
     """Periodic experiments or, where there are none, windows, with remarks on the quality of the estimate."""
-    found = periodic_experiments(recordings)
-    if not found.experiments:
-        found = window_experiments(recordings, settings.window_s)
-    remarks = list(found.remarks)
-    if found.experiments and all(experiment.periods == 1 for experiment in found.experiments) and found.periodic:
+    experiment_set = periodic_experiments(recordings)
+    if not experiment_set.experiments:
+        experiment_set = window_experiments(recordings, settings.window_s)
+    remarks = list(experiment_set.remarks)
+    if (
+        experiment_set.experiments
+        and all(experiment.periods == 1 for experiment in experiment_set.experiments)
+        and experiment_set.periodic
+    ):
         remarks.append(
             "No experiment has two counted periods: errors were estimated from the scatter from line to line, and from "
             "the noise at rest where that is larger."
@@ -82,7 +86,7 @@ def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSett
             "A feedback acted, but its share of the command was not recorded: noise that it fed back biases the "
             "estimate where the response is weak."
         )
-    return replace(found, remarks=tuple(remarks))
+    return replace(experiment_set, remarks=tuple(remarks))
 
 
 def _group_by_lines(experiments: Sequence[Experiment], rate_hz: float) -> Iterator[tuple[FloatArray, list[Experiment]]]:
@@ -91,17 +95,17 @@ def _group_by_lines(experiments: Sequence[Experiment], rate_hz: float) -> Iterat
     # Lines as integer multiples of rate / common, common the least common multiple of the lengths: compared exactly.
     common = int(np.lcm.reduce(np.array(lengths, dtype=np.int64)))
     numbers = {length: np.arange(1, (length + 1) // 2, dtype=np.int64) * (common // length) for length in lengths}
-    every = np.unique(np.concatenate(list(numbers.values())))
-    holders = np.stack([np.isin(every, numbers[length]) for length in lengths], axis=1)
-    for pattern in np.unique(holders, axis=0):
-        shared = every[(holders == pattern).all(axis=1)]
-        chosen = {length for length, holds in zip(lengths, pattern, strict=True) if holds}
-        cut = [
+    all_lines = np.unique(np.concatenate(list(numbers.values())))
+    has_line = np.stack([np.isin(all_lines, numbers[length]) for length in lengths], axis=1)
+    for pattern in np.unique(has_line, axis=0):
+        shared = all_lines[(has_line == pattern).all(axis=1)]
+        chosen = {length for length, has_lines in zip(lengths, pattern, strict=True) if has_lines}
+        group = [
             _select_lines(experiment, shared // (common // experiment.length) - 1)
             for experiment in experiments
             if experiment.length in chosen
         ]
-        yield shared * (rate_hz / common), cut
+        yield shared * (rate_hz / common), group
 
 
 def _select_lines(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Experiment:
@@ -115,12 +119,15 @@ def _select_lines(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype
 
 
 def _join_parts(
-    parts: Sequence[SharedLines], recordings: Sequence[Recording], found: ExperimentSet, settings: EstimateSettings
+    parts: Sequence[SharedLines],
+    recordings: Sequence[Recording],
+    experiment_set: ExperimentSet,
+    settings: EstimateSettings,
 ) -> FrequencyResponse:
     """Join the groups of lines in ascending order of frequency, and judge the reliability of each line."""
     command, response = recordings[0].command, recordings[0].response
     if not parts:
-        raise TransferEstimateError(_too_few_experiments_text(len(command.channels), found))
+        raise TransferEstimateError(_too_few_experiments_text(len(command.channels), experiment_set))
     order = np.argsort(np.concatenate([part.frequency_hz for part in parts]))
     frequency_hz = np.concatenate([part.frequency_hz for part in parts])[order]
     excited = np.concatenate(
@@ -128,44 +135,46 @@ def _join_parts(
     )[order]
     coherence = np.concatenate([part.coherence for part in parts])[order]
     spring_hz = spring_frequency_hz([recording.meta for recording in recordings])
-    judged = judge_lines(frequency_hz, excited, coherence, spring_hz, settings.rules)
+    judgement = judge_lines(frequency_hz, excited, coherence, spring_hz, settings.rules)
     return FrequencyResponse(
         frequency_hz,
         np.concatenate([part.response for part in parts])[order],
         np.concatenate([part.noise_variance for part in parts])[order],
         coherence,
-        judged.reliable,
+        judgement.reliable,
         recordings[0].sample_rate_hz,
         command.channels,
         response.channels,
         _unit(command),
         _unit(response),
-        (*found.remarks, *judged.remarks),
+        (*experiment_set.remarks, *judgement.remarks),
     )
 
 
-def _check_alike(recordings: Sequence[Recording]) -> None:
+def _check_compatible(recordings: Sequence[Recording]) -> None:
     if not recordings:
         raise TransferEstimateError("there is no recording to estimate from; give at least one")
     first = recordings[0]
-    for number, other in enumerate(recordings[1:], start=2):
-        for what, wanted, found in (
-            ("sample rate", f"{first.sample_rate_hz:g} Hz", f"{other.sample_rate_hz:g} Hz"),
-            ("command channels", _channels(first.command), _channels(other.command)),
-            ("response channels", _channels(first.response), _channels(other.response)),
+    for number, recording in enumerate(recordings[1:], start=2):
+        for name, expected, value in (
+            ("sample rate", f"{first.sample_rate_hz:g} Hz", f"{recording.sample_rate_hz:g} Hz"),
+            ("command channels", _channels(first.command), _channels(recording.command)),
+            ("response channels", _channels(first.response), _channels(recording.response)),
         ):
-            if wanted != found:
+            if expected != value:
                 raise TransferEstimateError(
-                    f"recording {number} has the {what} {found}, but the first has {wanted}; estimate them separately"
+                    f"recording {number} has the {name} {value}, but the first has {expected}; estimate them separately"
                 )
 
 
-def _refuse_still_outputs(recordings: Sequence[Recording]) -> None:
+def _refuse_constant_outputs(recordings: Sequence[Recording]) -> None:
     """Raises TransferEstimateError for an output that is constant in every recording, as of a stuck sensor: its
     response would consist of rounding errors."""
     rows = [recording.response.samples for recording in recordings]
-    still = np.all([(samples == samples[:1]).all(axis=0) for samples in rows], axis=0)
-    names = ", ".join(name for name, is_still in zip(recordings[0].response.channels, still, strict=True) if is_still)
+    constant_outputs = np.all([(samples == samples[:1]).all(axis=0) for samples in rows], axis=0)
+    names = ", ".join(
+        name for name, is_constant in zip(recordings[0].response.channels, constant_outputs, strict=True) if is_constant
+    )
     if names:
         raise TransferEstimateError(
             f"there is no signal from {names}, not even noise: check the sensor and record again"
@@ -180,9 +189,9 @@ def _unit(signal: Signal) -> str:
     return signal.unit if isinstance(signal.unit, str) else ", ".join(signal.unit)
 
 
-def _too_few_experiments_text(inputs: int, found: ExperimentSet) -> str:
+def _too_few_experiments_text(inputs: int, data: ExperimentSet) -> str:
     return (
-        f"{inputs} inputs need {inputs} independent experiments at each line, but the {len(found.experiments)} that "
+        f"{inputs} inputs need {inputs} independent experiments at each line, but the {len(data.experiments)} that "
         "were found are not: at no line do they drive the inputs in so many directions. Record every axis "
         "separately, or as many multisines with independent phases as there are inputs"
     )

@@ -22,7 +22,7 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFit,
     MechanicalFitRefused,
     MechanicalFitSettings,
-    OrderTried,
+    OrderCandidate,
 )
 from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
 from equalizer.identification.mechanical.mechanical_lines import (
@@ -32,13 +32,12 @@ from equalizer.identification.mechanical.mechanical_lines import (
     split_fit_and_test,
 )
 from equalizer.identification.mechanical.mechanical_misfit import LineGroup, line_groups
-from equalizer.identification.mechanical.mechanical_model_of import readable_model
 from equalizer.identification.mechanical.mechanical_order import (
     LEAST_GAIN,
     choose_simplest,
+    compute_stage_ends,
     grow_across_joint,
     grow_by_stages,
-    stage_ends,
 )
 from equalizer.identification.mechanical.mechanical_refinement import RefinedFit, refine_unknowns
 from equalizer.identification.mechanical.mechanical_refusals import refuse_noise, refuse_unstable, refuse_unsuitable
@@ -46,12 +45,13 @@ from equalizer.identification.mechanical.mechanical_start import rigid_start
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.identification.mechanical.modal_order import balance_fit, choose_modes
 from equalizer.identification.mechanical.modal_structure import ModalStructure
+from equalizer.identification.mechanical.physical_model import readable_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
-ELSEWHERE = 1.1
+NONCOLLOCATED_ERROR = 1.1
 """Cross-validated error, in units of noise and floor (1: all that can be explained), from which sensors that are not
-collocated with the commands are considered. By hand."""
+collocated with the commands are considered. Chosen heuristically."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +59,7 @@ class StructureChoice:
     """The chosen structure, with sensors collocated with the commands or elsewhere; result of `choose_structure`."""
 
     best: RefinedFit[Structure] | RefinedFit[ModalStructure]
-    tried: tuple[OrderTried, ...]
+    candidates: tuple[OrderCandidate, ...]
     """All structures that were tried, with their errors."""
     reason: str
     """Reason for the choice, as a sentence."""
@@ -75,21 +75,23 @@ def choose_structure(
     """Choose oscillators on the driven axes if they explain the lines, else modes with free shapes at the sensors if
     these explain more.
 
-    groups: lines of the segments to fit. starts: fits of the driven axes alone up to the first of `stage_ends`, from
-    several initial values. on_progress: called with the share done, 0 to 1.
-    """
+    groups: lines of the segments to fit. starts: fits of the driven axes alone up to the first of `compute_stage_ends`,
+    from several initial values. on_progress: called with the share done, 0 to 1."""
     best = choose_simplest(starts)
     if settings.joint:
         return StructureChoice(*grow_across_joint(groups, best, band_hz, settings, on_progress))
     if settings.sensors_elsewhere:
         return _fit_sensors_elsewhere(groups, best, band_hz, settings, on_progress)
-    here = StructureChoice(*grow_by_stages(groups, best, band_hz, settings, lambda share: on_progress(share / 2)))
-    if here.best.error < ELSEWHERE or settings.sensors_elsewhere is False:
-        return here
-    other = _fit_sensors_elsewhere(groups, best, band_hz, settings, lambda share: on_progress(0.5 + share / 2))
-    tried = (*here.tried, *(replace(each, what=f"sensors elsewhere: {each.what}") for each in other.tried))
-    better = other.best.left_out < (1 - LEAST_GAIN) * here.best.left_out
-    return replace(other if better else here, tried=tried)
+    collocated = StructureChoice(*grow_by_stages(groups, best, band_hz, settings, lambda share: on_progress(share / 2)))
+    if collocated.best.error < NONCOLLOCATED_ERROR or settings.sensors_elsewhere is False:
+        return collocated
+    noncollocated = _fit_sensors_elsewhere(groups, best, band_hz, settings, lambda share: on_progress(0.5 + share / 2))
+    candidates = (
+        *collocated.candidates,
+        *(replace(trial, description=f"sensors elsewhere: {trial.description}") for trial in noncollocated.candidates),
+    )
+    prefers_noncollocated = noncollocated.best.held_out_squares < (1 - LEAST_GAIN) * collocated.best.held_out_squares
+    return replace(noncollocated if prefers_noncollocated else collocated, candidates=candidates)
 
 
 def _fit_sensors_elsewhere(
@@ -105,8 +107,8 @@ def _fit_sensors_elsewhere(
     if not any(group.transient for group in groups):
         return StructureChoice(*choose_modes(groups, best.structure, band_hz, settings, on_progress))
     structure = replace(best.structure, shared=True)
-    begun = replace(best, structure=structure, unknowns=best.structure.transfer_unknowns(best.unknowns, structure))
-    return StructureChoice(*grow_by_stages(groups, begun, band_hz, settings, on_progress))
+    start = replace(best, structure=structure, unknowns=best.structure.transfer_unknowns(best.unknowns, structure))
+    return StructureChoice(*grow_by_stages(groups, start, band_hz, settings, on_progress))
 
 
 LINES_PER_GROUP, LINES_IN_ALL = 400, 1600
@@ -114,7 +116,7 @@ LINES_PER_GROUP, LINES_IN_ALL = 400, 1600
 time; the chosen structure is then fitted to all lines."""
 _LEAST_LINES = 8
 """Fewest driven lines from which a model is fitted; times the number of axes where a part of the band is used."""
-_LOW_PARTS = (0.25, 0.5, 1.0)
+_BAND_SHARES = (0.25, 0.5, 1.0)
 """Parts of the first stage's band, from its lower end and as shares of its octaves, to which the rigid body is fitted:
 a mode at higher frequencies would bias it."""
 
@@ -134,7 +136,7 @@ def fit_mechanical_model(
     settings = settings or MechanicalFitSettings()
     refuse_unsuitable(recordings)
     fit, test = split_fit_and_test(recordings)
-    lines = [spectra for each in fit if (spectra := segment_lines(*each)) is not None]
+    lines = [spectra for pair in fit if (spectra := segment_lines(*pair)) is not None]
     segments = select_band(lines, settings.band_hz)
     if sum(len(segment.frequency_hz) for segment in segments) < _LEAST_LINES:
         raise MechanicalFitRefused(
@@ -143,17 +145,17 @@ def fit_mechanical_model(
         )
     band = _find_covered_band(segments)
     groups = line_groups(segments, settings.floor)
-    structure = _rigid_structure(recordings[0], settings, band)
-    fewer = [group.thin_out(min(LINES_PER_GROUP, -(-LINES_IN_ALL // len(groups)))) for group in groups]
-    starts = _fit_rigid_starts(segments, fewer, structure, band, settings)
-    chosen = choose_structure(fewer, starts, band, settings, on_progress)
-    every = [group.of_lines(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
-    final = _refit(_include_all_lines(every), chosen.best, band)
+    structure = _make_rigid_structure(recordings[0], settings, band)
+    thinned = [group.thin_out(min(LINES_PER_GROUP, -(-LINES_IN_ALL // len(groups)))) for group in groups]
+    starts = _fit_rigid_starts(segments, thinned, structure, band, settings)
+    choice = choose_structure(thinned, starts, band, settings, on_progress)
+    full_groups = [group.of_lines(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
+    final = _refit(_include_all_lines(full_groups), choice.best, band)
     refuse_unstable(final)
-    tested = [spectra for each in test if (spectra := segment_lines(*each)) is not None]
+    test_lines = [spectra for pair in test if (spectra := segment_lines(*pair)) is not None]
     on_progress(1.0)
     model = readable_model(final, name)
-    errors = _channel_errors(model, lines, tested, band, recordings[0].response.channels)
+    errors = _compute_channel_errors(model, lines, test_lines, band, recordings[0].response.channels)
     return MechanicalFit(
         model=model,
         errors=errors[:-1],
@@ -161,13 +163,13 @@ def fit_mechanical_model(
         held_out=errors[-1].held_out,
         noise=errors[-1].noise,
         band_hz=band,
-        tried=chosen.tried,
-        reason=chosen.reason,
-        remarks=_remarks(final, recordings[0].response.channels, bool(tested)),
+        candidates=choice.candidates,
+        reason=choice.reason,
+        remarks=_list_remarks(final, recordings[0].response.channels, bool(test_lines)),
     )
 
 
-def _channel_errors(
+def _compute_channel_errors(
     model: MechanicalModel,
     fitted: Sequence[SegmentLines],
     tested: Sequence[SegmentLines],
@@ -178,12 +180,12 @@ def _channel_errors(
     explained."""
     error, noise = simulation_errors(model, fitted, band)
     refuse_noise(error, channels)
-    held = simulation_errors(model, tested, band)[0] if tested else None
+    test_error = simulation_errors(model, tested, band)[0] if tested else None
     return tuple(
         ChannelError(
             channel,
             float(error[i]),
-            None if held is None else float(held[i]),
+            None if test_error is None else float(test_error[i]),
             float(noise[i]) if np.isfinite(noise[i]) else None,
         )
         for i, channel in enumerate((*channels, "all"))
@@ -199,22 +201,26 @@ def _fit_rigid_starts(
 ) -> list[RefinedFit[Structure]]:
     """Fits of a rigid body at the driven axes up to the end of the first stage, one for each initial value: from
     growing parts of that band, without and, if asked for, with a delay."""
-    found: list[RefinedFit[Structure]] = []
-    first = stage_ends(band)[0]
-    lower = [part for group in groups if len((part := group.of_lines(group.frequency_hz <= first)).frequency_hz)]
-    for share in _LOW_PARTS:
-        end = band[0] * (first / band[0]) ** share
-        low = select_band(segments, (band[0], end))
-        lines = sum(len(each.frequency_hz) for each in low)
-        if lines < _LEAST_LINES * structure.inputs and (found or share != _LOW_PARTS[-1]):
+    fits: list[RefinedFit[Structure]] = []
+    stage_end = compute_stage_ends(band)[0]
+    stage_groups = [
+        part for group in groups if len((part := group.of_lines(group.frequency_hz <= stage_end)).frequency_hz)
+    ]
+    for share in _BAND_SHARES:
+        end = band[0] * (stage_end / band[0]) ** share
+        low_segments = select_band(segments, (band[0], end))
+        lines = sum(len(segment.frequency_hz) for segment in low_segments)
+        if lines < _LEAST_LINES * structure.inputs and (fits or share != _BAND_SHARES[-1]):
             continue
         for delayed in (False, True)[: 1 + settings.fit_delay]:
-            begun, unknowns = rigid_start(low, replace(structure, delayed=delayed), settings.floor)
-            found.append(refine_unknowns(lower, begun, unknowns, (band[0], first)))
-    return found
+            rigid_structure, unknowns = rigid_start(low_segments, replace(structure, delayed=delayed), settings.floor)
+            fits.append(refine_unknowns(stage_groups, rigid_structure, unknowns, (band[0], stage_end)))
+    return fits
 
 
-def _rigid_structure(recording: Recording, settings: MechanicalFitSettings, band: tuple[float, float]) -> Structure:
+def _make_rigid_structure(
+    recording: Recording, settings: MechanicalFitSettings, band: tuple[float, float]
+) -> Structure:
     """Structure without modes; its speed scale (rad/s) is 2 pi times the geometric mean of the band's ends (Hz)."""
     inputs, outputs = len(recording.command.channels), len(recording.response.channels)
     return Structure(
@@ -250,22 +256,22 @@ def _refit(
 
 def _include_all_lines(groups: Sequence[LineGroup]) -> list[LineGroup]:
     """The groups with no line held out for cross-validation, so that a fit uses all lines."""
-    return [replace(group, left_out=np.zeros(len(group.left_out), dtype=bool)) for group in groups]
+    return [replace(group, held_out=np.zeros(len(group.held_out), dtype=bool)) for group in groups]
 
 
-def _remarks(
+def _list_remarks(
     final: RefinedFit[Structure] | RefinedFit[ModalStructure], channels: tuple[str, ...], tested: bool
 ) -> tuple[str, ...]:
     """Sentences on what was assumed and what the fit shows."""
     structure = final.structure
     collocated = ", ".join(channels[: structure.inputs])
-    found = [f"No model was given, so a linear one was fitted; {collocated} taken to move as the commands act."]
+    remarks = [f"No model was given, so a linear one was fitted; {collocated} taken to move as the commands act."]
     if isinstance(structure, ModalStructure):
-        found.append("The sensors are not where the commands act on the modes: a joint or cable lies between.")
+        remarks.append("The sensors are not where the commands act on the modes: a joint or cable lies between.")
     elif -1.0 in structure.signs:
-        found.append("The response is positive in the direction opposite to the command.")
+        remarks.append("The response is positive in the direction opposite to the command.")
     if isinstance(structure, Structure) and not structure.grounded:
-        found.append("No spring to the ground was found: the device drifts under a constant command.")
+        remarks.append("No spring to the ground was found: the device drifts under a constant command.")
     if not tested:
-        found.append("No segment was kept for a test: the error is that of the fitted segments.")
-    return tuple(found)
+        remarks.append("No segment was kept for a test: the error is that of the fitted segments.")
+    return tuple(remarks)

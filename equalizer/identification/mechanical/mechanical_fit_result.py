@@ -45,10 +45,10 @@ class MechanicalFitSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class OrderTried:
+class OrderCandidate:
     """A model structure that the order selection fitted, with its cross-validated error."""
 
-    what: str
+    description: str
     """Description of the structure: "driven axes alone", "with 2 modes", "with a delay"..."""
     coordinates: int
     """Number of generalized coordinates; of modes where the shapes are free."""
@@ -67,6 +67,7 @@ class ChannelError:
 
     channel: str
     fit: float
+    """Error of a free simulation of the fitted segments from the best-fitting initial state."""
     held_out: float | None
     """Error of a free simulation of the held-out samples from the best-fitting initial state; None without such
     samples."""
@@ -86,9 +87,13 @@ class MechanicalFit:
     error: float
     """Error over all channels, on the fitted segments."""
     held_out: float | None
+    """Error over all channels on the held-out segments, as `ChannelError.held_out`."""
     noise: float | None
+    """Noise over all channels, as `ChannelError.noise`."""
     band_hz: tuple[float, float]
-    tried: tuple[OrderTried, ...]
+    """Lowest and highest fitted frequency (Hz)."""
+    candidates: tuple[OrderCandidate, ...]
+    """All structures that the order selection fitted, in this order."""
     reason: str
     """Reason for the number of coordinates, as a sentence."""
     remarks: tuple[str, ...]

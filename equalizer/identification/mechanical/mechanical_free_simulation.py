@@ -26,11 +26,11 @@ def simulation_errors(
     p = model.outputs
     error, power, noise = np.zeros(p), np.zeros(p), np.zeros(p)
     for segment in segments:
-        inside = (segment.frequency_hz >= band_hz[0]) & (segment.frequency_hz <= band_hz[1])
-        misfit = simulation_misfit(model, segment)[inside]
+        in_band = (segment.frequency_hz >= band_hz[0]) & (segment.frequency_hz <= band_hz[1])
+        misfit = simulation_misfit(model, segment)[in_band]
         error += (np.abs(misfit) ** 2).sum(axis=0)
-        power += (np.abs(segment.response[inside]) ** 2).sum(axis=0)
-        noise += segment.noise[inside].sum(axis=0)
+        power += (np.abs(segment.response[in_band]) ** 2).sum(axis=0)
+        noise += segment.noise[in_band].sum(axis=0)
     shares, floor = error / np.maximum(power, 1e-300), noise / np.maximum(power, 1e-300)
     return (
         np.sqrt(np.append(shares, shares.mean())),
@@ -47,15 +47,15 @@ def simulation_misfit(model: MechanicalModel, segment_lines: SegmentLines) -> Co
         return np.asarray(misfit)
     free = free_response(model, segment_lines.frequency_hz, segment_lines.rate_hz)
     if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
-        straight = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
-        free = np.concatenate([free, straight], axis=2)
-    every = max(1, len(free) // _STATE_LINES)
+        feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
+        free = np.concatenate([free, feedthrough], axis=2)
+    stride = max(1, len(free) // _STATE_LINES)
     # The initial state contributes mostly at low frequencies: the first 200 lines are all kept, the others thinned out.
-    some = np.unique(np.concatenate([np.arange(min(200, len(free))), np.arange(0, len(free), every)]))
+    fitted_lines = np.unique(np.concatenate([np.arange(min(200, len(free))), np.arange(0, len(free), stride)]))
     size = np.linalg.norm(segment_lines.response, axis=0)[:, None] + 1e-300
-    columns = (free[some] / size).reshape(-1, free.shape[2])
-    wanted = (misfit[some] / size[:, 0]).ravel()
+    columns = (free[fitted_lines] / size).reshape(-1, free.shape[2])
+    target = (misfit[fitted_lines] / size[:, 0]).ravel()
     real = np.concatenate([columns.real, columns.imag])
     scale = np.maximum(np.linalg.norm(real, axis=0), 1e-300)
-    state = np.linalg.lstsq(real / scale, np.concatenate([wanted.real, wanted.imag]), rcond=1e-10)[0] / scale
+    state = np.linalg.lstsq(real / scale, np.concatenate([target.real, target.imag]), rcond=1e-10)[0] / scale
     return np.asarray(misfit - free @ state)

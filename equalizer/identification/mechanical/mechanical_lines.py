@@ -32,22 +32,22 @@ def local_noise(command: ComplexArray, response: ComplexArray) -> FloatArray:
     """
     lines, m = command.shape
     unknowns = 2 * m + 3
-    taken = unknowns + _SPARE
-    if lines < taken:
+    window_lines = unknowns + _SPARE
+    if lines < window_lines:
         return np.full(response.shape, np.nan)
-    starts = np.arange(0, lines - taken + 1, max(1, lines // 4000))
-    window = starts[:, None] + np.arange(taken)
-    away = np.linspace(-1.0, 1.0, taken)
+    starts = np.arange(0, lines - window_lines + 1, max(1, lines // 4000))
+    window = starts[:, None] + np.arange(window_lines)
+    offset = np.linspace(-1.0, 1.0, window_lines)
     driven = command[window]
     size = np.maximum(np.abs(driven).max(axis=(1, 2), keepdims=True), 1e-300)
-    smooth = np.broadcast_to(away[:, None] ** np.arange(3), (len(window), taken, 3))
-    regressors = np.concatenate([driven / size, away[:, None] * driven / size, smooth], axis=2)
+    smooth = np.broadcast_to(offset[:, None] ** np.arange(3), (len(window), window_lines, 3))
+    regressors = np.concatenate([driven / size, offset[:, None] * driven / size, smooth], axis=2)
     basis, _ = np.linalg.qr(regressors)
     values = response[window]
-    explained = np.sum(np.abs(np.swapaxes(basis.conj(), 1, 2) @ values) ** 2, axis=1)
-    power = np.maximum(np.sum(np.abs(values) ** 2, axis=1) - explained, 0.0) / (taken - unknowns)
-    centre = starts + taken // 2
-    return np.stack([np.interp(np.arange(lines), centre, power[:, out]) for out in range(power.shape[1])], axis=1)
+    explained_power = np.sum(np.abs(np.swapaxes(basis.conj(), 1, 2) @ values) ** 2, axis=1)
+    power = np.maximum(np.sum(np.abs(values) ** 2, axis=1) - explained_power, 0.0) / (window_lines - unknowns)
+    centre = starts + window_lines // 2
+    return np.stack([np.interp(np.arange(lines), centre, power[:, output]) for output in range(power.shape[1])], axis=1)
 
 
 EXCITED = 1e-2
@@ -85,10 +85,10 @@ def segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None
         return None
     rate = recording.sample_rate_hz
     transient = not segment.period or starts == [segment.start]
-    spectra = [_spectra(s.samples, starts, length) for s in (recording.command, recording.response)]
-    driving = recording.command if recording.excitation is None else recording.excitation
-    size = np.linalg.norm(_spectra(driving.samples, starts, length).mean(axis=0), axis=1)
-    if not size.max() > 1e-9 * max(float(np.abs(driving.samples[segment.start : segment.stop]).max()), 1e-300):
+    spectra = [_spectra(signal.samples, starts, length) for signal in (recording.command, recording.response)]
+    excitation = recording.command if recording.excitation is None else recording.excitation
+    size = np.linalg.norm(_spectra(excitation.samples, starts, length).mean(axis=0), axis=1)
+    if not size.max() > 1e-9 * max(float(np.abs(excitation.samples[segment.start : segment.stop]).max()), 1e-300):
         return None
     command, response = (spectrum.mean(axis=0) for spectrum in spectra)
     if len(starts) > 1:
@@ -106,16 +106,16 @@ def select_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] |
     """The excited lines of the band (Hz, ends included; None: all). Periodic segments with the same lines get those
     that any of them excites; a segment with a transient keeps at most about `MOST_LINES`."""
     low, high = band_hz or (0.0, np.inf)
-    found = []
+    selected = []
     for segment in segments:
-        alike = [other.excited for other in segments if have_same_lines(segment, other)]
-        excited = segment.excited if segment.transient else np.any(alike, axis=0)
+        shared_excited = [candidate.excited for candidate in segments if have_same_lines(segment, candidate)]
+        excited = segment.excited if segment.transient else np.any(shared_excited, axis=0)
         chosen = np.flatnonzero(excited & (segment.frequency_hz >= low) & (segment.frequency_hz <= high))
         if segment.transient and len(chosen) > MOST_LINES:
             chosen = chosen[:: -(-len(chosen) // MOST_LINES)]
         if len(chosen):
-            found.append(_select_lines(segment, chosen))
-    return tuple(found)
+            selected.append(_select_lines(segment, chosen))
+    return tuple(selected)
 
 
 def have_same_lines(first: SegmentLines, second: SegmentLines) -> bool:
@@ -151,12 +151,12 @@ def split_fit_and_test(
         return fit, test
     if len(fit) > 2 * fit[0][0].command.samples.shape[1]:
         return fit[:-1], fit[-1:]
-    recording, last = fit[-1]
-    if len(fit) == 1 and not last.period:
-        middle = last.start + 2 * (last.stop - last.start) // 3
+    recording, last_segment = fit[-1]
+    if len(fit) == 1 and not last_segment.period:
+        middle = last_segment.start + 2 * (last_segment.stop - last_segment.start) // 3
         parts = (
-            Segment(last.start, middle, last.kind, last.amplitude, 0, "fit"),
-            Segment(middle, last.stop, last.kind, last.amplitude, 0, "test"),
+            Segment(last_segment.start, middle, last_segment.kind, last_segment.amplitude, 0, "fit"),
+            Segment(middle, last_segment.stop, last_segment.kind, last_segment.amplitude, 0, "test"),
         )
         return [(recording, parts[0])], [(recording, parts[1])]
     return fit, []
@@ -177,14 +177,14 @@ def _whole_periods(recording: Recording, segment: Segment) -> tuple[list[int], i
     signals = [recording.command.samples, recording.response.samples]
     if recording.excitation is not None:
         signals.append(recording.excitation.samples)
-    there = np.all([np.isfinite(samples).all(axis=1) for samples in signals], axis=0)
+    is_complete = np.all([np.isfinite(samples).all(axis=1) for samples in signals], axis=0)
     if segment.period >= 8:
         starts = range(segment.start, segment.stop - segment.period + 1, segment.period)
-        whole = [start for start in starts if there[start : start + segment.period].all()]
-        counted = [start for start in whole if start != segment.start] or whole
-        if counted:
-            return counted, segment.period
-    ends = np.flatnonzero(~np.concatenate([[False], there[segment.start : segment.stop], [False]]))
+        complete_starts = [start for start in starts if is_complete[start : start + segment.period].all()]
+        period_starts = [start for start in complete_starts if start != segment.start] or complete_starts
+        if period_starts:
+            return period_starts, segment.period
+    ends = np.flatnonzero(~np.concatenate([[False], is_complete[segment.start : segment.stop], [False]]))
     longest = int(np.argmax(np.diff(ends)))
     start, length = segment.start + int(ends[longest]), int(np.diff(ends)[longest]) - 1
     return ([start] if length > 0 else []), length

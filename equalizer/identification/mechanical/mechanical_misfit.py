@@ -17,7 +17,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-LARGEST = 0.25
+LARGEST_SCATTER = 0.25
 """Upper limit of the scatter that counts as noise, relative to a channel's largest response near a line; heuristic.
 Where resonances shift with the level, segments differ more, and without a limit lines with most of the motion would get
 little weight."""
@@ -33,18 +33,21 @@ def add_scatter_noise(segments: Sequence[SegmentLines]) -> tuple[SegmentLines, .
     lines differ between realisations, directions and levels.
     """
     return tuple(
-        _raise_noise(segment, [other for other in segments if have_same_lines(segment, other)]) for segment in segments
+        _raise_noise(segment, [candidate for candidate in segments if have_same_lines(segment, candidate)])
+        for segment in segments
     )
 
 
-def _raise_noise(segment: SegmentLines, alike: Sequence[SegmentLines]) -> SegmentLines:
+def _raise_noise(segment: SegmentLines, same_lines: Sequence[SegmentLines]) -> SegmentLines:
     m = segment.command.shape[1]
-    if len(alike) <= m:
+    if len(same_lines) <= m:
         return segment
-    sizes = [_command_size(other) for other in alike]
-    answers = [np.abs(other.response / size) ** 2 for other, size in zip(alike, sizes, strict=True)]
-    largest = LARGEST**2 * smooth_over_lines(np.max(answers, axis=0), _LINES)
-    scatter = np.minimum(_scatter(alike, sizes), largest) * _command_size(segment) ** 2
+    sizes = [_command_size(segment_lines) for segment_lines in same_lines]
+    response_powers = [
+        np.abs(segment_lines.response / size) ** 2 for segment_lines, size in zip(same_lines, sizes, strict=True)
+    ]
+    largest = LARGEST_SCATTER**2 * smooth_over_lines(np.max(response_powers, axis=0), _LINES)
+    scatter = np.minimum(_scatter(same_lines, sizes), largest) * _command_size(segment) ** 2
     return replace(segment, noise=np.fmax(segment.noise, scatter))
 
 
@@ -53,27 +56,27 @@ def _command_size(segment_lines: SegmentLines) -> float:
     return max(float(np.sqrt(np.mean(np.abs(segment_lines.command) ** 2))), 1e-300)
 
 
-def _scatter(alike: Sequence[SegmentLines], sizes: Sequence[float]) -> FloatArray:
+def _scatter(segments: Sequence[SegmentLines], sizes: Sequence[float]) -> FloatArray:
     """(lines, p): residual power of the best linear response at each line, per degree of freedom, for a command of rms
     magnitude 1. sizes: rms magnitude of each segment's command."""
-    m = alike[0].command.shape[1]
-    driven = np.array([other.excited / size for other, size in zip(alike, sizes, strict=True)]).T[:, :, None]
-    command = np.stack([other.command for other in alike], axis=1) * driven
-    response = np.stack([other.response for other in alike], axis=1) * driven
+    m = segments[0].command.shape[1]
+    driven = np.array([segment.excited / size for segment, size in zip(segments, sizes, strict=True)]).T[:, :, None]
+    command = np.stack([segment.command for segment in segments], axis=1) * driven
+    response = np.stack([segment.response for segment in segments], axis=1) * driven
     basis, triangle = np.linalg.qr(command)
     strengths = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
-    known = strengths.min(axis=1) > 1e-6 * strengths.max()
-    explained = np.sum(np.abs(np.swapaxes(basis.conj(), 1, 2) @ response) ** 2, axis=1)
-    residual_power = np.maximum(np.sum(np.abs(response) ** 2, axis=1) - explained, 0.0)
+    has_full_rank = strengths.min(axis=1) > 1e-6 * strengths.max()
+    explained_power = np.sum(np.abs(np.swapaxes(basis.conj(), 1, 2) @ response) ** 2, axis=1)
+    residual_power = np.maximum(np.sum(np.abs(response) ** 2, axis=1) - explained_power, 0.0)
     freedom = np.count_nonzero(driven[:, :, 0], axis=1) - m
-    usable = known & (freedom > 0)
+    usable = has_full_rank & (freedom > 0)
     total = smooth_over_lines(np.where(usable[:, None], residual_power, 0.0), _LINES)
     return np.asarray(total / np.maximum(smooth_over_lines(np.where(usable, freedom, 0.0)[:, None], _LINES), 1e-12))
 
 
-LEFT_OUT_EVERY = 4
+HELD_OUT_EVERY = 4
 """Every fourth line is held out for cross-validation of structures."""
-_RUN_AWAY = 1e120
+_LARGEST_TRANSIENT = 1e120
 """Amplitude of a transient's spectrum above which it is not fitted, because squares in the fit would overflow."""
 _STEP = 1e-6
 """Relative step of finite differences."""
@@ -91,7 +94,7 @@ class LineGroup:
     """(lines, p, rows): weighted responses."""
     weight: FloatArray
     """(lines, p): 1 / expected error of the response, of the first segment of the group."""
-    left_out: BoolArray
+    held_out: BoolArray
     """(lines,): held out for cross-validation of structures."""
     count: FloatArray
     """(lines,): number of residuals that were compressed into the rows."""
@@ -99,55 +102,55 @@ class LineGroup:
     rate_hz: float
     hold: Hold
 
-    def without_left_out(self) -> "LineGroup":
+    def without_held_out(self) -> "LineGroup":
         """The lines that are fitted, without those held out for cross-validation."""
-        return self.of_lines(~self.left_out)
+        return self.of_lines(~self.held_out)
 
-    def thin_out(self, most: int) -> "LineGroup":
-        """Keep at most `most` lines: every second, third, ... line, with held-out lines chosen anew."""
-        every = -(-len(self.frequency_hz) // most)
-        part = self.of_lines(np.arange(len(self.frequency_hz)) % every == 0)
-        return replace(part, left_out=_every_fourth_line(len(part.frequency_hz)))
+    def thin_out(self, most_lines: int) -> "LineGroup":
+        """Keep at most `most_lines` lines: every second, third, ... line, with held-out lines chosen anew."""
+        stride = -(-len(self.frequency_hz) // most_lines)
+        part = self.of_lines(np.arange(len(self.frequency_hz)) % stride == 0)
+        return replace(part, held_out=_every_fourth_line(len(part.frequency_hz)))
 
     def of_lines(self, chosen: BoolArray) -> "LineGroup":
         """The group on the lines where the mask `chosen` (lines,) is true."""
         return LineGroup(
             self.frequency_hz[chosen], self.root[chosen], self.target[chosen], self.weight[chosen],
-            self.left_out[chosen], self.count[chosen], self.transient, self.rate_hz, self.hold,
+            self.held_out[chosen], self.count[chosen], self.transient, self.rate_hz, self.hold,
         )  # fmt: skip
 
 
 def line_groups(segments: Sequence[SegmentLines], floor: float) -> tuple[LineGroup, ...]:
     """Weighted groups of the segments; periodic segments with the same lines are compressed into a common group. floor:
     expected error of a linear model, relative to the response's magnitude."""
-    found: list[LineGroup] = []
+    groups: list[LineGroup] = []
     for segment in add_scatter_noise(segments):
         weight = _line_weights(segment, floor)
         root = weight[:, :, None, None] * segment.command[:, None, None, :]
         target = (weight * segment.response)[:, :, None]
-        left_out = _every_fourth_line(len(segment.frequency_hz))
+        held_out = _every_fourth_line(len(segment.frequency_hz))
         group = LineGroup(
-            segment.frequency_hz, root, target, weight, left_out, np.count_nonzero(weight, axis=1).astype(float),
+            segment.frequency_hz, root, target, weight, held_out, np.count_nonzero(weight, axis=1).astype(float),
             segment.transient, segment.rate_hz, segment.hold,
         )  # fmt: skip
-        alike = [i for i, other in enumerate(found) if not group.transient and _can_be_folded(group, other)]
-        if alike:
-            found[alike[0]] = _fold_groups(found[alike[0]], group)
+        matching = [i for i, existing in enumerate(groups) if not group.transient and _can_be_folded(group, existing)]
+        if matching:
+            groups[matching[0]] = _fold_groups(groups[matching[0]], group)
         else:
-            found.append(group)
-    return tuple(found)
+            groups.append(group)
+    return tuple(groups)
 
 
 def misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list[ComplexArray]:
     """Residuals of each group, (lines, p, rows), after transients were fitted to the lines that are not held out."""
-    form, found = pole_form(model), []
+    form, residuals = pole_form(model), []
     for group in groups:
         response = sample_response(model, group.frequency_hz, group.rate_hz, group.hold, form)
         misfit = group.target - (group.root @ response[..., None])[..., 0]
-        found.append(
+        residuals.append(
             _subtract_transient(group, transient_basis(group, model, form), misfit) if group.transient else misfit
         )
-    return found
+    return residuals
 
 
 def transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) -> ComplexArray:
@@ -155,8 +158,8 @@ def transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) ->
     model."""
     free = free_response(model, group.frequency_hz, group.rate_hz, form)
     if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
-        straight = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
-        free = np.concatenate([free, straight], axis=2)
+        feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
+        free = np.concatenate([free, feedthrough], axis=2)
     return np.asarray(group.weight[:, :, None] * free)
 
 
@@ -167,17 +170,17 @@ def stack_real(parts: Sequence[ComplexArray]) -> FloatArray:
 
 
 def numerical_jacobian(
-    residuals: Callable[[FloatArray], FloatArray], unknowns: FloatArray, here: FloatArray, high: FloatArray
+    residuals: Callable[[FloatArray], FloatArray], unknowns: FloatArray, base_residuals: FloatArray, high: FloatArray
 ) -> FloatArray:
-    """Jacobian (len(here), unknowns) by forward differences, backward where a step would exceed the bound `high`. here:
-    residuals at `unknowns`."""
-    columns = np.empty((len(here), len(unknowns)))
+    """Jacobian (len(here), unknowns) by forward differences, backward where a step would exceed the bound `high`.
+    base_residuals: residuals at `unknowns`."""
+    columns = np.empty((len(base_residuals), len(unknowns)))
     for k in range(len(unknowns)):
         step = _STEP * max(1.0, abs(unknowns[k]))
         step = -step if unknowns[k] + step > high[k] else step
-        moved = unknowns.copy()
-        moved[k] += step
-        columns[:, k] = (residuals(moved) - here) / step
+        shifted = unknowns.copy()
+        shifted[k] += step
+        columns[:, k] = (residuals(shifted) - base_residuals) / step
     return columns
 
 
@@ -186,43 +189,43 @@ def _line_weights(segment: SegmentLines, floor: float) -> FloatArray:
     power = np.abs(segment.response) ** 2
     size = smooth_over_lines(power, 5)
     noise = np.where(np.isfinite(segment.noise), segment.noise, 0.0)
-    least = 1e-12 * power.max(axis=0, initial=0.0) + 1e-300
-    return np.asarray(segment.excited[:, None] / np.sqrt(noise + floor**2 * size + least))
+    floor_power = 1e-12 * power.max(axis=0, initial=0.0) + 1e-300
+    return np.asarray(segment.excited[:, None] / np.sqrt(noise + floor**2 * size + floor_power))
 
 
 def _every_fourth_line(lines: int) -> BoolArray:
-    return np.asarray(np.arange(lines) % LEFT_OUT_EVERY == LEFT_OUT_EVERY // 2)
+    return np.asarray(np.arange(lines) % HELD_OUT_EVERY == HELD_OUT_EVERY // 2)
 
 
-def _can_be_folded(group: LineGroup, other: LineGroup) -> bool:
+def _can_be_folded(group: LineGroup, existing: LineGroup) -> bool:
     return (
-        not other.transient
-        and (group.rate_hz, group.hold) == (other.rate_hz, other.hold)
-        and len(group.frequency_hz) == len(other.frequency_hz)
-        and bool(np.allclose(group.frequency_hz, other.frequency_hz))
+        not existing.transient
+        and (group.rate_hz, group.hold) == (existing.rate_hz, existing.hold)
+        and len(group.frequency_hz) == len(existing.frequency_hz)
+        and bool(np.allclose(group.frequency_hz, existing.frequency_hz))
     )
 
 
-def _fold_groups(group: LineGroup, other: LineGroup) -> LineGroup:
-    """Append the rows of `other`; more than m + 1 rows are reduced by QR, which keeps the sum of squares for any G."""
-    root = np.concatenate([group.root, other.root], axis=2)
-    target = np.concatenate([group.target, other.target], axis=2)
+def _fold_groups(group: LineGroup, added: LineGroup) -> LineGroup:
+    """Append the rows of `added`; more than m + 1 rows are reduced by QR, which keeps the sum of squares for any G."""
+    root = np.concatenate([group.root, added.root], axis=2)
+    target = np.concatenate([group.target, added.target], axis=2)
     if root.shape[2] > root.shape[3] + 1:  # m + 1 rows contain all information for the least squares
         triangle = np.asarray(np.linalg.qr(np.concatenate([root, target[..., None]], axis=3), mode="r"))
         root, target = triangle[..., :-1], triangle[..., -1]
     return LineGroup(
-        group.frequency_hz, root, target, group.weight, group.left_out, group.count + other.count,
+        group.frequency_hz, root, target, group.weight, group.held_out, group.count + added.count,
         group.transient, group.rate_hz, group.hold,
     )  # fmt: skip
 
 
 def _subtract_transient(group: LineGroup, basis: ComplexArray, misfit: ComplexArray) -> ComplexArray:
     """Subtract the combination of basis columns, with real coefficients, that fits the lines not held out."""
-    if not np.abs(basis).max(initial=0.0) < _RUN_AWAY:
+    if not np.abs(basis).max(initial=0.0) < _LARGEST_TRANSIENT:
         return misfit  # the search may try an unstable model, whose free response overflows
-    kept = ~group.left_out
-    columns, wanted = basis[kept].reshape(-1, basis.shape[2]), misfit[kept].reshape(-1)
+    is_fitted = ~group.held_out
+    columns, target = basis[is_fitted].reshape(-1, basis.shape[2]), misfit[is_fitted].reshape(-1)
     real = np.concatenate([columns.real, columns.imag])
     scale = np.maximum(np.linalg.norm(real, axis=0), 1e-300)
-    ends = np.linalg.lstsq(real / scale, np.concatenate([wanted.real, wanted.imag]), rcond=1e-10)[0] / scale
-    return np.asarray(misfit - (basis @ ends)[:, :, None])
+    coefficients = np.linalg.lstsq(real / scale, np.concatenate([target.real, target.imag]), rcond=1e-10)[0] / scale
+    return np.asarray(misfit - (basis @ coefficients)[:, :, None])

@@ -19,13 +19,14 @@ from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-_GRID = 60
-"""Number of resonance frequencies that are tried."""
-_RATIOS = (0.01, 0.05, 0.25)
-"""Damping ratios that are tried. Heuristic."""
-_MOST_ROWS = 6000
-"""Largest number of rows of the regression, over all groups; more lines are thinned out."""
-_SMALL_START = 0.02
+_GRID_FREQUENCIES = 60
+"""Number of resonance frequencies on the grid."""
+_DAMPING_RATIOS = (0.01, 0.05, 0.25)
+"""Damping ratios on the grid. Heuristic."""
+_INTENDED_ROWS = 6000
+"""Intended number of rows of the regression, over all groups; more are thinned out to between this and twice as
+many."""
+_LEAST_ROOT_MASS = 0.02
 """Least starting value of the root of the mode's mass over the mass scale, as the linear estimate may be zero or
 negative. Heuristic."""
 
@@ -37,49 +38,54 @@ class ModeStart:
     structure: Structure
     unknowns: FloatArray
     frequency_hz: float
-    explained: float
+    explained_squares: float
     """Fall of the residual sum of squares by the mode, to first order in its mass."""
 
 
-def mode_starts(
-    groups: Sequence[LineGroup], now: RefinedFit[Structure], band_hz: tuple[float, float], most: int = 2
+def estimate_mode_starts(
+    groups: Sequence[LineGroup], current: RefinedFit[Structure], band_hz: tuple[float, float], most_starts: int = 2
 ) -> tuple[ModeStart, ...]:
-    """Starting values of a further oscillator, at the `most` frequencies that explain most, best first; frequencies
-    differ by more than 10 % (0.1 in the natural logarithm)."""
-    thinned = [_thin_group(group.without_left_out(), len(groups)) for group in groups]
-    model = now.structure.model(now.unknowns)
-    misfit = stack_real(misfits(thinned, model))
-    known = _tangent_basis(thinned, now, misfit)
-    misfit = misfit - known @ (known.T @ misfit)
-    moving = [_model_motion(group, model, now.structure) for group in thinned]
-    found = []
-    for frequency_hz in np.geomspace(band_hz[0] / 1.5, band_hz[1] * 1.5, _GRID):
-        for ratio in _RATIOS:
-            columns = _mode_columns(moving, now.structure, 2 * np.pi * frequency_hz, ratio)
-            columns = columns - known @ (known.T @ columns)
-            strengths = solve_scaled(columns, misfit)
-            explained = float(misfit @ misfit - np.sum((misfit - columns @ strengths) ** 2))
-            found.append((explained, float(frequency_hz), ratio, strengths))
+    """Starting values of a further oscillator, at the `most_starts` frequencies that explain most, best first;
+    frequencies differ by more than 10 % (0.1 in the natural logarithm)."""
+    thinned_groups = [_thin_group(group.without_held_out(), len(groups)) for group in groups]
+    model = current.structure.model(current.unknowns)
+    misfit = stack_real(misfits(thinned_groups, model))
+    tangent = _tangent_basis(thinned_groups, current, misfit)
+    misfit = misfit - tangent @ (tangent.T @ misfit)
+    motions = [_model_motion(group, model, current.structure) for group in thinned_groups]
+    candidates = []
+    for frequency_hz in np.geomspace(band_hz[0] / 1.5, band_hz[1] * 1.5, _GRID_FREQUENCIES):
+        for damping_ratio in _DAMPING_RATIOS:
+            columns = _mode_columns(motions, current.structure, 2 * np.pi * frequency_hz, damping_ratio)
+            columns = columns - tangent @ (tangent.T @ columns)
+            coefficients = solve_scaled(columns, misfit)
+            explained_squares = float(misfit @ misfit - np.sum((misfit - columns @ coefficients) ** 2))
+            candidates.append((explained_squares, float(frequency_hz), damping_ratio, coefficients))
     chosen: list[tuple[float, float, float, FloatArray]] = []
-    for candidate in sorted(found, key=lambda each: -each[0]):
-        if all(abs(np.log(candidate[1] / other[1])) > 0.1 for other in chosen):
+    for candidate in sorted(candidates, key=lambda item: -item[0]):
+        if all(abs(np.log(candidate[1] / accepted[1])) > 0.1 for accepted in chosen):
             chosen.append(candidate)
-    return tuple(_make_start(now, *candidate) for candidate in chosen[:most])
+    return tuple(_make_start(current, *candidate) for candidate in chosen[:most_starts])
 
 
-def _tangent_basis(groups: Sequence[LineGroup], now: RefinedFit[Structure], misfit: FloatArray) -> FloatArray:
+def _tangent_basis(groups: Sequence[LineGroup], current: RefinedFit[Structure], misfit: FloatArray) -> FloatArray:
     """(rows, parameters): orthonormal basis of the changes of the residuals by the present unknowns, to first order."""
-    high = np.full(now.structure.parameters, np.inf)
-    slope = numerical_jacobian(
-        lambda unknowns: stack_real(misfits(groups, now.structure.model(unknowns))), now.unknowns, misfit, high
+    upper_bounds = np.full(current.structure.parameters, np.inf)
+    jacobian = numerical_jacobian(
+        lambda unknowns: stack_real(misfits(groups, current.structure.model(unknowns))),
+        current.unknowns,
+        misfit,
+        upper_bounds,
     )
-    return np.asarray(np.linalg.qr(slope / np.maximum(np.linalg.norm(slope, axis=0), 1e-300))[0])
+    return np.asarray(np.linalg.qr(jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300))[0])
 
 
 def _thin_group(group: LineGroup, groups: int) -> LineGroup:
+    """The group on every k-th line, with k such that groups of this size have fewer than twice `_INTENDED_ROWS` rows
+    together. groups: their number."""
     rows = 2 * group.target[0].size * len(group.frequency_hz)
     chosen = np.zeros(len(group.frequency_hz), dtype=bool)
-    chosen[:: max(1, rows * groups // _MOST_ROWS)] = True
+    chosen[:: max(1, rows * groups // _INTENDED_ROWS)] = True
     return group.of_lines(chosen)
 
 
@@ -92,70 +98,86 @@ class _ModelMotion:
     """(lines,): j 2 pi f, 1/s."""
     response: ComplexArray
     """(lines, p, m): response to the commands."""
-    shown: ComplexArray
+    sensor: ComplexArray
     """(lines,): frequency response of a sensor to a position, with the derivative that the response's quantity
     takes."""
-    moved: ComplexArray
+    axis_motion: ComplexArray
     """(lines, m, m): positions of the driven axes per unit command."""
 
 
 def _model_motion(group: LineGroup, model: MechanicalModel, structure: Structure) -> _ModelMotion:
+    """Response and axis motion of the model at the lines of a group."""
     order = DERIVATIVE_OF_QUANTITY[structure.quantity]
     s = np.asarray(2j * np.pi * group.frequency_hz, dtype=np.complex128)
     z = np.exp(s / group.rate_hz)
     response = sample_response(model, group.frequency_hz, group.rate_hz, group.hold)
     # A held force appears in an acceleration one sample later, in velocity and position half a sample later.
-    late = (1.0 if order == 2 else 0.5) if group.hold.value == "zero-order" else 0.0
-    shown = sensor_response(model.sensor.bandwidth_hz, z, group.rate_hz) * z ** (-late) * s**order
-    moved = response[:, : structure.inputs] * np.array(structure.signs)[:, None] / shown[:, None, None]
-    return _ModelMotion(group, s, response, shown, moved)
+    delay_samples = (1.0 if order == 2 else 0.5) if group.hold.value == "zero-order" else 0.0
+    sensor = sensor_response(model.sensor.bandwidth_hz, z, group.rate_hz) * z ** (-delay_samples) * s**order
+    axis_motion = response[:, : structure.inputs] * np.array(structure.signs)[:, None] / sensor[:, None, None]
+    return _ModelMotion(group, s, response, sensor, axis_motion)
 
 
-def _mode_columns(moving: Sequence[_ModelMotion], structure: Structure, speed: float, ratio: float) -> FloatArray:
+def _mode_columns(
+    motions: Sequence[_ModelMotion], structure: Structure, natural_rad_s: float, damping_ratio: float
+) -> FloatArray:
     """Change of the weighted modelled response, (rows, columns): first per entry of L Lᵀ (lower triangle), then per
-    entry of (sensor shape) Lᵀ, sensor by sensor. speed: natural frequency in rad/s; ratio: damping ratio."""
-    m, p = structure.inputs, structure.outputs
-    parts = []
-    for lines in moving:
-        s, response, moved = lines.s, lines.response, lines.moved
-        below = s**2 + 2 * ratio * speed * s + speed**2
-        heavier = s**2 * (2 * ratio * speed * s + speed**2) / below
+    entry of (sensor shape) Lᵀ, sensor by sensor. natural_rad_s: natural frequency in rad/s."""
+    inputs, outputs = structure.inputs, structure.outputs
+    group_columns = []
+    for motion in motions:
+        s, response, axis_motion = motion.s, motion.response, motion.axis_motion
+        denominator = s**2 + 2 * damping_ratio * natural_rad_s * s + natural_rad_s**2
+        dynamic_stiffness = s**2 * (2 * damping_ratio * natural_rad_s * s + natural_rad_s**2) / denominator
         changes = [
-            -heavier[:, None, None] * np.einsum("lp,lm->lpm", response[:, :, row], moved[:, column])
+            -dynamic_stiffness[:, None, None] * np.einsum("lp,lm->lpm", response[:, :, row], axis_motion[:, column])
             + (0 if row == column else 1)
-            * -heavier[:, None, None]
-            * np.einsum("lp,lm->lpm", response[:, :, column], moved[:, row])
-            for row, column in triangle_pairs(m)
+            * -dynamic_stiffness[:, None, None]
+            * np.einsum("lp,lm->lpm", response[:, :, column], axis_motion[:, row])
+            for row, column in triangle_pairs(inputs)
         ]
-        for seen in range(0 if structure.shared else m, p):
-            for axis in range(m):
+        for output in range(0 if structure.shared else inputs, outputs):
+            for axis in range(inputs):
                 change = np.zeros_like(response)
-                change[:, seen] = (-(s**2) / below * lines.shown)[:, None] * moved[:, axis]
+                change[:, output] = (-(s**2) / denominator * motion.sensor)[:, None] * axis_motion[:, axis]
                 changes.append(change)
-        columns = [-np.einsum("lpem,lpm->lpe", lines.group.root, change) for change in changes]
-        parts.append(columns)
-    flat = [stack_real([part[k] for part in parts]) for k in range(len(parts[0]))]
+        columns = [-np.einsum("lpem,lpm->lpe", motion.group.root, change) for change in changes]
+        group_columns.append(columns)
+    flat = [stack_real([part[k] for part in group_columns]) for k in range(len(group_columns[0]))]
     return -np.stack(flat, axis=1)
 
 
 def _make_start(
-    now: RefinedFit[Structure], explained: float, frequency_hz: float, ratio: float, strengths: FloatArray
+    current: RefinedFit[Structure],
+    explained_squares: float,
+    frequency_hz: float,
+    damping_ratio: float,
+    coefficients: FloatArray,
 ) -> ModeStart:
-    structure, m = now.structure, now.structure.inputs
-    grown = replace(structure, modes=structure.modes + 1)
-    unknowns = structure.transfer_unknowns(now.unknowns, grown)
-    own_entries = m * (m + 1) // 2
-    own, others = symmetric_matrix(strengths[:own_entries], m), strengths[own_entries:].reshape(-1, m)
-    root = np.sqrt(structure.mass_scale)
+    structure, inputs = current.structure, current.structure.inputs
+    extended = replace(structure, modes=structure.modes + 1)
+    unknowns = structure.transfer_unknowns(current.unknowns, extended)
+    entries = inputs * (inputs + 1) // 2
+    mass_matrix, sensor_rows = (
+        symmetric_matrix(coefficients[:entries], inputs),
+        coefficients[entries:].reshape(-1, inputs),
+    )
+    root_mass = np.sqrt(structure.mass_scale)
     # A mode has a single participation vector: the dominant direction of the estimated matrices, to which further
     # sensors' shapes are then fitted.
-    along = (
-        np.linalg.svd(np.concatenate([own / root**2, others]))[2][0] if len(others) else np.linalg.eigh(own)[1][:, -1]
+    direction = (
+        np.linalg.svd(np.concatenate([mass_matrix / root_mass**2, sensor_rows]))[2][0]
+        if len(sensor_rows)
+        else np.linalg.eigh(mass_matrix)[1][:, -1]
     )
-    participation = along * max(np.sqrt(max(along @ own @ along, 0.0)), _SMALL_START * root)
-    seen = others @ participation / (participation @ participation)
-    speed = np.log(2 * np.pi * frequency_hz / structure.speed_scale)
-    each = np.concatenate([[speed, np.log(ratio)], participation / root, seen * root])
-    part = grown.slices["modes"]
-    unknowns[part.stop - len(each) : part.stop] = each
-    return ModeStart(grown, unknowns, frequency_hz, explained)
+    participation = direction * max(
+        np.sqrt(max(direction @ mass_matrix @ direction, 0.0)), _LEAST_ROOT_MASS * root_mass
+    )
+    sensor_shape = sensor_rows @ participation / (participation @ participation)
+    log_frequency = np.log(2 * np.pi * frequency_hz / structure.speed_scale)
+    mode_unknowns = np.concatenate(
+        [[log_frequency, np.log(damping_ratio)], participation / root_mass, sensor_shape * root_mass]
+    )
+    mode_slice = extended.slices["modes"]
+    unknowns[mode_slice.stop - len(mode_unknowns) : mode_slice.stop] = mode_unknowns
+    return ModeStart(extended, unknowns, frequency_hz, explained_squares)

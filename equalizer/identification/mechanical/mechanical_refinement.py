@@ -28,9 +28,9 @@ class RefinedFit(Generic[S]):
     unknowns: FloatArray
     squares: float
     """Sum of squares of the fitted lines' misfits, each in units of its expected error."""
-    left_out: float
+    held_out_squares: float
     """Sum of squares of the held-out lines' misfits."""
-    left_out_count: int
+    held_out_count: int
     """Number of misfits in that sum."""
     slope: FloatArray
     """Jacobian at the solution, (2 n, parameters): real, then imaginary parts of the n complex misfits."""
@@ -38,7 +38,7 @@ class RefinedFit(Generic[S]):
     @property
     def error(self) -> float:
         """Root mean square misfit over the held-out lines, in units of the expected error; 0 without such lines."""
-        return float(np.sqrt(self.left_out / max(self.left_out_count, 1)))
+        return float(np.sqrt(self.held_out_squares / max(self.held_out_count, 1)))
 
 
 def refine_unknowns(
@@ -53,20 +53,20 @@ def refine_unknowns(
     # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
     from scipy.optimize import least_squares
 
-    fitted = [group.without_left_out() for group in groups]
+    fitted = [group.without_held_out() for group in groups]
     low, high = structure.bounds(band_hz)
 
     start = np.clip(start, low + 1e-9, high - 1e-9)
-    worst = stack_real(misfits(fitted, structure.model(start)))
+    start_residuals = stack_real(misfits(fitted, structure.model(start)))
 
     def residuals(unknowns: FloatArray) -> FloatArray:
         try:
-            found = stack_real(misfits(fitted, structure.model(unknowns)))
+            stacked = stack_real(misfits(fitted, structure.model(unknowns)))
         except (np.linalg.LinAlgError, MechanicalModelError):
-            return np.full_like(worst, 1e6)  # large, so that the step to an invalid model is rejected
-        return found if np.isfinite(found).all() else np.full_like(worst, 1e6)
+            return np.full_like(start_residuals, 1e6)  # large, so that the step to an invalid model is rejected
+        return stacked if np.isfinite(stacked).all() else np.full_like(start_residuals, 1e6)
 
-    answer = least_squares(
+    solution = least_squares(
         residuals,
         start,
         jac=lambda unknowns: numerical_jacobian(residuals, unknowns, residuals(unknowns), high),
@@ -77,12 +77,12 @@ def refine_unknowns(
         ftol=1e-6,
         xtol=1e-7,
     )
-    left_out, count = _left_out_squares(groups, structure.model(answer.x))
-    return RefinedFit(structure, answer.x, 2 * float(answer.cost), left_out, count, answer.jac)
+    held_out, count = _held_out_squares(groups, structure.model(solution.x))
+    return RefinedFit(structure, solution.x, 2 * float(solution.cost), held_out, count, solution.jac)
 
 
-def _left_out_squares(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:
+def _held_out_squares(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:
     """Sum of squares of the held-out lines' misfits, and number of misfits in it."""
     pairs = list(zip(groups, misfits(groups, model), strict=True))
-    squares = sum(np.sum(np.abs(misfit[group.left_out]) ** 2) for group, misfit in pairs)
-    return float(squares), int(sum(group.count[group.left_out].sum() for group in groups))
+    squares = sum(np.sum(np.abs(misfit[group.held_out]) ** 2) for group, misfit in pairs)
+    return float(squares), int(sum(group.count[group.held_out].sum() for group in groups))

@@ -28,16 +28,16 @@ def refuse_unsuitable(recordings: Sequence[Recording]) -> None:
     if not recordings:
         raise MechanicalFitRefused("there is no recording to fit a model to; give at least one")
     first = recordings[0]
-    for number, other in enumerate(recordings[1:], start=2):
-        for what, each, found in (
-            ("sample rate", first.sample_rate_hz, other.sample_rate_hz),
-            ("hold", first.hold.value, other.hold.value),
-            ("command", channels_text(first.command), channels_text(other.command)),
-            ("response", channels_text(first.response), channels_text(other.response)),
+    for number, recording in enumerate(recordings[1:], start=2):
+        for property_name, expected, actual in (
+            ("sample rate", first.sample_rate_hz, recording.sample_rate_hz),
+            ("hold", first.hold.value, recording.hold.value),
+            ("command", channels_text(first.command), channels_text(recording.command)),
+            ("response", channels_text(first.response), channels_text(recording.response)),
         ):
-            if each != found:
+            if expected != actual:
                 raise MechanicalFitRefused(
-                    f"recording {number} has the {what} {found}, the first {each}; fit them separately"
+                    f"recording {number} has the {property_name} {actual}, the first {expected}; fit them separately"
                 )
     quantities = set(first.response.quantities)
     if len(quantities) > 1 or not quantities <= set(DERIVATIVE_OF_QUANTITY):

@@ -70,8 +70,8 @@ def sample_response(
     (lines,), above zero. form: the model's, if known."""
     form = form or pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
-    answers, direct = pole_responses(form.poles, z, rate_hz, hold, model.actuator.delay_s)
-    response = _sum_poles(answers, form.outputs, form.inputs) + direct[:, None, None] * form.direct
+    pole_terms, direct = pole_responses(form.poles, z, rate_hz, hold, model.actuator.delay_s)
+    response = _sum_poles(pole_terms, form.outputs, form.inputs) + direct[:, None, None] * form.direct
     return np.asarray(response * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
 
 
@@ -92,11 +92,12 @@ def free_response(
     return np.asarray(spectra * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
 
 
-def _sum_poles(answers: ComplexArray, outputs: ComplexArray, inputs: ComplexArray) -> ComplexArray:
-    """Sum over the poles, (lines, p, m), in one product of matrices. answers: response of each pole, (lines, poles)."""
+def _sum_poles(pole_terms: ComplexArray, outputs: ComplexArray, inputs: ComplexArray) -> ComplexArray:
+    """Sum over the poles, (lines, p, m), in one product of matrices. pole_terms: response of each pole, (lines,
+    poles)."""
     residues = outputs.T[:, :, None] * inputs[:, None, :]
-    flat = answers @ residues.reshape(len(residues), -1)
-    return np.asarray(flat.reshape(len(answers), *residues.shape[1:]))
+    products = pole_terms @ residues.reshape(len(residues), -1)
+    return np.asarray(products.reshape(len(pole_terms), *residues.shape[1:]))
 
 
 def sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> ComplexArray:
@@ -104,8 +105,8 @@ def sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> Com
     1 where the bandwidth is 0, which means no low-pass."""
     if not bandwidth_hz:
         return np.ones(len(z), dtype=np.complex128)
-    left = np.exp(-2 * np.pi * bandwidth_hz / rate_hz)
-    return np.asarray((1 - left) / (1 - left / z))
+    decay = np.exp(-2 * np.pi * bandwidth_hz / rate_hz)
+    return np.asarray((1 - decay) / (1 - decay / z))
 
 
 def _append_input_lag(
@@ -128,18 +129,18 @@ def pole_responses(
     # A fit may try an unstable model: the growth per sample is limited, so that its response stays finite.
     poles = np.minimum(poles.real, _FASTEST_GROWTH * rate_hz) + 1j * poles.imag
     if hold is Hold.ZERO_ORDER:
-        whole = np.floor(delay_s * rate_hz + 1e-9)
-        late = max(delay_s - whole * step, 0.0)
-        early = step - late
-        first = _integrate_exponential(poles, early)
-        second = np.exp(poles * early) * _integrate_exponential(poles, late)
-        away = column ** (-whole)
-        return away * (first + second / column) / (column - np.exp(poles * step)), z ** (-whole - 1)
+        whole_steps = np.floor(delay_s * rate_hz + 1e-9)
+        delay_rest = max(delay_s - whole_steps * step, 0.0)
+        step_rest = step - delay_rest
+        first = _integrate_exponential(poles, step_rest)
+        second = np.exp(poles * step_rest) * _integrate_exponential(poles, delay_rest)
+        factor = column ** (-whole_steps)
+        return factor * (first + second / column) / (column - np.exp(poles * step)), z ** (-whole_steps - 1)
     delayed = np.exp(-np.log(z) * delay_s * rate_hz)
     if hold is Hold.LINEAR:
         ramp = _integrate_ramp(poles, step)
-        away = column - np.exp(poles * step)
-        return delayed[:, None] * (_integrate_exponential(poles, step) + ramp * (column - 1)) / away, delayed
+        factor = column - np.exp(poles * step)
+        return delayed[:, None] * (_integrate_exponential(poles, step) + ramp * (column - 1)) / factor, delayed
     return delayed[:, None] / (np.log(column) * rate_hz - poles), delayed
 
 

@@ -35,8 +35,8 @@ def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: f
     m = structure.inputs
     if structure.delayed:
         delays_s = np.linspace(0.0, _MOST_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _DELAYS)
-        solved = [_solve_matrices(segments, structure, floor, float(delay_s)) for delay_s in delays_s]
-        delay_s = float(delays_s[int(np.argmin([left for _, left in solved]))])
+        trials = [_solve_matrices(segments, structure, floor, float(delay_s)) for delay_s in delays_s]
+        delay_s = float(delays_s[int(np.argmin([residual for _, residual in trials]))])
     else:
         delay_s = structure.actuator.delay_s
     parts = _solve_matrices(segments, structure, floor, delay_s)[0].reshape(3, -1)
@@ -44,8 +44,8 @@ def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: f
     if m == 1 and mass[0, 0] < 0 and structure.signs == (1.0,):
         return rigid_start(segments, replace(structure, signs=(-1.0,)), floor)
     values, vectors = np.linalg.eigh(mass)
-    top = max(float(np.abs(values).max()), 1e-300)
-    mass = (vectors * np.maximum(values, _LEAST_EIGENVALUE * top)) @ vectors.T
+    largest = max(float(np.abs(values).max()), 1e-300)
+    mass = (vectors * np.maximum(values, _LEAST_EIGENVALUE * largest)) @ vectors.T
     structure = replace(structure, mass_scale=float(np.trace(mass) / m))
     units = structure.units
     unknowns = np.zeros(structure.parameters)
@@ -64,10 +64,10 @@ def _solve_matrices(
 ) -> tuple[FloatArray, float]:
     """Entries of mass, damping and stiffness (lower triangles, row by row), and the weighted residual sum of
     squares."""
-    rows, right = _stiffness_rows(segments, structure, floor, delay_s)
-    found = solve_scaled(rows, right)
+    rows, target = _stiffness_rows(segments, structure, floor, delay_s)
+    solution = solve_scaled(rows, target)
     m = structure.inputs
-    return found[: 3 * m * (m + 1) // 2], float(np.sum((right - rows @ found) ** 2))
+    return solution[: 3 * m * (m + 1) // 2], float(np.sum((target - rows @ solution) ** 2))
 
 
 def _stiffness_rows(
@@ -77,37 +77,37 @@ def _stiffness_rows(
     imaginary parts, divided by the expected error of the force."""
     m, order = structure.inputs, DERIVATIVE_OF_QUANTITY[structure.quantity]
     # A held force shows in the acceleration one sample later, in velocity and position half a sample later.
-    late_steps = 1.0 if order == 2 else 0.5
-    blocks, right = [], []
+    delay_steps = 1.0 if order == 2 else 0.5
+    blocks, targets = [], []
     transients = [i for i, segment in enumerate(segments) if segment.transient]
-    for number, each in enumerate(segments):
-        s = 2j * np.pi * each.frequency_hz
-        z = np.exp(s / each.rate_hz)
-        late = late_steps if each.hold.value == "zero-order" else 0.0
-        shown = sensor_response(structure.sensor.bandwidth_hz, z, each.rate_hz) * z ** (-late)
-        shown = shown * np.exp(-s * delay_s)
-        moved = each.response[:, :m] * np.array(structure.signs) / shown[:, None]
-        size = np.linalg.norm(each.response[:, :m], axis=1)
-        noise = np.sqrt(np.nan_to_num(each.noise[:, :m]).sum(axis=1)) / np.maximum(size, 1e-300)
-        weight = each.excited / (np.linalg.norm(each.command, axis=1) * np.hypot(5 * floor, noise) + 1e-300)
+    for number, lines in enumerate(segments):
+        s = 2j * np.pi * lines.frequency_hz
+        z = np.exp(s / lines.rate_hz)
+        delay_samples = delay_steps if lines.hold.value == "zero-order" else 0.0
+        sensor = sensor_response(structure.sensor.bandwidth_hz, z, lines.rate_hz) * z ** (-delay_samples)
+        sensor = sensor * np.exp(-s * delay_s)
+        motion = lines.response[:, :m] * np.array(structure.signs) / sensor[:, None]
+        size = np.linalg.norm(lines.response[:, :m], axis=1)
+        noise = np.sqrt(np.nan_to_num(lines.noise[:, :m]).sum(axis=1)) / np.maximum(size, 1e-300)
+        weight = lines.excited / (np.linalg.norm(lines.command, axis=1) * np.hypot(5 * floor, noise) + 1e-300)
         columns = [
-            _entry_force(moved * (s ** (power - order))[:, None], pair)
+            _entry_force(motion * (s ** (power - order))[:, None], pair)
             for power in (2, 1, 0)
             for pair in triangle_pairs(m)
         ]
-        ends = np.zeros((len(s), m, 3 * m * len(transients)), dtype=np.complex128)
-        if each.transient:
+        transient_columns = np.zeros((len(s), m, 3 * m * len(transients)), dtype=np.complex128)
+        if lines.transient:
             # The states at the segment's ends add s, 1, 1 / s, over s^order, times unknown factors.
             for axis in range(m):
                 first = 3 * (m * transients.index(number) + axis)
-                ends[:, axis, first : first + 3] = s[:, None] ** (np.array([1, 0, -1]) - order)
-        block = np.concatenate([np.stack(columns, axis=2), ends], axis=2) * weight[:, None, None]
+                transient_columns[:, axis, first : first + 3] = s[:, None] ** (np.array([1, 0, -1]) - order)
+        block = np.concatenate([np.stack(columns, axis=2), transient_columns], axis=2) * weight[:, None, None]
         blocks.append(block.reshape(-1, block.shape[2]))
-        right.append((each.command * weight[:, None]).ravel())
-    complex_rows, complex_right = np.concatenate(blocks), np.concatenate(right)
+        targets.append((lines.command * weight[:, None]).ravel())
+    complex_rows, complex_targets = np.concatenate(blocks), np.concatenate(targets)
     return (
         np.concatenate([complex_rows.real, complex_rows.imag]),
-        np.concatenate([complex_right.real, complex_right.imag]),
+        np.concatenate([complex_targets.real, complex_targets.imag]),
     )
 
 
@@ -127,11 +127,11 @@ def _entry_force(motion: ComplexArray, pair: tuple[int, int]) -> ComplexArray:
     return force
 
 
-def solve_scaled(rows: FloatArray, right: FloatArray) -> FloatArray:
-    """(k,): least-squares solution of rows (n, k) @ x = right (n,), computed with columns of unit length; singular
+def solve_scaled(rows: FloatArray, target: FloatArray) -> FloatArray:
+    """(k,): least-squares solution of rows (n, k) @ x = target (n,), computed with columns of unit length; singular
     values below 1e-12 of the largest are cut off."""
     scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
-    return np.asarray(np.linalg.lstsq(rows / scale, right, rcond=1e-12)[0] / scale)
+    return np.asarray(np.linalg.lstsq(rows / scale, target, rcond=1e-12)[0] / scale)
 
 
 def symmetric_matrix(entries: FloatArray, m: int) -> FloatArray:
@@ -149,10 +149,12 @@ def _make_positive(matrix: FloatArray) -> FloatArray:
 
 def _other_rows(segments: Sequence[SegmentLines], m: int) -> FloatArray:
     """(p - m, m): output rows of the further responses: their least-squares weights on the driven axes' responses."""
-    own = np.concatenate([segment.response[:, :m] for segment in segments])
-    others = np.concatenate([segment.response[:, m:] for segment in segments])
+    axis_responses = np.concatenate([segment.response[:, :m] for segment in segments])
+    further_responses = np.concatenate([segment.response[:, m:] for segment in segments])
     return np.asarray(
-        np.linalg.lstsq(np.concatenate([own.real, own.imag]), np.concatenate([others.real, others.imag]), rcond=None)[
-            0
-        ].T
+        np.linalg.lstsq(
+            np.concatenate([axis_responses.real, axis_responses.imag]),
+            np.concatenate([further_responses.real, further_responses.imag]),
+            rcond=None,
+        )[0].T
     )

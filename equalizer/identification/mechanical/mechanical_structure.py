@@ -29,17 +29,17 @@ def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: 
     is assumed.
     """
     participation = model.mass[m:, :m]
-    rest = model.mass[:m, :m] - participation.T @ participation
+    bare_mass = model.mass[:m, :m] - participation.T @ participation
     n = model.coordinates + m
     mass, damping, springs = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
     mass[m:, m:] = model.mass
-    mass[m : 2 * m, m : 2 * m] -= DRIVEN_SHARE * rest
-    mass[:m, :m] = DRIVEN_SHARE * rest
-    for whole, part in ((damping, model.damping), (springs, model.stiffness)):
-        whole[:m, :m] = part[:m, :m]
-        whole[2 * m :, 2 * m :] = part[m:, m:]
-    for whole, part in ((damping, loss_s * stiffness), (springs, stiffness)):
-        whole[: 2 * m, : 2 * m] += np.block([[part, -part], [-part, part]])
+    mass[m : 2 * m, m : 2 * m] -= DRIVEN_SHARE * bare_mass
+    mass[:m, :m] = DRIVEN_SHARE * bare_mass
+    for target, part in ((damping, model.damping), (springs, model.stiffness)):
+        target[:m, :m] = part[:m, :m]
+        target[2 * m :, 2 * m :] = part[m:, m:]
+    for target, part in ((damping, loss_s * stiffness), (springs, stiffness)):
+        target[: 2 * m, : 2 * m] += np.block([[part, -part], [-part, part]])
     return replace(
         model,
         mass=mass,
@@ -100,12 +100,12 @@ class Structure:
         participations, the sensor shape. Slices of what the structure lacks are empty."""
         m, p = self.inputs, self.outputs
         pairs = m * (m + 1) // 2
-        seen = p if self.shared else p - m
+        shape_entries = p if self.shared else p - m
         sizes = {
             "mass": pairs, "damping": pairs, "stiffness": pairs if self.grounded else 0,
             "rows": (p - m) * m, "turn": m * (m - 1) // 2 if self.turned else 0,
             "joint": pairs + 1 if self.joint else 0, "delay": 1 if self.delayed else 0,
-            "modes": self.modes * (2 + m + seen),
+            "modes": self.modes * (2 + m + shape_entries),
         }  # fmt: skip
         ends = np.cumsum(list(sizes.values()))
         return {name: slice(int(end) - size, int(end)) for (name, size), end in zip(sizes.items(), ends, strict=True)}
@@ -129,48 +129,48 @@ class Structure:
             self.mass_scale * self.speed_scale**2,
         )
 
-    def transfer_unknowns(self, unknowns: FloatArray, other: "Structure") -> FloatArray:
+    def transfer_unknowns(self, unknowns: FloatArray, destination: "Structure") -> FloatArray:
         """The unknowns converted to a larger structure, whose additional ones start at zero, or to a smaller
         structure."""
-        grown = np.zeros(other.parameters)
+        transferred = np.zeros(destination.parameters)
         for name, part in self.slices.items():
-            there = other.slices[name]
+            target = destination.slices[name]
             if name == "modes" and self.modes:
-                old = unknowns[part].reshape(self.modes, -1)
-                new = np.zeros((other.modes, (there.stop - there.start) // other.modes))
+                old_modes = unknowns[part].reshape(self.modes, -1)
+                new_modes = np.zeros((destination.modes, (target.stop - target.start) // destination.modes))
                 head = 2 + self.inputs
-                new[: self.modes, :head] = old[:, :head]
-                if old.shape[1] > head:
-                    new[: self.modes, new.shape[1] - (old.shape[1] - head) :] = old[:, head:]
-                grown[there] = new.ravel()
-            elif name != "modes" and part.stop - part.start == there.stop - there.start:
-                grown[there] = unknowns[part]
-        return grown
+                new_modes[: self.modes, :head] = old_modes[:, :head]
+                if old_modes.shape[1] > head:
+                    new_modes[: self.modes, new_modes.shape[1] - (old_modes.shape[1] - head) :] = old_modes[:, head:]
+                transferred[target] = new_modes.ravel()
+            elif name != "modes" and part.stop - part.start == target.stop - target.start:
+                transferred[target] = unknowns[part]
+        return transferred
 
     def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
         """The model in relative coordinates. Raises MechanicalModelError where the mass is not positive definite."""
         m, part = self.inputs, self.slices
         mass, damping, stiffness = self.find_grounded_parts(unknowns)
-        frequency, ratio, participation, seen = self.oscillators(unknowns)
-        own = np.diag(self.signs) @ _cayley_rotation(unknowns[part["turn"]], m)
-        rows = np.concatenate([own, unknowns[part["rows"]].reshape(-1, m)])
-        whole = MechanicalModel(
+        frequency, ratio, participation, sensor_shapes = self.oscillators(unknowns)
+        sensor_rotation = np.diag(self.signs) @ _cayley_rotation(unknowns[part["turn"]], m)
+        rows = np.concatenate([sensor_rotation, unknowns[part["rows"]].reshape(-1, m)])
+        model = MechanicalModel(
             name=name,
             quantity=self.quantity,
             mass=_assemble_matrix(mass + participation.T @ participation, participation, np.ones(self.modes)),
             damping=_assemble_matrix(damping, None, 2 * ratio * frequency),
             stiffness=_assemble_matrix(stiffness, None, frequency**2),
             input=np.concatenate([np.eye(m), np.zeros((self.modes, m))]),
-            output=np.concatenate([rows, seen.T], axis=1),
+            output=np.concatenate([rows, sensor_shapes.T], axis=1),
             sensor=self.sensor,
             actuator=replace(self.actuator, delay_s=self.delay_s(unknowns)),
             rotational=self.rotational,
         )
         if not self.joint:
-            return whole
+            return model
         joint = unknowns[part["joint"]]
         lower = _unpack_triangle(joint[:-1], m)
-        return insert_joint(whole, m, self.units[2] * lower @ lower.T, float(np.exp(joint[-1])) / self.speed_scale)
+        return insert_joint(model, m, self.units[2] * lower @ lower.T, float(np.exp(joint[-1])) / self.speed_scale)
 
     def find_grounded_parts(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Mass (without the oscillators'), damping and stiffness at the driven axes, (m, m) each."""
@@ -189,8 +189,8 @@ class Structure:
         low[part["mass"].start + diagonal], high[part["mass"].start + diagonal] = -_WIDEST_LOG, _WIDEST_LOG
         if self.joint:
             first = part["joint"].start + diagonal
-            at = np.log(2 * np.pi * band_hz[1] / self.speed_scale)
-            low[first], high[first] = at - _WIDEST_JOINT_LOG, at + _WIDEST_JOINT_LOG
+            joint_log = np.log(2 * np.pi * band_hz[1] / self.speed_scale)
+            low[first], high[first] = joint_log - _WIDEST_JOINT_LOG, joint_log + _WIDEST_JOINT_LOG
             low[part["joint"].stop - 1], high[part["joint"].stop - 1] = np.log(1e-4), np.log(1.0)
         low[part["turn"]], high[part["turn"]] = -_LARGEST_TURN, _LARGEST_TURN
         low[part["delay"]], high[part["delay"]] = 0.0, _MOST_DELAY_SAMPLES
@@ -212,12 +212,12 @@ class Structure:
         """Frequencies in rad/s (modes,), damping ratios (modes,), participations (modes, m), sensor shapes (modes,
         p)."""
         m, p = self.inputs, self.outputs
-        each = unknowns[self.slices["modes"]].reshape(self.modes, -1) if self.modes else np.zeros((0, 2 + m))
+        rows = unknowns[self.slices["modes"]].reshape(self.modes, -1) if self.modes else np.zeros((0, 2 + m))
         root = np.sqrt(self.mass_scale)
-        seen = np.zeros((self.modes, p))
-        if self.modes and each.shape[1] > 2 + m:
-            seen[:, p - (each.shape[1] - 2 - m) :] = each[:, 2 + m :] / root
-        return self.speed_scale * np.exp(each[:, 0]), np.exp(each[:, 1]), root * each[:, 2 : 2 + m], seen
+        shapes = np.zeros((self.modes, p))
+        if self.modes and rows.shape[1] > 2 + m:
+            shapes[:, p - (rows.shape[1] - 2 - m) :] = rows[:, 2 + m :] / root
+        return self.speed_scale * np.exp(rows[:, 0]), np.exp(rows[:, 1]), root * rows[:, 2 : 2 + m], shapes
 
 
 def pack_mass(mass: FloatArray) -> FloatArray:
@@ -238,13 +238,13 @@ def start_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float)
     """The unknowns with an isotropic joint whose resonance, for the mean mass of the axes, is at frequency_hz."""
     mass = structure.find_grounded_parts(unknowns)[0]
     m, part = structure.inputs, structure.slices["joint"]
-    shared = float(np.trace(mass)) / m * DRIVEN_SHARE * (1 - DRIVEN_SHARE)
-    begun = unknowns.copy()
-    begun[part] = 0.0
-    root = 2 * np.pi * frequency_hz * np.sqrt(shared / structure.units[2])
-    begun[part.start + diagonal_places(m)] = np.log(root)
-    begun[part.stop - 1] = np.log(_JOINT_LOSS * structure.speed_scale / (2 * np.pi * frequency_hz))
-    return begun
+    reduced_mass = float(np.trace(mass)) / m * DRIVEN_SHARE * (1 - DRIVEN_SHARE)
+    started = unknowns.copy()
+    started[part] = 0.0
+    root = 2 * np.pi * frequency_hz * np.sqrt(reduced_mass / structure.units[2])
+    started[part.start + diagonal_places(m)] = np.log(root)
+    started[part.stop - 1] = np.log(_JOINT_LOSS * structure.speed_scale / (2 * np.pi * frequency_hz))
+    return started
 
 
 def remove_mode(structure: Structure, unknowns: FloatArray, number: int) -> tuple[Structure, FloatArray]:
@@ -288,12 +288,12 @@ def _cayley_rotation(angles: FloatArray, m: int) -> FloatArray:
     return np.asarray(np.linalg.solve(np.eye(m) - skew, np.eye(m) + skew))
 
 
-def _assemble_matrix(driven: FloatArray, between: FloatArray | None, own: FloatArray) -> FloatArray:
-    """Matrix of the driven axes (m, m), then the oscillators. own: (modes,), between: (modes, m)."""
-    m, n = len(driven), len(driven) + len(own)
-    whole = np.zeros((n, n))
-    whole[:m, :m] = driven
-    whole[range(m, n), range(m, n)] = own
-    if between is not None:
-        whole[m:, :m], whole[:m, m:] = between, between.T
-    return whole
+def _assemble_matrix(driven: FloatArray, coupling: FloatArray | None, diagonal: FloatArray) -> FloatArray:
+    """Matrix of the driven axes (m, m), then the oscillators. diagonal: (modes,), coupling: (modes, m)."""
+    m, n = len(driven), len(driven) + len(diagonal)
+    matrix = np.zeros((n, n))
+    matrix[:m, :m] = driven
+    matrix[range(m, n), range(m, n)] = diagonal
+    if coupling is not None:
+        matrix[m:, :m], matrix[:m, m:] = coupling, coupling.T
+    return matrix

@@ -10,23 +10,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitSettings, OrderTried
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitSettings, OrderCandidate
 from equalizer.identification.mechanical.mechanical_misfit import LineGroup
-from equalizer.identification.mechanical.mechanical_order import ALLOWED
+from equalizer.identification.mechanical.mechanical_order import TARGET_REACHED
 from equalizer.identification.mechanical.mechanical_refinement import RefinedFit, refine_unknowns
 from equalizer.identification.mechanical.mechanical_structure import Structure
-from equalizer.identification.mechanical.modal_search import FoundModes, ModalSearch
+from equalizer.identification.mechanical.modal_search import ModalSearch, ModeEstimate
 from equalizer.identification.mechanical.modal_structure import ModalStructure, find_balancing_factors
 from equalizer.signals.signal import FloatArray
 
 LEAST_GAIN = 0.08
 """Smallest relative fall of the cross-validated squared error for which a further frequency, with its shape, is
 adopted."""
-REACHED = 1.02
+DELAY_ERROR = 1.02
 """Cross-validated rms error, in units of noise and floor, from which a delay is tried."""
-ALIKE = 1.1
+DELAY_RATIO = 1.1
 """Largest ratio of the cross-validated squared errors with and without a delay, where it needs fewer modes."""
-LEAST_SHAPE = 0.15
+MIN_SINGULAR_VALUE = 0.15
 """Singular value of a shape, relative to the largest at the same frequency, below which its rank-one part is left
 out."""
 
@@ -37,48 +37,54 @@ def choose_modes(
     band_hz: tuple[float, float],
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
-) -> tuple[RefinedFit[ModalStructure], tuple[OrderTried, ...], str]:
+) -> tuple[RefinedFit[ModalStructure], tuple[OrderCandidate, ...], str]:
     """Choose the number of modes. Groups must not contain transients. Returns the fit, all orders tried, and the reason
-    for the choice. A delay is tried only where modes alone leave an error of `REACHED` or more, because a delay can
+    for the choice. A delay is tried only where modes alone leave an error of `DELAY_ERROR` or more, because a delay can
     substitute missing modes."""
-    most = settings.most_modes + structure.inputs
-    best, tried, reason = _add_modes(
-        ModalSearch(groups, structure, band_hz, fit_delay=False), structure, most, lambda s: on_progress(0.4 * s)
+    most_modes = settings.most_modes + structure.inputs
+    best, trials, reason = _add_modes(
+        ModalSearch(groups, structure, band_hz, fit_delay=False), structure, most_modes, lambda s: on_progress(0.4 * s)
     )
-    if settings.fit_delay and _left_out_error(best) >= REACHED:
+    if settings.fit_delay and _compute_held_out_error(best) >= DELAY_ERROR:
         search = ModalSearch(groups, structure, band_hz, fit_delay=True)
-        other, more, why = _add_modes(search, structure, most, lambda s: on_progress(0.4 + 0.4 * s))
-        tried = [*tried, *(replace(each, what=f"{each.what}, with a delay") for each in more)]
-        fewer = len(other.logs) < len(best.logs)
-        if other.left_out < (ALIKE if fewer else 1 - LEAST_GAIN) * best.left_out:
-            best, reason = other, why
-    modal, unknowns = _rank_one_modes(best, structure)
-    return balance_fit(refine_unknowns(groups, modal, unknowns, band_hz, most_steps=10)), tuple(tried), reason
+        delayed, delayed_trials, delayed_reason = _add_modes(
+            search, structure, most_modes, lambda s: on_progress(0.4 + 0.4 * s)
+        )
+        trials = [
+            *trials,
+            *(replace(trial, description=f"{trial.description}, with a delay") for trial in delayed_trials),
+        ]
+        has_fewer_modes = len(delayed.logs) < len(best.logs)
+        if delayed.held_out_squares < (DELAY_RATIO if has_fewer_modes else 1 - LEAST_GAIN) * best.held_out_squares:
+            best, reason = delayed, delayed_reason
+    modal, unknowns = _split_into_rank_one_modes(best, structure)
+    return balance_fit(refine_unknowns(groups, modal, unknowns, band_hz, most_steps=10)), tuple(trials), reason
 
 
 def _add_modes(
-    search: ModalSearch, structure: Structure, most: int, on_progress: Callable[[float], None]
-) -> tuple[FoundModes, list[OrderTried], str]:
-    """Add modes, up to `most`, while the error on held-out lines falls enough; also the orders tried and the reason."""
+    search: ModalSearch, structure: Structure, most_modes: int, on_progress: Callable[[float], None]
+) -> tuple[ModeEstimate, list[OrderCandidate], str]:
+    """Add modes, up to `most_modes`, while the error on held-out lines falls enough; also the orders tried and the
+    reason."""
     best = search.add_mode(None)
-    tried = [_record_trial(best, structure, True)]
-    for number in range(1, most):
-        on_progress(number / most)
-        if _left_out_error(best) < 1:
-            return best, tried, ALLOWED
-        more = search.add_mode(best)
-        better = more.left_out < (1 - LEAST_GAIN) * best.left_out
-        tried.append(_record_trial(more, structure, better))
-        if not better:
-            why = f"One more frequency explains less than {LEAST_GAIN:.0%} of the residual on held-out lines."
-            return best, tried, why
-        best = more
-    return best, tried, f"{most} frequencies, the most that are allowed, were used."
+    trials = [_record_trial(best, structure, True)]
+    for number in range(1, most_modes):
+        on_progress(number / most_modes)
+        if _compute_held_out_error(best) < 1:
+            return best, trials, TARGET_REACHED
+        extended = search.add_mode(best)
+        is_accepted = extended.held_out_squares < (1 - LEAST_GAIN) * best.held_out_squares
+        trials.append(_record_trial(extended, structure, is_accepted))
+        if not is_accepted:
+            reason = f"One more frequency explains less than {LEAST_GAIN:.0%} of the residual on held-out lines."
+            return best, trials, reason
+        best = extended
+    return best, trials, f"{most_modes} frequencies, the most that are allowed, were used."
 
 
-def _left_out_error(found: FoundModes) -> float:
+def _compute_held_out_error(estimate: ModeEstimate) -> float:
     """Rms error on the held-out lines, in units of the expected error."""
-    return float(np.sqrt(found.left_out / max(found.left_out_count, 1)))
+    return float(np.sqrt(estimate.held_out_squares / max(estimate.held_out_count, 1)))
 
 
 def balance_fit(fit: RefinedFit[ModalStructure]) -> RefinedFit[ModalStructure]:
@@ -87,17 +93,17 @@ def balance_fit(fit: RefinedFit[ModalStructure]) -> RefinedFit[ModalStructure]:
     return replace(fit, unknowns=fit.unknowns * factors, slope=fit.slope / factors)
 
 
-def _rank_one_modes(found: FoundModes, structure: Structure) -> tuple[ModalStructure, FloatArray]:
+def _split_into_rank_one_modes(modes: ModeEstimate, structure: Structure) -> tuple[ModalStructure, FloatArray]:
     """Rank-one modes, as a structure and its unknowns: a frequency whose shape has a higher rank becomes several
     modes."""
-    half = len(found.logs) // 2
+    half = len(modes.logs) // 2
     rows = []
-    for speed, ratio, shape in zip(found.logs[:half], found.logs[half:], found.shapes, strict=True):
-        left, strengths, right = np.linalg.svd(shape, full_matrices=False)
-        for k in np.flatnonzero(strengths >= LEAST_SHAPE * strengths[0]):
-            root = np.sqrt(strengths[k] * structure.mass_scale)
-            head = [speed - np.log(structure.speed_scale), ratio]
-            rows.append(np.concatenate([head, root * right[k], root * left[:, k]]))
+    for speed, ratio, shape in zip(modes.logs[:half], modes.logs[half:], modes.shapes, strict=True):
+        left_vectors, singular_values, right_vectors = np.linalg.svd(shape, full_matrices=False)
+        for k in np.flatnonzero(singular_values >= MIN_SINGULAR_VALUE * singular_values[0]):
+            root = np.sqrt(singular_values[k] * structure.mass_scale)
+            pole_unknowns = [speed - np.log(structure.speed_scale), ratio]
+            rows.append(np.concatenate([pole_unknowns, root * right_vectors[k], root * left_vectors[:, k]]))
     modal = ModalStructure(
         structure.inputs,
         structure.outputs,
@@ -106,13 +112,15 @@ def _rank_one_modes(found: FoundModes, structure: Structure) -> tuple[ModalStruc
         structure.mass_scale,
         structure.speed_scale,
         structure.sensor,
-        replace(structure.actuator, delay_s=found.delay_s if found.delay_s > 1e-3 * structure.step_s else 0.0),
+        replace(structure.actuator, delay_s=modes.delay_s if modes.delay_s > 1e-3 * structure.step_s else 0.0),
         structure.rotational,
     )
     return modal, np.concatenate(rows)
 
 
-def _record_trial(found: FoundModes, structure: Structure, accepted: bool) -> OrderTried:
-    modes = len(found.logs) // 2
+def _record_trial(estimate: ModeEstimate, structure: Structure, accepted: bool) -> OrderCandidate:
+    modes = len(estimate.logs) // 2
     parameters = modes * (2 + structure.inputs * structure.outputs)
-    return OrderTried(f"{modes} frequencies, every shape free", modes, parameters, _left_out_error(found), accepted)
+    return OrderCandidate(
+        f"{modes} frequencies, every shape free", modes, parameters, _compute_held_out_error(estimate), accepted
+    )

@@ -29,7 +29,7 @@ _MOST_DELAY_SAMPLES = 20.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FoundModes:
+class ModeEstimate:
     """Modes with free shapes (p m numbers each), and their misfit on the held-out lines."""
 
     logs: FloatArray
@@ -37,9 +37,9 @@ class FoundModes:
     delay_s: float
     shapes: FloatArray
     """(modes, p, m)"""
-    left_out: float
+    held_out_squares: float
     """Sum of squares of the weighted residuals on the held-out lines."""
-    left_out_count: int
+    held_out_count: int
     """Number of residuals in that sum."""
 
 
@@ -68,34 +68,36 @@ class ModalSearch:
         self._band = band_hz
         self._fit_delay = fit_delay
         self._known_delay = structure.actuator.delay_s / structure.step_s
-        self._kept = [~group.left_out for group in groups]
+        self._kept = [~group.held_out for group in groups]
 
-    def add_mode(self, now: FoundModes | None) -> FoundModes:
-        """Add a mode at the grid point that explains most, then refine all modes together. now: None for the first
+    def add_mode(self, current: ModeEstimate | None) -> ModeEstimate:
+        """Add a mode at the grid point that explains most, then refine all modes together. current: None for the first
         mode."""
-        logs = np.empty(0) if now is None else now.logs
-        delay = self._known_delay if now is None else now.delay_s / self._structure.step_s
-        solved = self._solve(np.append(logs, delay))
+        logs = np.empty(0) if current is None else current.logs
+        delay = self._known_delay if current is None else current.delay_s / self._structure.step_s
+        solution = self._solve(np.append(logs, delay))
         low, high = np.log(2 * np.pi * np.array([self._band[0] / 2, self._band[1] * 2]))
         best = max(
-            ((self._compute_explained_by_mode(solved, np.array([speed, np.log(ratio), delay])), speed, np.log(ratio))
+            ((self._compute_explained_by_mode(solution, np.array([speed, np.log(ratio), delay])), speed, np.log(ratio))
             for speed in np.linspace(low, high, _GRID) for ratio in _RATIOS),
         )  # fmt: skip
         half = len(logs) // 2
         return self._refine(np.concatenate([logs[:half], [best[1]], logs[half:], [best[2]], [delay]]))
 
-    def _refine(self, start: FloatArray) -> FoundModes:
+    def _refine(self, start: FloatArray) -> ModeEstimate:
         """Bounded least squares over the unknowns: logs of w (rad/s), logs of damping ratios, delay (samples). The
         delay is free only with at least two modes."""
         # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
         from scipy.optimize import least_squares
 
         half, delay = len(start) // 2, start[-1]
-        least, most = (0.0, _MOST_DELAY_SAMPLES) if self._fit_delay and half > 1 else (delay - 1e-9, delay + 1e-9)
+        low_delay, high_delay = (
+            (0.0, _MOST_DELAY_SAMPLES) if self._fit_delay and half > 1 else (delay - 1e-9, delay + 1e-9)
+        )
         low = np.concatenate([np.full(half, np.log(2 * np.pi * self._band[0] / 10)), np.full(half, np.log(1e-3))])
         high = np.concatenate([np.full(half, np.log(2 * np.pi * self._band[1] * 2)), np.full(half, np.log(30.0))])
-        low, high = np.append(low, least), np.append(high, most)
-        answer = least_squares(
+        low, high = np.append(low, low_delay), np.append(high, high_delay)
+        result = least_squares(
             lambda unknowns: self._stack_real(self._solve(unknowns).misfit),
             np.clip(start, low + 1e-10, high - 1e-10),
             jac=self._jacobian,
@@ -103,14 +105,14 @@ class ModalSearch:
             max_nfev=40,
             ftol=1e-5,
         )
-        solved = self._solve(answer.x)
-        pairs = list(zip(self._groups, solved.misfit, strict=True))
-        return FoundModes(
-            answer.x[:-1],
-            float(answer.x[-1]) * self._structure.step_s,
-            solved.shapes,
-            float(sum(np.sum(np.abs(part[group.left_out]) ** 2) for group, part in pairs)),
-            int(sum(group.count[group.left_out].sum() for group in self._groups)),
+        solution = self._solve(result.x)
+        pairs = list(zip(self._groups, solution.misfit, strict=True))
+        return ModeEstimate(
+            result.x[:-1],
+            float(result.x[-1]) * self._structure.step_s,
+            solution.shapes,
+            float(sum(np.sum(np.abs(part[group.held_out]) ** 2) for group, part in pairs)),
+            int(sum(group.count[group.held_out].sum() for group in self._groups)),
         )
 
     def _solve(self, unknowns: FloatArray) -> _Solution:
@@ -119,78 +121,88 @@ class ModalSearch:
         basis = [self._mode_responses(group, unknowns) for group in self._groups]
         shapes = np.zeros((modes, p, m))
         bases = []
-        for out in range(p):
+        for output in range(p):
             rows = [
-                (group.root[kept, out][..., None, :] * answers[kept, None, :, None]).reshape(
-                    group.target[kept, out].size, modes * m
+                (group.root[is_fitted, output][..., None, :] * responses[is_fitted, None, :, None]).reshape(
+                    group.target[is_fitted, output].size, modes * m
                 )
-                for group, answers, kept in zip(self._groups, basis, self._kept, strict=True)
+                for group, responses, is_fitted in zip(self._groups, basis, self._kept, strict=True)
             ]
-            right = [group.target[kept, out].ravel() for group, kept in zip(self._groups, self._kept, strict=True)]
-            design, wanted = _real_and_imaginary(np.concatenate(rows)), _real_and_imaginary(np.concatenate(right))
+            targets = [
+                group.target[is_fitted, output].ravel()
+                for group, is_fitted in zip(self._groups, self._kept, strict=True)
+            ]
+            design, target = _real_and_imaginary(np.concatenate(rows)), _real_and_imaginary(np.concatenate(targets))
             scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
             q, r = np.linalg.qr(design / scale) if modes else (design, design)
             bases.append(q)
             if modes:
-                entries = np.linalg.lstsq(r, q.T @ wanted, rcond=1e-9)[0] / scale
-                shapes[:, out] = entries.reshape(modes, m)
+                entries = np.linalg.lstsq(r, q.T @ target, rcond=1e-9)[0] / scale
+                shapes[:, output] = entries.reshape(modes, m)
         misfit = [
-            group.target - (group.root @ np.einsum("lk,kpm->lpm", answers, shapes)[..., None])[..., 0]
-            for group, answers in zip(self._groups, basis, strict=True)
+            group.target - (group.root @ np.einsum("lk,kpm->lpm", responses, shapes)[..., None])[..., 0]
+            for group, responses in zip(self._groups, basis, strict=True)
         ]
         return _Solution(misfit, bases, shapes)
 
     def _jacobian(self, unknowns: FloatArray) -> FloatArray:
         """Kaufman's approximation: derivative at fixed shapes, by finite differences, with the shapes' span projected
         out."""
-        solved = self._solve(unknowns)
+        solution = self._solve(unknowns)
         half = len(unknowns) // 2
         columns = []
         for k in range(len(unknowns)):
             # A mode's own parameters change its response alone, the delay changes all of them.
             modes = np.arange(half) if k == 2 * half else np.array([k % half])
             chosen = np.concatenate([modes, half + modes, [2 * half]])
-            moved = unknowns.copy()
-            moved[k] += _STEP
+            shifted = unknowns.copy()
+            shifted[k] += _STEP
             change = [
                 -np.einsum(
                     "lpem,lk,kpm->lpe",
                     group.root,
-                    (self._mode_responses(group, moved[chosen]) - self._mode_responses(group, unknowns[chosen]))
+                    (self._mode_responses(group, shifted[chosen]) - self._mode_responses(group, unknowns[chosen]))
                     / _STEP,
-                    solved.shapes[modes],
+                    solution.shapes[modes],
                     optimize=True,
                 )
                 for group in self._groups
             ]
-            columns.append(self._project_out(change, solved.bases))
+            columns.append(self._project_out(change, solution.bases))
         return np.stack(columns, axis=1)
 
-    def _compute_explained_by_mode(self, solved: _Solution, unknowns: FloatArray) -> float:
+    def _compute_explained_by_mode(self, solution: _Solution, unknowns: FloatArray) -> float:
         """Fall of the residual sum of squares by a further mode, all shapes free. unknowns: its three, as in
         `_refine`."""
-        answers = [self._mode_responses(group, unknowns)[:, 0] for group in self._groups]
+        responses = [self._mode_responses(group, unknowns)[:, 0] for group in self._groups]
         total = 0.0
-        for out, basis in enumerate(solved.bases):
+        for output, basis in enumerate(solution.bases):
             rows = [
-                (group.root[kept, out] * answer[kept, None, None]).reshape(-1, self._structure.inputs)
-                for group, answer, kept in zip(self._groups, answers, self._kept, strict=True)
+                (group.root[is_fitted, output] * response[is_fitted, None, None]).reshape(-1, self._structure.inputs)
+                for group, response, is_fitted in zip(self._groups, responses, self._kept, strict=True)
             ]
             design = _real_and_imaginary(np.concatenate(rows))
-            wanted = _real_and_imaginary(
-                np.concatenate([part[kept, out].ravel() for part, kept in zip(solved.misfit, self._kept, strict=True)])
+            target = _real_and_imaginary(
+                np.concatenate(
+                    [
+                        part[is_fitted, output].ravel()
+                        for part, is_fitted in zip(solution.misfit, self._kept, strict=True)
+                    ]
+                )
             )
             design = design - basis @ (basis.T @ design)
             q, _ = np.linalg.qr(design / np.maximum(np.linalg.norm(design, axis=0), 1e-300))
-            total += float(np.sum((q.T @ wanted) ** 2))
+            total += float(np.sum((q.T @ target) ** 2))
         return total
 
     def _project_out(self, change: Sequence[ComplexArray], bases: Sequence[FloatArray]) -> FloatArray:
         """Component of a change of the residuals that no change of the shapes can compensate, output by output."""
         parts = []
-        for out, basis in enumerate(bases):
+        for output, basis in enumerate(bases):
             column = _real_and_imaginary(
-                np.concatenate([part[kept, out].ravel() for part, kept in zip(change, self._kept, strict=True)])
+                np.concatenate(
+                    [part[is_fitted, output].ravel() for part, is_fitted in zip(change, self._kept, strict=True)]
+                )
             )
             parts.append(column - basis @ (basis.T @ column))
         return np.concatenate(parts)
@@ -200,9 +212,11 @@ class ModalSearch:
         return np.concatenate(
             [
                 _real_and_imaginary(
-                    np.concatenate([part[kept, out].ravel() for part, kept in zip(misfit, self._kept, strict=True)])
+                    np.concatenate(
+                        [part[is_fitted, output].ravel() for part, is_fitted in zip(misfit, self._kept, strict=True)]
+                    )
                 )
-                for out in range(self._structure.outputs)
+                for output in range(self._structure.outputs)
             ]
         )
 
@@ -215,13 +229,13 @@ class ModalSearch:
         ratio = np.where(np.abs(ratio - 1) < 1e-6, 1 + 1e-6, ratio)
         root = np.sqrt(ratio.astype(np.complex128) ** 2 - 1)
         poles = np.concatenate([speed * (-ratio + root), speed * (-ratio - root)])
-        other = np.concatenate([poles[half:], poles[:half]])
+        paired = np.concatenate([poles[half:], poles[:half]])
         z = np.exp(2j * np.pi * group.frequency_hz / group.rate_hz)
-        answers, direct = pole_responses(poles, z, group.rate_hz, group.hold, delay_s)
-        weighted = answers * (poles**self._order / (poles - other))
-        through = direct[:, None] if self._order == 2 else 0.0
-        shown = sensor_response(self._structure.sensor.bandwidth_hz, z, group.rate_hz)
-        return np.asarray((weighted[:, :half] + weighted[:, half:] + through) * shown[:, None])
+        responses, direct = pole_responses(poles, z, group.rate_hz, group.hold, delay_s)
+        weighted = responses * (poles**self._order / (poles - paired))
+        feedthrough = direct[:, None] if self._order == 2 else 0.0
+        sensor = sensor_response(self._structure.sensor.bandwidth_hz, z, group.rate_hz)
+        return np.asarray((weighted[:, :half] + weighted[:, half:] + feedthrough) * sensor[:, None])
 
 
 def _real_and_imaginary(values: ComplexArray) -> FloatArray:

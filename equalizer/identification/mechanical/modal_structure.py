@@ -8,15 +8,15 @@ import numpy as np
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.signal import FloatArray
 
-_WIDEST = 10.0
+_BAND_MARGIN = 10.0
 """Factor by which a mode's frequency may lie outside the band of the fit. By hand."""
 _LEAST_RATIO, _LARGEST_RATIO = 1e-4, 100.0
 """Least and largest damping ratio of a mode; a rigid body on weak springs has the largest. By hand."""
-_WEAKEST = 1e-9
+_RANK_TOLERANCE = 1e-9
 """Least singular value of the input matrix, relative to the largest: below it, an axis counts as not driven."""
-_SHARE = 0.5
+_FLEXIBLE_SHARE = 0.5
 """Largest norm of the input shape of a flexible mode, relative to the largest of the rigid-body modes. By hand."""
-_ALIKE = 1.5
+_RIGID_RATIO = 1.5
 """Modes count as rigid-body modes where their frequency is at most this factor above the lowest one."""
 
 
@@ -56,16 +56,16 @@ class ModalStructure:
 
     def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
         """The model in modal coordinates normalised to unit modal mass. unknowns: (parameters,), mode by mode."""
-        each = unknowns.reshape(self.modes, -1)
-        speed, ratio = self.speed_scale * np.exp(each[:, 0]), np.exp(each[:, 1])
+        mode_rows = unknowns.reshape(self.modes, -1)
+        speed, ratio = self.speed_scale * np.exp(mode_rows[:, 0]), np.exp(mode_rows[:, 1])
         return MechanicalModel(
             name=name,
             quantity=self.quantity,
             mass=np.eye(self.modes),
             damping=np.diag(2 * ratio * speed),
             stiffness=np.diag(speed**2),
-            input=each[:, 2 : 2 + self.inputs] / np.sqrt(self.mass_scale),
-            output=(each[:, 2 + self.inputs :] / np.sqrt(self.mass_scale)).T,
+            input=mode_rows[:, 2 : 2 + self.inputs] / np.sqrt(self.mass_scale),
+            output=(mode_rows[:, 2 + self.inputs :] / np.sqrt(self.mass_scale)).T,
             sensor=self.sensor,
             actuator=self.actuator,
             rotational=self.rotational,
@@ -75,24 +75,25 @@ class ModalStructure:
         """Lower and upper bounds (parameters,) of the unknowns, for a fit in this band; shapes are unbounded."""
         low = np.full((self.modes, 2 + self.inputs + self.outputs), -np.inf)
         high = -low
-        low[:, 0] = np.log(2 * np.pi * band_hz[0] / _WIDEST / self.speed_scale)
-        high[:, 0] = np.log(2 * np.pi * band_hz[1] * _WIDEST / self.speed_scale)
+        low[:, 0] = np.log(2 * np.pi * band_hz[0] / _BAND_MARGIN / self.speed_scale)
+        high[:, 0] = np.log(2 * np.pi * band_hz[1] * _BAND_MARGIN / self.speed_scale)
         low[:, 1], high[:, 1] = np.log(_LEAST_RATIO), np.log(_LARGEST_RATIO)
         return low.ravel(), high.ravel()
 
 
 def find_balancing_factors(structure: ModalStructure, unknowns: FloatArray) -> FloatArray:
-    """(parameters,): factors on the unknowns that limit the norm of each flexible mode's input shape to `_SHARE` of the
-    largest of the rigid-body modes, and scale its output shape up by the reciprocal, so that no response changes.
-    Sensors that are not collocated do not determine this scale; the limit keeps the mass at the commands realistic."""
-    each = unknowns.reshape(structure.modes, -1)
-    pushed = slice(2, 2 + structure.inputs)
-    size = np.maximum(np.linalg.norm(each[:, pushed], axis=1), 1e-300)
-    slowest = each[:, 0] <= each[:, 0].min() + np.log(_ALIKE)
-    most = _SHARE * size[slowest].max()
-    share = np.where(slowest, 1.0, np.minimum(1.0, most / size))
-    factors = np.ones_like(each)
-    factors[:, pushed] = share[:, None]
+    """(parameters,): factors on the unknowns that limit the norm of each flexible mode's input shape to
+    `_FLEXIBLE_SHARE` of the largest of the rigid-body modes, and scale its output shape up by the reciprocal, so that
+    no response changes. Sensors that are not collocated do not determine this scale; the limit keeps the mass at the
+    commands realistic."""
+    mode_rows = unknowns.reshape(structure.modes, -1)
+    input_columns = slice(2, 2 + structure.inputs)
+    size = np.maximum(np.linalg.norm(mode_rows[:, input_columns], axis=1), 1e-300)
+    is_rigid = mode_rows[:, 0] <= mode_rows[:, 0].min() + np.log(_RIGID_RATIO)
+    largest_norm = _FLEXIBLE_SHARE * size[is_rigid].max()
+    share = np.where(is_rigid, 1.0, np.minimum(1.0, largest_norm / size))
+    factors = np.ones_like(mode_rows)
+    factors[:, input_columns] = share[:, None]
     factors[:, 2 + structure.inputs :] = 1 / share[:, None]
     return np.asarray(factors.ravel())
 
@@ -102,14 +103,14 @@ def to_driven_axes(model: MechanicalModel) -> MechanicalModel:
     Bampton). Raises numpy.linalg.LinAlgError where the modes do not move each command's axis independently."""
     B = model.input
     m, n = B.shape[1], model.coordinates
-    left, strengths, right = np.linalg.svd(B)
-    if strengths[-1] < _WEAKEST * strengths[0]:
+    left_vectors, strengths, right_vectors = np.linalg.svd(B)
+    if strengths[-1] < _RANK_TOLERANCE * strengths[0]:
         raise np.linalg.LinAlgError("an axis that no mode moves")
-    pushed = left[:, :m] / strengths @ right
-    rest = left[:, m:]
+    axis_shapes = left_vectors[:, :m] / strengths @ right_vectors
+    internal_modes = left_vectors[:, m:]
     if n > m:  # fixed-interface modes: those with the driven axes held
-        rest = rest @ np.linalg.eigh(rest.T @ model.stiffness @ rest)[1]
-    change = np.concatenate([pushed, rest], axis=1)
+        internal_modes = internal_modes @ np.linalg.eigh(internal_modes.T @ model.stiffness @ internal_modes)[1]
+    change = np.concatenate([axis_shapes, internal_modes], axis=1)
     mass, damping, stiffness = (change.T @ part @ change for part in (model.mass, model.damping, model.stiffness))
     return replace(
         model,

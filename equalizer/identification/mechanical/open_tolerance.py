@@ -20,16 +20,15 @@ and of the modes' frequencies and masses, relative. Heuristic."""
 def widen_tolerance(model: MechanicalModel) -> MechanicalModel:
     """The model with its own tolerance, widened to at least the constants above times its largest mass, damping and
     stiffness at any driven axis."""
-    along = driven_axes(model)
+    axes = driven_axes(model)
     mass, damping, stiffness = (
-        float(np.einsum("ni,nk,ki->i", along, part, along).max())
-        for part in (model.mass, model.damping, model.stiffness)
+        float(np.einsum("ni,nk,ki->i", axes, part, axes).max()) for part in (model.mass, model.damping, model.stiffness)
     )
-    own = model.tolerance or Tolerance()
+    model_tolerance = model.tolerance or Tolerance()
     tolerance = Tolerance(
-        mass_kg=max(MASS * mass, own.mass_kg or 0.0),
-        damping_n_s_per_m=max(DAMPING * damping, own.damping_n_s_per_m or 0.0),
-        stiffness_n_per_m=max(STIFFNESS * stiffness, own.stiffness_n_per_m or 0.0),
-        modes=max(MODES, own.modes or 0.0),
+        mass_kg=max(MASS * mass, model_tolerance.mass_kg or 0.0),
+        damping_n_s_per_m=max(DAMPING * damping, model_tolerance.damping_n_s_per_m or 0.0),
+        stiffness_n_per_m=max(STIFFNESS * stiffness, model_tolerance.stiffness_n_per_m or 0.0),
+        modes=max(MODES, model_tolerance.modes or 0.0),
     )
     return replace(model, tolerance=tolerance)

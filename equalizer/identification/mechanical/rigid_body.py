@@ -31,12 +31,12 @@ most. Chosen by hand."""
 LEAST_MASS, LEAST_DAMPING = 0.02, 0.05
 """Smallest tolerances of mass and damping, relative to the largest value of all axes. Chosen by hand: about as well as
 a laboratory knows them."""
-OF_FRICTION = 0.2
+FRICTION_TOLERANCE = 0.2
 """Tolerance of the subtracted equivalent damping, relative to it: real friction is not exactly Coulomb friction. Chosen
 by hand."""
-MOST_OFF = 0.8
+LARGEST_REMOVED_SHARE = 0.8
 """Largest share of the fitted damping that is subtracted, so that a damping above zero remains. Chosen by hand."""
-SPRING = 0.03
+LEAST_STIFFNESS = 0.03
 """Smallest tolerance of the stiffness, relative to the inertial force per displacement, m (2 pi f)², at the lower end f
 of the band: a weaker spring does not show in the fit. Chosen by hand."""
 
@@ -58,7 +58,7 @@ class RigidBody:
 
 
 def fit_rigid_body(
-    fit: MechanicalFit, strong: Recording, weaker: Recording, settings: MechanicalFitSettings
+    fit: MechanicalFit, stronger: Recording, weaker: Recording, settings: MechanicalFitSettings
 ) -> RigidBody:
     """Rigid fits of two recordings of the same device, at a stronger and a weaker level of the excitation. fit: that of
     the whole band, whose tolerances are kept where they are wider. settings: of `fit`. Raises MechanicalFitRefused
@@ -68,27 +68,33 @@ def fit_rigid_body(
     rigid = replace(
         settings, band_hz=(low, up_to_hz), most_modes=0, joint=False, fit_delay=False, sensors_elsewhere=False
     )
-    ratio = _amplitude(strong) / _amplitude(weaker)
-    at_strong, at_weaker = (_axis_values(fit_mechanical_model([each], rigid).model) for each in (strong, weaker))
+    ratio = _amplitude(stronger) / _amplitude(weaker)
+    at_strong, at_weaker = (
+        _axis_values(fit_mechanical_model([recording], rigid).model) for recording in (stronger, weaker)
+    )
     mass, damping, _ = at_strong
-    of_friction = np.clip((at_weaker[1] - damping) / max(ratio - 1, 1e-3), 0.0, MOST_OFF * damping)
-    own = fit.model.tolerance or Tolerance()
+    of_friction = np.clip((at_weaker[1] - damping) / max(ratio - 1, 1e-3), 0.0, LARGEST_REMOVED_SHARE * damping)
+    fitted_tolerance = fit.model.tolerance or Tolerance()
     heaviest = float(mass.max())
     tolerance = Tolerance(
-        mass_kg=max(LEAST_MASS * heaviest, own.mass_kg or 0.0),
+        mass_kg=max(LEAST_MASS * heaviest, fitted_tolerance.mass_kg or 0.0),
         damping_n_s_per_m=max(
-            OF_FRICTION * float(of_friction.max()), LEAST_DAMPING * float(damping.max()), own.damping_n_s_per_m or 0.0
+            FRICTION_TOLERANCE * float(of_friction.max()),
+            LEAST_DAMPING * float(damping.max()),
+            fitted_tolerance.damping_n_s_per_m or 0.0,
         ),
-        stiffness_n_per_m=max(SPRING * heaviest * (2 * np.pi * low) ** 2, own.stiffness_n_per_m or 0.0),
-        modes=own.modes,
+        stiffness_n_per_m=max(
+            LEAST_STIFFNESS * heaviest * (2 * np.pi * low) ** 2, fitted_tolerance.stiffness_n_per_m or 0.0
+        ),
+        modes=fitted_tolerance.modes,
     )
     return RigidBody(up_to_hz, mass, damping, of_friction, tolerance)
 
 
 def remove_friction_damping(model: MechanicalModel, of_friction: FloatArray) -> MechanicalModel:
     """The model without friction's equivalent damping. of_friction: (m,), N s/m at each driven axis."""
-    along = driven_axes(model)
-    return replace(model, damping=model.damping - (along * of_friction) @ along.T)
+    axes = driven_axes(model)
+    return replace(model, damping=model.damping - (axes * of_friction) @ axes.T)
 
 
 def _axis_values(model: MechanicalModel) -> FloatArray:

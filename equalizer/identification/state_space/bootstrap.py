@@ -42,8 +42,8 @@ def parameter_draws(
     for _ in range(draws):
         real, imaginary = random.standard_normal((2, *modelled.shape))
         noisy = replace(lines, response=modelled + deviation * (real + 1j * imaginary))
-        drawn = refine(fitted.form, noisy, radius, STEPS)
-        parts = (drawn.form.state_matrix, drawn.B, drawn.form.C, drawn.D)
+        refit = refine(fitted.form, noisy, radius, STEPS)
+        parts = (refit.form.state_matrix, refit.B, refit.form.C, refit.D)
         rows.append(np.concatenate([part.ravel() for part in parts]))
     return np.array(rows)
 
@@ -66,6 +66,6 @@ def scatter_of_draws(model: IdentifiedModel, frequency_hz: FloatArray, slow: tup
     low, high = frequency_hz[0], frequency_hz[-1]
     peaks = [pole.frequency_hz + WIDTHS / (2 * np.pi * pole.decay_s) for pole in slow]
     grid = np.unique(np.clip(np.concatenate([np.linspace(low, high, BAND_POINTS), *peaks]), low, high))
-    each_hz = np.gradient(grid)[:, None, None]
-    size = np.sqrt((each_hz * np.abs(model_response(model, grid)) ** 2).sum())
-    return float(np.sqrt((each_hz * response_deviation(model, grid) ** 2).sum()) / size)
+    spacing_hz = np.gradient(grid)[:, None, None]
+    size = np.sqrt((spacing_hz * np.abs(model_response(model, grid)) ** 2).sum())
+    return float(np.sqrt((spacing_hz * response_deviation(model, grid) ** 2).sum()) / size)

@@ -71,14 +71,14 @@ class Candidate:
 
 def subspace_starts(lines: WeightedLines, settings: IdentificationSettings) -> tuple[Start, ...]:
     """Starting models by frequency-domain subspace identification, for each number in `settings.longer_horizons`."""
-    return tuple(subspace_start(lines, settings, longer) for longer in settings.longer_horizons)
+    return tuple(subspace_start(lines, settings, extra_rows) for extra_rows in settings.longer_horizons)
 
 
-def subspace_start(lines: WeightedLines, settings: IdentificationSettings, longer: int) -> Start:
-    """Starting model by frequency-domain subspace identification with a warped frequency axis. longer: block rows
+def subspace_start(lines: WeightedLines, settings: IdentificationSettings, extra_rows: int) -> Start:
+    """Starting model by frequency-domain subspace identification with a warped frequency axis. extra_rows: block rows
     beyond the shortest useful horizon."""
     radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
-    horizon = default_horizon(settings.order, lines.response.shape[1]) + longer
+    horizon = default_horizon(settings.order, lines.response.shape[1]) + extra_rows
     subspace = estimate_subspace(lines, horizon, settings.centre_hz)
     return Start(f"warped subspace, horizon {horizon}", poles_and_shapes(subspace, settings.order, radius))
 
@@ -96,9 +96,9 @@ def record_starts(
     radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
     starts = []
     for horizon in settings.record_horizons:
-        observed = canonical_variate(records, m, horizon) if horizon * p > settings.order + p else None
-        if observed is not None:
-            form = from_records(observed, p, settings.order, factor, radius)
+        observability = canonical_variate(records, m, horizon) if horizon * p > settings.order + p else None
+        if observability is not None:
+            form = from_records(observability, p, settings.order, factor, radius)
             starts.append(Start(f"canonical variates, horizon {horizon}", form))
     return tuple(starts)
 
@@ -110,38 +110,42 @@ def refine_start(start: Start, lines: WeightedLines, settings: IdentificationSet
 
 
 def refine_candidate(
-    name: str, found: FittedForm, lines: WeightedLines, settings: IdentificationSettings, radius: Radius
+    name: str, fitted: FittedForm, lines: WeightedLines, settings: IdentificationSettings, radius: Radius
 ) -> Candidate:
     """Refine a model on bins, formed anew about the result of each pass, then on all lines if the band is narrow.
     radius: largest magnitude of a pole."""
     for steps in MOST_STEPS:
-        found = refine(found.form, bins_about(found, lines, settings), radius, steps)
+        fitted = refine(fitted.form, bins_about(fitted, lines, settings), radius, steps)
     if not settings.wide:
-        found = refine(found.form, lines, radius, LAST_STEPS)
-    cost = lines.cost(found.response(lines.z)) / lines.response.size
-    return Candidate(name, found, cost, outside_gain(found, lines), radius)
+        fitted = refine(fitted.form, lines, radius, LAST_STEPS)
+    cost = lines.cost(fitted.response(lines.z)) / lines.response.size
+    return Candidate(name, fitted, cost, outside_gain(fitted, lines), radius)
 
 
-def bins_about(found: FittedForm, lines: WeightedLines, settings: IdentificationSettings) -> WeightedLines:
+def bins_about(fitted: FittedForm, lines: WeightedLines, settings: IdentificationSettings) -> WeightedLines:
     """The lines averaged in bins. The difference from the model's response is averaged, which varies less within a bin
     than the response."""
     bins = group_lines(lines, 1, OCTAVE_SHARE) if settings.wide else group_lines(lines, LINES_PER_BIN, 0.0)
     centres = np.exp(2j * np.pi * bin_centres_hz(lines, bins) / lines.sample_rate_hz)
-    return average_bins(lines, bins, found.response(lines.z), found.response(centres))
+    return average_bins(lines, bins, fitted.response(lines.z), fitted.response(centres))
 
 
-def outside_gain(found: FittedForm, lines: WeightedLines) -> float:
+def outside_gain(fitted: FittedForm, lines: WeightedLines) -> float:
     """Largest gain at `GAIN_POINTS` frequencies from 0 to half the sample rate over the largest on the lines. The gain
     is the largest singular value of the response matrix."""
-    every = np.exp(1j * np.linspace(0, np.pi, GAIN_POINTS))
-    return float(_largest_gain(found.response(every)) / _largest_gain(found.response(lines.z)))
+    circle = np.exp(1j * np.linspace(0, np.pi, GAIN_POINTS))
+    return float(_largest_gain(fitted.response(circle)) / _largest_gain(fitted.response(lines.z)))
 
 
-def choose_best(found: Sequence[Candidate]) -> Candidate:
+def choose_best(candidates: Sequence[Candidate]) -> Candidate:
     """The candidate of lowest cost among those with acceptable gain outside the band; if none is acceptable, the
     candidate with the smallest gain outside the band. Raises ValueError for an empty sequence."""
-    sane = [each for each in found if each.sane]
-    return min(sane, key=lambda each: each.cost) if sane else min(found, key=lambda each: each.outside_gain)
+    sane = [candidate for candidate in candidates if candidate.sane]
+    return (
+        min(sane, key=lambda candidate: candidate.cost)
+        if sane
+        else min(candidates, key=lambda candidate: candidate.outside_gain)
+    )
 
 
 def _largest_gain(response: ComplexArray) -> float:

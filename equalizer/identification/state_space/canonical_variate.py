@@ -36,9 +36,9 @@ def driven_records(recordings: Sequence[Recording], factor: int) -> list[FloatAr
     its mean removed, then low-pass filtered and decimated by `factor`. Segments with missing samples are left out."""
     records = []
     for recording in recordings:
-        both = np.hstack([recording.command.samples, recording.response.samples])
+        signals = np.hstack([recording.command.samples, recording.response.samples])
         for segment in recording.segments:
-            part = both[segment.start : segment.stop]
+            part = signals[segment.start : segment.stop]
             if segment.kind in _SILENT_KINDS or segment.role == "test" or not np.isfinite(part).all():
                 continue
             centred = part - part.mean(axis=0)
@@ -53,14 +53,16 @@ def canonical_variate(records: Sequence[FloatArray], inputs: int, horizon: int) 
     records: (n, m + p) each, commands first; inputs: m; horizon: number of past samples, and of future samples.
     """
     rows = 2 * horizon * records[0].shape[1] if records else 0
-    long = [record for record in records if len(record) > LEAST_SAMPLES * rows / max(len(records), 1) + 2 * horizon]
-    if not long:
+    long_records = [
+        record for record in records if len(record) > LEAST_SAMPLES * rows / max(len(records), 1) + 2 * horizon
+    ]
+    if not long_records:
         return None
-    triangle = np.vstack([_qr_triangle(_past_and_future(record, inputs, horizon)) for record in long])
+    triangle = np.vstack([_qr_triangle(_past_and_future(record, inputs, horizon)) for record in long_records])
     triangle = _qr_triangle(triangle)
     p = records[0].shape[1] - inputs
-    known, future = horizon * inputs, triangle.shape[1] - horizon * p
-    by_past, by_chance = triangle[known:future, future:], triangle[future:, future:]
+    command_columns, future = horizon * inputs, triangle.shape[1] - horizon * p
+    by_past, by_chance = triangle[command_columns:future, future:], triangle[future:, future:]
     # Covariance L L' of the future responses, given the future commands: the part that the past predicts, and the rest.
     spread = by_past.T @ by_past + by_chance.T @ by_chance
     spread[np.diag_indices_from(spread)] += 1e-13 * np.trace(spread)
@@ -98,5 +100,5 @@ def poles_and_shapes(observed: FloatArray, outputs: int, order: int, factor: int
     values, vectors = np.linalg.eig(np.linalg.lstsq(observability[:-outputs], observability[outputs:], rcond=None)[0])
     slow: ComplexArray = stabilise_poles(values, radius**factor)
     # A negative real pole may have no real factor-th root; the positive pole with the same decay is used.
-    turned = np.where((slow.imag == 0) & (slow.real < 0), -slow, slow)
-    return from_poles(stabilise_poles(turned ** (1 / factor), radius), observability[:outputs] @ vectors)
+    positive = np.where((slow.imag == 0) & (slow.real < 0), -slow, slow)
+    return from_poles(stabilise_poles(positive ** (1 / factor), radius), observability[:outputs] @ vectors)

@@ -84,15 +84,19 @@ def _compare_segment(model: IdentifiedModel, recording: Recording, segment: Segm
     if not (np.isfinite(commands).all() and np.isfinite(response[segment.start - start :]).all()):
         raise ValueError(f"samples {start} to {segment.stop} hold missing values; a test segment needs all of them")
     predicted = simulate(model, commands)
-    last = _first_compared_sample(segment) - start
-    length = segment.stop - start - last
-    measured = _band_spectrum(response[last:], rate_hz, model.band_hz)
-    error = measured - _band_spectrum(predicted[last:], rate_hz, model.band_hz)
+    first_compared = _first_compared_sample(segment) - start
+    length = segment.stop - start - first_compared
+    measured = _band_spectrum(response[first_compared:], rate_hz, model.band_hz)
+    error = measured - _band_spectrum(predicted[first_compared:], rate_hz, model.band_hz)
     noise = None
-    if segment.period and last - 2 * length >= segment.start - start:  # the first period contains the transient
+    if (
+        segment.period and first_compared - 2 * length >= segment.start - start
+    ):  # the first period contains the transient
         # From the residuals, so that a free decay from period to period does not count as noise.
-        before = _band_spectrum((response - predicted)[last - length : last], rate_hz, model.band_hz)
-        noise = _power(error - before) / 2
+        previous_error = _band_spectrum(
+            (response - predicted)[first_compared - length : first_compared], rate_hz, model.band_hz
+        )
+        noise = _power(error - previous_error) / 2
     return _Part(_power(error), noise, _power(measured), length / rate_hz)
 
 
@@ -113,10 +117,10 @@ def _first_compared_sample(segment: Segment) -> int:
 def _band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> ComplexArray:
     """(lines, p): spectrum within the band, ends included. Raises ValueError where no line lies in it."""
     lines = np.fft.rfftfreq(len(samples), 1 / rate_hz)
-    inside = (lines >= band_hz[0]) & (lines <= band_hz[1])
-    if not inside.any():
+    in_band = (lines >= band_hz[0]) & (lines <= band_hz[1])
+    if not in_band.any():
         raise ValueError(f"{len(samples)} samples are too few to compare {band_hz[0]:g} to {band_hz[1]:g} Hz")
-    return np.asarray(np.fft.rfft(samples, axis=0)[inside], dtype=np.complex128)
+    return np.asarray(np.fft.rfft(samples, axis=0)[in_band], dtype=np.complex128)
 
 
 def _power(spectrum: ComplexArray) -> float:

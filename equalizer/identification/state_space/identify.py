@@ -103,11 +103,11 @@ def identify(
     settings: IdentificationSettings | None = None,
     records: tuple[Recording, ...] = (),
     on_progress: Callable[[float], None] | None = None,
-    near: Candidate | None = None,
+    initial: Candidate | None = None,
 ) -> Identified:
     """Fit one model to all estimates together, each line weighted by its noise. The model is always stable.
 
-    `records` give further starts in the time domain. `on_progress` takes the share done, 0 to 1. `near`: a model to
+    `records` give further starts in the time domain. `on_progress` takes the share done, 0 to 1. `initial`: a model to
     refine on these lines instead of a search; poles that were relaxed for it are bounded again where that costs
     nothing. Raises IdentificationRefused where no model can be fitted to the data.
     """
@@ -117,15 +117,18 @@ def identify(
     lines = require_lines(responses, settings)
     _refuse_foreign(records, responses[0])
 
-    if near is not None:
-        again = RelaxedFit(retighten(near, lines, settings), bound_costs=False)
-        return _assess_model((again.candidate,), again, lines, responses[0], settings)
-    found = _search(lines, settings, records, lambda share: report(FIRST_SEARCH * share))
-    after = relax_poles(
-        choose_best(found), lambda freer: _search(lines, freer, records, lambda _: None), lines, settings
+    if initial is not None:
+        refit = RelaxedFit(retighten(initial, lines, settings), bound_costs=False)
+        return _assess_model((refit.candidate,), refit, lines, responses[0], settings)
+    candidates = _search(lines, settings, records, lambda share: report(FIRST_SEARCH * share))
+    relaxed_fit = relax_poles(
+        choose_best(candidates),
+        lambda relaxed_settings: _search(lines, relaxed_settings, records, lambda _: None),
+        lines,
+        settings,
     )
-    every = found if after.candidate in found else [*found, after.candidate]
-    identified = _assess_model(tuple(every), after, lines, responses[0], settings)
+    all_candidates = candidates if relaxed_fit.candidate in candidates else [*candidates, relaxed_fit.candidate]
+    identified = _assess_model(tuple(all_candidates), relaxed_fit, lines, responses[0], settings)
     report(1.0)
     return identified
 
@@ -137,13 +140,13 @@ def _search(
     report: Callable[[float], None],
 ) -> list[Candidate]:
     starts = _make_starts(lines, settings, records)
-    found = []
+    candidates = []
     for number, start in enumerate(starts):
         report(number / len(starts))
-        found.append(refine_start(start, lines, settings))
-    found += _spare_candidates(choose_best(found), lines, settings)
+        candidates.append(refine_start(start, lines, settings))
+    candidates += _spare_candidates(choose_best(candidates), lines, settings)
     report(1.0)
-    return found
+    return candidates
 
 
 def _make_starts(
@@ -159,59 +162,61 @@ def _make_starts(
         ) from problem
 
 
-def _spare_candidates(so_far: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> list[Candidate]:
+def _spare_candidates(
+    best_so_far: Candidate, lines: WeightedLines, settings: IdentificationSettings
+) -> list[Candidate]:
     """Further candidates of a wide band, until one leaves no more than noise."""
-    found: list[Candidate] = []
-    for longer in settings.spare_horizons if settings.wide else ():
-        if choose_best([so_far, *found]).cost <= UNEXPLAINED:
+    candidates: list[Candidate] = []
+    for extra_rows in settings.spare_horizons if settings.wide else ():
+        if choose_best([best_so_far, *candidates]).cost <= UNEXPLAINED:
             break
-        found.append(refine_start(subspace_start(lines, settings, longer), lines, settings))
-    return found
+        candidates.append(refine_start(subspace_start(lines, settings, extra_rows), lines, settings))
+    return candidates
 
 
 def _assess_model(
-    found: tuple[Candidate, ...],
-    after: RelaxedFit,
+    candidates: tuple[Candidate, ...],
+    relaxed_fit: RelaxedFit,
     lines: WeightedLines,
-    like: FrequencyResponse,
+    response: FrequencyResponse,
     settings: IdentificationSettings,
 ) -> Identified:
-    chosen = after.candidate
+    chosen = relaxed_fit.candidate
     low, high = settings.band_hz
     p, m = lines.response.shape[1:]
     unknowns = count_unknowns(settings.order, p, m)
     cost = chosen.cost * lines.response.size / max(lines.response.size - unknowns / 2, 1.0)
-    inside = (lines.frequency_hz >= low) & (lines.frequency_hz <= high)
+    in_band = (lines.frequency_hz >= low) & (lines.frequency_hz <= high)
     modelled = chosen.fitted.response(lines.z)
-    error = lines.relative_error(modelled)[inside]
+    error = lines.relative_error(modelled)[in_band]
     slow = () if settings.longest_decay_s else slow_poles(chosen, settings.decay_s, lines.sample_rate_hz)
-    misfit = misfit_of(lines, modelled, inside, unknowns)
-    model = _make_model(chosen, lines, cost, like, settings, slow)
+    misfit = misfit_of(lines, modelled, in_band, unknowns)
+    model = _make_model(chosen, lines, cost, response, settings, slow)
     return Identified(
         model=model,
         cost=cost,
         rms_relative_error=float(np.sqrt((error**2).mean())),
         worst_relative_error=float(error.max()),
-        scatter=(scatter := scatter_of_draws(model, lines.frequency_hz[inside], slow)),
+        scatter=(scatter := scatter_of_draws(model, lines.frequency_hz[in_band], slow)),
         misfit=misfit,
-        expected_error=None if scatter is None else float(np.hypot(scatter, misfit.most)),
-        lines=int(inside.sum()),
-        candidates=found,
+        expected_error=None if scatter is None else float(np.hypot(scatter, misfit.upper_bound)),
+        lines=int(in_band.sum()),
+        candidates=candidates,
         chosen=chosen,
         relaxed=slow,
-        bound_costs=after.bound_costs,
-        remarks=(*fit_remarks(cost, misfit, slow, after.bound_costs, settings), *outside_remark(chosen)),
+        bound_costs=relaxed_fit.bound_costs,
+        remarks=(*fit_remarks(cost, misfit, slow, relaxed_fit.bound_costs, settings), *outside_remark(chosen)),
     )
 
 
-def _refuse_foreign(records: tuple[Recording, ...], like: FrequencyResponse) -> None:
+def _refuse_foreign(records: tuple[Recording, ...], response: FrequencyResponse) -> None:
     for record in records:
         form = (record.sample_rate_hz, record.command.channels, record.response.channels)
-        if form != (like.sample_rate_hz, like.input_channels, like.output_channels):
+        if form != (response.sample_rate_hz, response.input_channels, response.output_channels):
             raise IdentificationRefused(
                 f"a record of {', '.join(form[2])} per {', '.join(form[1])} at {form[0]:g} Hz does not belong to a "
-                f"response of {', '.join(like.output_channels)} per {', '.join(like.input_channels)} at "
-                f"{like.sample_rate_hz:g} Hz; give the records that the response was estimated from"
+                f"response of {', '.join(response.output_channels)} per {', '.join(response.input_channels)} at "
+                f"{response.sample_rate_hz:g} Hz; give the records that the response was estimated from"
             )
 
 
@@ -229,7 +234,7 @@ def _make_model(
     chosen: Candidate,
     lines: WeightedLines,
     cost: float,
-    like: FrequencyResponse,
+    response: FrequencyResponse,
     settings: IdentificationSettings,
     slow: tuple[SlowPole, ...],
 ) -> IdentifiedModel:
@@ -244,12 +249,12 @@ def _make_model(
         B=fitted.B,
         C=fitted.form.C,
         D=fitted.D,
-        sample_rate_hz=like.sample_rate_hz,
+        sample_rate_hz=response.sample_rate_hz,
         band_hz=settings.band_hz,
-        input_unit=like.input_unit,
-        output_unit=like.output_unit,
-        input_channels=like.input_channels,
-        output_channels=like.output_channels,
+        input_unit=response.input_unit,
+        output_unit=response.output_unit,
+        input_channels=response.input_channels,
+        output_channels=response.output_channels,
         delay_samples=SAMPLED_BEFORE_WRITTEN,
         samples=samples,
         provenance={

@@ -54,13 +54,13 @@ def identify_recordings(
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or IdentificationSettings()
     estimate = estimate_transfer(recordings)
-    looked_twice = _has_repeats(recordings)
-    if not looked_twice:
+    has_repeats = _has_repeats(recordings)
+    if not has_repeats:
         settings = replace(settings, longest_decay_s=settings.decay_s)
-    found = _fit_estimate(estimate, recordings, settings, smooth, on_progress or (lambda _: None))
-    if looked_twice and found.fitted is found.estimate:
-        return found
-    return _add_causes(found, settings, looked_twice)
+    result = _fit_estimate(estimate, recordings, settings, smooth, on_progress or (lambda _: None))
+    if has_repeats and result.fitted is result.estimate:
+        return result
+    return _add_causes(result, settings, has_repeats)
 
 
 def _fit_estimate(
@@ -81,17 +81,17 @@ def _fit_estimate(
 
 
 def _add_causes(
-    found: IdentifiedRecordings, settings: IdentificationSettings, looked_twice: bool
+    result: IdentifiedRecordings, settings: IdentificationSettings, has_repeats: bool
 ) -> IdentifiedRecordings:
     """Add the causes of the misfit, judged on the lines themselves: residuals of local averages are always smooth,
     because neighbours share their lines."""
-    identified, averaged = found.identified, found.fitted is not found.estimate
-    misfit = misfit_of_estimate(identified.model, found.estimate) if averaged else identified.misfit
-    misfit = misfit if looked_twice else replace(misfit, smooth=None)
+    identified, averaged = result.identified, result.fitted is not result.estimate
+    misfit = misfit_of_estimate(identified.model, result.estimate) if averaged else identified.misfit
+    misfit = misfit if has_repeats else replace(misfit, smooth=None)
     cost = misfit.cost if averaged else identified.cost
     causes = fit_remarks(cost, misfit, identified.relaxed, identified.bound_costs, settings)
     remarks = (*([SMOOTHED] if averaged else []), *causes, *outside_remark(identified.chosen))
-    return replace(found, identified=replace(identified, misfit=misfit, remarks=remarks))
+    return replace(result, identified=replace(identified, misfit=misfit, remarks=remarks))
 
 
 def _has_repeats(recordings: Sequence[Recording]) -> bool:
@@ -101,8 +101,8 @@ def _has_repeats(recordings: Sequence[Recording]) -> bool:
     relaxed on their evidence. Noise estimated from the scatter of the lines does not reveal the cause of a misfit
     either.
     """
-    found = periodic_experiments(recordings)
-    return bool(found.experiments) and all(experiment.periods > 1 for experiment in found.experiments)
+    experiment_set = periodic_experiments(recordings)
+    return bool(experiment_set.experiments) and all(experiment.periods > 1 for experiment in experiment_set.experiments)
 
 
 def _remove_transients(
@@ -112,34 +112,34 @@ def _remove_transients(
     settings: IdentificationSettings,
 ) -> tuple[FrequencyResponse, Identified]:
     """Subtract the free decay of slow poles from the recordings, and identify again, until the decay settles."""
-    radius, quick = largest_radius(DISTURBING_DECAY_S, estimate.sample_rate_hz), replace(settings, draws=0)
+    radius, without_draws = largest_radius(DISTURBING_DECAY_S, estimate.sample_rate_hz), replace(settings, draws=0)
     rounds = 0
     while (slow := slow_part(identified, radius)) is not None and rounds < MOST_ROUNDS:
-        before, rounds = identified.slowest_decay_s, rounds + 1
+        previous_decay_s, rounds = identified.slowest_decay_s, rounds + 1
         estimate = estimate_transfer(subtract_free_decay(recordings, slow))
-        identified = identify(estimate, quick, near=identified.chosen)
-        if abs(identified.slowest_decay_s / before - 1) < SETTLED:
+        identified = identify(estimate, without_draws, initial=identified.chosen)
+        if abs(identified.slowest_decay_s / previous_decay_s - 1) < SETTLED:
             break
-    return estimate, identify(estimate, settings, near=identified.chosen) if rounds else identified
+    return estimate, identify(estimate, settings, initial=identified.chosen) if rounds else identified
 
 
 def _fit_smoothed(
     estimate: FrequencyResponse,
     recordings: tuple[Recording, ...],
     settings: IdentificationSettings,
-    known: Identified | None,
+    unsmoothed: Identified | None,
     report: Callable[[float], None],
 ) -> IdentifiedRecordings:
-    relaxed = known is not None and bool(known.relaxed)
-    if known is not None and relaxed:
-        fitted = smooth_response(estimate, about=model_response(known.model, estimate.frequency_hz))
-        identified = identify(fitted, settings, near=known.chosen)
+    relaxed = unsmoothed is not None and bool(unsmoothed.relaxed)
+    if unsmoothed is not None and relaxed:
+        fitted = smooth_response(estimate, baseline=model_response(unsmoothed.model, estimate.frequency_hz))
+        identified = identify(fitted, settings, initial=unsmoothed.chosen)
     else:
         fitted = smooth_response(estimate)
         # Averaged lines are correlated, so the likelihood-ratio test for a longer decay does not hold on them.
-        held = replace(settings, longest_decay_s=settings.decay_s)
-        identified = identify(fitted, held, recordings, report)
+        bounded = replace(settings, longest_decay_s=settings.decay_s)
+        identified = identify(fitted, bounded, recordings, report)
     report(1.0)
     # For the same reason the cost of the bound cannot be tested on averaged lines.
-    bound_costs = known is not None and known.bound_costs
+    bound_costs = unsmoothed is not None and unsmoothed.bound_costs
     return IdentifiedRecordings(estimate, fitted, replace(identified, bound_costs=bound_costs))

@@ -1,5 +1,7 @@
-"""Misfit of a model: the power of its residuals in excess of the noise power of the lines, an upper bound of the misfit
-that the noise may hide, and the correlation of the residuals from line to line.
+"""Misfit of an identified model on the lines of a measured frequency response, reported with the model.
+
+It is the power of the residuals in excess of the noise power of the lines, with an upper bound of the misfit that the
+noise may hide, and the correlation of the residuals from line to line.
 """
 
 from dataclasses import dataclass
@@ -24,7 +26,7 @@ class Misfit:
     error: float
     """Root mean square of model - estimate in excess of the noise, relative to the response's; 0 where the residual is
     noise."""
-    most: float
+    upper_bound: float
     """Upper 95 % bound of the misfit that the noise may hide, also relative to the response; accounts for the scatter
     of the noise and of its estimate, and for the degrees of freedom that the fit used. Not below `error`."""
     cost: float
@@ -40,22 +42,25 @@ ONE_SIDED_95 = 1.645
 """Quantile of the normal distribution at 95 %."""
 
 
-def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray, unknowns: int) -> Misfit:
-    """Misfit of modelled responses (lines, p, m). inside: (lines,), mask of the lines that count. unknowns: number of
+def misfit_of(lines: WeightedLines, modelled: ComplexArray, in_band: BoolArray, unknowns: int) -> Misfit:
+    """Misfit of modelled responses (lines, p, m). in_band: (lines,), mask of the lines that count. unknowns: number of
     real parameters that were fitted."""
-    residual = (modelled - lines.response)[inside]
-    weight = lines.weight[inside]
-    size = float((np.abs(lines.response[inside]) ** 2).sum())
-    beyond = float((np.abs(residual) ** 2).sum() - NOISE_TRUSTED * (1 / weight**2).sum())
-    hidden = float((np.abs(residual) ** 2).sum() - _lower_noise_bound(1 / weight**2, unknowns))
+    residual = (modelled - lines.response)[in_band]
+    weight = lines.weight[in_band]
+    response_power = float((np.abs(lines.response[in_band]) ** 2).sum())
+    excess_power = float((np.abs(residual) ** 2).sum() - NOISE_TRUSTED * (1 / weight**2).sum())
+    hidden_power = float((np.abs(residual) ** 2).sum() - _lower_noise_bound(1 / weight**2, unknowns))
     weighted = weight * residual
     power = float((np.abs(weighted) ** 2).sum())
     smooth = None
     if power > NOISE_TRUSTED * weighted.size and len(weighted) > 1:
-        both = float((weighted[1:] * weighted[:-1].conj()).real.sum()) * len(weighted) / (len(weighted) - 1)
-        smooth = both / (power - weighted.size)
-    error, most = (float(np.sqrt(max(part, 0.0) / max(size, 1e-300))) for part in (beyond, max(beyond, hidden)))
-    return Misfit(error, most, power / max(weighted.size, 1), smooth)
+        lag_product = float((weighted[1:] * weighted[:-1].conj()).real.sum()) * len(weighted) / (len(weighted) - 1)
+        smooth = lag_product / (power - weighted.size)
+    error, largest_error = (
+        float(np.sqrt(max(misfit_power, 0.0) / max(response_power, 1e-300)))
+        for misfit_power in (excess_power, max(excess_power, hidden_power))
+    )
+    return Misfit(error, largest_error, power / max(weighted.size, 1), smooth)
 
 
 def _lower_noise_bound(variance: FloatArray, unknowns: int) -> float:
@@ -69,8 +74,8 @@ def _lower_noise_bound(variance: FloatArray, unknowns: int) -> float:
 def misfit_of_estimate(model: IdentifiedModel, estimate: FrequencyResponse) -> Misfit:
     """Misfit of a model on an estimate's reliable lines within its band."""
     lines = weight_lines((estimate,), model.band_hz)
-    modelled, every = model_response(model, lines.frequency_hz), np.ones(len(lines), bool)
-    return misfit_of(lines, modelled, every, count_unknowns(model.order, *model.D.shape))
+    modelled, all_lines = model_response(model, lines.frequency_hz), np.ones(len(lines), bool)
+    return misfit_of(lines, modelled, all_lines, count_unknowns(model.order, *model.D.shape))
 
 
 def count_unknowns(order: int, p: int, m: int) -> int:

@@ -34,36 +34,36 @@ def fit_remarks(
     """Remarks on the fit alone, as sentences without full stop. Those on the decay bound come first, because its effect
     resembles the other causes. bound_costs: see `RelaxedFit`."""
     bound_s, order = settings.decay_s, settings.order
-    found = [
+    remarks = [
         f"the resonance at {pole.frequency_hz:.2f} Hz (damping ratio {100 * pole.damping_ratio:.2g} %) rings longer "
         f"than the ordinary bound of {bound_s:g} s allows; its pole was relaxed to a decay of {pole.decay_s:.2f} s"
         for pole in relaxed
     ]
     if bound_costs:
-        found.append(
+        remarks.append(
             f"a pole is at the bound of the decay, {bound_s:g} s, and without it the fit would improve beyond noise: "
             "a resonance rings longer, or a sweep without two counted periods contains the transient of its start; "
             "record three periods of every sweep, or raise --longest-decay"
         )
     if cost > UNEXPLAINED and not bound_costs:
-        left = f"the residual of the model is {np.sqrt(cost):.2g} times the noise"
+        residual = f"the residual of the model is {np.sqrt(cost):.2g} times the noise"
         if misfit.smooth is None:
-            found.append(
-                f"{left}: the order {order} may be too low, or the device is not linear, as with friction; without "
+            remarks.append(
+                f"{residual}: the order {order} may be too low, or the device is not linear, as with friction; without "
                 "two counted periods of every sweep the lines do not show which"
             )
         elif misfit.smooth >= SMOOTH:
-            found.append(
-                f"{left}, and it varies smoothly from line to line, as that of a linear response does: the order "
+            remarks.append(
+                f"{residual}, and it varies smoothly from line to line, as that of a linear response does: the order "
                 f"{order} may be too low; weak friction can do this too, and then a higher order does not help"
             )
         else:
-            found.append(
-                f"{left}, and it scatters from line to line, as that of a linear response does not: a higher order "
+            remarks.append(
+                f"{residual}, and it scatters from line to line, as that of a linear response does not: a higher order "
                 "does not help; the device is not linear (friction does this, clipping, a grip that moves), or it "
                 "changed from one sweep to the next; the lines do not show which"
             )
-    return found
+    return remarks
 
 
 def held_out_remarks(
@@ -71,49 +71,53 @@ def held_out_remarks(
 ) -> tuple[str, ...]:
     """Remarks, as whole sentences, on clipped sensors and on a test error that neither noise nor the fit's misfit
     explains."""
-    found = [
+    remarks = [
         f"The sensor is at its limit: {channel} stays at one extreme value."
         for channel in _find_clipped_channels(recordings)
     ]
     if tested is None:
-        return tuple(found)
+        return tuple(remarks)
     expected = float(np.hypot(tested.noise or 0.0, misfit.error))
     if tested.noise is None or tested.error <= HELD_OUT_BEYOND * expected or cost > UNEXPLAINED:
-        return tuple(found)
+        return tuple(remarks)
     fit, test = (_largest_amplitude(recordings, test=test) for test in (False, True))
     if min(fit, test) > 0 and max(fit, test) > LEVEL_RATIO * min(fit, test):
-        found.append(
+        remarks.append(
             "The error on the test is larger than that of the fit, and the test was played at another level (up to "
             f"{test:.3g} N, the fit {fit:.3g} N): the response may depend on the amplitude, as with friction."
         )
     else:
-        found.append(
+        remarks.append(
             "The error on the test is larger than the fit explains, at the same level: the device differed between "
             "the two, or its response depends on the kind of signal; these recordings do not show which."
         )
-    return tuple(found)
+    return tuple(remarks)
 
 
 def _largest_amplitude(recordings: Sequence[Recording], *, test: bool) -> float:
     """Largest stated amplitude of the segments with the role "test", or of all others; 0 without any."""
-    found = [
+    amplitudes = [
         segment.amplitude
         for recording in recordings
         for segment in recording.segments
         if (segment.role == "test") is test
     ]
-    return max(found, default=0.0)
+    return max(amplitudes, default=0.0)
 
 
 def _find_clipped_channels(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Channels that repeatedly stay at the same largest or smallest value."""
-    found: dict[str, None] = {}
+    clipped: dict[str, None] = {}
     for recording in recordings:
         samples = recording.response.samples
         for column, channel in enumerate(recording.response.channels):
             values = samples[np.isfinite(samples[:, column]), column]
             for extreme in (values.max(initial=-np.inf), values.min(initial=np.inf)):
-                at = values == extreme
-                if np.sum(at[1:] & at[:-1]) >= LIMIT_SAMPLES and np.ptp(values) > 0 and not at.all():
-                    found[channel] = None
-    return tuple(found)
+                is_extreme = values == extreme
+                if (
+                    np.sum(is_extreme[1:] & is_extreme[:-1]) >= LIMIT_SAMPLES
+                    and np.ptp(values) > 0
+                    and not is_extreme.all()
+                ):
+                    clipped[channel] = None
+    return tuple(clipped)

@@ -40,21 +40,21 @@ class ModalForm:
 
     def from_states(self, z: ComplexArray) -> ComplexArray:
         """C (zI - A)^-1, shape (lines, p, n). z: (lines,)."""
-        away = z[:, None] - self.a
-        scale = 1 / (away**2 - self.b)
+        offset = z[:, None] - self.a
+        scale = 1 / (offset**2 - self.b)
         first, second = self.C[:, ::2], self.C[:, 1::2]
         states = np.empty((len(z), *self.C.shape), dtype=np.complex128)
-        states[:, :, ::2] = (first * away[:, None] + second * self.b) * scale[:, None]
-        states[:, :, 1::2] = (first + second * away[:, None]) * scale[:, None]
+        states[:, :, ::2] = (first * offset[:, None] + second * self.b) * scale[:, None]
+        states[:, :, 1::2] = (first + second * offset[:, None]) * scale[:, None]
         return states
 
     def to_states(self, z: ComplexArray, B: FloatArray) -> ComplexArray:
         """(zI - A)^-1 B, shape (lines, n, m). z: (lines,), B: (n, m)."""
-        away = (z[:, None] - self.a)[:, :, None]
-        scale = 1 / (away**2 - self.b[:, None])
+        offset = (z[:, None] - self.a)[:, :, None]
+        scale = 1 / (offset**2 - self.b[:, None])
         states = np.empty((len(z), *B.shape), dtype=np.complex128)
-        states[:, ::2] = (away * B[::2] + B[1::2]) * scale
-        states[:, 1::2] = (self.b[:, None] * B[::2] + away * B[1::2]) * scale
+        states[:, ::2] = (offset * B[::2] + B[1::2]) * scale
+        states[:, 1::2] = (self.b[:, None] * B[::2] + offset * B[1::2]) * scale
         return states
 
 

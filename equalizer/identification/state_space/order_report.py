@@ -66,15 +66,16 @@ def compare_orders(
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     highest = replace(settings, order=max(orders))
     fit, test = (
-        require_lines([each.of_lines(_alternate_lines(each, k)) for each in responses], highest) for k in (0, 1)
+        require_lines([estimate.of_lines(_alternate_lines(estimate, k)) for estimate in responses], highest)
+        for k in (0, 1)
     )
     per_line = []
     rows = []
     for number, order in enumerate(sorted(orders)):
         report(number / len(orders))
         at_order = replace(settings, order=order)
-        found = choose_best([refine_start(start, fit, at_order) for start in subspace_starts(fit, at_order)])
-        modelled = found.fitted.response(test.z)
+        best = choose_best([refine_start(start, fit, at_order) for start in subspace_starts(fit, at_order)])
+        modelled = best.fitted.response(test.z)
         squared = (np.abs(test.weight * (modelled - test.response)) ** 2).mean(axis=(1, 2))
         per_line.append(squared)
         error = float(np.sqrt((test.relative_error(modelled) ** 2).mean()))
@@ -83,8 +84,10 @@ def compare_orders(
             OrderRow(order, float(squared.mean()), error, multiply_adds(order, p, m), dense_multiply_adds(order, p, m))
         )
     report(1.0)
-    whole = require_lines(responses, highest)
-    subspace = estimate_subspace(whole, default_horizon(max(orders), whole.response.shape[1]), settings.centre_hz)
+    all_lines = require_lines(responses, highest)
+    subspace = estimate_subspace(
+        all_lines, default_horizon(max(orders), all_lines.response.shape[1]), settings.centre_hz
+    )
     values = subspace.singular_values
     return OrderReport(
         values, int((values > VISIBLE).sum()), tuple(rows), _relative_noise(test), rows[_suggest_order(per_line)].order

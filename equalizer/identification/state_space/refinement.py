@@ -35,8 +35,8 @@ def solve_input_matrices(form: ModalForm, lines: WeightedLines) -> tuple[FloatAr
     n, p = form.C.shape[1], form.C.shape[0]
     regressors = weight_regressors(form, lines)
     measured = stack_by_input(lines.weight * lines.response)
-    solved = np.stack([_least_squares(phi, y) for phi, y in zip(regressors, measured, strict=True)], axis=1)
-    return solved[:n], solved[n : n + p]
+    solution = np.stack([_least_squares(phi, y) for phi, y in zip(regressors, measured, strict=True)], axis=1)
+    return solution[:n], solution[n : n + p]
 
 
 def weight_regressors(form: ModalForm, lines: WeightedLines) -> FloatArray:
@@ -60,8 +60,8 @@ def _least_squares(phi: FloatArray, y: FloatArray) -> FloatArray:
     """Least-squares solution with the columns scaled to unit norm, truncated at `RANK`."""
     size = np.linalg.norm(phi, axis=0)
     size[size == 0] = 1.0
-    solved: FloatArray = np.linalg.lstsq(phi / size, y, rcond=RANK)[0] / size
-    return solved
+    solution: FloatArray = np.linalg.lstsq(phi / size, y, rcond=RANK)[0] / size
+    return solution
 
 
 FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e12
@@ -71,7 +71,7 @@ the diagonal of J'J."""
 LEAST_GAIN = 1e-7
 """Relative fall of the cost in a step below which the search ends."""
 
-UNSEEN = 1e-13
+UNOBSERVABLE = 1e-13
 """Diagonal entry of R in the QR decomposition of the scaled regressors below which a state counts as unobservable."""
 
 
@@ -97,7 +97,7 @@ class _Point:
     form: ModalForm
     basis: FloatArray
     """(m, rows, n + p): for each input, orthonormal basis of the span of its regressors, which B and D can explain."""
-    solved: FloatArray
+    input_matrices: FloatArray
     """(m, n + p): B and D of each input."""
     residual: FloatArray
     """(m, rows): model minus measured, weighted."""
@@ -118,18 +118,18 @@ def refine(form: ModalForm, lines: WeightedLines, radius: Radius, most_steps: in
             if trial.cost < point.cost or damping > LARGEST_DAMPING:
                 break
             damping, growth = damping * growth, growth * 2
-        gained = point.cost - trial.cost
-        if not gained > 0:
+        decrease = point.cost - trial.cost
+        if not decrease > 0:
             break
         expected = -float(step @ (2 * gradient + normal @ step))
-        damping *= max(1 / 3, 1 - (2 * min(gained / expected, 1.5) - 1) ** 3) if expected > 0 else 1.0
+        damping *= max(1 / 3, 1 - (2 * min(decrease / expected, 1.5) - 1) ** 3) if expected > 0 else 1.0
         growth = 2.0
-        small = gained < LEAST_GAIN * point.cost
+        is_small = decrease < LEAST_GAIN * point.cost
         point = trial
-        if small:
+        if is_small:
             break
     n = form.C.shape[1]
-    return FittedForm(point.form, point.solved[:, :n].T, point.solved[:, n:].T)
+    return FittedForm(point.form, point.input_matrices[:, :n].T, point.input_matrices[:, n:].T)
 
 
 def complete_form(form: ModalForm, lines: WeightedLines) -> FittedForm:
@@ -160,13 +160,13 @@ def _evaluate_form(form: ModalForm, lines: WeightedLines) -> _Point:
     size[size == 0] = 1.0
     basis, triangle = np.linalg.qr(phi / size)
     measured = stack_by_input(lines.weight * lines.response)
-    along = np.einsum("jrs,jr->js", basis, measured)
-    residual = np.einsum("jrs,js->jr", basis, along) - measured
+    projection = np.einsum("jrs,jr->js", basis, measured)
+    residual = np.einsum("jrs,js->jr", basis, projection) - measured
     # For a state that is not observable (its column is zero, or a combination of others) R is singular.
-    unseen = np.abs(np.diagonal(triangle, axis1=1, axis2=2)) < UNSEEN
-    triangle = triangle + np.eye(triangle.shape[1]) * np.where(unseen, 1.0, 0.0)[:, None]
-    solved = np.linalg.solve(triangle, along[:, :, None])[:, :, 0] / size[:, 0]
-    return _Point(form, basis, solved, residual, float((residual**2).sum()))
+    is_unobservable = np.abs(np.diagonal(triangle, axis1=1, axis2=2)) < UNOBSERVABLE
+    triangle = triangle + np.eye(triangle.shape[1]) * np.where(is_unobservable, 1.0, 0.0)[:, None]
+    solution = np.linalg.solve(triangle, projection[:, :, None])[:, :, 0] / size[:, 0]
+    return _Point(form, basis, solution, residual, float((residual**2).sum()))
 
 
 def _jacobian(point: _Point, lines: WeightedLines) -> FloatArray:
@@ -175,12 +175,12 @@ def _jacobian(point: _Point, lines: WeightedLines) -> FloatArray:
     form, z = point.form, lines.z
     p, n = form.C.shape
     blocks = n // 2
-    B = point.solved[:, :n].T
+    B = point.input_matrices[:, :n].T
     outputs, driven = form.from_states(z), form.to_states(z, B)
     m = B.shape[1]
     rows = np.zeros((m, len(z), p, 2 * blocks + p * n), dtype=np.complex128)
-    both = np.einsum("lis,lsj->jlis", outputs, driven)
-    rows[..., :blocks] = both[..., ::2] + both[..., 1::2]
+    products = np.einsum("lis,lsj->jlis", outputs, driven)
+    rows[..., :blocks] = products[..., ::2] + products[..., 1::2]
     rows[..., blocks : 2 * blocks] = np.einsum("lis,lsj->jlis", outputs[:, :, 1::2], driven[:, ::2])
     for i in range(p):
         rows[:, :, i, 2 * blocks + i * n : 2 * blocks + (i + 1) * n] = driven.transpose(2, 0, 1)

@@ -38,9 +38,9 @@ def require_lines(responses: Sequence[FrequencyResponse], settings: Identificati
             f"from {rate / 2:g} Hz on; choose a lower end or record faster"
         )
     _refuse_unexcited_inputs(responses, settings)
-    _refuse_dead_outputs(responses, settings)
+    _refuse_zero_outputs(responses, settings)
     lines = weight_lines(responses, settings.fitted_hz)
-    _refuse_an_empty_band(responses, lines, settings)
+    _refuse_empty_band(responses, lines, settings)
     _refuse_noise(lines, settings)
     _refuse_too_high_an_order(lines, settings)
     return lines
@@ -50,18 +50,18 @@ def _refuse_mixed_responses(responses: Sequence[FrequencyResponse]) -> None:
     if not responses:
         raise IdentificationRefused("no frequency response was given; estimate one from a recorded sweep first")
     first = responses[0]
-    for other in responses[1:]:
+    for second in responses[1:]:
         for name in ("sample_rate_hz", "input_channels", "output_channels", "input_unit", "output_unit"):
-            if getattr(other, name) != getattr(first, name):
+            if getattr(second, name) != getattr(first, name):
                 raise IdentificationRefused(
-                    f"the records differ in {name} ({getattr(first, name)} and {getattr(other, name)}); identify each "
+                    f"the records differ in {name} ({getattr(first, name)} and {getattr(second, name)}); identify each "
                     "separately or convert one"
                 )
 
 
 def _refuse_unexcited_inputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
-    known = [np.isfinite(estimate.within(*settings.band_hz).response).any(axis=(0, 1)) for estimate in responses]
-    missing = ~np.any(known, axis=0)
+    determined = [np.isfinite(estimate.within(*settings.band_hz).response).any(axis=(0, 1)) for estimate in responses]
+    missing = ~np.any(determined, axis=0)
     names = ", ".join(name for name, is_missing in zip(responses[0].input_channels, missing, strict=True) if is_missing)
     if names and not missing.all():
         raise IdentificationRefused(
@@ -70,47 +70,47 @@ def _refuse_unexcited_inputs(responses: Sequence[FrequencyResponse], settings: I
         )
 
 
-def _refuse_dead_outputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
-    answers = [np.nan_to_num(estimate.within(*settings.band_hz).response) for estimate in responses]
-    dead = ~np.any([(answer != 0).any(axis=(0, 2)) for answer in answers], axis=0)
-    names = ", ".join(name for name, is_dead in zip(responses[0].output_channels, dead, strict=True) if is_dead)
-    if names and any(len(answer) for answer in answers):
+def _refuse_zero_outputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
+    in_band = [np.nan_to_num(estimate.within(*settings.band_hz).response) for estimate in responses]
+    zero_outputs = ~np.any([(response != 0).any(axis=(0, 2)) for response in in_band], axis=0)
+    names = ", ".join(name for name, is_zero in zip(responses[0].output_channels, zero_outputs, strict=True) if is_zero)
+    if names and any(len(response) for response in in_band):
         raise IdentificationRefused(
             f"there is no signal from {names}, not even noise: check the sensor and record again"
         )
 
 
-def _refuse_an_empty_band(
+def _refuse_empty_band(
     responses: Sequence[FrequencyResponse], lines: WeightedLines, settings: IdentificationSettings
 ) -> None:
     low, high = settings.band_hz
     measured = sum(len(estimate.within(low, high)) for estimate in responses)
     if not len(lines):
         reasons = "; ".join(dict.fromkeys(remark for estimate in responses for remark in estimate.remarks))
-        which = "none of its lines is reliable" if measured else "no line was excited there"
+        finding = "none of its lines is reliable" if measured else "no line was excited there"
         raise IdentificationRefused(
-            f"no data in {low:g} to {high:g} Hz: {which}{f' ({reasons})' if reasons else ''}; "
+            f"no data in {low:g} to {high:g} Hz: {finding}{f' ({reasons})' if reasons else ''}; "
             f"record a sweep from {low / 1.1:.3g} to {high * 1.06:.3g} Hz"
         )
-    _refuse_a_hole(lines, settings)
+    _refuse_gap(lines, settings)
 
 
-def _refuse_a_hole(lines: WeightedLines, settings: IdentificationSettings) -> None:
+def _refuse_gap(lines: WeightedLines, settings: IdentificationSettings) -> None:
     """Raises IdentificationRefused for a gap wider than `LARGEST_GAP` and `SPACINGS`, which a model could fill at
     will."""
     low, high = settings.band_hz
     ends = np.clip(np.concatenate([[low], lines.frequency_hz, [high]]), low, high)
     octaves, steps = np.diff(np.log2(ends)), np.diff(ends)
-    usual = float(np.median(np.diff(lines.frequency_hz))) if len(lines) > 1 else 0.0
+    usual_step = float(np.median(np.diff(lines.frequency_hz))) if len(lines) > 1 else 0.0
     widest = int(np.argmax(octaves))
-    if octaves[widest] <= LARGEST_GAP or steps[widest] <= SPACINGS * usual:
+    if octaves[widest] <= LARGEST_GAP or steps[widest] <= SPACINGS * usual_step:
         return
     below, above = ends[widest], ends[widest + 1]
-    left, right = max((low, below), (above, high), key=lambda side: float(side[1] / side[0]))
+    low_end, high_end = max((low, below), (above, high), key=lambda side: float(side[1] / side[0]))
     raise IdentificationRefused(
         f"between {below:.3g} and {above:.3g} Hz no line can be used, but the band is {low:g} to {high:g} Hz; "
         f"record a sweep from {low / 1.1:.3g} to {high * 1.06:.3g} Hz, or choose a band that the lines cover "
-        f"({left:.3g} to {right:.3g} Hz)"
+        f"({low_end:.3g} to {high_end:.3g} Hz)"
     )
 
 
@@ -129,13 +129,13 @@ def _refuse_too_high_an_order(lines: WeightedLines, settings: IdentificationSett
     """Raises IdentificationRefused for fewer lines than the unknowns, or the subspace method's block rows, need."""
     p, m = lines.response.shape[1:]
     n = settings.order
-    free = n * (p + m) + p * m
+    unknowns = n * (p + m) + p * m
     rows = default_horizon(n, p) + max(settings.longer_horizons)
-    needed = max(-(-free // (p * m)), -(-rows * (p + m) // (2 * m)))
-    if len(lines) < needed:
+    minimum = max(-(-unknowns // (p * m)), -(-rows * (p + m) // (2 * m)))
+    if len(lines) < minimum:
         spacing = (lines.frequency_hz[-1] - lines.frequency_hz[0]) / max(len(lines) - 1, 1)
-        longer = f", or record longer periods (now {1 / spacing:.3g} s)" if spacing > 0 else ""
+        advice = f", or record longer periods (now {1 / spacing:.3g} s)" if spacing > 0 else ""
         raise IdentificationRefused(
-            f"order {n} has {free} unknowns and needs at least {needed} lines, but the band holds {len(lines)}; "
-            f"choose a lower order{longer}"
+            f"order {n} has {unknowns} unknowns and needs at least {minimum} lines, but the band holds {len(lines)}; "
+            f"choose a lower order{advice}"
         )

@@ -25,7 +25,7 @@ from equalizer.identification.state_space.stable_poles import Radius, largest_ra
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import FloatArray
 
-PERIODS_TOLD = 4.0
+RESOLVED_PERIODS = 4.0
 """Longest resolvable time constant, in periods (1 / line spacing). The flanks of a resonance that is narrower than the
 line spacing still determine its decay, up to the point where they equal those of an undamped mode. Heuristic."""
 FALSE_ALARM = 1e-3
@@ -68,21 +68,23 @@ def relax_poles(
     if limit_s <= settings.decay_s:
         return RelaxedFit(chosen, bound_costs=False)
     limit = largest_radius(limit_s, lines.sample_rate_hz)
-    costs = _bound_costs(chosen, limit, lines, settings)
-    if settings.longest_decay_s is not None or not (costs or _has_outlying_line(chosen, lines)):
-        return RelaxedFit(chosen, costs)
-    freer = replace(settings, longest_decay_s=limit_s)
-    found = choose_best([*search(freer), refine_candidate(chosen.name, chosen.fitted, lines, settings, limit)])
-    again = _tighten_poles(found, lines, settings, limit)
-    taken = again.sane >= chosen.sane and _is_better(again, chosen, lines)
-    return RelaxedFit(again, bound_costs=False) if taken else RelaxedFit(chosen, costs)
+    bound_costs = _bound_costs(chosen, limit, lines, settings)
+    if settings.longest_decay_s is not None or not (bound_costs or _has_outlying_line(chosen, lines)):
+        return RelaxedFit(chosen, bound_costs)
+    relaxed_settings = replace(settings, longest_decay_s=limit_s)
+    relaxed = choose_best(
+        [*search(relaxed_settings), refine_candidate(chosen.name, chosen.fitted, lines, settings, limit)]
+    )
+    tightened = _tighten_poles(relaxed, lines, settings, limit)
+    is_accepted = tightened.sane >= chosen.sane and _lowers_cost(tightened, chosen, lines)
+    return RelaxedFit(tightened, bound_costs=False) if is_accepted else RelaxedFit(chosen, bound_costs)
 
 
-def retighten(near: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
+def retighten(candidate: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
     """Refine a candidate from another estimate of the same device on these lines; of its relaxed poles, those that are
     no longer needed return to the ordinary bound."""
-    again = refine_candidate(near.name, near.fitted, lines, settings, near.radius)
-    return _tighten_poles(again, lines, settings, float(np.max(near.radius)))
+    refined = refine_candidate(candidate.name, candidate.fitted, lines, settings, candidate.radius)
+    return _tighten_poles(refined, lines, settings, float(np.max(candidate.radius)))
 
 
 def slow_poles(chosen: Candidate, bound_s: float, sample_rate_hz: float) -> tuple[SlowPole, ...]:
@@ -90,89 +92,91 @@ def slow_poles(chosen: Candidate, bound_s: float, sample_rate_hz: float) -> tupl
     form = chosen.fitted.form
     first, second = form.poles.reshape(2, -1)
     slower = np.where(np.abs(first) >= np.abs(second), first, second)
-    beyond = slower[np.abs(slower) > largest_radius(bound_s, sample_rate_hz) * (1 + 1e-9)]
-    continuous = np.log(beyond) * sample_rate_hz
-    natural = np.abs(continuous)
-    found = [
-        SlowPole(float(size / (2 * np.pi)), float(-1 / pole.real), float(-pole.real / size))
-        for pole, size in zip(continuous, natural, strict=True)
+    slow = slower[np.abs(slower) > largest_radius(bound_s, sample_rate_hz) * (1 + 1e-9)]
+    continuous = np.log(slow) * sample_rate_hz
+    natural_rad_s = np.abs(continuous)
+    poles = [
+        SlowPole(float(rad_s / (2 * np.pi)), float(-1 / pole.real), float(-pole.real / rad_s))
+        for pole, rad_s in zip(continuous, natural_rad_s, strict=True)
     ]
-    return tuple(sorted(found, key=lambda pole: -pole.decay_s))
+    return tuple(sorted(poles, key=lambda pole: -pole.decay_s))
 
 
 def longest_resolved_decay_s(lines: WeightedLines) -> float:
     """Time constant (s) above which these lines do not distinguish a decay from an undamped mode; 0 for a single
     line."""
     steps = np.diff(np.unique(lines.frequency_hz))
-    return PERIODS_TOLD / float(np.median(steps)) if len(steps) else 0.0
+    return RESOLVED_PERIODS / float(np.median(steps)) if len(steps) else 0.0
 
 
-def is_at_bound(found: FittedForm, radius: Radius) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def is_at_bound(fitted: FittedForm, radius: Radius) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """(blocks,): whether the larger pole of a block lies on the radius, to within 1e-7 of it."""
-    return np.asarray(_pole_radii(found) >= radius * (1 - 1e-7))
+    return np.asarray(_pole_radii(fitted) >= radius * (1 - 1e-7))
 
 
-def _pole_radii(found: FittedForm) -> FloatArray:
+def _pole_radii(fitted: FittedForm) -> FloatArray:
     """(blocks,): magnitude of the larger pole."""
-    poles = np.abs(found.form.poles).reshape(2, -1)
+    poles = np.abs(fitted.form.poles).reshape(2, -1)
     return np.asarray(poles.max(axis=0))
 
 
 def _bound_costs(chosen: Candidate, limit: float, lines: WeightedLines, settings: IdentificationSettings) -> bool:
     """Whether lifting the bound for the poles at it lowers the cost by more than noise does, judged from a limited
     number of refinement steps."""
-    on = is_at_bound(chosen.fitted, chosen.radius)
-    if not on.any():
+    at_bound = is_at_bound(chosen.fitted, chosen.radius)
+    if not at_bound.any():
         return False
     bins = bins_about(chosen.fitted, lines, settings)
-    loose = np.where(on, limit, chosen.radius)
-    after = bins.cost(refine(chosen.fitted.form, bins, loose, MOST_STEPS[-1]).response(bins.z))
-    if not _exceeds_noise(bins.cost(chosen.fitted.response(bins.z)) - after, after, bins, len(lines)):
+    radii = np.where(at_bound, limit, chosen.radius)
+    relaxed_cost = bins.cost(refine(chosen.fitted.form, bins, radii, MOST_STEPS[-1]).response(bins.z))
+    if not _exceeds_noise(bins.cost(chosen.fitted.response(bins.z)) - relaxed_cost, relaxed_cost, bins, len(lines)):
         return False
     # A fall of the cost that further steps achieve with the bound, too, is not counted.
-    held = bins.cost(refine(chosen.fitted.form, bins, chosen.radius, MOST_STEPS[-1]).response(bins.z))
-    return _exceeds_noise(held - after, after, bins, len(lines))
+    bounded_cost = bins.cost(refine(chosen.fitted.form, bins, chosen.radius, MOST_STEPS[-1]).response(bins.z))
+    return _exceeds_noise(bounded_cost - relaxed_cost, relaxed_cost, bins, len(lines))
 
 
 def _has_outlying_line(chosen: Candidate, lines: WeightedLines) -> bool:
     """Whether the residual of a line is an outlier, as from a resonance so narrow that no pole moved there in the
     search."""
-    left = (np.abs(lines.weight * (chosen.fitted.response(lines.z) - lines.response)) ** 2).sum(axis=(1, 2))
+    line_costs = (np.abs(lines.weight * (chosen.fitted.response(lines.z) - lines.response)) ** 2).sum(axis=(1, 2))
     entries = lines.response[0].size
-    return bool(2 * left.max() / max(chosen.cost, 1.0) > chi2.isf(FALSE_ALARM / len(lines), 2 * entries))
+    return bool(2 * line_costs.max() / max(chosen.cost, 1.0) > chi2.isf(FALSE_ALARM / len(lines), 2 * entries))
 
 
-def _tighten_poles(free: Candidate, lines: WeightedLines, settings: IdentificationSettings, limit: float) -> Candidate:
+def _tighten_poles(
+    relaxed: Candidate, lines: WeightedLines, settings: IdentificationSettings, limit: float
+) -> Candidate:
     """Return poles to the ordinary bound, slowest first, where that raises the cost by no more than noise would."""
     ordinary = largest_radius(settings.decay_s, lines.sample_rate_hz)
-    sizes, entries = _pole_radii(free.fitted), lines.response.size
-    name = f"{free.name.removesuffix(RELAXED)}{RELAXED}"
-    found = replace(free, name=name, radius=np.where(sizes > ordinary, limit, ordinary))
+    sizes, entries = _pole_radii(relaxed.fitted), lines.response.size
+    name = f"{relaxed.name.removesuffix(RELAXED)}{RELAXED}"
+    tightened = replace(relaxed, name=name, radius=np.where(sizes > ordinary, limit, ordinary))
     for block in [int(k) for k in np.argsort(-sizes) if sizes[k] > ordinary]:
-        radii = np.array(found.radius)
+        radii = np.array(tightened.radius)
         radii[block] = ordinary
-        form = found.fitted.form
+        form = tightened.fitted.form
         a, b = stabilise_blocks(form.a, form.b, radii)
-        tried = refine_candidate(name, complete_form(replace(form, a=a, b=b), lines), lines, settings, radii)
-        lost = entries * (tried.cost - free.cost)
-        if tried.sane and not _exceeds_noise(lost, entries * free.cost, lines, len(lines)):
-            found = tried
-    return found
+        trial = refine_candidate(name, complete_form(replace(form, a=a, b=b), lines), lines, settings, radii)
+        increase = entries * (trial.cost - relaxed.cost)
+        if trial.sane and not _exceeds_noise(increase, entries * relaxed.cost, lines, len(lines)):
+            tightened = trial
+    return tightened
 
 
-def _is_better(again: Candidate, chosen: Candidate, lines: WeightedLines) -> bool:
+def _lowers_cost(tightened: Candidate, chosen: Candidate, lines: WeightedLines) -> bool:
     """Whether a pole is still relaxed, and the cost fell by more than noise alone explains."""
     entries = lines.response.size
-    gained = entries * (chosen.cost - again.cost)
-    return bool(np.any(again.radius > np.min(again.radius))) and _exceeds_noise(
-        gained, entries * again.cost, lines, len(lines)
+    decrease = entries * (chosen.cost - tightened.cost)
+    return bool(np.any(tightened.radius > np.min(tightened.radius))) and _exceeds_noise(
+        decrease, entries * tightened.cost, lines, len(lines)
     )
 
 
-def _exceeds_noise(gained: float, left: float, lines: WeightedLines, tried: int) -> bool:
-    """Whether the fall `gained` of the cost, to `left`, exceeds that of a resonance fitted to noise at the best of
-    `tried` lines: chi-squared with 2 (p + m + 1) degrees of freedom. Residuals larger than the noise count as the
-    noise."""
+def _exceeds_noise(decrease: float, remaining: float, lines: WeightedLines, tested_lines: int) -> bool:
+    """Whether the fall `decrease` of the cost, to `remaining`, exceeds that of a resonance fitted to noise at the best
+    of `tested_lines` lines: chi-squared with 2 (p + m + 1) degrees of freedom. Residuals larger than the noise count as
+    the noise."""
     p, m = lines.response.shape[1:]
-    scale = max(left / lines.response.size, 1.0)
-    return bool(2 * gained / scale > chi2.isf(FALSE_ALARM / tried, 2 * (p + m + 1)))
+    scale = max(remaining / lines.response.size, 1.0)
+    return bool(2 * decrease / scale > chi2.isf(FALSE_ALARM / tested_lines, 2 * (p + m + 1)))

@@ -33,8 +33,8 @@ def slow_part(identified: Identified, radius: float) -> SlowPart | None:
     the limit of the lines' resolution, is left out, because its decay is not known."""
     fitted = identified.chosen.fitted
     sizes = np.abs(fitted.form.poles).reshape(2, -1).max(axis=0)
-    beyond = (sizes > radius) & ~is_at_bound(fitted, identified.chosen.radius)
-    states = np.flatnonzero(np.repeat(beyond, 2))
+    is_slow = (sizes > radius) & ~is_at_bound(fitted, identified.chosen.radius)
+    states = np.flatnonzero(np.repeat(is_slow, 2))
     if not len(states) or not identified.relaxed:
         return None
     return SlowPart(fitted.form.state_matrix[np.ix_(states, states)], fitted.B[states], fitted.form.C[:, states])
@@ -55,10 +55,10 @@ def _settle_recording(recording: Recording, slow: SlowPart) -> Recording:
         if segment.period > 0
         for start in range(segment.start, segment.stop - segment.period + 1, segment.period)
     ]
-    wanted = {edge for period in periods for edge in period}
+    edges = {edge for period in periods for edge in period}
     x = np.zeros(len(slow.A))
-    for k in range(max(wanted, default=-1) + 1):
-        if k in wanted:
+    for k in range(max(edges, default=-1) + 1):
+        if k in edges:
             states[k] = x
         if k < len(commands):
             x = slow.A @ x + slow.B @ commands[k]
@@ -74,8 +74,8 @@ def _settle_recording(recording: Recording, slow: SlowPart) -> Recording:
 
 def _free_decay(slow: SlowPart, first: FloatArray, last: FloatArray, samples: int) -> FloatArray:
     """Response (samples, p) of the free decay. first, last: (n,), states at the start and the end of the period."""
-    once = np.linalg.matrix_power(slow.A, samples)
-    x = np.linalg.solve(np.eye(len(slow.A)) - once, first - last)
+    one_period = np.linalg.matrix_power(slow.A, samples)
+    x = np.linalg.solve(np.eye(len(slow.A)) - one_period, first - last)
     rows = np.empty((samples, len(slow.C)))
     for k in range(samples):
         rows[k] = slow.C @ x

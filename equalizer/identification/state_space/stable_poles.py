@@ -21,8 +21,8 @@ def stabilise_poles(poles: ComplexArray | FloatArray, radius: Radius) -> Complex
     """Poles of any shape, stabilised: unstable poles are reflected at the unit circle, then all magnitudes are limited
     to the radius. Angles, which are the frequencies, are unchanged."""
     size = np.abs(poles)
-    wanted = np.minimum(np.where(size > 1, 1 / np.maximum(size, 1e-300), size), radius)
-    return np.asarray(poles * wanted / np.maximum(size, 1e-300), dtype=np.complex128)
+    limited = np.minimum(np.where(size > 1, 1 / np.maximum(size, 1e-300), size), radius)
+    return np.asarray(poles * limited / np.maximum(size, 1e-300), dtype=np.complex128)
 
 
 def stabilise_blocks(a: FloatArray, b: FloatArray, radius: Radius) -> tuple[FloatArray, FloatArray]:

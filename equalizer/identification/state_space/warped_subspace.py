@@ -56,22 +56,22 @@ def estimate_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> S
     of_output = np.exp(np.log(deviation).mean(axis=(0, 2)))
     of_column = np.exp(np.log(deviation / of_output[:, None]).mean(axis=1))
     scaled = lines.response / of_output[:, None] / of_column[:, None, :]
-    entered = np.einsum("lq,lj,jk->qklj", powers, 1 / of_column, np.eye(m)).reshape(horizon * m, -1)
-    came_out = np.einsum("lq,lij->qilj", powers, scaled).reshape(horizon * p, -1)
-    unexplained = _project_out_inputs(entered, came_out)
+    input_rows = np.einsum("lq,lj,jk->qklj", powers, 1 / of_column, np.eye(m)).reshape(horizon * m, -1)
+    output_rows = np.einsum("lq,lij->qilj", powers, scaled).reshape(horizon * p, -1)
+    unexplained = _project_out_inputs(input_rows, output_rows)
     noise = np.kron(np.linalg.cholesky((powers.T @ powers.conj()).real / len(zeta)), np.eye(p))
     vectors, values, _ = np.linalg.svd(np.linalg.solve(noise, unexplained))
     coloured = np.tile(of_output, horizon)[:, None] * (noise @ vectors)
     return Subspace(coloured, values / np.sqrt(len(zeta) * m), p, c)
 
 
-def _project_out_inputs(entered: ComplexArray, came_out: ComplexArray) -> FloatArray:
+def _project_out_inputs(input_rows: ComplexArray, output_rows: ComplexArray) -> FloatArray:
     """(horizon p, horizon p): the outputs' rows with the span of the inputs' rows projected out, compressed by an LQ
     decomposition of real and imaginary parts."""
-    stacked = np.concatenate([entered, came_out])
+    stacked = np.concatenate([input_rows, output_rows])
     real = np.concatenate([stacked.real, stacked.imag], axis=1)
     upper = np.asarray(np.linalg.qr(real.T, mode="r"))
-    return np.asarray(upper[len(entered) :, len(entered) :].T, dtype=np.float64)
+    return np.asarray(upper[len(input_rows) :, len(input_rows) :].T, dtype=np.float64)
 
 
 def poles_and_shapes(subspace: Subspace, order: int, radius: float) -> ModalForm:
@@ -80,8 +80,8 @@ def poles_and_shapes(subspace: Subspace, order: int, radius: float) -> ModalForm
     observed = subspace.directions[:, :order]
     p, c = subspace.outputs, subspace.warp
     size = np.linalg.norm(observed.reshape(-1, p, order), axis=(0, 2))
-    evened = observed / np.tile(size, len(observed) // p)[:, None]
-    shifted = np.linalg.lstsq(evened[:-p], evened[p:], rcond=None)[0]
+    normalised = observed / np.tile(size, len(observed) // p)[:, None]
+    shifted = np.linalg.lstsq(normalised[:-p], normalised[p:], rcond=None)[0]
     values, vectors = np.linalg.eig(shifted)
     # The map also changes B and D, which are fitted afterwards; C is kept.
     return from_poles(stabilise_poles((values + c) / (1 + c * values), radius), observed[:p] @ vectors)

@@ -52,9 +52,9 @@ class WeightedLines:
 def weight_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float, float]) -> WeightedLines:
     """All reliable lines of the band (Hz, ends included) of all estimates, in ascending order. Where the noise of an
     entry is not known, it is estimated from differences between neighbouring lines (`scatter_variance`)."""
-    inside = [estimate.within(*band_hz) for estimate in responses]
+    in_band = [estimate.within(*band_hz) for estimate in responses]
     chosen = [
-        estimate.of_lines(estimate.reliable & np.isfinite(estimate.response).all(axis=(1, 2))) for estimate in inside
+        estimate.of_lines(estimate.reliable & np.isfinite(estimate.response).all(axis=(1, 2))) for estimate in in_band
     ]
     chosen = [estimate for estimate in chosen if len(estimate)]
     if not chosen:
@@ -66,8 +66,8 @@ def weight_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float, f
     rising = np.argsort(frequency, kind="stable")
     response = np.concatenate([estimate.response for estimate in chosen])[rising]
     variance = np.concatenate([_noise_variance(estimate) for estimate in chosen])[rising]
-    least = LEAST_NOISE * float(np.abs(response).max())
-    weight = 1 / np.sqrt(np.maximum(variance, least**2))
+    floor = LEAST_NOISE * float(np.abs(response).max())
+    weight = 1 / np.sqrt(np.maximum(variance, floor**2))
     return WeightedLines(frequency[rising], response, weight, chosen[0].sample_rate_hz)
 
 
@@ -84,8 +84,8 @@ def scatter_variance(response: ComplexArray) -> FloatArray:
     second = np.diff(response, n=2, axis=0)
     # The median, because a sharp resonance hardly changes it. A second difference has 1 + 4 + 1 = 6 times the variance;
     # |.|² of circular noise is exponentially distributed, with the median ln 2 times its mean.
-    typical = np.median(np.abs(second) ** 2, axis=0) / (6 * np.log(2))
-    return np.asarray(np.broadcast_to(typical, response.shape), dtype=np.float64)
+    median_variance = np.median(np.abs(second) ** 2, axis=0) / (6 * np.log(2))
+    return np.asarray(np.broadcast_to(median_variance, response.shape), dtype=np.float64)
 
 
 def average_bins(

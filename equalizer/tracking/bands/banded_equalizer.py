@@ -126,33 +126,33 @@ class BandedEqualizer:
         """`latency_samples` in ms."""
         return 1e3 * self.latency_samples / self.middle.sample_rate_hz
 
-    def play(self, wanted: FloatArray, cap: CapPolicy | None = None) -> BandedForces:
-        """Forces of all three bands for a wanted acceleration. wanted: (n, p), m/s²; cap: None = no limit. Raises
+    def play(self, reference: FloatArray, cap: CapPolicy | None = None) -> BandedForces:
+        """Forces of all three bands for a wanted acceleration. reference: (n, p), m/s²; cap: None = no limit. Raises
         ForceLimitError for forces above the cap, TrackingError where no forces under it are found."""
-        bands = self.split.split(self._pad(wanted))
+        bands = self.split.split(self._pad(reference))
         low, motion = self._low_forces(bands.low)
         problem = make_tracking_problem(self.middle, self.weights)
-        tracked = track(stored_gains(problem, len(low)), bands.middle)
-        middle, answer, loss = tracked.forces, tracked.predicted, None
-        high, share = self._high_forces(bands.high, low + middle)
-        others = low if high is None else low + high.forces
+        middle_track = track(stored_gains(problem, len(low)), bands.middle)
+        middle, middle_response, loss = middle_track.forces, middle_track.predicted, None
+        high, stylus_share = self._high_forces(bands.high, low + middle)
+        other_forces = low if high is None else low + high.forces
         if cap is not None and cap.constrain:
-            capped = track_under_cap(problem, bands.middle, cap.cap_n, others)
-            middle, answer, loss = capped.forces, capped.predicted, capped.loss
-        entering = middle + others
-        by_band = (low, middle, others - low)
+            capped = track_under_cap(problem, bands.middle, cap.cap_n, other_forces)
+            middle, middle_response, loss = capped.forces, capped.predicted, capped.loss
+        total_forces = middle + other_forces
+        by_band = (low, middle, other_forces - low)
         return BandedForces(
-            commands=entering - self._spring_force(motion, answer),
-            entering=entering,
+            commands=total_forces - self._spring_force(motion, middle_response),
+            entering=total_forces,
             by_band=by_band,
-            predicted=self._predict_bands(by_band, motion, answer),
+            predicted=self._predict_bands(by_band, motion, middle_response),
             bands=bands,
             latency_samples=self.latency_samples,
-            peaks=None if cap is None else require_under_cap(entering, cap.cap_n, self._rate_hz),
+            peaks=None if cap is None else require_under_cap(total_forces, cap.cap_n, self._rate_hz),
             loss=loss,
             motion=motion,
             high=high,
-            stylus=share,
+            stylus=stylus_share,
         )
 
     @property
@@ -165,36 +165,45 @@ class BandedEqualizer:
         decay_s = 0.0 if self.low is None else LOW_BAND_DECAYS / (2 * np.pi * self.low.corner_hz)
         return int(np.ceil(max(PADDING_S, decay_s) * self._rate_hz))
 
-    def _pad(self, wanted: FloatArray) -> FloatArray:
-        """Pad wanted (n, p) with zeros, to a length for which the FFT is fast; causal: only after it."""
-        before = 0 if self.causal else self._padding
-        around = 2 * self.split.latency_samples
-        after = next_fast_len(len(wanted) + before + self._padding + around) - len(wanted) - before - around
-        return np.pad(np.asarray(wanted, dtype=np.float64), ((before, after), (0, 0)))
+    def _pad(self, reference: FloatArray) -> FloatArray:
+        """Pad reference (n, p) with zeros, to a length for which the FFT is fast; causal: only after it."""
+        rows_before = 0 if self.causal else self._padding
+        filter_rows = 2 * self.split.latency_samples
+        rows_after = (
+            next_fast_len(len(reference) + rows_before + self._padding + filter_rows)
+            - len(reference)
+            - rows_before
+            - filter_rows
+        )
+        return np.pad(np.asarray(reference, dtype=np.float64), ((rows_before, rows_after), (0, 0)))
 
     def _plan_motion(self, acceleration: FloatArray, corner_hz: float) -> SlowMotion:
         """Motion of an acceleration (N, m) above a corner, causal or with zero phase as the split is."""
         plan = plan_motion_causally if self.causal else plan_motion
         return plan(acceleration, self._rate_hz, corner_hz)
 
-    def _low_forces(self, wanted: FloatArray) -> tuple[FloatArray, SlowMotion | None]:
+    def _low_forces(self, reference: FloatArray) -> tuple[FloatArray, SlowMotion | None]:
         """Forces (N, m) of the low band and its planned motion; zeros and None without a low band."""
         if self.low is None:
-            return np.zeros((len(wanted), self.middle.B.shape[1])), None
-        motion = self._plan_motion(wanted, self.low.corner_hz)
+            return np.zeros((len(reference), self.middle.B.shape[1])), None
+        motion = self._plan_motion(reference, self.low.corner_hz)
         return low_band_forces(motion, self.low.rigid, self._rate_hz), motion
 
-    def _high_forces(self, wanted: FloatArray, others: FloatArray) -> tuple[HighBandForces | None, StylusShare | None]:
-        """Forces of the high band, and the share of the stylus. others: (N, m), the forces of the other bands."""
+    def _high_forces(
+        self, reference: FloatArray, other_forces: FloatArray
+    ) -> tuple[HighBandForces | None, StylusShare | None]:
+        """Forces of the high band, and the share of the stylus. other_forces: (N, m), the forces of the other bands."""
         if self.high is None:
             return None, None
-        signal = project_to_one_dof(wanted) if self.causal else reduce_to_one_dof(wanted)
-        share = None
+        one_dof_reference = project_to_one_dof(reference) if self.causal else reduce_to_one_dof(reference)
+        stylus_share = None
         if self.high.stylus is not None:
-            share = share_with_stylus(signal, self._rate_hz, self.high.stylus)
-            signal = share.motors
+            stylus_share = share_with_stylus(one_dof_reference, self._rate_hz, self.high.stylus)
+            one_dof_reference = stylus_share.motors
         settings = replace(self.high.settings, causal=self.causal)
-        return high_band_forces(signal, self._rate_hz, self.high.source, others, settings), share
+        return high_band_forces(
+            one_dof_reference, self._rate_hz, self.high.source, other_forces, settings
+        ), stylus_share
 
     def _spring_force(self, motion: SlowMotion | None, middle: FloatArray) -> FloatArray:
         """(N, m), N: force -(k x + b v) of the virtual spring along the motion of the low and the middle band; the
@@ -203,16 +212,18 @@ class BandedEqualizer:
         if k == b == 0:
             return np.zeros_like(middle)
         motions = [self._plan_motion(middle, CORNER_HZ)] + ([] if motion is None else [motion])
-        force: FloatArray = -sum((k * part.position_m + b * part.velocity_m_s for part in motions), np.zeros(()))
+        force: FloatArray = -sum(
+            (k * planned.position_m + b * planned.velocity_m_s for planned in motions), np.zeros(())
+        )
         return force
 
     def _predict_bands(
-        self, by_band: tuple[FloatArray, FloatArray, FloatArray], motion: SlowMotion | None, answer: FloatArray
+        self, by_band: tuple[FloatArray, FloatArray, FloatArray], motion: SlowMotion | None, middle_response: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Predicted acceleration (N, p) of each band: by the high band's response where there is a high band, because
-        it covers all frequencies; else by each band's own model. answer: (N, p), the middle model's."""
+        it covers all frequencies; else by each band's own model. middle_response: (N, p), the middle model's."""
         if self.high is not None:
             low, middle, high = (predict_acceleration(forces, self._rate_hz, self.high.source) for forces in by_band)
             return low, middle, high
-        nothing = np.zeros_like(answer)
-        return nothing if motion is None else motion.acceleration, answer, nothing
+        zeros = np.zeros_like(middle_response)
+        return zeros if motion is None else motion.acceleration, middle_response, zeros

@@ -55,12 +55,12 @@ class MeasuredResponse:
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
         """(lines, p, m), m/s² per N: interpolated response."""
-        flat = self.response.reshape(len(self.frequency_hz), -1)
+        channels = self.response.reshape(len(self.frequency_hz), -1)
         columns = []
-        for column in flat.T:
-            length = np.interp(frequency_hz, self.frequency_hz, np.abs(column))
+        for column in channels.T:
+            magnitude = np.interp(frequency_hz, self.frequency_hz, np.abs(column))
             phase = np.interp(frequency_hz, self.frequency_hz, np.unwrap(np.angle(column)))
-            columns.append(length * np.exp(1j * phase))
+            columns.append(magnitude * np.exp(1j * phase))
         return np.stack(columns, axis=1).reshape(len(frequency_hz), *self.response.shape[1:])
 
 
@@ -94,59 +94,66 @@ class HighBandForces:
     """(m,): that peak (N) for forces along each single axis, for comparison."""
 
 
-def reduce_to_one_dof(wanted: FloatArray) -> FloatArray:
+def reduce_to_one_dof(reference: FloatArray) -> FloatArray:
     """(N,) from (N, p): spectral reduction, at each line the norm over all axes with the phase of their sum. The energy
     of every line is preserved (Landin et al., Dimensional reduction of high-frequency accelerations for haptic
     rendering, 2010)."""
-    spectrum = np.fft.rfft(wanted, axis=0)
-    length = np.linalg.norm(spectrum, axis=1)
+    spectrum = np.fft.rfft(reference, axis=0)
+    magnitude = np.linalg.norm(spectrum, axis=1)
     # The sum over axes vanishes where axes cancel each other; the phase is then that of the strongest axis.
     total = spectrum.sum(axis=1)
     strongest = np.take_along_axis(spectrum, np.abs(spectrum).argmax(axis=1)[:, None], axis=1)[:, 0]
-    phase = np.angle(np.where(np.abs(total) > 1e-9 * length, total, strongest))
-    return np.asarray(np.fft.irfft(length * np.exp(1j * phase), len(wanted)))
+    phase = np.angle(np.where(np.abs(total) > 1e-9 * magnitude, total, strongest))
+    return np.asarray(np.fft.irfft(magnitude * np.exp(1j * phase), len(reference)))
 
 
-def project_to_one_dof(wanted: FloatArray) -> FloatArray:
+def project_to_one_dof(reference: FloatArray) -> FloatArray:
     """(N,) from (N, p): projection on the first principal direction, scaled to the energy of all axes. Unlike
-    `reduce_to_one_dof` it is causal: each row depends on the same row of `wanted`, apart from direction and scale."""
-    direction = np.linalg.svd(wanted, full_matrices=False)[2][0]
-    along = wanted @ direction
-    size = float(np.linalg.norm(along))
-    return np.asarray(along * (np.linalg.norm(wanted) / size) if size > 0 else along)
+    `reduce_to_one_dof` it is causal: each row depends on the same row of `reference`, apart from direction and
+    scale."""
+    direction = np.linalg.svd(reference, full_matrices=False)[2][0]
+    projected = reference @ direction
+    size = float(np.linalg.norm(projected))
+    return np.asarray(projected * (np.linalg.norm(reference) / size) if size > 0 else projected)
 
 
 def high_band_forces(
-    wanted: FloatArray,
+    reference: FloatArray,
     sample_rate_hz: float,
     source: ResponseSource,
-    others: FloatArray | None = None,
+    added_forces: FloatArray | None = None,
     settings: HighBandSettings | None = None,
 ) -> HighBandForces:
-    """Forces along the direction of the smallest peak. wanted: (N,), m/s², one degree of freedom; unless causal, at
-    rest at both ends, because the two-sided inverse is circular. others: (N, m), N, further forces, which count in the
-    peak."""
+    """Forces along the direction of the smallest peak. reference: (N,), m/s², one degree of freedom; unless causal, at
+    rest at both ends, because the two-sided inverse is circular. added_forces: (N, m), N, further forces, which count
+    in the peak."""
     settings = settings or HighBandSettings()
-    n = 2 * len(wanted) if settings.causal else len(wanted)
+    n = 2 * len(reference) if settings.causal else len(reference)
     response = source.at(lines_hz(n, sample_rate_hz))
-    there = np.zeros((len(wanted), response.shape[2])) if others is None else np.asarray(others, dtype=np.float64)
-    spectrum = np.fft.rfft(wanted, n)
+    other_forces = (
+        np.zeros((len(reference), response.shape[2]))
+        if added_forces is None
+        else np.asarray(added_forces, dtype=np.float64)
+    )
+    spectrum = np.fft.rfft(reference, n)
     candidates = _candidate_directions(response.shape[2], settings.shared)
-    played = [_invert_along(spectrum, n, response @ direction, settings) for direction in candidates]
+    force_signals = [_invert_along(spectrum, n, response @ direction, settings) for direction in candidates]
     # The sign of the direction is not felt, but it changes the peak of the sum with the other forces.
-    ways = [sign * scalar[:, None] * d for scalar, d in zip(played, candidates, strict=True) for sign in (1.0, -1.0)]
-    peaks = np.array([np.linalg.norm(forces + there, axis=1).max(initial=0.0) for forces in ways])
+    candidate_forces = [
+        sign * signal[:, None] * d for signal, d in zip(force_signals, candidates, strict=True) for sign in (1.0, -1.0)
+    ]
+    peaks = np.array([np.linalg.norm(forces + other_forces, axis=1).max(initial=0.0) for forces in candidate_forces])
     best = int(peaks.argmin())
     by_axis = peaks.reshape(-1, 2).min(axis=1)[: response.shape[2]]
-    return HighBandForces(ways[best], candidates[best // 2], float(peaks[best]), by_axis)
+    return HighBandForces(candidate_forces[best], candidates[best // 2], float(peaks[best]), by_axis)
 
 
 def predict_acceleration(forces: FloatArray, sample_rate_hz: float, source: ResponseSource) -> FloatArray:
     """(N, p), m/s²: response of the source to forces (N, m), in N, from rest; zero-padded to twice the length."""
     n = 2 * len(forces)
     spectrum = np.fft.rfft(forces, n, axis=0)[:, :, None]
-    answer = (source.at(lines_hz(n, sample_rate_hz)) @ spectrum)[:, :, 0]
-    return np.asarray(np.fft.irfft(answer, n, axis=0)[: len(forces)])
+    response = (source.at(lines_hz(n, sample_rate_hz)) @ spectrum)[:, :, 0]
+    return np.asarray(np.fft.irfft(response, n, axis=0)[: len(forces)])
 
 
 def lines_hz(samples: int, sample_rate_hz: float) -> FloatArray:
@@ -154,15 +161,15 @@ def lines_hz(samples: int, sample_rate_hz: float) -> FloatArray:
     return np.asarray(np.fft.rfftfreq(samples, 1 / sample_rate_hz), dtype=np.float64)
 
 
-def _invert_along(spectrum: ComplexArray, n: int, answer: ComplexArray, settings: HighBandSettings) -> FloatArray:
-    """Force along a direction, (N,), N. spectrum: wanted signal, n samples; answer: (lines, p), response to a unit
+def _invert_along(spectrum: ComplexArray, n: int, response: ComplexArray, settings: HighBandSettings) -> FloatArray:
+    """Force along a direction, (N,), N. spectrum: wanted signal, n samples; response: (lines, p), response to a unit
     force along the direction, m/s² per N."""
-    length = np.linalg.norm(answer, axis=1)
-    inverse = (length / (length**2 + settings.weight)).astype(np.complex128)
+    magnitude = np.linalg.norm(response, axis=1)
+    inverse = (magnitude / (magnitude**2 + settings.weight)).astype(np.complex128)
     if settings.causal:
         # At twice the length, so that the filter's decay does not wrap around to the start.
         return np.asarray(np.fft.irfft(spectrum * minimum_phase(inverse.real), n)[: n // 2])
-    strongest = np.take_along_axis(answer, np.abs(answer).argmax(axis=1)[:, None], axis=1)[:, 0]
+    strongest = np.take_along_axis(response, np.abs(response).argmax(axis=1)[:, None], axis=1)[:, 0]
     # The strongest axis is in phase with the wanted signal.
     return np.asarray(np.fft.irfft(spectrum * inverse * np.exp(-1j * np.angle(strongest)), n))
 
@@ -188,6 +195,6 @@ def _candidate_directions(inputs: int, shared: bool) -> list[FloatArray]:
     if not shared or inputs != 3:
         return axes
     z = 1 - (2 * np.arange(DIRECTIONS) + 1) / (2 * DIRECTIONS)
-    turn = np.pi * (1 + np.sqrt(5)) * np.arange(DIRECTIONS)
-    ring = np.sqrt(1 - z**2)
-    return axes + list(np.stack([ring * np.cos(turn), ring * np.sin(turn), z], axis=1))
+    azimuth = np.pi * (1 + np.sqrt(5)) * np.arange(DIRECTIONS)
+    radius = np.sqrt(1 - z**2)
+    return axes + list(np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=1))

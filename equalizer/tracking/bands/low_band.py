@@ -36,28 +36,30 @@ class SlowMotion:
         return float(np.linalg.norm(self.position_m, axis=1).max(initial=0.0))
 
 
-def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
-    """Plan the slow motion of the low band by a zero-phase filter. wanted: (N, m), m/s², known beforehand and zero at
-    both ends. Raises ValueError for a corner that is not between zero and half the sample rate.
+def plan_motion(reference: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
+    """Plan the slow motion of the low band by a zero-phase filter. reference: (N, m), m/s², known beforehand and zero
+    at both ends. Raises ValueError for a corner that is not between zero and half the sample rate.
 
     x = a / (s² - w²), a convolution with a two-sided exponential kernel. The filter from wanted to planned acceleration
     is real, f² / (f² + corner²), so that there is no phase error.
     """
-    a, corner = np.asarray(wanted, dtype=np.float64), _corner_rad_per_s(corner_hz, sample_rate_hz)
+    a, corner = np.asarray(reference, dtype=np.float64), _corner_rad_per_s(corner_hz, sample_rate_hz)
     # Zeros over eight time constants, so that the kernel does not wrap around the ends.
-    run = int(np.ceil(8 * sample_rate_hz / corner))
-    padded = np.pad(a, ((run, run), (0, 0)))
+    padding_rows = int(np.ceil(8 * sample_rate_hz / corner))
+    padded = np.pad(a, ((padding_rows, padding_rows), (0, 0)))
     s = 2j * np.pi * np.fft.rfftfreq(len(padded), 1 / sample_rate_hz)[:, None]
     position = np.fft.rfft(padded, axis=0) / (s**2 - corner**2)
-    parts = [np.fft.irfft(part, len(padded), axis=0)[run:][: len(a)] for part in (position, s * position)]
-    return SlowMotion(parts[0], parts[1], a + corner**2 * parts[0])
+    signals = [
+        np.fft.irfft(spectrum, len(padded), axis=0)[padding_rows:][: len(a)] for spectrum in (position, s * position)
+    ]
+    return SlowMotion(signals[0], signals[1], a + corner**2 * signals[0])
 
 
-def plan_motion_causally(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
-    """Plan the slow motion of the low band by a causal filter. wanted: (N, m), m/s², from rest at the first row, as
+def plan_motion_causally(reference: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
+    """Plan the slow motion of the low band by a causal filter. reference: (N, m), m/s², from rest at the first row, as
     after a contact. x = a / (s + w)²: the planned acceleration leads the wanted by 2 atan(corner / f). Raises
     ValueError for a corner that is not between zero and half the sample rate."""
-    a, corner = np.asarray(wanted, dtype=np.float64), _corner_rad_per_s(corner_hz, sample_rate_hz)
+    a, corner = np.asarray(reference, dtype=np.float64), _corner_rad_per_s(corner_hz, sample_rate_hz)
     # 1 / (s + w) by the bilinear transform, s = c (1 - z^-1) / (1 + z^-1).
     c = 2 * sample_rate_hz
     integral = np.array([1.0, 1.0]) / (c + corner), np.array([1.0, (corner - c) / (c + corner)])
@@ -72,12 +74,14 @@ def plan_motion_causally(wanted: FloatArray, sample_rate_hz: float, corner_hz: f
 def low_band_forces(motion: SlowMotion, rigid: RigidModel, sample_rate_hz: float) -> FloatArray:
     """Forces (N, m) in N by inverse dynamics along the motion, advanced by the rigid model's delay and the half
     sample of the hold, to first order (Taylor), which is enough for a slow band."""
-    early = rigid.delay_s + 0.5 / sample_rate_hz
+    lead_s = rigid.delay_s + 0.5 / sample_rate_hz
     x, v, a = motion.position_m, motion.velocity_m_s, motion.acceleration
-    later_x, later_v = x + early * v, v + early * a
-    later_a = a + early * np.gradient(a, 1 / sample_rate_hz, axis=0) if len(a) > 1 else a
+    lead_position, lead_velocity = x + lead_s * v, v + lead_s * a
+    lead_acceleration = a + lead_s * np.gradient(a, 1 / sample_rate_hz, axis=0) if len(a) > 1 else a
     force: FloatArray = (
-        later_a @ rigid.mass_kg.T + later_v @ rigid.damping_n_s_per_m.T + later_x @ rigid.stiffness_n_per_m.T
+        lead_acceleration @ rigid.mass_kg.T
+        + lead_velocity @ rigid.damping_n_s_per_m.T
+        + lead_position @ rigid.stiffness_n_per_m.T
     )
     return force
 

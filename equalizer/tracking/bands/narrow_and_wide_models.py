@@ -19,13 +19,13 @@ from equalizer.tracking.bands.rigid_model import RigidModel, fit_rigid_model
 from equalizer.tracking.feedforward.band_split import BandEdges, LinearPhaseSplit
 from equalizer.tracking.feedforward.feedforward import (
     EDGE_ROOM_HZ,
-    LEAKED,
+    LEAKAGE_SHARE,
     Feedforward,
     FeedforwardSettings,
     extract_band,
     solve_causally,
 )
-from equalizer.tracking.feedforward.periodic_inverse import check_wanted
+from equalizer.tracking.feedforward.periodic_inverse import check_reference
 from equalizer.tracking.lqr.limits import require_under_cap
 from equalizer.tracking.lqr.padding import band_error, simulate_from_rest
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
@@ -57,7 +57,7 @@ class TwoModels:
                 f"must begin at {high:g} Hz or below and reach {LEAST_REACH * high:g} Hz or more, the narrower one "
                 f"begin above {2 * EDGE_ROOM_HZ:g} Hz"
             )
-        origins = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
+        origins = [[model.provenance.get(key) for key in ("hand", "input")] for model in (self.narrow, self.wide)]
         if origins[0] != origins[1] and None not in origins[0] + origins[1]:
             raise ValueError(
                 f"the narrower one was made {_describe_conditions(self.narrow)}, the wider one "
@@ -93,36 +93,40 @@ class BandedFeedforward:
     facts: BandFacts
 
 
-def solve_banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardSettings) -> BandedFeedforward:
+def solve_banded_feedforward(models: TwoModels, reference: Signal, settings: FeedforwardSettings) -> BandedFeedforward:
     """Solve for the forces of all bands. Raises ForceLimitError above the cap, TrackingError where nothing is wanted in
     the middle band or the cap leaves no solution, ValueError for an unsuitable signal or weight."""
-    check_wanted(models.narrow, wanted)
-    check_wanted(models.wide, wanted)
-    equalizer, rate_hz = make_banded_equalizer(models, settings.weight), wanted.sample_rate_hz
-    below = _remove_above_band(wanted.samples, models.wide)
-    played = equalizer.play(below)
-    rows = played.rows_of_wanted(len(wanted))
-    if not np.linalg.norm(played.bands.middle[rows]) > LEAKED * np.linalg.norm(wanted.samples):
+    check_reference(models.narrow, reference)
+    check_reference(models.wide, reference)
+    equalizer, rate_hz = make_banded_equalizer(models, settings.weight), reference.sample_rate_hz
+    in_band_reference = _remove_above_band(reference.samples, models.wide)
+    banded_forces = equalizer.play(in_band_reference)
+    rows = banded_forces.rows_of_wanted(len(reference))
+    if not np.linalg.norm(banded_forces.bands.middle[rows]) > LEAKAGE_SHARE * np.linalg.norm(reference.samples):
         low, high = models.narrow.band_hz
         raise TrackingError(f"nothing is wanted between {low:g} and {high:g} Hz, the narrower model's band")
     problem = make_tracking_problem(models.narrow, TrackingWeights(settings.weight))
-    others = (played.by_band[0] + played.by_band[2])[rows]
-    left = extract_band(models.narrow, below - simulate_from_rest(problem, others))
-    middle, loss = solve_causally(problem, left, settings, others)
-    forces = middle + others
+    outer_forces = (banded_forces.by_band[0] + banded_forces.by_band[2])[rows]
+    middle_reference = extract_band(models.narrow, in_band_reference - simulate_from_rest(problem, outer_forces))
+    middle, loss = solve_causally(problem, middle_reference, settings, outer_forces)
+    forces = middle + outer_forces
     predicted = simulate_from_rest(problem, forces)
-    slow = np.zeros_like(below) if played.motion is None else played.motion.acceleration[rows]
-    inside = slow + (played.bands.middle + played.bands.high)[rows]
-    found = Feedforward(
+    low_reference = (
+        np.zeros_like(in_band_reference) if banded_forces.motion is None else banded_forces.motion.acceleration[rows]
+    )
+    total_reference = low_reference + (banded_forces.bands.middle + banded_forces.bands.high)[rows]
+    solution = Feedforward(
         forces=Signal(forces, rate_hz, "force", "N", models.narrow.input_channels),
-        wanted=inside,
+        reference=total_reference,
         predicted=predicted,
-        error=band_error(below, predicted, rate_hz, models.narrow.band_hz),
-        left_out=float(np.linalg.norm(wanted.samples - inside) / np.linalg.norm(wanted.samples)),
+        error=band_error(in_band_reference, predicted, rate_hz, models.narrow.band_hz),
+        out_of_band_share=float(
+            np.linalg.norm(reference.samples - total_reference) / np.linalg.norm(reference.samples)
+        ),
         peaks=require_under_cap(forces, settings.cap_n, rate_hz),
         loss=loss,
     )
-    return BandedFeedforward(found, _collect_facts(models, equalizer, played, below, forces))
+    return BandedFeedforward(solution, _collect_facts(models, equalizer, banded_forces, in_band_reference, forces))
 
 
 def make_banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
@@ -146,55 +150,67 @@ def rigid_part(model: IdentifiedModel) -> RigidModel:
     return fit_rigid_model(lines_hz, model_response(model, lines_hz), model.sample_rate_hz)
 
 
-def level_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> float | None:
+def level_error(
+    reference: FloatArray, delivered: FloatArray, rate_hz: float, band_hz: tuple[float, float]
+) -> float | None:
     """Relative error of the level (root of the power of all axes together) by sixths of an octave, where people no
     longer perceive the direction of a vibration but only its level: |L_played - L_wanted| / |L_wanted|, L (bins,) from
-    the DFT, zero-padded to twice the length. wanted, played: (n, axes). None where nothing is wanted in the band."""
-    length = 2 * len(wanted)
+    the DFT, zero-padded to twice the length. reference, delivered: (n, axes). None where nothing is wanted in the
+    band."""
+    length = 2 * len(reference)
     lines_hz = np.fft.rfftfreq(length, 1 / rate_hz)
     count = max(1, round(BINS_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
     bins = np.digitize(lines_hz, np.geomspace(*band_hz, count + 1))
     levels = []
-    for samples in (wanted, played):
+    for samples in (reference, delivered):
         power = (np.abs(np.fft.rfft(samples, length, axis=0)) ** 2).sum(axis=1)
         levels.append(np.sqrt(np.bincount(bins, power, minlength=count + 2)))
     size = float(np.linalg.norm(levels[0][1:-1]))
-    if size <= LEAKED * float(np.linalg.norm(levels[0])):
+    if size <= LEAKAGE_SHARE * float(np.linalg.norm(levels[0])):
         return None
     return float(np.linalg.norm((levels[1] - levels[0])[1:-1]) / size)
 
 
-def _remove_above_band(wanted: FloatArray, wide: IdentifiedModel) -> FloatArray:
+def _remove_above_band(reference: FloatArray, wide: IdentifiedModel) -> FloatArray:
     """The wanted acceleration without frequencies above the wide band."""
     edge_hz = wide.band_hz[1] + EDGE_ROOM_HZ
     if edge_hz + EDGE_ROOM_HZ >= wide.sample_rate_hz / 2:
-        return wanted
-    bands = LinearPhaseSplit(BandEdges(None, edge_hz), wide.sample_rate_hz).split(wanted)
-    return bands.middle[bands.latency_samples : bands.latency_samples + len(wanted)]
+        return reference
+    bands = LinearPhaseSplit(BandEdges(None, edge_hz), wide.sample_rate_hz).split(reference)
+    return bands.middle[bands.latency_samples : bands.latency_samples + len(reference)]
 
 
 def _collect_facts(
-    models: TwoModels, equalizer: BandedEqualizer, played: BandedForces, wanted: FloatArray, forces: FloatArray
+    models: TwoModels,
+    equalizer: BandedEqualizer,
+    banded_forces: BandedForces,
+    reference: FloatArray,
+    forces: FloatArray,
 ) -> BandFacts:
     """Predicted errors of the forces (n, inputs): the middle band's by the narrow model, the high band's by the wide
-    one. wanted: (n, axes), without what lies above the wide band."""
-    edges, rows, band_hz = equalizer.split.edges, played.rows_of_wanted(len(wanted)), models.narrow.band_hz
+    one. reference: (n, axes), without what lies above the wide band."""
+    edges, rows, band_hz = equalizer.split.edges, banded_forces.rows_of_wanted(len(reference)), models.narrow.band_hz
     rate_hz, problem = models.narrow.sample_rate_hz, make_tracking_problem(models.narrow, equalizer.weights)
-    whole, cut = simulate_from_rest(problem, played.entering)[rows], simulate_from_rest(problem, played.entering[rows])
+    full_response, cut_response = (
+        simulate_from_rest(problem, banded_forces.entering)[rows],
+        simulate_from_rest(problem, banded_forces.entering[rows]),
+    )
     upper_hz = band_hz[1] + 2 * EDGE_ROOM_HZ, models.wide.band_hz[1]
-    above = predict_acceleration(forces, rate_hz, ModelledResponse(models.wide))
+    high_response = predict_acceleration(forces, rate_hz, ModelledResponse(models.wide))
     return BandFacts(
         edges_hz=(edges.low_hz or 0.0, edges.high_hz or 0.0),
-        cut_error=band_error(wanted, cut, rate_hz, band_hz),
-        whole_error=band_error(wanted, whole, rate_hz, band_hz),
-        level_error=level_error(wanted, above, rate_hz, upper_hz),
-        direction=() if played.high is None else tuple(float(part) for part in played.high.direction),
-        travel_m=0.0 if played.motion is None else played.motion.travel_m,
+        cut_error=band_error(reference, cut_response, rate_hz, band_hz),
+        whole_error=band_error(reference, full_response, rate_hz, band_hz),
+        level_error=level_error(reference, high_response, rate_hz, upper_hz),
+        direction=()
+        if banded_forces.high is None
+        else tuple(float(component) for component in banded_forces.high.direction),
+        travel_m=0.0 if banded_forces.motion is None else banded_forces.motion.travel_m,
     )
 
 
 def _describe_conditions(model: IdentifiedModel) -> str:
     """Conditions of the identification in words, from the model's provenance."""
-    held = "in a hand" if "held" in str(model.provenance.get("hand")) else "without a hand"
-    spring = "with" if model.provenance.get("input") == "excitation" else "without"
-    return f"{held} and {spring} the spring in it"
+    hand_condition = "in a hand" if "held" in str(model.provenance.get("hand")) else "without a hand"
+    spring_condition = "with" if model.provenance.get("input") == "excitation" else "without"
+    return f"{hand_condition} and {spring_condition} the spring in it"

@@ -33,8 +33,8 @@ class RigidModel:
     def force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
         """(lines, m, m), N per m/s²: inverse response, advanced by `delay_s`. frequency_hz: (lines,), above zero."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)[:, None, None]
-        force = self.mass_kg + self.damping_n_s_per_m / s + self.stiffness_n_per_m / s**2
-        return np.asarray(force * np.exp(s * self.delay_s))
+        ratio = self.mass_kg + self.damping_n_s_per_m / s + self.stiffness_n_per_m / s**2
+        return np.asarray(ratio * np.exp(s * self.delay_s))
 
 
 def fit_rigid_model(
@@ -56,13 +56,13 @@ def fit_rigid_model(
         )
     m, s = response.shape[1], 2j * np.pi * frequency_hz
     # A zero-order hold delays a command by half a sample on average.
-    late = np.exp(-s * (delay_s + 0.5 / sample_rate_hz))[:, None, None]
-    inverse = np.linalg.inv(response / late)
+    delay_factor = np.exp(-s * (delay_s + 0.5 / sample_rate_hz))[:, None, None]
+    inverse = np.linalg.inv(response / delay_factor)
     weight = 1 / np.linalg.norm(inverse, axis=(1, 2))
     force = inverse.reshape(len(s), -1) * weight[:, None]
     basis = np.stack([np.ones_like(s), 1 / s, 1 / s**2], axis=1) * weight[:, None]
-    real, right = np.vstack([basis.real, basis.imag]), np.vstack([force.real, force.imag])
-    scale = np.linalg.norm(real, axis=0)
-    parts = np.linalg.lstsq(real / scale, right, rcond=None)[0] / scale[:, None]
-    mass, damping, stiffness = parts.reshape(3, m, m)
+    real_basis, real_force = np.vstack([basis.real, basis.imag]), np.vstack([force.real, force.imag])
+    scale = np.linalg.norm(real_basis, axis=0)
+    matrices = np.linalg.lstsq(real_basis / scale, real_force, rcond=None)[0] / scale[:, None]
+    mass, damping, stiffness = matrices.reshape(3, m, m)
     return RigidModel(mass, damping, stiffness, delay_s)

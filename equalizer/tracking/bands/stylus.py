@@ -44,28 +44,31 @@ class StylusShare:
 
     command: FloatArray
     """(N,), in the unit of the actuator's command."""
-    played: FloatArray
+    predicted: FloatArray
     """(N,), m/s²: predicted acceleration due to the command."""
     motors: FloatArray
     """(N,), m/s²: the motors' share; the sum with `taken` is the wanted acceleration."""
-    taken: FloatArray
+    actuator_share: FloatArray
     """(N,), m/s²: the actuator's share."""
 
 
-def share_with_stylus(wanted: FloatArray, sample_rate_hz: float, stylus: StylusActuator) -> StylusShare:
-    """Split wanted (N,), m/s², one degree of freedom, at rest at both ends, between stylus and motors. A command above
-    the actuator's limit is scaled down as a whole, and the motors play the remainder."""
-    n = len(wanted)
+def share_with_stylus(reference: FloatArray, sample_rate_hz: float, stylus: StylusActuator) -> StylusShare:
+    """Split reference (N,), m/s², one degree of freedom, at rest at both ends, between stylus and motors. A command
+    above the actuator's limit is scaled down as a whole, and the motors play the remainder."""
+    n = len(reference)
     lines = np.fft.rfftfreq(n, 1 / sample_rate_hz)
-    rising = np.clip((lines - stylus.from_hz) / stylus.transition_hz + 0.5, 0, 1)
-    known = (lines >= stylus.frequency_hz[0]) & (lines <= stylus.frequency_hz[-1])
-    part = np.fft.rfft(wanted) * np.sin(np.pi / 2 * rising) ** 2 * known
-    length = np.interp(lines, stylus.frequency_hz, np.abs(stylus.response))
-    answer = length * np.exp(1j * np.interp(lines, stylus.frequency_hz, np.unwrap(np.angle(stylus.response))))
-    command = part * answer.conj() / (np.abs(answer) ** 2 + WEIGHT)
+    crossover = np.clip((lines - stylus.from_hz) / stylus.transition_hz + 0.5, 0, 1)
+    has_response = (lines >= stylus.frequency_hz[0]) & (lines <= stylus.frequency_hz[-1])
+    stylus_spectrum = np.fft.rfft(reference) * np.sin(np.pi / 2 * crossover) ** 2 * has_response
+    magnitude = np.interp(lines, stylus.frequency_hz, np.abs(stylus.response))
+    response = magnitude * np.exp(1j * np.interp(lines, stylus.frequency_hz, np.unwrap(np.angle(stylus.response))))
+    command = stylus_spectrum * response.conj() / (np.abs(response) ** 2 + WEIGHT)
     peak = float(np.abs(np.fft.irfft(command, n)).max(initial=0.0))
     scale = min(1.0, stylus.limit / peak) if peak > 0 else 1.0
-    taken = scale * np.fft.irfft(part, n)
+    stylus_acceleration = scale * np.fft.irfft(stylus_spectrum, n)
     return StylusShare(
-        scale * np.fft.irfft(command, n), scale * np.fft.irfft(command * answer, n), wanted - taken, taken
+        scale * np.fft.irfft(command, n),
+        scale * np.fft.irfft(command * response, n),
+        reference - stylus_acceleration,
+        stylus_acceleration,
     )

@@ -28,7 +28,7 @@ from equalizer.tracking.compensation.law_compensation import (
     single_axis_law,
 )
 from equalizer.tracking.feedforward.band_part import band_share, find_padded_length
-from equalizer.tracking.feedforward.planned_motion import PlannedMotion, planned_motion
+from equalizer.tracking.feedforward.planned_motion import PlannedMotion, integrate_motion
 from equalizer.tracking.learning.iteration import largest_share
 
 SLIP_SHARE = 0.05
@@ -56,7 +56,7 @@ class Compensation:
 
 def compensate(
     forces: FloatArray,
-    wanted: FloatArray,
+    reference: FloatArray,
     model: IdentifiedModel,
     physics: MechanicalModel,
     identified_with_n: float | None,
@@ -69,31 +69,31 @@ def compensate(
     was identified on the device with the effects; None = the model does not contain them. Raises ValueError for shapes
     that differ, an amplitude that is not above zero, and an axis that the model does not have.
     """
-    if forces.shape != wanted.shape:
-        raise ValueError(f"forces of shape {forces.shape} do not match the wanted accelerations, {wanted.shape}")
+    if forces.shape != reference.shape:
+        raise ValueError(f"forces of shape {forces.shape} do not match the wanted accelerations, {reference.shape}")
     if identified_with_n is not None and not identified_with_n > 0:
         raise ValueError(f"identified_with_n is {identified_with_n}; it must be a force above zero")
     rate_hz = model.sample_rate_hz
-    motion = along_axes(planned_motion(wanted, rate_hz, model.band_hz, lead_s(physics, rate_hz)), physics)
+    motion = motion_along_axes(integrate_motion(reference, rate_hz, model.band_hz, lead_s(physics, rate_hz)), physics)
     reasons = [(effect, reason_not_compensated(effect, model.input_channels)) for effect in physics.effects]
     used = tuple(effect for effect, reason in reasons if not reason)
     gain = axis_gains(physics, model.input_channels, model.output_channels)
-    played, added = forces.copy(), np.zeros_like(forces)
+    scaled_forces, compensating = forces.copy(), np.zeros_like(forces)
     for effect, axis in _effects_by_axis(used, model):
         if effect.kind in LAWS or _is_force(effect):
-            added[:, axis] += _force_beyond_model(effect, axis, motion, model, identified_with_n) / gain[axis]
+            compensating[:, axis] += _force_beyond_model(effect, axis, motion, model, identified_with_n) / gain[axis]
     for effect, axis in _effects_by_axis(used, model):
         if effect.kind == "force_deadband":
-            _compensate_deadband(effect.parameters, played, added, axis, identified_with_n)
+            _compensate_deadband(effect.parameters, scaled_forces, compensating, axis, identified_with_n)
         elif effect.law is not None and not _is_force(effect):
-            _compensate_command_map(effect.law, played, added, axis, identified_with_n)
-    difference = played + added - forces
+            _compensate_command_map(effect.law, scaled_forces, compensating, axis, identified_with_n)
+    difference = scaled_forces + compensating - forces
     share = 1.0 if cap_n is None else largest_share(forces, difference, cap_n)
     not_used = tuple((effect, reason) for effect, reason in reasons if reason)
     return Compensation(forces + share * difference, used, not_used, share)
 
 
-def along_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion:
+def motion_along_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion:
     """Motion along the driven axes, on which the effects act, from the motion along the response channels: the sign of
     an axis is reversed where the diagonal of the product of output matrix and driven axes is negative. Unchanged where
     that product has fewer rows or columns than the motion has axes."""
@@ -101,22 +101,22 @@ def along_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion
     columns = motion.position.shape[1]
     if min(gains.shape) < columns:
         return motion
-    way = np.where(np.diagonal(gains)[:columns] < 0, -1.0, 1.0)
-    return PlannedMotion(motion.position * way, motion.velocity * way, motion.acceleration * way)
+    signs = np.where(np.diagonal(gains)[:columns] < 0, -1.0, 1.0)
+    return PlannedMotion(motion.position * signs, motion.velocity * signs, motion.acceleration * signs)
 
 
-def axes_of(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:
+def effect_axes(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:
     """Indices of the axes that an effect acts on; all where it names none. Raises ValueError for an unknown axis."""
-    named = tuple(
-        number
-        for number, channels in enumerate(zip(inputs, outputs, strict=True))
+    matches = tuple(
+        index
+        for index, channels in enumerate(zip(inputs, outputs, strict=True))
         if effect.axis is None or any(effect.axis in (channel, channel[-1:]) for channel in channels)
     )
-    if not named:
+    if not matches:
         raise ValueError(
             f"{effect.kind} is on the axis '{effect.axis}', but there are {', '.join(inputs)} and {', '.join(outputs)}"
         )
-    return named
+    return matches
 
 
 def axis_gains(physics: MechanicalModel, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> FloatArray:
@@ -124,7 +124,7 @@ def axis_gains(physics: MechanicalModel, inputs: tuple[str, ...], outputs: tuple
     gain = np.ones(len(inputs))
     for effect in physics.effects:
         if effect.kind == "force_gain":
-            gain[list(axes_of(effect, inputs, outputs))] *= effect.parameters["gain"]
+            gain[list(effect_axes(effect, inputs, outputs))] *= effect.parameters["gain"]
     return gain
 
 
@@ -137,7 +137,7 @@ def slip_speed(velocity: FloatArray) -> float:
 def _effects_by_axis(effects: tuple[ModelEffect, ...], model: IdentifiedModel) -> Iterator[tuple[ModelEffect, int]]:
     """Each effect with the index of each axis that it acts on."""
     for effect in effects:
-        for axis in axes_of(effect, model.input_channels, model.output_channels):
+        for axis in effect_axes(effect, model.input_channels, model.output_channels):
             yield effect, axis
 
 
@@ -153,12 +153,12 @@ def _force_beyond_model(
         return force
     length = find_padded_length(len(v), model.sample_rate_hz)
     lines_hz = np.asarray(np.fft.rfftfreq(length, 1 / model.sample_rate_hz), dtype=np.float64)
-    inside = np.flatnonzero(band_share(lines_hz, model.band_hz) > 0)
-    along = np.abs(model_response(model, lines_hz[inside])[:, axis, axis])
-    speed = np.maximum(along * identified_with_n / (2 * np.pi * lines_hz[inside]), LEAST_SPEED)
-    held = np.zeros(len(lines_hz), dtype=np.complex128)
-    held[inside] = equivalent_impedance(law, effect.parameters, lines_hz[inside], speed, SLIP_SHARE)
-    return np.asarray(force - np.fft.irfft(held * np.fft.rfft(v, length), length)[: len(v)])
+    in_band = np.flatnonzero(band_share(lines_hz, model.band_hz) > 0)
+    direct_gain = np.abs(model_response(model, lines_hz[in_band])[:, axis, axis])
+    speed = np.maximum(direct_gain * identified_with_n / (2 * np.pi * lines_hz[in_band]), LEAST_SPEED)
+    equivalent = np.zeros(len(lines_hz), dtype=np.complex128)
+    equivalent[in_band] = equivalent_impedance(law, effect.parameters, lines_hz[in_band], speed, SLIP_SHARE)
+    return np.asarray(force - np.fft.irfft(equivalent * np.fft.rfft(v, length), length)[: len(v)])
 
 
 def force_law(
@@ -168,8 +168,8 @@ def force_law(
     commands, and the sample rate (Hz). slip: speed below which a change of sign is smoothed, m/s."""
     if effect.law is not None:
         letters = axis_names(sampled[0])
-        against = compute_compensating_force(effect.law, letters, motion, sampled[1], slip)
-        return single_axis_law(effect.law, letters, axis), against
+        force = compute_compensating_force(effect.law, letters, motion, sampled[1], slip)
+        return single_axis_law(effect.law, letters, axis), force
     law, v = LAWS[effect.kind], motion.velocity[:, axis]
     if slip == 0:
         return law, np.zeros_like(v)
@@ -182,26 +182,30 @@ def _is_force(effect: ModelEffect) -> bool:
 
 
 def _compensate_command_map(
-    law: FoundLaw, played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None
+    law: FoundLaw, scaled_forces: FloatArray, compensating: FloatArray, axis: int, identified_with_n: float | None
 ) -> None:
     """Change the commands in place so that a command map (a discovered law) turns them into the intended forces."""
     if identified_with_n is not None:
-        played[:, axis] *= linear_share(law, identified_with_n)
-    meant = played[:, axis] + added[:, axis]
-    slip_n = SLIP_SHARE * float(np.sqrt(np.mean(meant**2)))
-    added[:, axis] += invert_command_map(law, meant, slip_n) - meant
+        scaled_forces[:, axis] *= linear_share(law, identified_with_n)
+    intended = scaled_forces[:, axis] + compensating[:, axis]
+    slip_n = SLIP_SHARE * float(np.sqrt(np.mean(intended**2)))
+    compensating[:, axis] += invert_command_map(law, intended, slip_n) - intended
 
 
 def _compensate_deadband(
-    parameters: Mapping[str, float], played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None
+    parameters: Mapping[str, float],
+    scaled_forces: FloatArray,
+    compensating: FloatArray,
+    axis: int,
+    identified_with_n: float | None,
 ) -> None:
     """Change the commands in place so that the forces after a dead band are the intended forces: what the dead band
     takes, (1 - jump) width (N), is added in the direction of the force, smoothly near zero. Intended forces below the
     jump, which no command gives, are not played."""
     if identified_with_n is not None:
-        played[:, axis] *= deadband_share(parameters, identified_with_n)
-    meant = played[:, axis] + added[:, axis]
-    level = float(np.sqrt(np.mean(meant**2)))
+        scaled_forces[:, axis] *= deadband_share(parameters, identified_with_n)
+    intended = scaled_forces[:, axis] + compensating[:, axis]
+    level = float(np.sqrt(np.mean(intended**2)))
     if level > 0:
-        lost = (1.0 - parameters.get("jump", 0.0)) * parameters["width"]
-        added[:, axis] += lost * np.tanh(meant / (SLIP_SHARE * level))
+        deadband_loss = (1.0 - parameters.get("jump", 0.0)) * parameters["width"]
+        compensating[:, axis] += deadband_loss * np.tanh(intended / (SLIP_SHARE * level))

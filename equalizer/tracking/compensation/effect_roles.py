@@ -14,7 +14,7 @@ from equalizer.tracking.compensation.law_compensation import reason_law_not_comp
 IN_MODEL = "it is linear, so the identified model has it; compensating it again would count it twice"
 """Reason for linear effects."""
 
-LEFT_ALONE = {
+NOT_COMPENSATED = {
     "viscous_damping": IN_MODEL,
     "added_mass": IN_MODEL,
     "extra_mode": IN_MODEL,
@@ -33,10 +33,12 @@ LEFT_ALONE = {
     "slew_limit": "the device cannot change its force faster",
 }
 """Reasons by name of the effect, for effects of mechanism and actuator that are not compensated."""
-SENSORS = "it is an error of the sensor: a force against it would turn that error into a real motion of the handle"
+SENSOR_REASON = (
+    "it is an error of the sensor: a force against it would turn that error into a real motion of the handle"
+)
 """Reason for all effects of the sensor but its lag."""
-SCALED = "in the identified model as far as it is linear; used to scale what is added"
-TIMED = "in the identified model; used to send what is added ahead of time"
+SCALING_REASON = "in the identified model as far as it is linear; used to scale what is added"
+TIMING_REASON = "in the identified model; used to send what is added ahead of time"
 """Reasons for the effects of `SCALING` and of `TIMING`."""
 
 SCALING, TIMING = ("force_gain",), ("amplifier_lag", "transport_delay", "sensor_lag")
@@ -51,26 +53,26 @@ def reason_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx",
     if kind in LAWS or kind == "force_deadband":
         return ""
     if kind in SCALING:
-        return SCALED
+        return SCALING_REASON
     if kind in TIMING:
-        return TIMED
+        return TIMING_REASON
     if EFFECTS_BY_NAME[kind].place == "sensor":
-        return SENSORS
-    return LEFT_ALONE[kind]
+        return SENSOR_REASON
+    return NOT_COMPENSATED[kind]
 
 
 def lead_s(physics: MechanicalModel, sample_rate_hz: float) -> float:
     """Delay (s) from a commanded force to its measured effect: half a sample of the hold, delays, and the time constant
     1 / (2 pi f) of each first-order low pass of actuator and sensor, exact well below its corner f. The identified
     model includes this delay; forces that are added to the model's forces must be advanced by it."""
-    corners = [physics.actuator.bandwidth_hz, physics.sensor.bandwidth_hz]
-    late = 0.5 / sample_rate_hz + physics.actuator.delay_s
+    corners_hz = [physics.actuator.bandwidth_hz, physics.sensor.bandwidth_hz]
+    delay_s = 0.5 / sample_rate_hz + physics.actuator.delay_s
     for effect in physics.effects:
         match effect.kind:
             case "amplifier_lag":
-                late += effect.parameters["time_constant"]
+                delay_s += effect.parameters["time_constant"]
             case "transport_delay":
-                late += effect.parameters["delay"]
+                delay_s += effect.parameters["delay"]
             case "sensor_lag":
-                corners[1] = effect.parameters["bandwidth"]
-    return late + sum(1 / (2 * np.pi * corner) for corner in corners if corner > 0)
+                corners_hz[1] = effect.parameters["bandwidth"]
+    return delay_s + sum(1 / (2 * np.pi * corner_hz) for corner_hz in corners_hz if corner_hz > 0)

@@ -57,11 +57,11 @@ def _compute_presliding_hysteresis(
 ) -> FloatArray:
     """Dahl's bristle model (1968): F = stiffness z with dz/dx = 1 - sign(v) z stiffness / level, by implicit Euler
     steps from z = 0. At z = level / stiffness the bristle slips."""
-    longest, bent = parameters["level"] / parameters["stiffness"], 0.0
-    bends = np.empty_like(x)
+    slip_deflection, deflection = parameters["level"] / parameters["stiffness"], 0.0
+    deflections = np.empty_like(x)
     for k, travel in enumerate(np.diff(x, prepend=x[:1])):
-        bent = bends[k] = (bent + travel) / (1 + abs(travel) / longest)
-    return np.asarray(parameters["stiffness"] * bends)
+        deflection = deflections[k] = (deflection + travel) / (1 + abs(travel) / slip_deflection)
+    return np.asarray(parameters["stiffness"] * deflections)
 
 
 def _quadratic_damping(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
@@ -99,35 +99,38 @@ def equivalent_impedance(
     velocity amplitudes `speed` (lines,), m/s, above zero. From the second of two cycles, in which a bristle has
     settled. slip_share: slip speed over velocity amplitude.
     """
-    chosen = np.unique(np.linspace(0, len(frequency_hz) - 1, min(AMPLITUDES, len(frequency_hz))).round().astype(int))
+    line_indices = np.unique(
+        np.linspace(0, len(frequency_hz) - 1, min(AMPLITUDES, len(frequency_hz))).round().astype(int)
+    )
     angle = 2 * np.pi * np.arange(2 * CYCLE) / CYCLE
-    found = np.empty(len(chosen), dtype=np.complex128)
-    for place, line in enumerate(chosen):
+    impedance = np.empty(len(line_indices), dtype=np.complex128)
+    for index, line in enumerate(line_indices):
         v = speed[line] * np.sin(angle)
         x = -speed[line] / (2 * np.pi * frequency_hz[line]) * np.cos(angle)
         force = law(parameters, x, v, slip_share * speed[line])[CYCLE:]
         # sin is -i / 2 of the positive line, so that a force along the velocity gives a positive real part.
-        found[place] = 2j * np.mean(force * np.exp(-1j * angle[CYCLE:])) / speed[line]
-    at = frequency_hz[chosen]
+        impedance[index] = 2j * np.mean(force * np.exp(-1j * angle[CYCLE:])) / speed[line]
+    chosen_hz = frequency_hz[line_indices]
     return np.asarray(
-        np.interp(frequency_hz, at, found.real) + 1j * np.interp(frequency_hz, at, found.imag), dtype=np.complex128
+        np.interp(frequency_hz, chosen_hz, impedance.real) + 1j * np.interp(frequency_hz, chosen_hz, impedance.imag),
+        dtype=np.complex128,
     )
 
 
 def pass_deadband(parameters: Mapping[str, float], command: FloatArray) -> FloatArray:
     """The force behind a dead band: 0 where |u| <= width, else u - (1 - jump) width sgn(u)."""
     width, jump = parameters["width"], parameters.get("jump", 0.0)
-    beyond = np.abs(command) > width
-    return np.asarray(np.where(beyond, command - (1.0 - jump) * width * np.sign(command), 0.0))
+    is_outside = np.abs(command) > width
+    return np.asarray(np.where(is_outside, command - (1.0 - jump) * width * np.sign(command), 0.0))
 
 
 def deadband_share(parameters: Mapping[str, float], amplitude: float) -> float:
     """Describing function of a dead band: share of a sinusoid's fundamental that passes. With s = width / amplitude it
     is 1 - 2/pi (arcsin s + s sqrt(1 - s^2)) of the dead zone, and 4/pi jump s sqrt(1 - s^2) of the jump (relay with
     dead zone; Gelb and Vander Velde, 1968, chapter 2)."""
-    share = parameters["width"] / amplitude
-    if share >= 1.0:
+    relative_width = parameters["width"] / amplitude
+    if relative_width >= 1.0:
         return 0.0
-    root = np.sqrt(1 - share**2)
-    jump = 4 / np.pi * parameters.get("jump", 0.0) * share * root
-    return float(1 - 2 / np.pi * (np.arcsin(share) + share * root) + jump)
+    root = np.sqrt(1 - relative_width**2)
+    jump = 4 / np.pi * parameters.get("jump", 0.0) * relative_width * root
+    return float(1 - 2 / np.pi * (np.arcsin(relative_width) + relative_width * root) + jump)

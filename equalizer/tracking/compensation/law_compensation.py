@@ -14,14 +14,14 @@ import numpy as np
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law
 from equalizer.laws.parse import MEMORY
-from equalizer.laws.tree import Apply, Node, Number, Variable, format_formula, nodes
+from equalizer.laws.tree import Apply, Node, Number, Variable, format_formula, iterate_nodes
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.compensation.known_forces import Law as ForceAgainst
+from equalizer.tracking.compensation.known_forces import Law as ForceLaw
 from equalizer.tracking.feedforward.planned_motion import PlannedMotion
 
 MOTION = ("", "v", "a")
 """Prefixes of the signals of a motion, before the letter of the axis: position, velocity, acceleration."""
-TABLE = 2001
+TABLE_SIZE = 2001
 """Number of commands in the table by which a command map is inverted; also samples of the cycle in `linear_share`."""
 REACH = 2.0
 """First range of that table, as a multiple of the largest intended force: enough for gains of 0.5 or more."""
@@ -33,29 +33,29 @@ _FLAT = 1e-9
 """Force, relative to the largest force of the table, below which a command counts as within a dead band."""
 _SPANS = tuple(10.0**decade for decade in range(-6, 5))
 """Ranges of commands, in the command's unit, within which a map is tested for rising."""
-PLAYED = 1000.0
+EVALUATION_RATE_HZ = 1000.0
 """Sample rate (Hz) at which a law without memory is evaluated; the result does not depend on it."""
-COMMANDS = "it depends on the command, which its compensation would change, or on the time"
-REMEMBERS = "it has memory of earlier commands, so no map of the present command inverts it"
-SEVERAL = "it depends on several commands or on the time"
-FOLDED = "the force does not rise with the command, so the map has no inverse"
-SENSED = "it is an error of the sensor: a force against it would turn that error into a real motion of the handle"
+DEPENDS_ON_COMMAND = "it depends on the command, which its compensation would change, or on the time"
+HAS_MEMORY = "it has memory of earlier commands, so no map of the present command inverts it"
+SEVERAL_SIGNALS = "it depends on several commands or on the time"
+NOT_INVERTIBLE = "the force does not rise with the command, so the map has no inverse"
+SENSOR_ERROR = "it is an error of the sensor: a force against it would turn that error into a real motion of the handle"
 
 
 def reason_law_not_compensated(law: Law, letters: tuple[str, ...]) -> str:
     """Why a law is not compensated, as a clause after "because"; empty for a law that is compensated. letters: letters
     of the axes, in the order of the commands."""
-    known = {prefix + letter for letter in letters for prefix in MOTION}
+    motion_signals = {prefix + letter for letter in letters for prefix in MOTION}
     if law.acts_on == "response":
-        return SENSED
+        return SENSOR_ERROR
     if law.acts_on == "force":
-        return "" if set(law.variables) <= known else COMMANDS
-    if any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree)):
-        return REMEMBERS
+        return "" if set(law.variables) <= motion_signals else DEPENDS_ON_COMMAND
+    if any(isinstance(node, Apply) and node.name in MEMORY for node in iterate_nodes(law.tree)):
+        return HAS_MEMORY
     if len(law.variables) != 1 or law.variables[0] not in (f"f{law.axis[-1:]}", law.axis):
-        return SEVERAL
+        return SEVERAL_SIGNALS
     tables = (_tabulate(law, span)[1] for span in _SPANS)
-    return "" if any(_is_rising(forces) and (np.diff(forces) > 0).any() for forces in tables) else FOLDED
+    return "" if any(_is_rising(forces) and (np.diff(forces) > 0).any() for forces in tables) else NOT_INVERTIBLE
 
 
 def compute_compensating_force(
@@ -72,20 +72,20 @@ def compute_compensating_force(
     return -evaluate(_smooth_signs(law, slip), columns, rate_hz)
 
 
-def single_axis_law(law: Law, letters: tuple[str, ...], axis: int) -> ForceAgainst:
+def single_axis_law(law: Law, letters: tuple[str, ...], axis: int) -> ForceLaw:
     """The law along a sinusoid of a single axis while the other axes rest, in the form that `equivalent_impedance`
     takes. axis: index of the axis in `letters`. The parameters are ignored: the law contains its own."""
 
-    def against(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    def force_against_law(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
         # For a sinusoid, rms velocity over rms position is the angular frequency (rad/s).
         omega = float(np.sqrt(np.mean(v**2) / np.mean(x**2)))
-        still = np.zeros((len(x), len(letters)))
-        motion = PlannedMotion(still, still.copy(), still.copy())
+        at_rest = np.zeros((len(x), len(letters)))
+        motion = PlannedMotion(at_rest, at_rest.copy(), at_rest.copy())
         motion.position[:, axis], motion.velocity[:, axis], motion.acceleration[:, axis] = x, v, -(omega**2) * x
         # The samples are two cycles: their number over the duration 2 (2 pi / omega) is the sample rate (Hz).
         return compute_compensating_force(law, letters, motion, len(x) / 2 * omega / (2 * np.pi), slip)
 
-    return against
+    return force_against_law
 
 
 def linear_share(law: Law, amplitude: float) -> float:
@@ -95,36 +95,37 @@ def linear_share(law: Law, amplitude: float) -> float:
 
     amplitude: A, in the command's unit (Gelb and Vander Velde, Multiple-Input Describing Functions, 1968, chapter 2).
     """
-    wave = np.sin(2 * np.pi * (np.arange(TABLE) + 0.5) / TABLE)
-    passed = evaluate(law, {law.variables[0]: amplitude * wave}, PLAYED)
-    return float(2 * np.mean(passed * wave) / amplitude)
+    wave = np.sin(2 * np.pi * (np.arange(TABLE_SIZE) + 0.5) / TABLE_SIZE)
+    force = evaluate(law, {law.variables[0]: amplitude * wave}, EVALUATION_RATE_HZ)
+    return float(2 * np.mean(force * wave) / amplitude)
 
 
-def invert_command_map(law: Law, meant: FloatArray, slip_n: float) -> FloatArray:
-    """(N,): the commands that a command map turns into the intended forces `meant` (N,). slip_n: force below which the
-    command crosses a dead band smoothly, because a command that jumps cannot be played; 0 if all intended forces are 0.
+def invert_command_map(law: Law, intended: FloatArray, slip_n: float) -> FloatArray:
+    """(N,): the commands that a command map turns into the intended forces `intended` (N,). slip_n: force below which
+    the command crosses a dead band smoothly, because a command that jumps cannot be played; 0 if all intended forces
+    are 0.
 
     By linear interpolation in a table, whose range is doubled until the map reaches all intended forces. Where the map
     does not reach them (saturation), the command is that of the nearest force in the first range. Raises ValueError
     where the map decreases somewhere in the first range.
     """
-    commands, forces = _tabulate_to(law, meant)
-    inverse = np.interp(meant, forces, commands)
-    flat = commands[np.abs(forces) <= _FLAT * np.abs(forces).max()]
-    if len(flat) < 2 or slip_n <= 0:
+    commands, forces = _tabulate_to(law, intended)
+    inverse = np.interp(intended, forces, commands)
+    deadband = commands[np.abs(forces) <= _FLAT * np.abs(forces).max()]
+    if len(deadband) < 2 or slip_n <= 0:
         return np.asarray(inverse)
     # At zero force, the command is the value in the dead band nearest to zero; with rising force it approaches the edge
     # of the dead band.
-    rest = float(np.clip(0.0, flat[0], flat[-1]))
-    edge = np.where(meant > 0, flat[-1], flat[0])
-    beyond = np.where(meant == 0, 0.0, inverse - edge)
-    return np.asarray(rest + np.abs(edge - rest) * np.tanh(meant / slip_n) + beyond)
+    rest_command = float(np.clip(0.0, deadband[0], deadband[-1]))
+    edge = np.where(intended > 0, deadband[-1], deadband[0])
+    outside_deadband = np.where(intended == 0, 0.0, inverse - edge)
+    return np.asarray(rest_command + np.abs(edge - rest_command) * np.tanh(intended / slip_n) + outside_deadband)
 
 
-def _tabulate_to(law: Law, meant: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _tabulate_to(law: Law, intended: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Commands and forces, (TABLE,) each, over the smallest range in which the map reaches the intended forces; over
     the first range where it never does. Raises ValueError where the map decreases in the first range."""
-    span = REACH * max(float(np.abs(meant).max()), np.finfo(np.float64).tiny)
+    span = REACH * max(float(np.abs(intended).max()), np.finfo(np.float64).tiny)
     tables = (_tabulate(law, span * 2**doubling) for doubling in range(_MOST_DOUBLINGS + 1))
     first = next(tables)
     if not _is_rising(first[1]):
@@ -132,15 +133,15 @@ def _tabulate_to(law: Law, meant: FloatArray) -> tuple[FloatArray, FloatArray]:
             f"the command map {law.text} decreases somewhere, so it has no inverse; leave it out of what is compensated"
         )
     for commands, forces in takewhile(lambda table: _is_rising(table[1]), chain((first,), tables)):
-        if forces[0] <= meant.min() and meant.max() <= forces[-1]:
+        if forces[0] <= intended.min() and intended.max() <= forces[-1]:
             return commands, forces
     return first
 
 
 def _tabulate(law: Law, span: float) -> tuple[FloatArray, FloatArray]:
     """(TABLE,) each: commands from -span to span, and the forces into which the map turns them."""
-    commands = np.linspace(-span, span, TABLE)
-    return commands, evaluate(law, {law.variables[0]: commands}, PLAYED)
+    commands = np.linspace(-span, span, TABLE_SIZE)
+    return commands, evaluate(law, {law.variables[0]: commands}, EVALUATION_RATE_HZ)
 
 
 def _is_rising(forces: FloatArray) -> bool:

@@ -14,15 +14,15 @@ from equalizer.laws.evaluate import evaluate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.tracking.compensation.effect_compensation import (
-    along_axes,
-    axes_of,
     axis_gains,
+    effect_axes,
     force_law,
+    motion_along_axes,
     slip_speed,
 )
 from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_compensated
 from equalizer.tracking.compensation.known_forces import pass_deadband
-from equalizer.tracking.feedforward.planned_motion import planned_motion
+from equalizer.tracking.feedforward.planned_motion import integrate_motion
 
 HIGHEST_SHARE = 3.0
 """Upper end of the band in which the motion is integrated, relative to the highest driven frequency: it includes the
@@ -52,23 +52,23 @@ def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz:
         raise ValueError("the recording has missing samples; a motion cannot be integrated across them")
     rate_hz = recording.sample_rate_hz
     band_hz = (LOWEST_SHARE * excited_hz[0], min(HIGHEST_SHARE * excited_hz[1], NYQUIST_SHARE * rate_hz))
-    planned = planned_motion(recording.response.samples, rate_hz, band_hz, lead_s(physics, rate_hz))
-    motion = along_axes(planned, physics)
-    gain, freed = axis_gains(physics, inputs, outputs), recording.command.samples.copy()
+    planned = integrate_motion(recording.response.samples, rate_hz, band_hz, lead_s(physics, rate_hz))
+    motion = motion_along_axes(planned, physics)
+    gain, commands = axis_gains(physics, inputs, outputs), recording.command.samples.copy()
     for effect in physics.effects:
-        for axis in axes_of(effect, inputs, outputs):
+        for axis in effect_axes(effect, inputs, outputs):
             if (
                 effect.law is not None
                 and effect.law.acts_on == "command"
                 and not reason_not_compensated(effect, inputs)
             ):
-                freed[:, axis] = evaluate(effect.law, {effect.law.variables[0]: freed[:, axis]}, rate_hz)
+                commands[:, axis] = evaluate(effect.law, {effect.law.variables[0]: commands[:, axis]}, rate_hz)
             if effect.kind == "force_deadband":
-                freed[:, axis] = pass_deadband(effect.parameters, freed[:, axis])
+                commands[:, axis] = pass_deadband(effect.parameters, commands[:, axis])
     for effect in physics.effects:
-        acts_on = "force" if effect.law is None else effect.law.acts_on
-        if acts_on == "force" and effect.kind != "force_deadband" and not reason_not_compensated(effect, inputs):
-            for axis in axes_of(effect, inputs, outputs):
+        law_place = "force" if effect.law is None else effect.law.acts_on
+        if law_place == "force" and effect.kind != "force_deadband" and not reason_not_compensated(effect, inputs):
+            for axis in effect_axes(effect, inputs, outputs):
                 slip = max(slip_speed(motion.velocity[:, axis]), np.finfo(np.float64).tiny)
-                freed[:, axis] -= force_law(effect, axis, motion, (inputs, rate_hz), slip)[1] / gain[axis]
-    return replace(recording, command=replace(recording.command, samples=freed))
+                commands[:, axis] -= force_law(effect, axis, motion, (inputs, rate_hz), slip)[1] / gain[axis]
+    return replace(recording, command=replace(recording.command, samples=commands))

@@ -29,8 +29,8 @@ def band_share(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> FloatA
     low, high = band_hz
     rise = np.ones_like(frequency_hz) if low == 0 else (frequency_hz / low - LOW_EDGE) / (1 - LOW_EDGE)
     fall = (HIGH_EDGE - frequency_hz / high) / (HIGH_EDGE - 1)
-    inside = np.clip(np.minimum(rise, fall), 0.0, 1.0)
-    return np.asarray(0.5 - 0.5 * np.cos(np.pi * inside))
+    edge_position = np.clip(np.minimum(rise, fall), 0.0, 1.0)
+    return np.asarray(0.5 - 0.5 * np.cos(np.pi * edge_position))
 
 
 def find_padded_length(samples: int, sample_rate_hz: float) -> int:

@@ -91,26 +91,26 @@ class LinearPhaseSplit:
     def filters(self) -> FloatArray:
         """(3, taps): impulse responses of low, middle and high; their sum is an impulse delayed by the latency."""
         taps = 2 * self.latency_samples + 1
-        everything, nothing = np.zeros(taps), np.zeros(taps)
-        everything[self.latency_samples] = 1.0
-        low = nothing if self.edges.low_hz is None else self._low_pass_filter(self.edges.low_hz)
-        below_high = everything if self.edges.high_hz is None else self._low_pass_filter(self.edges.high_hz)
-        return np.stack([low, below_high - low, everything - below_high])
+        impulse, zeros = np.zeros(taps), np.zeros(taps)
+        impulse[self.latency_samples] = 1.0
+        low = zeros if self.edges.low_hz is None else self._low_pass_filter(self.edges.low_hz)
+        below_high = impulse if self.edges.high_hz is None else self._low_pass_filter(self.edges.high_hz)
+        return np.stack([low, below_high - low, impulse - below_high])
 
-    def split(self, wanted: FloatArray) -> Bands:
-        """Split wanted (N, channels). The bands have N + 2 latency_samples rows, with the filters' run-in and
+    def split(self, reference: FloatArray) -> Bands:
+        """Split reference (N, channels). The bands have N + 2 latency_samples rows, with the filters' run-in and
         run-out."""
         low_taps, _, high_taps = self.filters
-        late = np.pad(np.asarray(wanted, dtype=np.float64), ((self.latency_samples,) * 2, (0, 0)))
-        low = oaconvolve(wanted, low_taps[:, None], axes=0)
-        high = oaconvolve(wanted, high_taps[:, None], axes=0)
-        return Bands(low, late - low - high, high, self.latency_samples)
+        delayed = np.pad(np.asarray(reference, dtype=np.float64), ((self.latency_samples,) * 2, (0, 0)))
+        low = oaconvolve(reference, low_taps[:, None], axes=0)
+        high = oaconvolve(reference, high_taps[:, None], axes=0)
+        return Bands(low, delayed - low - high, high, self.latency_samples)
 
     def response(self, frequency_hz: FloatArray) -> ComplexArray:
         """(lines, 3): gains of low, middle and high with the latency removed, which are real up to rounding."""
-        turned = np.exp(2j * np.pi * np.asarray(frequency_hz) * self.latency_samples / self.sample_rate_hz)
+        advance = np.exp(2j * np.pi * np.asarray(frequency_hz) * self.latency_samples / self.sample_rate_hz)
         parts = [freqz(taps, worN=frequency_hz, fs=self.sample_rate_hz)[1] for taps in self.filters]
-        return np.asarray(np.stack(parts, axis=1) * turned[:, None])
+        return np.asarray(np.stack(parts, axis=1) * advance[:, None])
 
     def _low_pass_filter(self, edge_hz: float) -> FloatArray:
         """(taps,): low-pass by the window method, with a gain of 1/2 at the edge."""
@@ -149,19 +149,19 @@ class CausalSplit:
         """Always 0."""
         return 0.0
 
-    def split(self, wanted: FloatArray) -> Bands:
-        """Split wanted (N, channels), with filters that start at rest; the bands have N rows."""
-        x = np.asarray(wanted, dtype=np.float64)
+    def split(self, reference: FloatArray) -> Bands:
+        """Split reference (N, channels), with filters that start at rest; the bands have N rows."""
+        x = np.asarray(reference, dtype=np.float64)
         high = self._high_pass(self.edges.high_hz, x) if self.edges.high_hz else np.zeros_like(x)
-        rest = x - high
-        low = rest - self._high_pass(self.edges.low_hz, rest) if self.edges.low_hz else np.zeros_like(x)
-        return Bands(low, rest - low, high, 0)
+        below_high = x - high
+        low = below_high - self._high_pass(self.edges.low_hz, below_high) if self.edges.low_hz else np.zeros_like(x)
+        return Bands(low, below_high - low, high, 0)
 
     def response(self, frequency_hz: FloatArray) -> ComplexArray:
         """(lines, 3): complex gains of low, middle and high; their sum is 1."""
-        nothing = np.zeros(len(frequency_hz), complex)
-        high = self._gain_above(self.edges.high_hz, frequency_hz) if self.edges.high_hz else nothing
-        low = (1 - high) * (1 - self._gain_above(self.edges.low_hz, frequency_hz)) if self.edges.low_hz else nothing
+        zeros = np.zeros(len(frequency_hz), complex)
+        high = self._gain_above(self.edges.high_hz, frequency_hz) if self.edges.high_hz else zeros
+        low = (1 - high) * (1 - self._gain_above(self.edges.low_hz, frequency_hz)) if self.edges.low_hz else zeros
         return np.asarray(np.stack([low, 1 - low - high, high], axis=1))
 
     def phase_deg(self, frequency_hz: FloatArray) -> FloatArray:

@@ -50,8 +50,8 @@ def no_equalization(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse
 def static_gain(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
     """A common gain for all axes: the inverse of the geometric mean, over lines and axes, of the direct responses'
     magnitude."""
-    along = np.abs(np.einsum("lii->li", model_response(model, frequency_hz)))
-    gain = float(np.exp(-np.log(along).mean()))
+    direct_gains = np.abs(np.einsum("lii->li", model_response(model, frequency_hz)))
+    gain = float(np.exp(-np.log(direct_gains).mean()))
     return Inverse(
         "static gain", _constant_response(gain * np.eye(*model.D.shape[::-1]), frequency_hz), model.D.shape[1]
     )
@@ -61,9 +61,9 @@ def acceleration_matching(model: IdentifiedModel, frequency_hz: FloatArray) -> I
     """Acceleration matching (Kuchenbecker et al. 2006, IEEE Trans. Vis. Comput. Graph. 12:219): the direct response of
     each axis is inverted, and coupling between axes is neglected. Cost: a transfer function of the model's order per
     axis."""
-    along = np.einsum("lii->li", model_response(model, frequency_hz))
-    inverse = np.einsum("li,ij->lij", 1 / along, np.eye(along.shape[1]))
-    return Inverse("acceleration matching", inverse, along.shape[1] * (2 * model.order + 1))
+    direct_response = np.einsum("lii->li", model_response(model, frequency_hz))
+    inverse = np.einsum("li,ij->lij", 1 / direct_response, np.eye(direct_response.shape[1]))
+    return Inverse("acceleration matching", inverse, direct_response.shape[1] * (2 * model.order + 1))
 
 
 def rigid_body(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
@@ -74,10 +74,10 @@ def rigid_body(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
     w = 2 * np.pi * frequency_hz
     parts = (np.ones(lines, dtype=complex), 1 / (1j * w), -1 / w**2)
     system = np.concatenate([part[:, None, None] * G for part in parts], axis=2).reshape(lines * p, 3 * m)
-    wanted = np.tile(np.eye(p), (lines, 1))
-    real = np.vstack([system.real, system.imag])
-    scale = np.linalg.norm(real, axis=0)
-    matrices = np.linalg.lstsq(real / scale, np.vstack([wanted, 0 * wanted]), rcond=None)[0] / scale[:, None]
+    targets = np.tile(np.eye(p), (lines, 1))
+    real_system = np.vstack([system.real, system.imag])
+    scale = np.linalg.norm(real_system, axis=0)
+    matrices = np.linalg.lstsq(real_system / scale, np.vstack([targets, 0 * targets]), rcond=None)[0] / scale[:, None]
     M, B, K = matrices.reshape(3, m, p)
     inverse = sum(part[:, None, None] * matrix for part, matrix in zip(parts, (M, B, K), strict=True))
     # Cost: three matrices, and two integrations per axis.

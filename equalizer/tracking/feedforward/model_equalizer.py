@@ -54,19 +54,19 @@ class ModelEqualizer:
         gains = _onset_gains(self.model, self.weight, T)
         loop = periodic_command(self.model, wanted, self.weight)
         # The loop as it continues after the onset of T samples, and the model's state at that moment.
-        turned = np.roll(loop.samples, -T, axis=0)
-        start = periodic_state(gains.problem, turned)
-        risen = envelope[:, None] * wanted.samples[np.arange(T) % n]
-        forces = track(gains, risen, final_state=start).forces
+        continued_loop = np.roll(loop.samples, -T, axis=0)
+        loop_state = periodic_state(gains.problem, continued_loop)
+        faded_reference = envelope[:, None] * wanted.samples[np.arange(T) % n]
+        forces = track(gains, faded_reference, final_state=loop_state).forces
         return Signal(forces - self._spring_during_onset(wanted, loop, envelope), *_force_properties(loop))
 
     def _spring_during_onset(self, wanted: Signal, loop: Signal, envelope: FloatArray) -> FloatArray:
         """Force of the virtual spring (N), (ticks, inputs), approximated as the loop's spring force times the
         envelope."""
-        alone = loop.samples - self.periodic(wanted).samples
+        spring_force = loop.samples - self.periodic(wanted).samples
         ticks = np.arange(len(envelope)) % len(wanted)
-        spring: FloatArray = envelope[:, None] * alone[ticks]
-        return spring
+        faded_force: FloatArray = envelope[:, None] * spring_force[ticks]
+        return faded_force
 
 
 def _force_properties(loop: Signal) -> tuple[float, str | tuple[str, ...], str | tuple[str, ...], tuple[str, ...]]:

@@ -15,7 +15,7 @@ WEIGHT = 1e-4
 """Weight w of |force|² against |acceleration error|², (m/s² per N)². It costs a thousandth of a decibel where
 the device's gain is 1 m/s² per N, and keeps the force finite at antiresonances."""
 
-EMPTY = 1e-9
+ROUNDING_SHARE = 1e-9
 """Fraction of the largest spectral line below which a line counts as a rounding error and gets no force."""
 
 
@@ -32,8 +32,8 @@ def inverse_response(
     H = invert_regularised(G, weight)
     if spring == NO_SPRING:
         return H
-    left_to_spring = spring.force_per_acceleration(frequency_hz)[:, None, None] * (G @ H)
-    return np.asarray(H - left_to_spring)
+    spring_share = spring.force_per_acceleration(frequency_hz)[:, None, None] * (G @ H)
+    return np.asarray(H - spring_share)
 
 
 def invert_regularised(G: ComplexArray, weight: float) -> ComplexArray:
@@ -43,52 +43,54 @@ def invert_regularised(G: ComplexArray, weight: float) -> ComplexArray:
 
 
 def periodic_command(
-    model: IdentifiedModel, wanted: Signal, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
+    model: IdentifiedModel, reference: Signal, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
 ) -> Signal:
     """One period of forces (N, m) for one period of wanted outputs (N, p).
 
     Raises OutsideBandError where something is wanted outside the model's band, ValueError for a rate, a number of
     channels or units other than the model's.
     """
-    check_wanted(model, wanted)
-    n = len(wanted)
-    lines = np.fft.rfft(wanted.samples, axis=0)
-    frequency_hz = np.fft.rfftfreq(n, 1.0 / wanted.sample_rate_hz)
-    size = np.abs(lines).max(axis=1)
-    used = size > EMPTY * size.max()
+    check_reference(model, reference)
+    n = len(reference)
+    lines = np.fft.rfft(reference.samples, axis=0)
+    frequency_hz = np.fft.rfftfreq(n, 1.0 / reference.sample_rate_hz)
+    magnitude = np.abs(lines).max(axis=1)
+    used = magnitude > ROUNDING_SHARE * magnitude.max()
     check_band(model, frequency_hz[used])
     forces = np.zeros((len(lines), model.B.shape[1]), dtype=np.complex128)
     if used.any():
         H = inverse_response(model, frequency_hz[used], weight, spring)
         forces[used] = np.einsum("lmp,lp->lm", H, lines[used])
     samples = np.fft.irfft(forces, n, axis=0)
-    return Signal(samples, wanted.sample_rate_hz, "force", "N", model.input_channels)
+    return Signal(samples, reference.sample_rate_hz, "force", "N", model.input_channels)
 
 
 def check_band(model: IdentifiedModel, frequency_hz: FloatArray) -> None:
     """Check that a model covers the frequencies of a signal. Raises OutsideBandError for frequencies that the model
     does not cover."""
     low, high = model.band_hz
-    outside = [f for f in np.atleast_1d(frequency_hz) if not low * (1 - 1e-9) <= f <= high * (1 + 1e-9)]
+    outside = [
+        line_hz for line_hz in np.atleast_1d(frequency_hz) if not low * (1 - 1e-9) <= line_hz <= high * (1 + 1e-9)
+    ]
     if outside:
-        named = ", ".join(f"{f:g}" for f in outside[:5]) + (" ..." if len(outside) > 5 else "")
+        listed = ", ".join(f"{line_hz:g}" for line_hz in outside[:5]) + (" ..." if len(outside) > 5 else "")
         raise OutsideBandError(
-            f"the model was made for {low:g} to {high:g} Hz, but {named} Hz is wanted; identify a model of a wider "
+            f"the model was made for {low:g} to {high:g} Hz, but {listed} Hz is wanted; identify a model of a wider "
             "band (hapteq identify --band)"
         )
 
 
-def check_wanted(model: IdentifiedModel, wanted: Signal) -> None:
+def check_reference(model: IdentifiedModel, reference: Signal) -> None:
     """Check a wanted signal against the model. Raises ValueError for a signal whose rate, channels or units are not the
     model's."""
-    if wanted.sample_rate_hz != model.sample_rate_hz:
+    if reference.sample_rate_hz != model.sample_rate_hz:
         raise ValueError(
-            f"the model runs at {model.sample_rate_hz:g} Hz, not at {wanted.sample_rate_hz:g} Hz; "
+            f"the model runs at {model.sample_rate_hz:g} Hz, not at {reference.sample_rate_hz:g} Hz; "
             "resample what is wanted"
         )
     p = model.C.shape[0]
-    if wanted.samples.shape[1] != p:
-        raise ValueError(f"the model has {p} outputs, but {wanted.samples.shape[1]} are wanted")
-    units = set(wanted.units)
+    if reference.samples.shape[1] != p:
+        raise ValueError(f"the model has {p} outputs, but {reference.samples.shape[1]} are wanted")
+    units = set(reference.units)
     if units != set([model.output_unit] if isinstance(model.output_unit, str) else model.output_unit):
         raise ValueError(f"the model answers in {model.output_unit}, but {', '.join(sorted(units))} is wanted")

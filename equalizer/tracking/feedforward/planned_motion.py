@@ -22,23 +22,23 @@ class PlannedMotion:
     acceleration: FloatArray
 
 
-def planned_motion(
-    wanted: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float], lead_s: float = 0.0
+def integrate_motion(
+    acceleration: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float], lead_s: float = 0.0
 ) -> PlannedMotion:
     """Motion for wanted accelerations (N, p), m/s², that begin and end at rest. lead_s: time (s) by which the motion is
     advanced. Raises ValueError for a band that begins at zero: a constant acceleration has no bounded motion."""
     if band_hz[0] <= 0:
         raise ValueError(f"the band begins at {band_hz[0]:g} Hz; a motion about a resting place needs more than 0 Hz")
-    length = find_padded_length(len(wanted), sample_rate_hz)
+    length = find_padded_length(len(acceleration), sample_rate_hz)
     lines_hz = np.asarray(np.fft.rfftfreq(length, 1 / sample_rate_hz), dtype=np.float64)
     s = 2j * np.pi * lines_hz
     share = band_share(lines_hz, band_hz) * np.exp(s * lead_s)
     s[0] = 1.0  # any finite value: the band has no gain there
-    spectrum = np.fft.rfft(wanted, length, axis=0) * share[:, np.newaxis]
+    spectrum = np.fft.rfft(acceleration, length, axis=0) * share[:, np.newaxis]
 
     def integrate(times: int) -> FloatArray:
         """(N, p): the acceleration in the band, integrated this number of times."""
-        rows: FloatArray = np.fft.irfft(spectrum / s[:, np.newaxis] ** times, length, axis=0)[: len(wanted)]
+        rows: FloatArray = np.fft.irfft(spectrum / s[:, np.newaxis] ** times, length, axis=0)[: len(acceleration)]
         return rows
 
     return PlannedMotion(integrate(2), integrate(1), integrate(0))

@@ -27,11 +27,11 @@ class Quality:
 def measure_quality(delivered: ComplexArray) -> Quality:
     """Flatness, coupling and direction error of an equalized response. delivered: T, (lines, p, p); column i is the
     response to axis i."""
-    along = np.abs(np.einsum("lii->li", delivered))
+    direct_gain = np.abs(np.einsum("lii->li", delivered))
     off_axis = np.abs(delivered * (1 - np.eye(delivered.shape[1])))
     with np.errstate(divide="ignore"):
-        flatness_db = float(np.abs(20 * np.log10(along)).max())
-        coupling_db = float(20 * np.log10((off_axis.max(axis=1) / along).max()))
+        flatness_db = float(np.abs(20 * np.log10(direct_gain)).max())
+        coupling_db = float(20 * np.log10((off_axis.max(axis=1) / direct_gain).max()))
     errors_deg = (_axis_error_deg(delivered[:, :, axis], axis) for axis in range(delivered.shape[1]))
     return Quality(flatness_db, coupling_db, max(errors_deg))
 

@@ -60,11 +60,11 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         kind = self.kind
-        found = (self.signal.quantity, self.signal.unit, self.signal.channels)
-        if found != (kind.quantity, kind.unit, kind.header[1:]):
+        actual = (self.signal.quantity, self.signal.unit, self.signal.channels)
+        if actual != (kind.quantity, kind.unit, kind.header[1:]):
             raise ValueError(
                 f"a table of {kind.name} holds {kind.quantity} in {kind.unit}, channels "
-                f"{', '.join(kind.header[1:])}, not {found[0]} in {found[1]}, channels {', '.join(found[2])}"
+                f"{', '.join(kind.header[1:])}, not {actual[0]} in {actual[1]}, channels {', '.join(actual[2])}"
             )
 
 
@@ -101,16 +101,16 @@ def trajectory_csv(trajectory: Trajectory) -> str:
 
 def require_rate(trajectory: Trajectory, rate_hz: float) -> None:
     """Check that a trajectory has the model's sample rate, `rate_hz`. Raises TableError where it has another rate."""
-    found = trajectory.signal.sample_rate_hz
-    if abs(found - rate_hz) > RATE_TOLERANCE * rate_hz:
-        raise TableError((f"the rows are at {found:g} Hz, but the model is at {rate_hz:g} Hz; resample them to it",))
+    found_hz = trajectory.signal.sample_rate_hz
+    if abs(found_hz - rate_hz) > RATE_TOLERANCE * rate_hz:
+        raise TableError((f"the rows are at {found_hz:g} Hz, but the model is at {rate_hz:g} Hz; resample them to it",))
 
 
 def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
     """Numbers of the rows after the header, (n, columns), n >= 2. Raises TableError with the first wrong lines, six at
     most."""
     width = len(kind.header)
-    found, problems = [], []
+    rows_of_values, problems = [], []
     for line, row in enumerate(rows, start=2):
         try:
             values = [float(field) for field in row]
@@ -121,13 +121,13 @@ def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
         elif not np.isfinite(values).all():
             problems.append(f"line {line} reads '{','.join(row)}'; every field must be a number")
         else:
-            found.append(values)
+            rows_of_values.append(values)
     if problems:
-        rest = [f"and {len(problems) - 5} lines more like these"] if len(problems) > 6 else []
-        raise TableError((*problems[: 5 if rest else 6], *rest))
-    if len(found) < 2:
-        raise TableError((f"there are {len(found)} rows of numbers; a rate needs two or more",))
-    return np.array(found, dtype=np.float64)
+        summary_lines = [f"and {len(problems) - 5} lines more like these"] if len(problems) > 6 else []
+        raise TableError((*problems[: 5 if summary_lines else 6], *summary_lines))
+    if len(rows_of_values) < 2:
+        raise TableError((f"there are {len(rows_of_values)} rows of numbers; a rate needs two or more",))
+    return np.array(rows_of_values, dtype=np.float64)
 
 
 def _find_rate_hz(time_s: FloatArray) -> float:
@@ -138,9 +138,9 @@ def _find_rate_hz(time_s: FloatArray) -> float:
     if mean <= 0 or (steps <= 0).any():
         row = int(np.argmax(steps <= 0))
         raise TableError((f"time_s does not grow at row {row + 2} (line {row + 3})",))
-    off = np.abs(steps / mean - 1)
-    if (off > STEP_TOLERANCE).any():
-        row = int(np.argmax(off > STEP_TOLERANCE))
+    deviation = np.abs(steps / mean - 1)
+    if (deviation > STEP_TOLERANCE).any():
+        row = int(np.argmax(deviation > STEP_TOLERANCE))
         raise TableError(
             (
                 f"time_s is not at a constant rate: the step to row {row + 2} (line {row + 3}) is {steps[row]:g} s, "
@@ -148,5 +148,5 @@ def _find_rate_hz(time_s: FloatArray) -> float:
             )
         )
     rate = 1 / mean
-    whole = round(rate)
-    return float(whole) if whole and abs(rate - whole) <= RATE_TOLERANCE * whole else rate
+    whole_hz = round(rate)
+    return float(whole_hz) if whole_hz and abs(rate - whole_hz) <= RATE_TOLERANCE * whole_hz else rate

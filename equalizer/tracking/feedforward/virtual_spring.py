@@ -1,7 +1,7 @@
 """The virtual spring and damper by which the device's control loop holds the handle at its place.
 
-The input of a model is the total force f that enters the plant. Where the loop adds the force s of a spring to the
-commands, that force along the planned motion is subtracted from them: u = f - s, with s = -(k x + b v).
+The input of a model is the total force f that enters the plant. Where the loop adds the force f_s of a spring to the
+commands, that force along the planned motion is subtracted from them: u = f - f_s, with f_s = -(k x + b v).
 """
 
 import math

@@ -59,20 +59,21 @@ def convergence(
             f"responses have shapes {model.shape} and {device.shape[1:]}; both must be (lines, p, p): as many forces "
             "as responses"
         )
-    inside = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
-    if not inside.any():
+    in_band = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
+    if not in_band.any():
         raise ValueError(f"no line lies in the band of {band_hz[0]:g} to {band_hz[1]:g} Hz")
-    played = np.asarray(device[:, inside] @ np.linalg.inv(model[inside]), dtype=np.complex128)
-    survivors = np.linalg.svd(np.eye(model.shape[1]) - beta * played, compute_uv=False)[..., 0]
-    return Convergence(frequency_hz[inside], survivors.max(axis=0), beta, _safe_beta(played))
+    loop_response = np.asarray(device[:, in_band] @ np.linalg.inv(model[in_band]), dtype=np.complex128)
+    survivors = np.linalg.svd(np.eye(model.shape[1]) - beta * loop_response, compute_uv=False)[..., 0]
+    return Convergence(frequency_hz[in_band], survivors.max(axis=0), beta, _safe_beta(loop_response))
 
 
-def _safe_beta(played: ComplexArray) -> float:
-    """Upper bound, 0 to 2, of the gains with |I - beta T| < 1 for all T of `played`, (..., lines, p, p). As matrix
-    inequalities the condition is T + T* > beta T* T, hence T⁻¹ + T⁻* > beta I: the smallest eigenvalue is the bound.
-    0 where a T is singular to rounding: in one direction the device then never moves, and no gain lessens an error."""
-    if np.any(np.linalg.cond(played) > 1 / np.finfo(float).eps):
+def _safe_beta(loop_response: ComplexArray) -> float:
+    """Upper bound, 0 to 2, of the gains with |I - beta T| < 1 for all T of `loop_response`, (..., lines, p, p). As
+    matrix inequalities the condition is T + T* > beta T* T, hence T⁻¹ + T⁻* > beta I: the smallest eigenvalue is the
+    bound. 0 where a T is singular to rounding: in one direction the device then never moves, and no gain lessens an
+    error."""
+    if np.any(np.linalg.cond(loop_response) > 1 / np.finfo(float).eps):
         return 0.0
-    inverse = np.linalg.inv(played)
+    inverse = np.linalg.inv(loop_response)
     lowest = np.linalg.eigvalsh(inverse + inverse.conj().swapaxes(-1, -2))[..., 0].min()
     return float(np.clip(lowest, 0.0, 2.0))

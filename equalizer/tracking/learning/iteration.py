@@ -24,9 +24,9 @@ from equalizer.tracking.feedforward.band_part import band_part
 Invert = Callable[[FloatArray], FloatArray]
 """Linear inverse of the device: from wanted motion (N, p) to forces (N, m), with N rows in time each."""
 
-SURE = 3.0
+SIGNIFICANCE_SIGMA = 3.0
 """A residual power this many standard deviations above the noise power is more than noise."""
-WORSE, DIVERGED = 1.1, 2.0
+WORSE_RATIO, DIVERGENCE_RATIO = 1.1, 2.0
 """Ratios of a residual to the smallest so far: above the first, the next correction starts from the best forces again;
 above the second, the iteration counts as diverging."""
 LOWEST_GAIN = 0.03
@@ -48,7 +48,7 @@ class Verdict(Enum):
 class Repetition:
     """Settings of an iteration, the same for all repeats."""
 
-    wanted: FloatArray
+    reference: FloatArray
     """(N, p): begins and ends at rest, with time for non-causal forces before and after."""
     invert: Invert
     sample_rate_hz: float
@@ -63,19 +63,19 @@ class Repetition:
     slew: float | None = None
     """Largest rate of change of the corrected force vector, N/s; None = not limited. The first forces are not checked
     against it."""
-    judged: tuple[int, int] | None = None
+    judged_rows: tuple[int, int] | None = None
     """Rows [first, end) over which residuals are computed; None = all. Other rows are corrected too, but are not
     judged: after the motion static friction may hold the handle, and no reasonable force moves it exactly."""
 
     def residual(self, missing: FloatArray) -> float:
         """Root mean square of the error (N, p) over the judged rows and all channels, in the unit of `wanted`."""
-        start, stop = self.judged or (0, len(missing))
+        start, stop = self.judged_rows or (0, len(missing))
         return rms(missing[start:stop])
 
     @property
     def level(self) -> float:
         """Root mean square of the wanted signal in the band, over the judged rows."""
-        return self.residual(self.part(self.wanted))
+        return self.residual(self.part(self.reference))
 
     def part(self, samples: FloatArray) -> FloatArray:
         """Part of samples (N, channels) within the band; they begin and end at rest, or are noise."""
@@ -85,8 +85,8 @@ class Repetition:
     def degrees_of_freedom(self) -> float:
         """Degrees of freedom of the judged rows in the band: 2 x bandwidth x duration x channels."""
         low, high = self.band_hz
-        start, stop = self.judged or (0, len(self.wanted))
-        return float(2 * (high - low) * (stop - start) * self.wanted.shape[1] / self.sample_rate_hz)
+        start, stop = self.judged_rows or (0, len(self.reference))
+        return float(2 * (high - low) * (stop - start) * self.reference.shape[1] / self.sample_rate_hz)
 
     def find_allowed_share(self, forces: FloatArray, correction: FloatArray) -> float:
         """Largest factor on the correction, up to 1, with which forces plus correction obey cap and slew limit. Both
@@ -106,7 +106,7 @@ class Repetition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IterationState:
-    """State of iterative learning control between two plays: made by `begin`, advanced by `next_forces`."""
+    """State of iterative learning control between two plays: made by `start_iteration`, advanced by `next_forces`."""
 
     repetition: Repetition
     forces: FloatArray
@@ -149,7 +149,7 @@ class IterationState:
         )
 
 
-def begin(repetition: Repetition, first: FloatArray | None = None) -> IterationState:
+def start_iteration(repetition: Repetition, first: FloatArray | None = None) -> IterationState:
     """The state before the first play. first: (N, m), initial forces (N); None = the model's inverse of the wanted
     motion. Raises ValueError where the first forces exceed the cap, or the wanted motion has no part in the band."""
     if repetition.level == 0:
@@ -157,13 +157,13 @@ def begin(repetition: Repetition, first: FloatArray | None = None) -> IterationS
         raise ValueError(
             f"the wanted trajectory has no content in the band of {low:g} to {high:g} Hz; give a trajectory within it"
         )
-    forces = repetition.invert(repetition.wanted) if first is None else np.asarray(first, dtype=np.float64)
+    forces = repetition.invert(repetition.reference) if first is None else np.asarray(first, dtype=np.float64)
     peak = float(np.linalg.norm(forces, axis=1).max())
     if repetition.cap is not None and peak > repetition.cap:
         raise ValueError(
             f"the first forces reach {peak:.4g} N, but the cap is {repetition.cap:g} N; scale the trajectory"
         )
-    missing = np.zeros_like(repetition.wanted)
+    missing = np.zeros_like(repetition.reference)
     return IterationState(repetition, forces, Verdict.CONTINUE, forces, np.inf, missing, repetition.noise_floor)
 
 
@@ -174,10 +174,10 @@ def next_forces(state: IterationState, measured: FloatArray) -> IterationState:
     repetition = state.repetition
     if state.verdict is not Verdict.CONTINUE:
         raise ValueError(f"this iteration is over: {state.verdict.value}")
-    if np.shape(measured) != repetition.wanted.shape or not np.isfinite(measured).all():
+    if np.shape(measured) != repetition.reference.shape or not np.isfinite(measured).all():
         raise ValueError(
             f"what was measured has shape {np.shape(measured)} or values that are not finite numbers; it must be "
-            f"{repetition.wanted.shape}"
+            f"{repetition.reference.shape}"
         )
     if state.noise_floor is not None:
         return _judge_measurement(state, measured, state.noise_floor, plays=1)
@@ -191,14 +191,14 @@ def next_forces(state: IterationState, measured: FloatArray) -> IterationState:
 def noise_of_repeats(measured: FloatArray, repetition: Repetition) -> float:
     """Noise of a single play: rms in the band of the deviations from the mean of several plays of the same forces
     (sample standard deviation). measured: (plays, N, p), at least two plays."""
-    off = measured - measured.mean(axis=0)
-    squares = sum(float(np.sum(repetition.part(each) ** 2)) for each in off)
+    deviations = measured - measured.mean(axis=0)
+    squares = sum(float(np.sum(repetition.part(deviation) ** 2)) for deviation in deviations)
     return float(np.sqrt(squares / ((len(measured) - 1) * measured[0].size)))
 
 
-def noise_of_rest(rest: FloatArray, repetition: Repetition) -> float:
+def noise_of_rest(rest_record: FloatArray, repetition: Repetition) -> float:
     """Rms in the band of a record (n, p) during which no force was commanded; the mean is removed first."""
-    return rms(repetition.part(rest - rest.mean(axis=0)))
+    return rms(repetition.part(rest_record - rest_record.mean(axis=0)))
 
 
 def rms(samples: FloatArray) -> float:
@@ -206,32 +206,32 @@ def rms(samples: FloatArray) -> float:
     return float(np.sqrt(np.mean(samples**2)))
 
 
-def _judge_measurement(state: IterationState, measured: FloatArray, floor: float, plays: int) -> IterationState:
+def _judge_measurement(state: IterationState, measured: FloatArray, play_noise: float, plays: int) -> IterationState:
     """The state after a measurement with this noise floor of a single play, averaged over so many plays: a stop, or
     corrected forces."""
     repetition = state.repetition
-    missing = repetition.part(repetition.wanted - measured)
-    residual, noise = repetition.residual(missing), floor / np.sqrt(plays)
+    missing = repetition.part(repetition.reference - measured)
+    residual, noise = repetition.residual(missing), play_noise / np.sqrt(plays)
     setbacks = state.setbacks + (residual > state.residuals[-1] if state.residuals else 0)
     state = replace(state, residuals=(*state.residuals, residual), setbacks=setbacks)
-    diverged = residual > DIVERGED * state.best_residual
-    base, left = state.forces, missing
+    diverged = residual > DIVERGENCE_RATIO * state.best_residual
+    base_forces, error_signal = state.forces, missing
     if residual < state.best_residual:
         state = replace(state, best=state.forces, best_residual=residual, best_missing=missing)
-    elif residual > WORSE * state.best_residual:
-        base, left = state.best, state.best_missing
+    elif residual > WORSE_RATIO * state.best_residual:
+        base_forces, error_signal = state.best, state.best_missing
     # Residual and noise power are both measured, each with the relative variance 2 / (degrees of freedom); the ratio
     # of both then has the relative standard deviation sqrt(4 / (degrees of freedom)).
-    limit = noise * np.sqrt(1 + SURE * np.sqrt(4 / repetition.degrees_of_freedom))
+    limit = noise * np.sqrt(1 + SIGNIFICANCE_SIGMA * np.sqrt(4 / repetition.degrees_of_freedom))
     if residual <= limit:
         return _finish(state, Verdict.AT_FLOOR)
     if diverged:
         return _finish(state, Verdict.DIVERGING)
-    signal_share = max(0.0, 1 - (noise / repetition.residual(left)) ** 2)
+    signal_share = max(0.0, 1 - (noise / repetition.residual(error_signal)) ** 2)
     gain = min(repetition.first_gain / (1 + setbacks), signal_share)
     if gain < LOWEST_GAIN:
         return _finish(state, Verdict.BEST_KEPT)
-    return _correct_forces(state, base, left, gain)
+    return _correct_forces(state, base_forces, error_signal, gain)
 
 
 def _finish(state: IterationState, verdict: Verdict) -> IterationState:
@@ -239,31 +239,37 @@ def _finish(state: IterationState, verdict: Verdict) -> IterationState:
     return replace(state, forces=state.best, verdict=verdict)
 
 
-def _correct_forces(state: IterationState, base: FloatArray, left: FloatArray, gain: float) -> IterationState:
-    """The state with the forces `base` (N, m) corrected for the error `left` (N, p); final where cap or slew limit
-    leave nearly nothing of the correction."""
+def _correct_forces(
+    state: IterationState, base_forces: FloatArray, error_signal: FloatArray, gain: float
+) -> IterationState:
+    """The state with the forces `base_forces` (N, m) corrected for the error `error_signal` (N, p); final where cap or
+    slew limit leave nearly nothing of the correction."""
     repetition = state.repetition
-    correction = gain * fade_ends(repetition.invert(left), repetition.sample_rate_hz)
-    fitted = repetition.find_allowed_share(base, correction)
+    correction = gain * fade_ends(repetition.invert(error_signal), repetition.sample_rate_hz)
+    fitted = repetition.find_allowed_share(base_forces, correction)
     if fitted < LOWEST_GAIN:
         return _finish(state, Verdict.BEST_KEPT)
-    return replace(state, forces=base + fitted * correction, gains=(*state.gains, gain), fitted=(*state.fitted, fitted))
+    return replace(
+        state, forces=base_forces + fitted * correction, gains=(*state.gains, gain), fitted=(*state.fitted, fitted)
+    )
 
 
 def fade_ends(rows: FloatArray, sample_rate_hz: float) -> FloatArray:
     """Rows (N, m) faded to zero at the first and the last row by a raised-cosine ramp of `EDGE_S` seconds."""
     until_end = np.minimum(np.arange(len(rows)), np.arange(len(rows))[::-1])
-    inside = np.clip(until_end / (EDGE_S * sample_rate_hz), 0.0, 1.0)
-    return np.asarray(rows * (0.5 - 0.5 * np.cos(np.pi * inside))[:, np.newaxis])
+    ramp_position = np.clip(until_end / (EDGE_S * sample_rate_hz), 0.0, 1.0)
+    return np.asarray(rows * (0.5 - 0.5 * np.cos(np.pi * ramp_position))[:, np.newaxis])
 
 
 def largest_share(forces: FloatArray, correction: FloatArray, cap: float) -> float:
     """Largest factor s, up to 1, with which no row of forces + s correction is longer than `cap`. Both (N, m)."""
     a = np.sum(correction**2, axis=1)
     b = np.sum(forces * correction, axis=1)
-    room = np.maximum(cap**2 - np.sum(forces**2, axis=1), 0.0)
-    moving = a > 0
+    headroom = np.maximum(cap**2 - np.sum(forces**2, axis=1), 0.0)
+    is_corrected = a > 0
     # The positive root s of |forces + s correction|² = cap², that is, of a s² + 2 b s = room.
-    roots = (np.sqrt(b[moving] ** 2 + a[moving] * room[moving]) - b[moving]) / a[moving]
+    roots = (np.sqrt(b[is_corrected] ** 2 + a[is_corrected] * headroom[is_corrected]) - b[is_corrected]) / a[
+        is_corrected
+    ]
     # Slightly less than the exact share, so that rounding does not put the longest force above the cap.
     return float(min(1.0, (1 - 1e-9) * roots.min(initial=2.0)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.feedforward.planned_motion import planned_motion
+from equalizer.tracking.feedforward.planned_motion import integrate_motion
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.iteration import Invert
 from equalizer.tracking.lqr.lqr import stored_gains, track
@@ -27,7 +27,7 @@ def inverse_operator(model: IdentifiedModel, weight: float = 1e-3) -> InverseOfL
     def of_length(rows: int) -> Invert:
         """Inverse operator for records of `rows` rows."""
         gains = stored_gains(make_tracking_problem(model, TrackingWeights(weight)), rows)
-        return lambda wanted: track(gains, wanted).forces
+        return lambda reference: track(gains, reference).forces
 
     return of_length
 
@@ -40,10 +40,10 @@ def compensate_spring(
     if spring == VirtualSpring():
         return invert
 
-    def commands(wanted: FloatArray) -> FloatArray:
+    def commands(reference: FloatArray) -> FloatArray:
         """Commands (N, m) for wanted accelerations (N, p)."""
-        motion = planned_motion(wanted, sample_rate_hz, band_hz)
-        held = spring.stiffness_n_per_m * motion.position + spring.damping_n_s_per_m * motion.velocity
-        return np.asarray(invert(wanted) + held)
+        motion = integrate_motion(reference, sample_rate_hz, band_hz)
+        spring_force = spring.stiffness_n_per_m * motion.position + spring.damping_n_s_per_m * motion.velocity
+        return np.asarray(invert(reference) + spring_force)
 
     return commands

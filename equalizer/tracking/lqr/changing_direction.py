@@ -14,7 +14,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr import lqr_kernel
 from equalizer.tracking.lqr.lqr import StoredGains, costate_feedforward
-from equalizer.tracking.lqr.rotation import every_normal, every_rotation
+from equalizer.tracking.lqr.rotation import axis_recordings, axis_trajectories
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only, require_trajectory
 
 
@@ -61,13 +61,13 @@ def make_rotatable_transient(gains: StoredGains, trajectory: FloatArray) -> Turn
     """Transient of a trajectory (N, p), m/s², before rotation. gains: for N rows, with a free end or rest as final
     state. Raises TrackingError for another shape."""
     p = gains.problem.outputs
-    return _make_transient(gains, every_rotation(require_trajectory(gains.problem, trajectory)), (p, p))
+    return _make_transient(gains, axis_trajectories(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
 def normal_transient(gains: StoredGains, recording: FloatArray) -> TurningTransient:
     """Transient of a recording (N,), m/s², to be played along a normal. Raises TrackingError for another shape."""
     p = gains.problem.outputs
-    return _make_transient(gains, every_normal(recording, p), (p,))
+    return _make_transient(gains, axis_recordings(recording, p), (p,))
 
 
 def initial_state(transient: TurningTransient) -> LiveState:
@@ -86,8 +86,8 @@ def step(transient: TurningTransient, state: LiveState, direction: FloatArray) -
 
     Raises TrackingError for another shape of the direction.
     """
-    turned = play(transient, np.asarray(direction, dtype=np.float64)[np.newaxis], state)
-    return turned.forces[0], turned.state
+    result = play(transient, np.asarray(direction, dtype=np.float64)[np.newaxis], state)
+    return result.forces[0], result.state
 
 
 def play(transient: TurningTransient, directions: FloatArray, state: LiveState | None = None) -> TurningResult:
@@ -95,22 +95,24 @@ def play(transient: TurningTransient, directions: FloatArray, state: LiveState |
 
     Raises TrackingError for another shape of the directions.
     """
-    problem, live = transient.problem, initial_state(transient) if state is None else state
-    turns = np.asarray(directions, dtype=np.float64)
-    if turns.shape[1:] != transient.direction_shape:
+    problem, start_state = transient.problem, initial_state(transient) if state is None else state
+    direction_rows = np.asarray(directions, dtype=np.float64)
+    if direction_rows.shape[1:] != transient.direction_shape:
         raise TrackingError(
-            f"a direction has shape {turns.shape[1:]}; this transient takes {transient.direction_shape}"
+            f"a direction has shape {direction_rows.shape[1:]}; this transient takes {transient.direction_shape}"
         )
     n, m = problem.order, problem.inputs
-    numbers = np.zeros(2 * n + m + problem.outputs)
-    numbers[:n] = problem.state(live.x)
-    out = np.empty((len(turns), m + problem.outputs))
-    flat = np.ascontiguousarray(turns.reshape(len(turns), -1))
-    lqr_kernel.run(problem.step, transient.K[live.tick :], transient.g[live.tick :], flat, numbers, out)
-    return TurningResult(out[:, :m], out[:, m:], LiveState(live.tick + len(turns), numbers[:n]))
+    work = np.zeros(2 * n + m + problem.outputs)
+    work[:n] = problem.state(start_state.x)
+    outputs = np.empty((len(direction_rows), m + problem.outputs))
+    flat = np.ascontiguousarray(direction_rows.reshape(len(direction_rows), -1))
+    lqr_kernel.run_ticks(
+        problem.step, transient.K[start_state.tick :], transient.g[start_state.tick :], flat, work, outputs
+    )
+    return TurningResult(outputs[:, :m], outputs[:, m:], LiveState(start_state.tick + len(direction_rows), work[:n]))
 
 
-def _make_transient(gains: StoredGains, wanted: FloatArray, direction_shape: tuple[int, ...]) -> TurningTransient:
+def _make_transient(gains: StoredGains, references: FloatArray, direction_shape: tuple[int, ...]) -> TurningTransient:
     """Transient from trajectories (c, N, p), one per element of the direction."""
-    g = np.stack([costate_feedforward(gains, each) for each in wanted], axis=2)
+    g = np.stack([costate_feedforward(gains, reference) for reference in references], axis=2)
     return TurningTransient(gains.problem, gains.gains.K, read_only(g), direction_shape)

@@ -72,93 +72,98 @@ class CapSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _CappedTask:
-    """The constrained problem of one trajectory: wanted (N, p), forces `already` there (N, m), cap in N."""
+    """The constrained problem of one trajectory: `reference` (N, p), `fixed_forces` (N, m) that count against the cap
+    too, and the cap in N."""
 
     problem: TrackingProblem
-    wanted: FloatArray
-    already: FloatArray
+    reference: FloatArray
+    fixed_forces: FloatArray
     cap_n: float
 
     def nearest(self, forces: FloatArray) -> FloatArray:
         """(N, m): projection of forces on those allowed under the cap."""
-        return project_to_cap(forces + self.already, self.cap_n) - self.already
+        return project_to_cap(forces + self.fixed_forces, self.cap_n) - self.fixed_forces
 
     def cost(self, forces: FloatArray) -> float:
         """Value of the quadratic cost for forces (N, m) from rest."""
         outputs = _simulate_outputs(self.problem, forces)
-        outputs[:, : self.problem.outputs] -= self.wanted
-        weighed = (outputs @ self.problem.Q * outputs).sum() + (forces @ self.problem.R * forces).sum()
-        return float(weighed)
+        outputs[:, : self.problem.outputs] -= self.reference
+        cost = (outputs @ self.problem.Q * outputs).sum() + (forces @ self.problem.R * forces).sum()
+        return float(cost)
 
     def lower_bound(self, forces: FloatArray, multipliers: FloatArray) -> float:
         """Lower bound of the optimal cost, the dual function: cost(u) + λ·u - sum_k (cap |λ_k| - λ_k·already_k).
         forces: u, which minimises cost(u) + λ·u without a cap; multipliers: λ, (N, m)."""
-        reach = self.cap_n * np.linalg.norm(multipliers, axis=1).sum() - (multipliers * self.already).sum()
-        return self.cost(forces) + float((multipliers * forces).sum() - reach)
+        support = self.cap_n * np.linalg.norm(multipliers, axis=1).sum() - (multipliers * self.fixed_forces).sum()
+        return self.cost(forces) + float((multipliers * forces).sum() - support)
 
 
 def track_under_cap(
     problem: TrackingProblem,
-    wanted: FloatArray,
+    reference: FloatArray,
     cap_n: float,
     already: FloatArray | None = None,
     settings: CapSettings | None = None,
 ) -> CappedForces:
-    """Track wanted (N, p), m/s², from rest. already: (N, m), N, further forces, which count against the cap.
+    """Track reference (N, p), m/s², from rest. already: (N, m), N, further forces, which count against the cap.
 
     Raises TrackingError for other shapes, where `already` alone is above the cap, and where the duality gap is not
     reached within the allowed rounds.
     """
-    r = require_trajectory(problem, wanted)
-    there = np.zeros((len(r), problem.inputs)) if already is None else np.asarray(already, dtype=np.float64)
-    if there.shape != (len(r), problem.inputs):
-        raise TrackingError(f"already has shape {there.shape}; these forces have ({len(r)}, {problem.inputs})")
-    alone = force_peaks(there, require_cap(cap_n))
-    if not alone.fits:
+    r = require_trajectory(problem, reference)
+    fixed_forces = np.zeros((len(r), problem.inputs)) if already is None else np.asarray(already, dtype=np.float64)
+    if fixed_forces.shape != (len(r), problem.inputs):
+        raise TrackingError(f"already has shape {fixed_forces.shape}; these forces have ({len(r)}, {problem.inputs})")
+    peaks = force_peaks(fixed_forces, require_cap(cap_n))
+    if not peaks.fits:
         raise TrackingError(
-            f"the other forces alone reach {alone.peak_n:.3g} N at row {alone.at_sample}, above the cap of {cap_n:g} "
+            f"the other forces alone reach {peaks.peak_n:.3g} N at row {peaks.at_sample}, above the cap of {cap_n:g} "
             "N; lower them, or raise the cap"
         )
-    task = _CappedTask(problem, r, there, cap_n)
-    free = track(stored_gains(problem, len(r)), r)
-    if force_peaks(free.forces + there, cap_n).fits:
-        return _state_loss(task, free.forces, free.forces, 0.0, 0)
-    return _state_loss(task, free.forces, *_alternate_directions(task, free.forces, settings or CapSettings()))
+    task = _CappedTask(problem, r, fixed_forces, cap_n)
+    unconstrained = track(stored_gains(problem, len(r)), r)
+    if force_peaks(unconstrained.forces + fixed_forces, cap_n).fits:
+        return _state_loss(task, unconstrained.forces, unconstrained.forces, 0.0, 0)
+    return _state_loss(
+        task, unconstrained.forces, *_alternate_directions(task, unconstrained.forces, settings or CapSettings())
+    )
 
 
 def _alternate_directions(task: _CappedTask, start: FloatArray, settings: CapSettings) -> tuple[FloatArray, float, int]:
     """ADMM with over-relaxation and scaled multipliers, in Boyd's notation: u from tracking, z projected on the cap,
     `scaled` = λ / (2 weight). Returns the best z, its relative duality gap and the number of rounds."""
     weight = _initial_penalty(task.problem)
-    gains = _compute_penalised_gains(task.problem, len(task.wanted), weight)
+    gains = _compute_penalised_gains(task.problem, len(task.reference), weight)
     z, scaled = task.nearest(start), np.zeros_like(start)
     best, best_cost, bound = z, task.cost(z), -np.inf
-    for number in range(1, settings.rounds + 1):
-        u = track(gains, np.hstack((task.wanted, z - scaled))).forces
+    for round_number in range(1, settings.rounds + 1):
+        u = track(gains, np.hstack((task.reference, z - scaled))).forces
         bound = max(bound, task.lower_bound(u, 2 * weight * (u - z + scaled)))
         relaxed = OVER_RELAXATION * u + (1 - OVER_RELAXATION) * z
-        before, z = z, task.nearest(relaxed + scaled)
+        previous_z, z = z, task.nearest(relaxed + scaled)
         scaled = scaled + relaxed - z
         cost = task.cost(z)
         if cost < best_cost:
             best, best_cost = z, cost
         gap = max(0.0, (best_cost - bound) / best_cost)
         if gap <= settings.gap:
-            return best, gap, number
-        factor = _penalty_factor(u - z, z - before) if number % ROUNDS_BETWEEN_TUNING == 0 else 1.0
+            return best, gap, round_number
+        factor = _penalty_factor(u - z, z - previous_z) if round_number % ROUNDS_BETWEEN_TUNING == 0 else 1.0
         if factor != 1.0:
             weight, scaled = weight * factor, scaled / factor
-            gains = _compute_penalised_gains(task.problem, len(task.wanted), weight)
+            gains = _compute_penalised_gains(task.problem, len(task.reference), weight)
     raise TrackingError(
         f"after {settings.rounds} rounds the forces under the cap of {task.cap_n:g} N are only known to be within "
         f"{gap:.2g} of the best cost; scale what is wanted down, or allow a larger gap than {settings.gap:g}"
     )
 
 
-def _penalty_factor(apart: FloatArray, moved: FloatArray) -> float:
+def _penalty_factor(primal_residual: FloatArray, dual_residual: FloatArray) -> float:
     """Factor on the penalty that balances the primal residual u - z and the dual residual, the change of z (Boyd et
     al., section 3.4.1)."""
-    ratio = float(np.linalg.norm(apart) / max(float(np.linalg.norm(moved)), np.finfo(np.float64).tiny))
+    ratio = float(
+        np.linalg.norm(primal_residual) / max(float(np.linalg.norm(dual_residual)), np.finfo(np.float64).tiny)
+    )
     return float(np.clip(np.sqrt(ratio), 0.2, 5.0)) if not 1 / 3 < ratio < 3 else 1.0
 
 
@@ -181,26 +186,28 @@ def _compute_penalised_gains(problem: TrackingProblem, samples: int, weight: flo
 
 def _simulate_outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
     """(N, q): response of all outputs, the p tracked outputs first, to forces (N, m) from rest."""
-    outputs, played = np.empty((len(forces), problem.C.shape[0])), np.empty_like(forces)
-    every = replace(problem, outputs=problem.C.shape[0]).step
+    outputs, forces_out = np.empty((len(forces), problem.C.shape[0])), np.empty_like(forces)
+    all_outputs_step = replace(problem, outputs=problem.C.shape[0]).step
     no_gain = np.zeros((len(forces), problem.inputs, problem.order))
-    simulate(every, no_gain, np.ascontiguousarray(forces), np.zeros(problem.order), played, outputs)
+    simulate(all_outputs_step, no_gain, np.ascontiguousarray(forces), np.zeros(problem.order), forces_out, outputs)
     return outputs
 
 
-def _state_loss(task: _CappedTask, free: FloatArray, forces: FloatArray, gap: float, rounds: int) -> CappedForces:
-    """Result with the loss of `forces` against the unconstrained forces `free`, (N, m) each."""
-    p, size = task.problem.outputs, float(np.linalg.norm(task.wanted)) or 1.0
+def _state_loss(
+    task: _CappedTask, unconstrained: FloatArray, forces: FloatArray, gap: float, rounds: int
+) -> CappedForces:
+    """Result with the loss of `forces` against the unconstrained forces `unconstrained`, (N, m) each."""
+    p, size = task.problem.outputs, float(np.linalg.norm(task.reference)) or 1.0
 
-    def error(played: FloatArray) -> float:
+    def error(tested_forces: FloatArray) -> float:
         """Relative tracking error of forces (N, m)."""
-        return float(np.linalg.norm(_simulate_outputs(task.problem, played)[:, :p] - task.wanted)) / size
+        return float(np.linalg.norm(_simulate_outputs(task.problem, tested_forces)[:, :p] - task.reference)) / size
 
     loss = TrackingLoss(
-        error(free),
+        error(unconstrained),
         error(forces),
-        error(task.nearest(free)),
-        task.cost(free),
+        error(task.nearest(unconstrained)),
+        task.cost(unconstrained),
         task.cost(forces),
         gap,
         rounds,

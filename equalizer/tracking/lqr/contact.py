@@ -19,7 +19,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr.changing_direction import TurningTransient, normal_transient
 from equalizer.tracking.lqr.lqr import stored_gains
 from equalizer.tracking.lqr.padding import CAUSAL, Padding, band_spectrum
-from equalizer.tracking.lqr.rotation import RotationBasis, every_normal, normal_basis
+from equalizer.tracking.lqr.rotation import RotationBasis, axis_recordings, normal_basis
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem
 
 
@@ -58,20 +58,25 @@ def causal_start(problem: TrackingProblem, recording: FloatArray, padding: Paddi
 
     Raises TrackingError where the recording has no content in the model's band, or another shape.
     """
-    room = padding or Padding()
-    causal = Padding(CAUSAL.before_s, room.after_s)
-    _, after = causal.samples(problem.sample_rate_hz)
-    played = np.pad(np.asarray(recording, dtype=np.float64), (0, after))
-    gains = stored_gains(problem, len(played))
-    basis = normal_basis(gains, played)
-    deviation = _deviation(problem, basis, played)
-    return CausalStart(basis, normal_transient(gains, played), deviation, _early_deviation(problem, played, room))
+    full_padding = padding or Padding()
+    causal = Padding(CAUSAL.before_s, full_padding.after_s)
+    _, rows_after = causal.samples(problem.sample_rate_hz)
+    padded_recording = np.pad(np.asarray(recording, dtype=np.float64), (0, rows_after))
+    gains = stored_gains(problem, len(padded_recording))
+    basis = normal_basis(gains, padded_recording)
+    deviation = _deviation(problem, basis, padded_recording)
+    return CausalStart(
+        basis,
+        normal_transient(gains, padded_recording),
+        deviation,
+        _early_deviation(problem, padded_recording, full_padding),
+    )
 
 
-def _early_deviation(problem: TrackingProblem, played: FloatArray, room: Padding) -> FloatArray:
-    """(p, p): S with zeros before the transient, in which forces may begin. played: (N,)."""
-    before, _ = room.samples(problem.sample_rate_hz)
-    padded = np.pad(played, (before, 0))
+def _early_deviation(problem: TrackingProblem, recording: FloatArray, padding: Padding) -> FloatArray:
+    """(p, p): S with zeros before the transient, in which forces may begin. recording: (N,)."""
+    rows_before, _ = padding.samples(problem.sample_rate_hz)
+    padded = np.pad(recording, (rows_before, 0))
     return _deviation(problem, normal_basis(stored_gains(problem, len(padded)), padded), padded)
 
 
@@ -85,9 +90,9 @@ def _deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatA
             f"the recording has nothing between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band; "
             "give a transient with content there"
         )
-    wanted = every_normal(recording, p)
-    along = [basis.predict_response(axis) - wanted[i] for i, axis in enumerate(np.eye(p))]
-    lines = np.array([band_spectrum(each, rate_hz, band_hz).ravel() for each in along]) / level
+    references = axis_recordings(recording, p)
+    errors = [basis.predict_response(axis) - references[i] for i, axis in enumerate(np.eye(p))]
+    lines = np.array([band_spectrum(error, rate_hz, band_hz).ravel() for error in errors]) / level
     return np.asarray(lines @ lines.T)
 
 

@@ -67,34 +67,34 @@ def stored_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatA
     n, m = problem.order, problem.inputs
     terminal = require_terminal_weight(problem, terminal_weight)
     P, K, H_inverse = terminal.copy(), np.empty((samples, m, n)), np.empty((samples, m, m))
-    done = riccati_kernel.backward(problem.joined, problem.stage_cost, P, K, H_inverse)
+    done = riccati_kernel.run_backward_recursion(problem.joined, problem.stage_cost, P, K, H_inverse)
     gains = Gains(K, H_inverse, P) if done else backward_gains(problem, samples, terminal)
     return StoredGains(problem, gains, read_only(terminal))
 
 
 def track(
-    gains: StoredGains, wanted: FloatArray, x0: FloatArray | None = None, final_state: FloatArray | None = None
+    gains: StoredGains, reference: FloatArray, x0: FloatArray | None = None, final_state: FloatArray | None = None
 ) -> TrackResult:
-    """Track wanted (N, p), m/s², with N the length of the gains. x0: the model's state before the first row; None = at
-    rest. final_state: x_f, target of the final state if the gains have a terminal weight; None = rest. Raises
+    """Track reference (N, p), m/s², with N the length of the gains. x0: the model's state before the first row; None =
+    at rest. final_state: x_f, target of the final state if the gains have a terminal weight; None = rest. Raises
     TrackingError for other shapes and values that are not finite."""
-    problem, g = gains.problem, costate_feedforward(gains, wanted, final_state)
+    problem, g = gains.problem, costate_feedforward(gains, reference, final_state)
     x = problem.state(x0).copy()
     forces, predicted = np.empty_like(g), np.empty((len(g), problem.outputs))
     lqr_kernel.simulate(problem.step, gains.gains.K, g, x, forces, predicted)
     return TrackResult(forces, predicted, x)
 
 
-def costate_feedforward(gains: StoredGains, wanted: FloatArray, final_state: FloatArray | None = None) -> FloatArray:
-    """(N, m), N: g of u = g - K x, the feedforward from the remaining trajectory. Linear in `wanted` and `final_state`.
-    Raises TrackingError as `track`."""
+def costate_feedforward(gains: StoredGains, reference: FloatArray, final_state: FloatArray | None = None) -> FloatArray:
+    """(N, m), N: g of u = g - K x, the feedforward from the remaining trajectory. Linear in `reference` and
+    `final_state`. Raises TrackingError as `track`."""
     problem = gains.problem
-    r = require_trajectory(problem, wanted)
+    r = require_trajectory(problem, reference)
     if len(r) != len(gains):
         raise TrackingError(f"the trajectory has {len(r)} samples, but the gains are for {len(gains)}")
     v = gains.terminal_weight @ problem.state(final_state)
     g = np.empty((len(r), problem.inputs))
-    lqr_kernel.feedforward(problem.joined, r @ problem.linear_cost, gains.gains.K, gains.gains.H_inverse, v, g)
+    lqr_kernel.compute_feedforward(problem.joined, r @ problem.linear_cost, gains.gains.K, gains.gains.H_inverse, v, g)
     return g
 
 
@@ -105,8 +105,8 @@ def periodic_state(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
     x = np.zeros(problem.order)
     for force in np.asarray(forces, dtype=np.float64):
         x = problem.A @ x + problem.B @ force
-    around = np.eye(problem.order) - np.linalg.matrix_power(problem.A, len(forces))
-    return np.asarray(np.linalg.solve(around, x))
+    one_period = np.eye(problem.order) - np.linalg.matrix_power(problem.A, len(forces))
+    return np.asarray(np.linalg.solve(one_period, x))
 
 
 def free_decay_weight(problem: TrackingProblem) -> FloatArray:

@@ -43,11 +43,11 @@ played."""
 class PaddedTrack:
     """Tracking of a padded trajectory, and its error with and without the padding played; result of `track_padded`."""
 
-    whole: TrackResult
+    padded: TrackResult
     """Forces and response with padding."""
     rows: slice
     """The trajectory's own rows in `whole`."""
-    whole_error: float
+    padded_error: float
     """Relative rms error in the model's band over the trajectory's rows, if all rows are played."""
     cut_error: float
     """The same error if only the trajectory's rows are played, from rest."""
@@ -55,23 +55,23 @@ class PaddedTrack:
     @property
     def forces(self) -> FloatArray:
         """(N, m), N: forces of the trajectory's own rows."""
-        return self.whole.forces[self.rows]
+        return self.padded.forces[self.rows]
 
 
 def track_padded(
-    problem: TrackingProblem, wanted: FloatArray, padding: Padding | None = None, gains: StoredGains | None = None
+    problem: TrackingProblem, reference: FloatArray, padding: Padding | None = None, gains: StoredGains | None = None
 ) -> PaddedTrack:
-    """Track wanted (N, p), m/s², from rest, with padding; None = `CAUSAL`. gains: for the length with padding; None =
-    computed here. Raises TrackingError for another shape, and where nothing is wanted in the model's band."""
-    r = require_trajectory(problem, wanted)
-    before, after = (padding or CAUSAL).samples(problem.sample_rate_hz)
-    padded = np.pad(r, ((before, after), (0, 0)))
-    whole = track(gains or stored_gains(problem, len(padded)), padded)
-    rows = slice(before, before + len(r))
-    cut = simulate_from_rest(problem, whole.forces[rows])
+    """Track reference (N, p), m/s², from rest, with padding; None = `CAUSAL`. gains: for the length with padding; None
+    = computed here. Raises TrackingError for another shape, and where nothing is wanted in the model's band."""
+    r = require_trajectory(problem, reference)
+    rows_before, rows_after = (padding or CAUSAL).samples(problem.sample_rate_hz)
+    padded = np.pad(r, ((rows_before, rows_after), (0, 0)))
+    padded_track = track(gains or stored_gains(problem, len(padded)), padded)
+    rows = slice(rows_before, rows_before + len(r))
+    cut_response = simulate_from_rest(problem, padded_track.forces[rows])
     rate_hz, band_hz = problem.sample_rate_hz, problem.band_hz
-    whole_error = band_error(r, whole.predicted[rows], rate_hz, band_hz)
-    return PaddedTrack(whole, rows, whole_error, band_error(r, cut, rate_hz, band_hz))
+    whole_error = band_error(r, padded_track.predicted[rows], rate_hz, band_hz)
+    return PaddedTrack(padded_track, rows, whole_error, band_error(r, cut_response, rate_hz, band_hz))
 
 
 def simulate_from_rest(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
@@ -83,18 +83,18 @@ def simulate_from_rest(problem: TrackingProblem, forces: FloatArray) -> FloatArr
     return predicted
 
 
-def band_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> float:
-    """Rms of (played - wanted) over rms of wanted, both (N, p), of their spectra within the band.
+def band_error(reference: FloatArray, delivered: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> float:
+    """Rms of (delivered - reference) over rms of reference, both (N, p), of their spectra within the band.
 
     Raises TrackingError where nothing is wanted in the band.
     """
-    off, level = band_spectrum(played - wanted, rate_hz, band_hz), band_spectrum(wanted, rate_hz, band_hz)
+    error, level = band_spectrum(delivered - reference, rate_hz, band_hz), band_spectrum(reference, rate_hz, band_hz)
     if not np.abs(level).max(initial=0.0) > 0:
         raise TrackingError(
             f"nothing is wanted between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band; "
             "give a trajectory within it, or a model of its band"
         )
-    return float(np.linalg.norm(off) / np.linalg.norm(level))
+    return float(np.linalg.norm(error) / np.linalg.norm(level))
 
 
 def band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:

@@ -27,16 +27,16 @@ class PreviewTracker:
     problem: TrackingProblem
     K: FloatArray
     """(m, n): stationary gains on the state of the simulated model."""
-    ahead: FloatArray
+    preview_gains: FloatArray
     """(M, m, p): weights of the present sample and of the M - 1 samples after it."""
 
     def __len__(self) -> int:
-        return int(self.ahead.shape[0])
+        return int(self.preview_gains.shape[0])
 
-    def step(self, x: FloatArray, known: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Force (m,), N, of this sample, and the next state. x: (n,), the state; known: (M, p), the present sample
+    def step(self, x: FloatArray, previewed: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Force (m,), N, of this sample, and the next state. x: (n,), the state; previewed: (M, p), the present sample
         first."""
-        force = np.einsum("jmp,jp->m", self.ahead, known) - self.K @ x
+        force = np.einsum("jmp,jp->m", self.preview_gains, previewed) - self.K @ x
         return force, self.problem.A @ x + self.problem.B @ force
 
 
@@ -58,22 +58,22 @@ def preview_tracker(problem: TrackingProblem, preview_samples: int) -> PreviewTr
         raise TrackingError(f"the preview is {preview_samples} samples; the present one at least must be known")
     gains = stationary_gains(problem)
     K, H_inverse = gains.K[0], gains.H_inverse[0]
-    closed, linear = _close_loop(problem, K)
-    ahead = np.empty((preview_samples, problem.inputs, problem.outputs))
-    ahead[0] = H_inverse @ problem.linear_cost[:, problem.order :].T
+    closed_loop, linear = _close_loop(problem, K)
+    weights = np.empty((preview_samples, problem.inputs, problem.outputs))
+    weights[0] = H_inverse @ problem.linear_cost[:, problem.order :].T
     for j in range(1, preview_samples):
-        ahead[j] = H_inverse @ problem.B.T @ linear
-        linear = closed.T @ linear
-    return PreviewTracker(problem, K, read_only(ahead))
+        weights[j] = H_inverse @ problem.B.T @ linear
+        linear = closed_loop.T @ linear
+    return PreviewTracker(problem, K, read_only(weights))
 
 
-def stream(tracker: PreviewTracker, wanted: FloatArray, x0: FloatArray | None = None) -> TrackResult:
+def stream(tracker: PreviewTracker, reference: FloatArray, x0: FloatArray | None = None) -> TrackResult:
     """Track a trajectory (N, p), m/s², as a stream, followed by zeros; equal to `step` row by row, but compiled. x0:
     (n,), initial state; None = at rest."""
     problem, M = tracker.problem, len(tracker)
-    r = require_trajectory(problem, wanted)
+    r = require_trajectory(problem, reference)
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(r, ((0, M - 1), (0, 0))), M, axis=0)
-    g = np.ascontiguousarray(np.einsum("jmp,npj->nm", tracker.ahead, windows, optimize=True))
+    g = np.ascontiguousarray(np.einsum("jmp,npj->nm", tracker.preview_gains, windows, optimize=True))
     K = np.repeat(tracker.K[np.newaxis], len(r), axis=0)
     x = problem.state(x0).copy()
     forces, predicted = np.empty_like(g), np.empty_like(r)
@@ -88,9 +88,11 @@ def preview_loss(problem: TrackingProblem, preview_samples: int) -> PreviewLoss:
     low, high = problem.band_hz
     lines_hz = np.linspace(low, high, max(2, round((high - low) / LINE_HZ) + 1))
     z = np.exp(2j * np.pi * lines_hz / problem.sample_rate_hz)
-    played = _compute_closed_response(problem, tracker.K, z)
-    response = np.einsum("lj,jmp->lmp", z[:, np.newaxis] ** np.arange(len(tracker)), tracker.ahead)
-    return PreviewLoss(_relative_error(played @ response), _relative_error(played @ _full_preview(problem, z)))
+    closed_response = _compute_closed_response(problem, tracker.K, z)
+    response = np.einsum("lj,jmp->lmp", z[:, np.newaxis] ** np.arange(len(tracker)), tracker.preview_gains)
+    return PreviewLoss(
+        _relative_error(closed_response @ response), _relative_error(closed_response @ _full_preview(problem, z))
+    )
 
 
 def _close_loop(problem: TrackingProblem, K: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -102,19 +104,23 @@ def _close_loop(problem: TrackingProblem, K: FloatArray) -> tuple[FloatArray, Fl
 def _compute_closed_response(problem: TrackingProblem, K: FloatArray, z: ComplexArray) -> ComplexArray:
     """(lines, p, m): response to forces that are added to -K x. z: (lines,), points of the unit circle."""
     n, p = problem.order, problem.outputs
-    closed = problem.A - problem.B @ K
-    state = np.linalg.solve(z[:, np.newaxis, np.newaxis] * np.eye(n) - closed, problem.B.astype(complex)[np.newaxis])
+    closed_loop = problem.A - problem.B @ K
+    state = np.linalg.solve(
+        z[:, np.newaxis, np.newaxis] * np.eye(n) - closed_loop, problem.B.astype(complex)[np.newaxis]
+    )
     return np.asarray((problem.C[:p] - problem.D[:p] @ K) @ state + problem.D[:p])
 
 
 def _full_preview(problem: TrackingProblem, z: ComplexArray) -> ComplexArray:
     """(lines, m, p): feedforward with unlimited preview; the sum over all future samples is a geometric series."""
     gains = stationary_gains(problem)
-    closed, linear = _close_loop(problem, gains.K[0])
-    turn = z[:, np.newaxis, np.newaxis]
-    costate = turn * np.linalg.solve(np.eye(problem.order) - turn * closed.T, linear.astype(complex)[np.newaxis])
-    now = problem.linear_cost[:, problem.order :].T
-    return np.asarray(gains.H_inverse[0] @ (now + problem.B.T @ costate))
+    closed_loop, linear = _close_loop(problem, gains.K[0])
+    delay_factor = z[:, np.newaxis, np.newaxis]
+    costate = delay_factor * np.linalg.solve(
+        np.eye(problem.order) - delay_factor * closed_loop.T, linear.astype(complex)[np.newaxis]
+    )
+    present_gain = problem.linear_cost[:, problem.order :].T
+    return np.asarray(gains.H_inverse[0] @ (present_gain + problem.B.T @ costate))
 
 
 def _relative_error(delivered: ComplexArray) -> float:

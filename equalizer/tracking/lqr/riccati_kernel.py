@@ -17,26 +17,26 @@ from numba import njit, types
 from equalizer.signals.signal import FloatArray
 
 _MATRIX = types.Array(types.float64, 2, "C", readonly=True)
-_OUT = types.float64[:, ::1]
+_OUTPUT_MATRIX = types.float64[:, ::1]
 _STACK = types.float64[:, :, ::1]
-HALF_OF_THE_DIGITS = float(np.sqrt(np.finfo(np.float64).eps))
+CANCELLATION_LIMIT = float(np.sqrt(np.finfo(np.float64).eps))
 """Ratio of a difference to its minuend below which more than half of the digits are lost by cancellation."""
 
 
-@njit(types.boolean(_OUT, types.int64), cache=True, nogil=True)
+@njit(types.boolean(_OUTPUT_MATRIX, types.int64), cache=True, nogil=True)
 def _eliminate(M: FloatArray, n: int) -> bool:
     """Cholesky factorisation and forward substitution, in place: the last rows of M, [F H], become [W L] with L L' = H
     and L W = F. Of H, only the lower triangle is read. Returns False where H is not positive definite beyond rounding.
     """
     for i in range(n, M.shape[0]):
-        whole = M[i, i]
+        pivot = M[i, i]
         for j in range(n, i):
             for c in range(n, j):
                 M[i, j] -= M[i, c] * M[j, c]
             M[i, j] /= M[j, j]
             M[i, i] -= M[i, j] * M[i, j]
         # A pivot this small, relative to its entry of H, consists of rounding errors.
-        if not M[i, i] > 1e-15 * whole:
+        if not M[i, i] > 1e-15 * pivot:
             return False
         M[i, i] = M[i, i] ** 0.5
         for j in range(n, i):
@@ -47,7 +47,7 @@ def _eliminate(M: FloatArray, n: int) -> bool:
     return True
 
 
-@njit(types.void(_OUT, types.int64, _OUT, _OUT), cache=True, nogil=True)
+@njit(types.void(_OUTPUT_MATRIX, types.int64, _OUTPUT_MATRIX, _OUTPUT_MATRIX), cache=True, nogil=True)
 def _solve(M: FloatArray, n: int, K: FloatArray, H_inverse: FloatArray) -> None:
     """Fill K = L'⁻¹ W, (m, n), and H⁻¹ = L'⁻¹ L⁻¹, (m, m), from the result of `_eliminate`."""
     m = M.shape[0] - n
@@ -70,44 +70,46 @@ def _solve(M: FloatArray, n: int, K: FloatArray, H_inverse: FloatArray) -> None:
             H_inverse[i, c] /= M[n + i, n + i]
 
 
-@njit(types.void(_MATRIX, _MATRIX, _OUT, _OUT), cache=True, nogil=True)
-def _cost_to_go(joined: FloatArray, stage_cost: FloatArray, P: FloatArray, M: FloatArray) -> None:
+@njit(types.void(_MATRIX, _MATRIX, _OUTPUT_MATRIX, _OUTPUT_MATRIX), cache=True, nogil=True)
+def _compute_cost_to_go(AB: FloatArray, stage_cost: FloatArray, P: FloatArray, M: FloatArray) -> None:
     """Fill M = [A B]' P [A B] + stage_cost, (n + m, n + m)."""
-    np.dot(joined.T, np.dot(P, joined), M)
+    np.dot(AB.T, np.dot(P, AB), M)
     M += stage_cost
 
 
-@njit(types.boolean(_OUT, types.int64, _OUT), cache=True, nogil=True)
-def _subtract(M: FloatArray, n: int, P: FloatArray) -> bool:
+@njit(types.boolean(_OUTPUT_MATRIX, types.int64, _OUTPUT_MATRIX), cache=True, nogil=True)
+def _update_weight(M: FloatArray, n: int, P: FloatArray) -> bool:
     """Fill P = M[:n, :n] - W' W, exactly symmetric. Returns False where a diagonal entry lost more than half of its
     digits by cancellation."""
-    kept = True
+    is_accurate = True
     for i in range(n):
-        whole = M[i, i]
+        minuend = M[i, i]
         for j in range(n, M.shape[0]):
             for c in range(i + 1):
                 M[i, c] -= M[j, i] * M[j, c]
         for c in range(i + 1):
             P[i, c] = M[i, c]
             P[c, i] = M[i, c]
-        kept &= P[i, i] >= HALF_OF_THE_DIGITS * whole
-    return kept
+        is_accurate &= P[i, i] >= CANCELLATION_LIMIT * minuend
+    return is_accurate
 
 
-@njit(types.boolean(_MATRIX, _MATRIX, _OUT, _STACK, _STACK), cache=True, nogil=True)
-def backward(joined: FloatArray, stage_cost: FloatArray, P: FloatArray, K: FloatArray, H_inverse: FloatArray) -> bool:
+@njit(types.boolean(_MATRIX, _MATRIX, _OUTPUT_MATRIX, _STACK, _STACK), cache=True, nogil=True)
+def run_backward_recursion(
+    AB: FloatArray, stage_cost: FloatArray, P: FloatArray, K: FloatArray, H_inverse: FloatArray
+) -> bool:
     """Fill K (N, m, n) and H_inverse (N, m, m) backward from the terminal weight P (n, n), which is overwritten by P_0.
 
-    joined: [A B], (n, n + m); stage_cost: (n + m, n + m). Returns False, with incomplete results, where a force has no
+    AB: [A B], (n, n + m); stage_cost: (n + m, n + m). Returns False, with incomplete results, where a force has no
     effect on the cost at some step, or rounding errors matter.
     """
     n, samples = P.shape[0], K.shape[0]
     M = np.empty_like(stage_cost)
     for k in range(samples - 1, -1, -1):
-        _cost_to_go(joined, stage_cost, P, M)
+        _compute_cost_to_go(AB, stage_cost, P, M)
         if not _eliminate(M, n):
             return False
         _solve(M, n, K[k], H_inverse[k])
-        if not _subtract(M, n, P):
+        if not _update_weight(M, n, P):
             return False
     return True

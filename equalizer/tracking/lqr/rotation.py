@@ -40,32 +40,32 @@ class RotationBasis:
 
     def _combine(self, stored: FloatArray, direction: FloatArray, columns: int) -> FloatArray:
         """(N, columns): stored solutions, weighted by the elements of the direction and added."""
-        turned = np.asarray(direction, dtype=np.float64)
-        if turned.shape != self.direction_shape:
-            raise TrackingError(f"a direction has shape {turned.shape}; this basis takes {self.direction_shape}")
-        combined: FloatArray = np.dot(turned.reshape(-1), stored)
+        weights = np.asarray(direction, dtype=np.float64)
+        if weights.shape != self.direction_shape:
+            raise TrackingError(f"a direction has shape {weights.shape}; this basis takes {self.direction_shape}")
+        combined: FloatArray = np.dot(weights.reshape(-1), stored)
         return combined.reshape(-1, columns)
 
 
 def rotation_basis(gains: StoredGains, trajectory: FloatArray) -> RotationBasis:
     """Basis of p * p solutions for every rotation of a trajectory. trajectory: (N, p), m/s², before rotation."""
     p = gains.problem.outputs
-    return _solve_basis(gains, every_rotation(require_trajectory(gains.problem, trajectory)), (p, p))
+    return _solve_basis(gains, axis_trajectories(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
 def normal_basis(gains: StoredGains, recording: FloatArray) -> RotationBasis:
     """Basis of p solutions for every normal. recording: (N,), m/s², to be played along a normal."""
     p = gains.problem.outputs
-    return _solve_basis(gains, every_normal(recording, p), (p,))
+    return _solve_basis(gains, axis_recordings(recording, p), (p,))
 
 
-def every_rotation(trajectory: FloatArray) -> FloatArray:
+def axis_trajectories(trajectory: FloatArray) -> FloatArray:
     """(p * p, N, p): entry i p + j is component j of the trajectory, along axis i."""
     p = trajectory.shape[1]
     return np.array([np.outer(samples, axis) for axis in np.eye(p) for samples in trajectory.T])
 
 
-def every_normal(recording: FloatArray, outputs: int) -> FloatArray:
+def axis_recordings(recording: FloatArray, outputs: int) -> FloatArray:
     """(p, N, p): entry i is the recording along axis i; outputs: p. Raises TrackingError for a recording that is not
     (N,)."""
     samples = np.asarray(recording, dtype=np.float64)
@@ -74,9 +74,9 @@ def every_normal(recording: FloatArray, outputs: int) -> FloatArray:
     return np.array([np.outer(samples, axis) for axis in np.eye(outputs)])
 
 
-def _solve_basis(gains: StoredGains, wanted: FloatArray, direction_shape: tuple[int, ...]) -> RotationBasis:
+def _solve_basis(gains: StoredGains, references: FloatArray, direction_shape: tuple[int, ...]) -> RotationBasis:
     """Basis from the solutions for trajectories (directions, N, p)."""
-    solutions = [track(gains, each) for each in wanted]
+    solutions = [track(gains, reference) for reference in references]
     forces = np.array([solution.forces.ravel() for solution in solutions])
-    answers = np.array([solution.predicted.ravel() for solution in solutions])
-    return RotationBasis(read_only(forces), read_only(answers), gains.problem.inputs, direction_shape)
+    responses = np.array([solution.predicted.ravel() for solution in solutions])
+    return RotationBasis(read_only(forces), read_only(responses), gains.problem.inputs, direction_shape)

@@ -119,11 +119,11 @@ class TrackingProblem:
         x = np.ascontiguousarray(x0, dtype=np.float64)
         if not np.isfinite(x).all():
             raise TrackingError("a state holds values that are not finite numbers")
-        own = self.order - (self.C.shape[0] - self.outputs)
-        if x.shape == (own,) != (self.order,):
-            return np.concatenate((x, np.zeros(self.order - own)))
+        model_order = self.order - (self.C.shape[0] - self.outputs)
+        if x.shape == (model_order,) != (self.order,):
+            return np.concatenate((x, np.zeros(self.order - model_order)))
         if x.shape != (self.order,):
-            raise TrackingError(f"a state has shape {x.shape}; this problem takes ({self.order},) or ({own},)")
+            raise TrackingError(f"a state has shape {x.shape}; this problem takes ({self.order},) or ({model_order},)")
         return x
 
 
@@ -148,10 +148,10 @@ def make_tracking_problem(model: IdentifiedModel, weights: TrackingWeights) -> T
     return TrackingProblem(A, B, C, D, Q, R, p, model.sample_rate_hz, model.band_hz)
 
 
-def require_trajectory(problem: TrackingProblem, wanted: FloatArray) -> FloatArray:
+def require_trajectory(problem: TrackingProblem, reference: FloatArray) -> FloatArray:
     """The trajectory (N, p) as a contiguous array. Raises TrackingError for another shape, no rows, and values that are
     not finite."""
-    r = np.ascontiguousarray(wanted, dtype=np.float64)
+    r = np.ascontiguousarray(reference, dtype=np.float64)
     if r.ndim != 2 or r.shape[1] != problem.outputs or not len(r):
         raise TrackingError(f"the trajectory has shape {r.shape}; this problem takes (N, {problem.outputs}), N >= 1")
     if not np.isfinite(r).all():

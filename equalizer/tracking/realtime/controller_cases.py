@@ -13,10 +13,10 @@ from equalizer.tracking.lqr.changing_direction import play
 from equalizer.tracking.lqr.tracking_problem import TrackingError
 from equalizer.tracking.realtime.realtime_controller import RealtimeController
 
-OF_CAP = 0.9
+CAP_SHARE = 0.9
 """Largest force of a case relative to the cap: below 1, because the action of the cap is not compared."""
 
-AFTER = 50
+TICKS_AFTER = 50
 """Least number of ticks after the last row of the transient, and after the first M ticks of a stream with a preview of
 M samples."""
 
@@ -47,24 +47,25 @@ class ControllerCases:
 
 def controller_cases(controller: RealtimeController, seed: int = 1) -> ControllerCases:
     """Compute reference inputs and forces for as many ticks as the transient has rows or the preview has samples, and
-    `AFTER` more. Raises TrackingError where transient or stream give no force, so that nothing could be compared."""
-    draw, p = np.random.default_rng(seed), controller.problem.outputs
-    ticks = max(len(controller.transient), len(controller.tracker)) + AFTER
-    rotations = np.cumsum(draw.standard_normal((ticks, p, p)), axis=0)
+    `TICKS_AFTER` more. Raises TrackingError where transient or stream give no force, so that nothing could be
+    compared."""
+    random, p = np.random.default_rng(seed), controller.problem.outputs
+    ticks = max(len(controller.transient), len(controller.tracker)) + TICKS_AFTER
+    rotations = np.cumsum(random.standard_normal((ticks, p, p)), axis=0)
     rotations *= _cap_factor(play(controller.transient, rotations).forces, controller.cap_n, "transient")
-    wanted = draw.standard_normal((ticks, p))
-    wanted *= _cap_factor(controller.simulate_stream(wanted)[1].forces, controller.cap_n, "stream")
-    bands, tracked = controller.simulate_stream(wanted)
+    reference = random.standard_normal((ticks, p))
+    reference *= _cap_factor(controller.simulate_stream(reference)[1].forces, controller.cap_n, "stream")
+    bands, track = controller.simulate_stream(reference)
     transient_forces = play(controller.transient, rotations).forces
-    return ControllerCases(rotations, transient_forces, wanted, bands.low, bands.high, tracked.forces)
+    return ControllerCases(rotations, transient_forces, reference, bands.low, bands.high, track.forces)
 
 
-def _cap_factor(forces: FloatArray, cap_n: float, way: str) -> float:
-    """Factor that scales the largest norm of forces (T, m) to `OF_CAP` of the cap. way: transient or stream, for the
-    error. Raises TrackingError for forces of zero."""
+def _cap_factor(forces: FloatArray, cap_n: float, part: str) -> float:
+    """Factor that scales the largest norm of forces (T, m) to `CAP_SHARE` of the cap. part: transient or stream, for
+    the error. Raises TrackingError for forces of zero."""
     longest = float(np.linalg.norm(forces, axis=1).max())
     if not longest >= NO_FORCE * cap_n:
         raise TrackingError(
-            f"the {way} comes to no force: there is nothing to play; give a transient with content in the model's band"
+            f"the {part} comes to no force: there is nothing to play; give a transient with content in the model's band"
         )
-    return OF_CAP * cap_n / longest
+    return CAP_SHARE * cap_n / longest

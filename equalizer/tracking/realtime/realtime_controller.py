@@ -65,16 +65,16 @@ class RealtimeController:
         """Model matrices and cost, common to both controllers."""
         return self.tracker.problem
 
-    def simulate_stream(self, wanted: FloatArray) -> tuple[Bands, TrackResult]:
-        """Simulate a stream of wanted (N, p), m/s², from rest: its bands, and the forces for the middle band.
+    def simulate_stream(self, reference: FloatArray) -> tuple[Bands, TrackResult]:
+        """Simulate a stream of reference (N, p), m/s², from rest: its bands, and the forces for the middle band.
 
-        Row k of the forces belongs to the tick at which row k of `wanted` arrives; the acceleration played at this
+        Row k of the forces belongs to the tick at which row k of `reference` arrives; the acceleration played at this
         tick is that of an earlier row, by the preview less one sample. The cap is not applied here.
         """
-        bands = self.split.split(wanted)
-        late = len(self.tracker) - 1
-        tracked = stream(self.tracker, np.pad(bands.middle, ((late, 0), (0, 0))))
-        return bands, TrackResult(tracked.forces[: len(wanted)], tracked.predicted[: len(wanted)], tracked.final_state)
+        bands = self.split.split(reference)
+        delay_rows = len(self.tracker) - 1
+        track = stream(self.tracker, np.pad(bands.middle, ((delay_rows, 0), (0, 0))))
+        return bands, TrackResult(track.forces[: len(reference)], track.predicted[: len(reference)], track.final_state)
 
 
 def realtime_controller(
@@ -90,14 +90,14 @@ def realtime_controller(
     if not model.order:
         raise TrackingError("the model has no states: its answer is a constant gain, which needs no controller")
     problem = make_tracking_problem(model, TrackingWeights(settings.weight))
-    wanted = tap(model) if transient is None else transient
-    _, after = CAUSAL.samples(model.sample_rate_hz)
-    played = np.pad(np.asarray(wanted, dtype=np.float64), ((0, after), (0, 0)))
+    reference = tap(model) if transient is None else transient
+    _, rows_after = CAUSAL.samples(model.sample_rate_hz)
+    padded_transient = np.pad(np.asarray(reference, dtype=np.float64), ((0, rows_after), (0, 0)))
     preview = max(1, round(settings.preview_s * model.sample_rate_hz))
     return RealtimeController(
         preview_tracker(problem, preview),
         CausalSplit(band_edges(model), model.sample_rate_hz),
-        make_rotatable_transient(stored_gains(problem, len(played)), played),
+        make_rotatable_transient(stored_gains(problem, len(padded_transient)), padded_transient),
         preview_loss(problem, preview),
         settings.cap_n,
     )
@@ -108,7 +108,7 @@ def tap(model: IdentifiedModel) -> FloatArray:
     middle of the model's band."""
     low_hz, high_hz = model.band_hz
     time_s = np.arange(round(TAP_S * model.sample_rate_hz)) / model.sample_rate_hz
-    wanted = np.zeros((len(time_s), model.C.shape[0]))
+    acceleration = np.zeros((len(time_s), model.C.shape[0]))
     middle_hz = (low_hz + high_hz) / 2
-    wanted[:, -1] = np.exp(-time_s / TAP_DECAY_S) * np.sin(2 * np.pi * middle_hz * time_s)
-    return wanted
+    acceleration[:, -1] = np.exp(-time_s / TAP_DECAY_S) * np.sin(2 * np.pi * middle_hz * time_s)
+    return acceleration

@@ -14,13 +14,13 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-BEYOND = 0.12
+BAND_MARGIN = 0.12
 """A resonance may lie this far outside the band, relative: its slope is inside."""
-RESONANT = 0.25
+LARGEST_DAMPING = 0.25
 """Largest damping ratio of what counts as a resonance; the rest is smooth."""
 LEAST_SHARE = 0.04
 """Least share of a resonance in the response, at the line of the band where the resonance is largest."""
-DRIFT = 0.1
+LARGEST_DRIFT = 0.1
 """A start that moves further in the fit, relative, was no resonance."""
 TERMS_PER_OCTAVE = 1.7
 """Number of Chebyshev polynomials in log frequency, per octave, that describe the smooth remainder."""
@@ -62,7 +62,7 @@ class BandLines:
     """(lines, p, m)"""
     size: FloatArray
     """(lines,): Frobenius norm of the response."""
-    inside: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    in_band: np.ndarray[tuple[int], np.dtype[np.bool_]]
     """(lines,): in the band itself."""
 
     @property
@@ -79,7 +79,7 @@ def band_lines(model: IdentifiedModel, band_hz: tuple[float, float]) -> BandLine
     """The model's response on a logarithmic grid of LINES_PER_OCTAVE, over the band and half of BEYOND to either
     side."""
     low, high = band_hz
-    widened = (low * (1 - BEYOND / 2), min(high * (1 + BEYOND / 2), 0.49 * model.sample_rate_hz))
+    widened = (low * (1 - BAND_MARGIN / 2), min(high * (1 + BAND_MARGIN / 2), 0.49 * model.sample_rate_hz))
     count = int(np.ceil(LINES_PER_OCTAVE * np.log2(widened[1] / widened[0])))
     frequency_hz = np.geomspace(*widened, count)
     response = model_response(model, frequency_hz)
@@ -102,10 +102,12 @@ def band_modes(model: IdentifiedModel, band_hz: tuple[float, float]) -> tuple[Ba
             _make_mode(lines, pair, residue, model.sample_rate_hz)
             for pair, residue in zip(fitted, residues, strict=True)
         ]
-        kept = np.array([_is_resonance(mode, start, band_hz) for mode, start in zip(modes, starts, strict=True)])
-        if kept.all():
+        is_resonance = np.array(
+            [_is_resonance(mode, start, band_hz) for mode, start in zip(modes, starts, strict=True)]
+        )
+        if is_resonance.all():
             return tuple(sorted(modes, key=lambda mode: mode.natural_hz))
-        starts = starts[kept]
+        starts = starts[is_resonance]
     return ()
 
 
@@ -119,21 +121,23 @@ def _starts(model: IdentifiedModel, band_hz: tuple[float, float]) -> FloatArray:
     natural, damping = np.abs(continuous) / (2 * np.pi), -continuous.real / np.abs(continuous)
     weight = weight[upper]
     low, high = band_hz
-    near = (damping < RESONANT) & (natural > low * (1 - BEYOND)) & (natural < high * (1 + BEYOND))
-    found: list[tuple[float, float, float]] = []
-    for f, d, w in sorted(zip(natural[near], damping[near], weight[near], strict=True)):
-        if found and f - found[-1][0] < max(d * f, found[-1][0] * found[-1][1]):
-            f0, d0, w0 = found.pop()
+    is_candidate = (
+        (damping < LARGEST_DAMPING) & (natural > low * (1 - BAND_MARGIN)) & (natural < high * (1 + BAND_MARGIN))
+    )
+    merged: list[tuple[float, float, float]] = []
+    for f, d, w in sorted(zip(natural[is_candidate], damping[is_candidate], weight[is_candidate], strict=True)):
+        if merged and f - merged[-1][0] < max(d * f, merged[-1][0] * merged[-1][1]):
+            f0, d0, w0 = merged.pop()
             f, d, w = (w0 * f0 + w * f) / (w0 + w), (w0 * d0 + w * d) / (w0 + w), w0 + w
-        found.append((float(f), float(d), float(w)))
-    return np.array([(f, d) for f, d, _ in found], dtype=np.float64).reshape(-1, 2)
+        merged.append((float(f), float(d), float(w)))
+    return np.array([(f, d) for f, d, _ in merged], dtype=np.float64).reshape(-1, 2)
 
 
 def _fit_modes(lines: BandLines, starts: FloatArray, rate_hz: float) -> tuple[FloatArray, ComplexArray]:
     """Variable projection: poles are searched, residues and remainder are linear. Returns natural frequencies and
     damping ratios (modes, 2), and residues (modes, p, m)."""
     size = lines.size[:, None]
-    wanted = _real_rows((lines.response.reshape(len(size), -1)) / size)
+    target = _real_rows((lines.response.reshape(len(size), -1)) / size)
     smooth = lines.smooth_basis / size
 
     def basis(logs: FloatArray) -> FloatArray:
@@ -142,25 +146,25 @@ def _fit_modes(lines: BandLines, starts: FloatArray, rate_hz: float) -> tuple[Fl
         upper, lower = 1 / (lines.z[:, None] - poles), 1 / (lines.z[:, None] - poles.conj())
         return _real_rows(np.hstack([(upper + lower) / size, 1j * (upper - lower) / size, smooth, 1j * smooth]))
 
-    def left(logs: FloatArray) -> FloatArray:
+    def residual(logs: FloatArray) -> FloatArray:
         orthonormal = np.linalg.qr(basis(logs))[0]
-        return np.asarray(wanted - orthonormal @ (orthonormal.T @ wanted)).ravel()
+        return np.asarray(target - orthonormal @ (orthonormal.T @ target)).ravel()
 
     # A floor under the damping keeps the first pole of a spurious pair from sitting on the circle.
     first = np.log(np.maximum(starts, [0.0, 1e-3]))
-    found = least_squares(left, first.ravel(), method="lm", x_scale=0.01, max_nfev=400)
-    linear = np.linalg.lstsq(basis(found.x), wanted, rcond=None)[0]
+    solution = least_squares(residual, first.ravel(), method="lm", x_scale=0.01, max_nfev=400)
+    linear = np.linalg.lstsq(basis(solution.x), target, rcond=None)[0]
     modes, shape = len(starts), lines.response.shape[1:]
     residues = (linear[:modes] + 1j * linear[modes : 2 * modes]).reshape(modes, *shape)
-    return np.exp(found.x.reshape(-1, 2)), residues
+    return np.exp(solution.x.reshape(-1, 2)), residues
 
 
 def _is_resonance(mode: BandMode, start: FloatArray, band_hz: tuple[float, float]) -> bool:
     low, high = band_hz
     return bool(
-        abs(mode.natural_hz / start[0] - 1) < DRIFT
-        and mode.damping_ratio < RESONANT
-        and low * (1 - BEYOND) < mode.natural_hz < high * (1 + BEYOND)
+        abs(mode.natural_hz / start[0] - 1) < LARGEST_DRIFT
+        and mode.damping_ratio < LARGEST_DAMPING
+        and low * (1 - BAND_MARGIN) < mode.natural_hz < high * (1 + BAND_MARGIN)
         and mode.share >= LEAST_SHARE
     )
 
@@ -169,7 +173,7 @@ def _make_mode(lines: BandLines, pair: FloatArray, residue: ComplexArray, rate_h
     without_share = BandMode(float(pair[0]), min(float(pair[1]), 0.95), residue, 0.0, rate_hz)
     part = np.linalg.norm(without_share.response(lines.z), axis=(1, 2)) / lines.size
     return BandMode(
-        without_share.natural_hz, without_share.damping_ratio, residue, float(part[lines.inside].max()), rate_hz
+        without_share.natural_hz, without_share.damping_ratio, residue, float(part[lines.in_band].max()), rate_hz
     )
 
 

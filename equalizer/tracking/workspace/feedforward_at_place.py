@@ -16,17 +16,17 @@ from equalizer.tracking.lqr.limits import require_under_cap
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
 
-def feedforward_at(at: ModelsAtPlace, wanted: Signal, settings: FeedforwardSettings) -> Feedforward:
+def feedforward_at(at: ModelsAtPlace, reference: Signal, settings: FeedforwardSettings) -> Feedforward:
     """Feedforward at a place: the weighted sum of the forces of all models with a weight. Error and loss are the
     largest of any model's forces, predicted by that model; `predicted` and the other fields are those of the model with
-    the largest weight. wanted: (N, p), m/s². Raises what `feedforward` raises."""
+    the largest weight. reference: (N, p), m/s². Raises what `feedforward` raises."""
     used = select_used_models(at)
     if len(used) == 1:
-        return feedforward(used[0][1], wanted, settings)
+        return feedforward(used[0][1], reference, settings)
     # The sum may be under the cap where the forces of a model are not. Weights are not negative and add up to 1, so the
     # sum is under the cap where those of all models are.
-    each = settings if settings.constrain else replace(settings, cap_n=NO_CAP_N)
-    parts = [(weight, feedforward(model, wanted, each)) for weight, model in used]
+    model_settings = settings if settings.constrain else replace(settings, cap_n=NO_CAP_N)
+    parts = [(weight, feedforward(model, reference, model_settings)) for weight, model in used]
     samples = np.asarray(sum(weight * part.forces.samples for weight, part in parts), dtype=np.float64)
     largest = max(parts, key=lambda part: part[0])[1]
     losses = [part.loss for _, part in parts if part.loss is not None]
@@ -34,7 +34,7 @@ def feedforward_at(at: ModelsAtPlace, wanted: Signal, settings: FeedforwardSetti
         largest,
         forces=replace(largest.forces, samples=samples),
         error=max(part.error for _, part in parts),
-        peaks=require_under_cap(samples, settings.cap_n, wanted.sample_rate_hz),
+        peaks=require_under_cap(samples, settings.cap_n, reference.sample_rate_hz),
         loss=max(losses, key=lambda loss: loss.error_capped, default=None),
     )
 
@@ -53,6 +53,8 @@ def inverse_at(at: ModelsAtPlace, weight: float) -> InverseOfLength:
     def of_length(rows: int) -> Invert:
         """Inverse operator for records of `rows` rows."""
         inverses = [(share, inverse(rows)) for share, inverse in parts]
-        return lambda wanted: np.asarray(sum(share * invert(wanted) for share, invert in inverses), dtype=np.float64)
+        return lambda reference: np.asarray(
+            sum(share * invert(reference) for share, invert in inverses), dtype=np.float64
+        )
 
     return of_length

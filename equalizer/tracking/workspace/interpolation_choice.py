@@ -86,7 +86,7 @@ def choose_interpolation(
     out in turn each model that lies between the others, which tests a coarser grid than the grid in use. Blended forces
     where nothing can be checked or modes do not match. weight: of |force|², (m/s² per N)². Raises WorkspaceError for a
     held-out place at which one of the models was identified, because it would test nothing."""
-    _check_apart(workspace, held_out)
+    _check_distances(workspace, held_out)
     try:
         modal = modal_interpolation(workspace) if len(workspace) > 1 else None
     except ModesDoNotMatchError as error:
@@ -96,7 +96,7 @@ def choose_interpolation(
     checks = tuple(
         [_check_place(workspace, modal, place, weight) for place in held_out]
         if held_out
-        else [_check_place(*left, weight) for left in _leave_one_out(workspace)]
+        else [_check_place(*fold, weight) for fold in _leave_one_out(workspace)]
     )
     return _choose_by_checks(workspace, modal, checks)
 
@@ -123,44 +123,48 @@ def _choose_by_checks(
     return InterpolationChoice("blended forces", f"forces are blended ({numbers})", checks, workspace, None)
 
 
-def _check_apart(workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace]) -> None:
+def _check_distances(workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace]) -> None:
     """Raise WorkspaceError for a held-out place within `OUTSIDE_M` of a model's place."""
     for place in held_out:
-        apart = np.linalg.norm(workspace.places_m - np.array(place.place_m), axis=1)
-        if apart.min() < OUTSIDE_M:
+        distances_m = np.linalg.norm(workspace.places_m - np.array(place.place_m), axis=1)
+        if distances_m.min() < OUTSIDE_M:
             raise WorkspaceError(
-                f"the place held out is that of model {int(apart.argmin()) + 1}; hold out one between the models"
+                f"the place held out is that of model {int(distances_m.argmin()) + 1}; hold out one between the models"
             )
 
 
 def _leave_one_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]]:
     """For each model inside the convex hull of the others: the others, their modal interpolation (None where modes do
     not match), and the model as reference. Empty for fewer than three models."""
-    found: list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]] = []
+    folds: list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]] = []
     for index, model in enumerate(workspace.models):
         if len(workspace) < 3:
             break
-        rest = workspace.without(index)
-        if place_weights(rest.places_m, workspace.places_m[index]).outside_m > OUTSIDE_M:
+        other_models = workspace.without_model(index)
+        if place_weights(other_models.places_m, workspace.places_m[index]).outside_m > OUTSIDE_M:
             continue
         try:
-            modal: ModalInterpolation | None = modal_interpolation(rest)
+            modal: ModalInterpolation | None = modal_interpolation(other_models)
         except ModesDoNotMatchError:
             modal = None
-        found.append((rest, modal, held_out_model(model, workspace.band_hz)))
-    return found
+        folds.append((other_models, modal, held_out_model(model, workspace.band_hz)))
+    return folds
 
 
 def _check_place(
     workspace: WorkspaceModels, modal: ModalInterpolation | None, place: HeldOutPlace, weight: float
 ) -> PlaceCheck:
     """Quality and error of both interpolations at a held-out place."""
-    blended = _compute_equalized_response(blend_at(workspace, place.place_m), place, weight)
+    blended_response = _compute_equalized_response(blend_at(workspace, place.place_m), place, weight)
     if modal is None:
-        return PlaceCheck(place.place_m, measure_quality(blended), None, _rms_error(blended), None)
-    moved = _compute_equalized_response(modal.at(place.place_m), place, weight)
+        return PlaceCheck(place.place_m, measure_quality(blended_response), None, _rms_error(blended_response), None)
+    modal_response = _compute_equalized_response(modal.at(place.place_m), place, weight)
     return PlaceCheck(
-        place.place_m, measure_quality(blended), measure_quality(moved), _rms_error(blended), _rms_error(moved)
+        place.place_m,
+        measure_quality(blended_response),
+        measure_quality(modal_response),
+        _rms_error(blended_response),
+        _rms_error(modal_response),
     )
 
 

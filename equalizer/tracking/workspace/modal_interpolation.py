@@ -77,21 +77,21 @@ def _track_modes(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]
     """Modes of each resonance in all models, followed from neighbour to neighbour along the minimum spanning tree of
     the places. Resonances that are not in every model are left out."""
     places = workspace.places_m
-    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
-    net = minimum_spanning_tree(apart)
-    order, before = breadth_first_order(net, 0, directed=False)
-    found: dict[int, dict[int, int]] = {start: {0: start} for start in range(len(modes[0]))}
+    distances_m = np.linalg.norm(places[:, None] - places[None], axis=2)
+    tree = minimum_spanning_tree(distances_m)
+    order, predecessors = breadth_first_order(tree, 0, directed=False)
+    mode_tracks: dict[int, dict[int, int]] = {start: {0: start} for start in range(len(modes[0]))}
     for node in order[1:]:
-        nearer = int(before[node])
+        parent = int(predecessors[node])
         try:
-            pairs = dict(match_modes(modes[nearer], modes[node], workspace.band_hz))
+            pairs = dict(match_modes(modes[parent], modes[node], workspace.band_hz))
         except ModesDoNotMatchError as error:
-            raise ModesDoNotMatchError(f"models {nearer + 1} (first) and {node + 1} (second): {error}") from error
-        for track in found.values():
-            if track.get(nearer) in pairs:
-                track[int(node)] = pairs[track[nearer]]
-    whole = [track for track in found.values() if len(track) == len(modes)]
-    return tuple(tuple(modes[k][track[k]] for k in range(len(modes))) for track in whole)
+            raise ModesDoNotMatchError(f"models {parent + 1} (first) and {node + 1} (second): {error}") from error
+        for track in mode_tracks.values():
+            if track.get(parent) in pairs:
+                track[int(node)] = pairs[track[parent]]
+    complete_tracks = [track for track in mode_tracks.values() if len(track) == len(modes)]
+    return tuple(tuple(modes[k][track[k]] for k in range(len(modes))) for track in complete_tracks)
 
 
 def _interpolate_mode(track: Sequence[BandMode], weights: FloatArray) -> BandMode:
@@ -115,20 +115,22 @@ def _rank(residue: ComplexArray) -> int:
 
 
 def _assemble_model(
-    prepared: ModalInterpolation, modes: Sequence[BandMode], remainder: ComplexArray, size: FloatArray
+    interpolation: ModalInterpolation, modes: Sequence[BandMode], remainder: ComplexArray, size: FloatArray
 ) -> tuple[IdentifiedModel, float]:
     """State-space model of resonances and remainder, (lines, p, m), which is fitted by least squares with fixed real
     poles; and the largest error of that fit relative to size, (lines,), the norm of the total response."""
-    first, lines = prepared.workspace.models[0], prepared.lines
-    poles = _smooth_poles(prepared.workspace.band_hz, first.sample_rate_hz)
+    first, lines = interpolation.workspace.models[0], interpolation.lines
+    poles = _smooth_poles(interpolation.workspace.band_hz, first.sample_rate_hz)
     basis = np.hstack([(1 - poles) / (lines.z[:, None] - poles), np.ones((len(lines.z), 1))]) / size[:, None]
-    wanted = remainder.reshape(len(size), -1) / size[:, None]
+    target = remainder.reshape(len(size), -1) / size[:, None]
     real_basis = np.vstack([basis.real, basis.imag])
     scale = np.linalg.norm(real_basis, axis=0)
-    solved = np.linalg.lstsq(real_basis / scale, np.vstack([wanted.real, wanted.imag]), rcond=1e-7)[0] / scale[:, None]
-    error = float(np.linalg.norm(basis @ solved - wanted, axis=1).max())
+    coefficients = (
+        np.linalg.lstsq(real_basis / scale, np.vstack([target.real, target.imag]), rcond=1e-7)[0] / scale[:, None]
+    )
+    error = float(np.linalg.norm(basis @ coefficients - target, axis=1).max())
     p, m = remainder.shape[1:]
-    gains = solved.reshape(len(poles) + 1, p, m)
+    gains = coefficients.reshape(len(poles) + 1, p, m)
     blocks = [_realise_mode(mode) for mode in modes]
     A = block_diag(*(block[0] for block in blocks), np.kron(np.diag(poles), np.eye(m)))
     B = np.vstack(
@@ -137,11 +139,11 @@ def _assemble_model(
     C = np.hstack([*(block[2] for block in blocks), *gains[:-1]])
     provenance = {
         "method": "modal interpolation",
-        "places_m": prepared.workspace.places_m.tolist(),
+        "places_m": interpolation.workspace.places_m.tolist(),
         "resonances_hz": [mode.natural_hz for mode in modes],
         "worst_relative_error": error,
     }
-    band_hz = prepared.workspace.band_hz
+    band_hz = interpolation.workspace.band_hz
     return replace(
         first, A=A, B=B, C=C, D=gains[-1], band_hz=band_hz, covariance=None, samples=None, provenance=provenance
     ), error
@@ -160,8 +162,8 @@ def _realise_mode(mode: BandMode) -> tuple[FloatArray, FloatArray, FloatArray]:
     u, s, v = np.linalg.svd(mode.residue)
     rank = int((s > 1e-9 * s[0]).sum())
     p = mode.pole
-    turn = np.array([[p.real, p.imag], [-p.imag, p.real]])
-    A = np.kron(np.eye(rank), turn)
+    rotation = np.array([[p.real, p.imag], [-p.imag, p.real]])
+    A = np.kron(np.eye(rank), rotation)
     shapes, inputs = u[:, :rank] * np.sqrt(s[:rank]), np.sqrt(s[:rank])[:, None] * v[:rank]
     B = np.concatenate([np.stack([2 * row.real, -2 * row.imag]) for row in inputs])
     C = np.hstack([np.column_stack([column.real, column.imag]) for column in shapes.T])

@@ -15,7 +15,7 @@ from scipy.spatial import Delaunay
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.workspace.workspace_models import Place
 
-FLAT = 0.05
+FLATNESS = 0.05
 """Spread of the points in a principal direction, relative to the largest (ratio of singular values), below which that
 direction is ignored: otherwise the triangulation of hand-placed points, which lie on a line or surface only nearly,
 would have slivers that join distant points."""
@@ -25,7 +25,7 @@ SUM_TO_ONE = 1e6
 """Factor of the equation sum(w) = 1 in the least-squares search for the nearest point of the hull; the other equations
 are distances of order 1."""
 
-BEND = 0.35
+MULTIQUADRIC_SHAPE = 0.35
 """Shape parameter epsilon of the multiquadrics sqrt(1 + (epsilon r)^2), times the distance r between neighbours: the
 smaller, the closer they are to parabolas."""
 ROUNDING = 1e-6
@@ -62,34 +62,36 @@ def place_weights(points_m: FloatArray, place_m: Place | FloatArray) -> PlaceWei
     points = np.asarray(points_m, dtype=np.float64)
     place = np.asarray(place_m, dtype=np.float64)
     if len(points) == 1:
-        alone = np.ones(1)
-        return PlaceWeights(alone, alone, float(np.linalg.norm(place - points[0])))
+        single_weight = np.ones(1)
+        return PlaceWeights(single_weight, single_weight, float(np.linalg.norm(place - points[0])))
     centre = points.mean(axis=0)
     scale = float(np.linalg.norm(points - centre, axis=1).max())
-    flat = _spread_directions(points - centre)
-    spread, wanted = (points - centre) @ flat.T / scale, flat @ (place - centre) / scale
-    inside = _nearest_in_hull(spread, wanted)
-    nearest = inside @ flat * scale + centre
-    outside_m = float(np.linalg.norm(place - nearest))
-    return PlaceWeights(_linear_weights(spread, inside), _smooth_weights(spread, inside), outside_m)
+    directions = _spread_directions(points - centre)
+    projected_points, projected_place = (points - centre) @ directions.T / scale, directions @ (place - centre) / scale
+    nearest_place = _nearest_in_hull(projected_points, projected_place)
+    nearest_m = nearest_place @ directions * scale + centre
+    outside_m = float(np.linalg.norm(place - nearest_m))
+    return PlaceWeights(
+        _linear_weights(projected_points, nearest_place), _smooth_weights(projected_points, nearest_place), outside_m
+    )
 
 
 def _spread_directions(offsets: FloatArray) -> FloatArray:
     """(dimensions, 3): principal directions of the offsets (points, 3), by singular value decomposition. Directions
-    with little spread (`FLAT`) are left out, unless two points would coincide, or nearly, without them."""
+    with little spread (`FLATNESS`) are left out, unless two points would coincide, or nearly, without them."""
     _, spreads, directions = np.linalg.svd(offsets, full_matrices=False)
-    rank = int((spreads > FLAT * spreads[0]).sum())
-    full = int((spreads > 1e-9 * spreads[0]).sum())
-    whole = _smallest_distance(offsets)
-    while rank < full and _smallest_distance(offsets @ directions[:rank].T) < 0.5 * whole:
+    rank = int((spreads > FLATNESS * spreads[0]).sum())
+    full_rank = int((spreads > 1e-9 * spreads[0]).sum())
+    full_distance = _smallest_distance(offsets)
+    while rank < full_rank and _smallest_distance(offsets @ directions[:rank].T) < 0.5 * full_distance:
         rank += 1
     return np.asarray(directions[:rank])
 
 
 def _smallest_distance(points: FloatArray) -> float:
     """Smallest distance between two of the points (points, dimensions)."""
-    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
-    return float(apart[np.triu_indices(len(points), 1)].min())
+    distances = np.linalg.norm(points[:, None] - points[None], axis=2)
+    return float(distances[np.triu_indices(len(points), 1)].min())
 
 
 def _nearest_in_hull(points: FloatArray, place: FloatArray) -> FloatArray:
@@ -106,8 +108,10 @@ def _linear_weights(points: FloatArray, place: FloatArray) -> FloatArray:
     count, dimensions = points.shape
     if dimensions == 1:
         order = np.argsort(points[:, 0])
-        along = points[order, 0]
-        shares = np.array([np.interp(place[0], along, each) for each in np.eye(count)[:, order]])
+        sorted_positions = points[order, 0]
+        shares = np.array(
+            [np.interp(place[0], sorted_positions, unit_values) for unit_values in np.eye(count)[:, order]]
+        )
         shares[shares < ROUNDING] = 0.0
         return np.asarray(shares / shares.sum())
     mesh = Delaunay(points)
@@ -129,7 +133,9 @@ def _smooth_weights(points: FloatArray, place: FloatArray) -> FloatArray:
     """(points,): cardinal functions of multiquadric radial basis functions with a linear part, so wide that they are
     nearly parabolas through three points. A natural cubic spline is not used: its curvature vanishes at the outer
     points, where that of a device's parameters need not."""
-    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
-    nearest = np.median(np.partition(apart, 1, axis=1)[:, 1])
-    cardinal = RBFInterpolator(points, np.eye(len(points)), kernel="multiquadric", epsilon=BEND / nearest, degree=1)
+    distances = np.linalg.norm(points[:, None] - points[None], axis=2)
+    nearest = np.median(np.partition(distances, 1, axis=1)[:, 1])
+    cardinal = RBFInterpolator(
+        points, np.eye(len(points)), kernel="multiquadric", epsilon=MULTIQUADRIC_SHAPE / nearest, degree=1
+    )
     return np.asarray(cardinal(place[None])[0])

@@ -35,7 +35,7 @@ class WorkspaceModels:
         if not self.models:
             raise WorkspaceError("no model was given; at least one is needed")
         for number, model in enumerate(self.models, start=1):
-            _check_alike(self.models[0], model, number)
+            _check_compatible(self.models[0], model, number)
         if len(self.models) > 1:
             _check_places(self.models)
         low, high = self.band_hz
@@ -56,22 +56,22 @@ class WorkspaceModels:
         """Lower and upper end of the band that all models cover."""
         return max(model.band_hz[0] for model in self.models), min(model.band_hz[1] for model in self.models)
 
-    def without(self, index: int) -> "WorkspaceModels":
+    def without_model(self, index: int) -> "WorkspaceModels":
         """All models except that of an index, from 0. Raises WorkspaceError for a single model."""
         return WorkspaceModels(self.models[:index] + self.models[index + 1 :])
 
 
-def _check_alike(first: IdentifiedModel, model: IdentifiedModel, number: int) -> None:
+def _check_compatible(first: IdentifiedModel, model: IdentifiedModel, number: int) -> None:
     """Check a model against the first. number: of the model, from 1, for the message. Raises WorkspaceError."""
-    for what, each, other in (
+    for property_name, first_value, value in (
         ("sample rate", first.sample_rate_hz, model.sample_rate_hz),
         ("input channels", first.input_channels, model.input_channels),
         ("output channels", first.output_channels, model.output_channels),
         ("input unit", first.input_unit, model.input_unit),
         ("output unit", first.output_unit, model.output_unit),
     ):
-        if each != other:
-            raise WorkspaceError(f"model {number} has the {what} {other}, but the first has {each}")
+        if first_value != value:
+            raise WorkspaceError(f"model {number} has the {property_name} {value}, but the first has {first_value}")
     if model.spectral_radius >= 1:
         raise WorkspaceError(f"model {number} is not stable, so nothing can be played through it; identify it again")
 
@@ -85,7 +85,7 @@ def _check_places(models: tuple[IdentifiedModel, ...]) -> None:
             "record with --place X Y Z, and identify again"
         )
     places = np.array([model.place_m for model in models], dtype=np.float64)
-    apart = np.linalg.norm(places[:, None] - places[None], axis=2) + np.eye(len(places))
-    first, second = np.unravel_index(int(apart.argmin()), apart.shape)
-    if apart[first, second] < SAME_PLACE_M:
+    distances_m = np.linalg.norm(places[:, None] - places[None], axis=2) + np.eye(len(places))
+    first, second = np.unravel_index(int(distances_m.argmin()), distances_m.shape)
+    if distances_m[first, second] < SAME_PLACE_M:
         raise WorkspaceError(f"models {first + 1} and {second + 1} were identified at the same place; give one of them")

@@ -14,8 +14,8 @@ GRAVITY_MPS2 = 9.80665
 """Standard gravity (m/s^2)."""
 
 POSITIONS = ("+x up", "-x up", "+y up", "-y up", "+z up", "-z up")
-"""Names of the positions, by the axis that points up, in the order of the rows of `UP`."""
-UP = np.kron(np.eye(3), np.array([[1.0], [-1.0]]))
+"""Names of the positions, by the axis that points up, in the order of the rows of `UP_DIRECTIONS`."""
+UP_DIRECTIONS = np.kron(np.eye(3), np.array([[1.0], [-1.0]]))
 """(6, 3): unit vector along the axis that points up, in each position."""
 
 WORST_RESIDUAL = 0.05
@@ -43,15 +43,15 @@ class Calibration:
 
     def acceleration(self, raw: FloatArray) -> FloatArray:
         """Acceleration (n, 3) or (3,) in m/s², gravity included, of raw values of the same shape."""
-        turned = np.linalg.solve(self.sensitivity, (np.asarray(raw, dtype=np.float64) - self.bias).T)
-        return np.asarray(turned.T, dtype=np.float64)
+        by_column = np.linalg.solve(self.sensitivity, (np.asarray(raw, dtype=np.float64) - self.bias).T)
+        return np.asarray(by_column.T, dtype=np.float64)
 
     @property
     def cross_axis(self) -> float:
         """Largest cross-axis sensitivity of a channel, relative to its sensitivity to its own axis."""
-        of_own = np.abs(np.diag(self.sensitivity))
-        others = np.abs(self.sensitivity - np.diag(np.diag(self.sensitivity)))
-        return float((others / of_own[:, None]).max())
+        main_axis = np.abs(np.diag(self.sensitivity))
+        cross_terms = np.abs(self.sensitivity - np.diag(np.diag(self.sensitivity)))
+        return float((cross_terms / main_axis[:, None]).max())
 
 
 def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
@@ -64,13 +64,13 @@ def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
     if len(positions) != len(POSITIONS) or any(len(samples) < 2 for samples in positions):
         raise ValueError(f"{len(POSITIONS)} positions are needed, each with two samples or more")
     means = np.array([np.mean(samples, axis=0) for samples in positions])
-    known = np.hstack((GRAVITY_MPS2 * UP, np.ones((len(UP), 1))))
-    solution = np.linalg.lstsq(known, means, rcond=None)[0]
+    design_matrix = np.hstack((GRAVITY_MPS2 * UP_DIRECTIONS, np.ones((len(UP_DIRECTIONS), 1))))
+    solution = np.linalg.lstsq(design_matrix, means, rcond=None)[0]
     sensitivity, bias = solution[:3].T, solution[3]
     scale = float(np.linalg.norm(sensitivity, 2))
     if not scale > 0:
         raise ValueError("no channel responds to gravity: check the wiring")
-    misfit_g = np.linalg.norm(means - known @ solution, axis=1) / (scale * GRAVITY_MPS2)
+    misfit_g = np.linalg.norm(means - design_matrix @ solution, axis=1) / (scale * GRAVITY_MPS2)
     worst = int(np.argmax(misfit_g))
     if misfit_g[worst] > WORST_RESIDUAL:
         raise ValueError(f"'{POSITIONS[worst]}' is off by {misfit_g[worst]:.2f} g: lay the sensor down again")

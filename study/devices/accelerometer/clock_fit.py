@@ -48,13 +48,13 @@ def fit_clock(device_s: FloatArray, arrived_s: FloatArray) -> ClockFit:
     if len(device) < 2 or not (np.diff(device) > 0).all() or not np.isfinite(arrived).all():
         raise ValueError("a clock needs two samples or more, with device times that rise")
     # Both intervals since the first sample are nearly equal; their difference is fitted, for numerical precision.
-    behind = (arrived - arrived[0]) - (device - device[0])
-    hull = _lower_hull(device - device[0], behind)
-    middle = float(np.mean(device - device[0]))
-    right = int(np.searchsorted(device[hull] - device[0], middle).clip(1, len(hull) - 1))
-    first, second = hull[right - 1], hull[right]
-    slope = float((behind[second] - behind[first]) / (device[second] - device[first]))
-    at_host_s = float(arrived[0] + behind[first] + (device[first] - device[0]))
+    excess_delay_s = (arrived - arrived[0]) - (device - device[0])
+    hull = _lower_hull(device - device[0], excess_delay_s)
+    mean_device_s = float(np.mean(device - device[0]))
+    edge_end = int(np.searchsorted(device[hull] - device[0], mean_device_s).clip(1, len(hull) - 1))
+    first, second = hull[edge_end - 1], hull[edge_end]
+    slope = float((excess_delay_s[second] - excess_delay_s[first]) / (device[second] - device[first]))
+    at_host_s = float(arrived[0] + excess_delay_s[first] + (device[first] - device[0]))
     fit = ClockFit(float(device[first]), at_host_s, 1.0 + slope, 0.0)
     return ClockFit(fit.at_device_s, at_host_s, fit.rate, float((arrived - fit.host_s(device)).max()))
 
@@ -63,12 +63,12 @@ def _lower_hull(x: FloatArray, y: FloatArray) -> list[int]:
     """Indices of the corners of the lower convex hull, from left to right; x rises (monotone chain)."""
     hull: list[int] = []
     for k in range(len(x)):
-        while len(hull) > 1 and _not_left(x, y, hull[-2], hull[-1], k):
+        while len(hull) > 1 and _is_above_chord(x, y, hull[-2], hull[-1], k):
             hull.pop()
         hull.append(k)
     return hull
 
 
-def _not_left(x: FloatArray, y: FloatArray, a: int, b: int, c: int) -> bool:
+def _is_above_chord(x: FloatArray, y: FloatArray, a: int, b: int, c: int) -> bool:
     """Whether point b lies on or above the chord from a to c, and so is no corner of the lower hull."""
     return bool((x[b] - x[a]) * (y[c] - y[a]) <= (y[b] - y[a]) * (x[c] - x[a]))

@@ -12,7 +12,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.samples import Counts, Samples
 
-KEPT_S = 300.0
+BUFFER_S = 300.0
 """Time (s) for which samples are kept after their arrival: room for a long recording and for the minutes before it to
 which the clock is fitted."""
 
@@ -32,10 +32,10 @@ class Table:
     def append(self, rows: FloatArray) -> None:
         """Append rows (k, columns). Only when the array is full is it replaced by one of twice the needed length."""
         if self._end + len(rows) > len(self._rows):
-            kept = self.rows
-            roomier = np.zeros((max(1024, 2 * (len(kept) + len(rows))), self._rows.shape[1]))
-            roomier[: len(kept)] = kept
-            self._rows, self._from, self._end = roomier, 0, len(kept)
+            present_rows = self.rows
+            enlarged_rows = np.zeros((max(1024, 2 * (len(present_rows) + len(rows))), self._rows.shape[1]))
+            enlarged_rows[: len(present_rows)] = present_rows
+            self._rows, self._from, self._end = enlarged_rows, 0, len(present_rows)
         self._rows[self._end : self._end + len(rows)] = rows
         self._end += len(rows)
 
@@ -64,13 +64,13 @@ class ArrivedSamples:
 
 
 class History:
-    """Samples of the last `KEPT_S` seconds and their arrivals, behind a lock; all times are in seconds."""
+    """Samples of the last `BUFFER_S` seconds and their arrivals, behind a lock; all times are in seconds."""
 
     def __init__(self) -> None:
         self._samples, self._arrivals = Table(5), Table(7)
         """Columns of a sample: device time (s), restarts, three raw values. Columns of an arrival: host time (s),
         number of all samples up to it, newest device time (s), and the four numbers of `Counts`."""
-        self._taken = 0
+        self._dropped = 0
         """Number of samples that were dropped."""
         self._lock = threading.Lock()
 
@@ -81,40 +81,49 @@ class History:
         rows = np.column_stack((device_s, samples.restarts, samples.raw))
         with self._lock:
             self._samples.append(rows)
-            until = self._taken + len(self._samples.rows)
-            new = (arrived_s, until, device_s[-1], counts.packets, counts.lost, counts.spoiled_bytes, counts.restarts)
-            self._arrivals.append(np.array([new], dtype=np.float64))
-            self._forget(arrived_s - KEPT_S)
+            sample_count = self._dropped + len(self._samples.rows)
+            arrival = (
+                arrived_s,
+                sample_count,
+                device_s[-1],
+                counts.packets,
+                counts.lost,
+                counts.spoiled_bytes,
+                counts.restarts,
+            )
+            self._arrivals.append(np.array([arrival], dtype=np.float64))
+            self._drop_outdated(arrived_s - BUFFER_S)
 
-    def counted(self, since_s: float) -> Counts:
-        """Counts since `since_s`: differences from the last arrival before that time to the newest arrival."""
+    def count_since(self, since_s: float) -> Counts:
+        """Counts since `since_s`: differences from the last arrival before that time, or else the first arrival that is
+        kept, to the newest arrival; zeros without arrivals."""
         with self._lock:
             arrivals = self._arrivals.rows
             if not len(arrivals):
                 return Counts()
-            before = max(0, int(np.searchsorted(arrivals[:, 0], since_s)) - 1)
-            counted = arrivals[-1, 3:] - arrivals[before, 3:]
-        return Counts(*(int(count) for count in counted))
+            reference_row = max(0, int(np.searchsorted(arrivals[:, 0], since_s)) - 1)
+            differences = arrivals[-1, 3:] - arrivals[reference_row, 3:]
+        return Counts(*(int(count) for count in differences))
 
-    def stretch(self, from_s: float, until_s: float) -> ArrivedSamples:
+    def select_interval(self, from_s: float, until_s: float) -> ArrivedSamples:
         """Arrivals from from_s until before until_s, by the host's clock (s), with all of their samples."""
         with self._lock:
             arrivals = self._arrivals.rows
             first, end = np.searchsorted(arrivals[:, 0], (from_s, until_s))
-            begin = int(arrivals[first - 1, 1]) - self._taken if first else 0
-            stop = int(arrivals[end - 1, 1]) - self._taken if end else 0
-            samples, arrivals = self._samples.rows[begin:stop].copy(), arrivals[first:end].copy()
+            first_sample = int(arrivals[first - 1, 1]) - self._dropped if first else 0
+            end_sample = int(arrivals[end - 1, 1]) - self._dropped if end else 0
+            samples, arrivals = self._samples.rows[first_sample:end_sample].copy(), arrivals[first:end].copy()
         return ArrivedSamples(
             samples[:, 0], samples[:, 1], samples[:, 2:], arrivals[:, 2], arrivals[:, 6], arrivals[:, 0]
         )
 
-    def _forget(self, before_s: float) -> None:
+    def _drop_outdated(self, before_s: float) -> None:
         """Drop what arrived before before_s, once it exceeds a tenth of all arrivals. The last arrival before that time
         is kept, without its samples: it gives the index of the next arrival's first sample."""
         arrivals = self._arrivals.rows
-        old = int(np.searchsorted(arrivals[:, 0], before_s)) - 1
-        if old > 0.1 * len(arrivals):
-            dropped = int(arrivals[old, 1]) - self._taken
+        outdated = int(np.searchsorted(arrivals[:, 0], before_s)) - 1
+        if outdated > 0.1 * len(arrivals):
+            dropped = int(arrivals[outdated, 1]) - self._dropped
             self._samples.drop(dropped)
-            self._arrivals.drop(old)
-            self._taken += dropped
+            self._arrivals.drop(outdated)
+            self._dropped += dropped

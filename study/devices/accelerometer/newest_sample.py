@@ -12,11 +12,11 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 
-FRESH_S = 0.05
+MAX_AGE_S = 0.05
 """Age in s above which a sample no longer counts: fifty ticks of the control loop, and longer than a thread waits for
 its turn on a busy computer."""
 
-COUNT, REST, ROWS = 0, 1, 16
+COUNT, REST_ACCELERATION, ROWS = 0, 1, 16
 """Columns of the first row: number of samples so far, first of three for the acceleration at rest. ROWS: number of
 further rows, the ring of samples."""
 TAKEN_S, SENSED, CLIPPED, WIDTH = 0, 1, 4, 5
@@ -25,14 +25,14 @@ a channel was at its limit. WIDTH: number of columns."""
 
 
 class NewestSample:
-    """Ring buffer of samples. Only one thread may call `put`; any thread may read."""
+    """Ring buffer of samples. Only one thread may call `add_sample`; any thread may read."""
 
     def __init__(self) -> None:
         self.rows: FloatArray = np.zeros((1 + ROWS, WIDTH))
         """(1 + ROWS, WIDTH): counter and rest acceleration, then the ring."""
         self._barrier = threading.Lock()
 
-    def put(self, taken_s: float, acceleration: FloatArray, clipped: bool) -> None:
+    def add_sample(self, taken_s: float, acceleration: FloatArray, clipped: bool) -> None:
         """Add a sample. taken_s: time of arrival by `time.monotonic`; acceleration: (3,), m/s², as sensed;
         clipped: whether a channel is at its limit."""
         count = self.rows[0, COUNT]
@@ -49,14 +49,14 @@ class NewestSample:
                 return row
         return None
 
-    def count_as_none(self, acceleration: FloatArray) -> None:
-        """Set the reading at rest (3,), m/s², which `fresh` subtracts (such as gravity and offset)."""
-        self.rows[0, REST : REST + 3] = acceleration
+    def set_rest(self, acceleration: FloatArray) -> None:
+        """Set the reading at rest (3,), m/s², which `read_zeroed` subtracts (such as gravity and offset)."""
+        self.rows[0, REST_ACCELERATION : REST_ACCELERATION + 3] = acceleration
 
-    def fresh(self, now_s: float) -> tuple[FloatArray, bool]:
-        """Acceleration less the reading at rest, (3,), m/s², NaN without a sample younger than `FRESH_S`; and whether a
-        channel is at its limit. now_s: by `time.monotonic`."""
+    def read_zeroed(self, now_s: float) -> tuple[FloatArray, bool]:
+        """Acceleration less the reading at rest, (3,), m/s², NaN without a sample younger than `MAX_AGE_S`; and whether
+        a channel is at its limit. now_s: by `time.monotonic`."""
         row = self.latest()
-        if row is None or now_s - row[TAKEN_S] > FRESH_S:
+        if row is None or now_s - row[TAKEN_S] > MAX_AGE_S:
             return np.full(3, np.nan), False
-        return row[SENSED : SENSED + 3] - self.rows[0, REST : REST + 3], bool(row[CLIPPED])
+        return row[SENSED : SENSED + 3] - self.rows[0, REST_ACCELERATION : REST_ACCELERATION + 3], bool(row[CLIPPED])

@@ -41,7 +41,7 @@ LAYOUT = np.dtype(
 """Fields of a packet, as in the table above."""
 
 
-def crc_of(rows: Bytes) -> npt.NDArray[np.uint16]:
+def compute_crc(rows: Bytes) -> npt.NDArray[np.uint16]:
     """(n,): CRC-16/CCITT-FALSE of each row of bytes (n, k), byte by byte with a table."""
     crc = np.full(len(rows), START, dtype=np.uint16)
     for column in rows.T:
@@ -49,7 +49,7 @@ def crc_of(rows: Bytes) -> npt.NDArray[np.uint16]:
     return crc
 
 
-def _table() -> npt.NDArray[np.uint16]:
+def _make_crc_table() -> npt.NDArray[np.uint16]:
     """The table `_TABLE`: eight steps of the shift register for each value of a byte, most significant bit first."""
     table = np.arange(256, dtype=np.uint32) << 8
     for _ in range(8):
@@ -57,7 +57,7 @@ def _table() -> npt.NDArray[np.uint16]:
     return table.astype(np.uint16)
 
 
-_TABLE = _table()
+_TABLE = _make_crc_table()
 """(256,): change of the CRC register by each value of a byte."""
 
 
@@ -80,7 +80,7 @@ CONFIRMED_BY = 2
 """Number of earlier doubtful packets that a packet with an unexpected number or time must follow to count (1
 for the first packets of a stream). Two false packets may follow each other by chance, three in practice do not."""
 
-MOST_DOUBTFUL = 8
+MAX_UNCONFIRMED = 8
 """Largest number of doubtful packets that are kept, the newest: more than occur by chance."""
 
 Indices = npt.NDArray[np.intp]
@@ -88,12 +88,12 @@ Packets = npt.NDArray[np.void]
 """Packets as an array of `LAYOUT`."""
 
 
-class _Found(NamedTuple):
+class _CandidatePacket(NamedTuple):
     """A packet with a correct checksum."""
 
     packet: Packets
     """The packet, shape (1,)."""
-    at: int
+    start: int
     """Index of its first byte in all bytes received."""
 
 
@@ -102,10 +102,10 @@ class PacketParser:
     packets. Bytes of packets with a wrong checksum are skipped and counted."""
 
     def __init__(self) -> None:
-        self._rest: Bytes = np.zeros(0, dtype=np.uint8)
+        self._remainder: Bytes = np.zeros(0, dtype=np.uint8)
         self._last: Packets | None = None
         """The newest packet that counts, shape (1,)."""
-        self._doubtful: list[_Found] = []
+        self._unconfirmed: list[_CandidatePacket] = []
         """Packets after it with an unexpected number or time, which later packets must confirm."""
         self._period_us = math.nan
         """Mean sample period (µs) by the board's clock; NaN before the first is known."""
@@ -117,24 +117,24 @@ class PacketParser:
 
     def feed(self, data: bytes) -> Samples:
         """The samples of the packets that these bytes complete."""
-        stream = np.concatenate((self._rest, np.frombuffer(data, dtype=np.uint8)))
+        stream = np.concatenate((self._remainder, np.frombuffer(data, dtype=np.uint8)))
         self._received += len(data)
-        starts, last = _whole_packets(stream), self._last
-        packets, starts = _packets_at(stream, starts), starts + (self._received - len(stream))
+        starts, last = _find_packets(stream), self._last
+        packets, starts = _read_packets(stream, starts), starts + (self._received - len(stream))
         if last is not None and self._in_order(last, starts, packets):
-            anew = np.zeros(len(packets), dtype=np.int64)
+            restarted = np.zeros(len(packets), dtype=np.int64)
         else:
-            packets, anew = self._choose(starts, packets)
+            packets, restarted = self._choose(starts, packets)
         self._last = packets[-1:].copy() if len(packets) else last
         # Up to 15 bytes at the end may be the beginning of a packet: they are kept for the next call.
-        self._rest = stream[max(0, len(stream) - (SIZE - 1)) :].copy()
-        return self._count_on(last, packets, anew)
+        self._remainder = stream[max(0, len(stream) - (SIZE - 1)) :].copy()
+        return self._count_on(last, packets, restarted)
 
     def _in_order(self, last: Packets, starts: Indices, packets: Packets) -> bool:
         """Whether all packets are the expected ones without overlap, so that all count (the usual, fast case). Then
         also updates the mean period and the end of the bytes used."""
         follows_bytes = np.diff(starts, prepend=self._used - SIZE) >= SIZE
-        if self._doubtful or not (follows_bytes & _comes_next(last, packets, self._period_us)).all():
+        if self._unconfirmed or not (follows_bytes & _is_expected(last, packets, self._period_us)).all():
             return False
         if len(packets):
             steps, times = _steps(last, packets)
@@ -146,57 +146,57 @@ class PacketParser:
         """Choose the packets that count. Returns them, (n,), and (n,): 1 where the firmware restarted before the
         packet, else 0. An expected packet may share bytes with its predecessor: if the last bytes of the predecessor
         were lost and the next packet begins with the same values, its checksum is still correct."""
-        chosen, anew, last = [packets[:0]], [0] * 0, self._last
-        for k, at in enumerate(starts.tolist()):
-            found = _Found(packets[k : k + 1].copy(), at)
-            comes_next = last is not None and _comes_next(last, found.packet, self._period_us).all()
-            if not comes_next and (at < self._used or _is_repeat(last, found.packet)):
+        chosen, restarted, last = [packets[:0]], [0] * 0, self._last
+        for k, start in enumerate(starts.tolist()):
+            candidate = _CandidatePacket(packets[k : k + 1].copy(), start)
+            is_expected = last is not None and _is_expected(last, candidate.packet, self._period_us).all()
+            if not is_expected and (start < self._used or _is_repeat(last, candidate.packet)):
                 continue
-            if comes_next:
-                counting = [*self._between(last, found), found]
+            if is_expected:
+                counting = [*self._select_between(last, candidate), candidate]
             else:
-                counting = self._chain_to(found, 1 if last is None else CONFIRMED_BY)
+                counting = self._chain_to(candidate, 1 if last is None else CONFIRMED_BY)
             if not counting:
-                self._doubtful = [*self._doubtful[1 - MOST_DOUBTFUL :], found]
+                self._unconfirmed = [*self._unconfirmed[1 - MAX_UNCONFIRMED :], candidate]
                 continue
-            for each in counting:
-                anew.append(int(last is not None and not _follows(last, each.packet).all()))
-                chosen.append(each.packet)
-                last = each.packet
-                self._shared += max(0, self._used - each.at)
-                self._used = each.at + SIZE
-            self._doubtful = []
-        return np.concatenate(chosen), np.array(anew, dtype=np.int64)
+            for accepted in counting:
+                restarted.append(int(last is not None and not _follows(last, accepted.packet).all()))
+                chosen.append(accepted.packet)
+                last = accepted.packet
+                self._shared += max(0, self._used - accepted.start)
+                self._used = accepted.start + SIZE
+            self._unconfirmed = []
+        return np.concatenate(chosen), np.array(restarted, dtype=np.int64)
 
-    def _between(self, last: Packets | None, found: _Found) -> list[_Found]:
-        """The doubtful packets whose bytes, numbers and times lie between the last packet that counts and `found`: the
-        board stamped or sent them late, so they count too."""
-        between, used = [found][:0], self._used
-        for doubtful in self._doubtful:
-            inside = doubtful.at >= used and doubtful.at + SIZE <= found.at
-            if last is None or not inside or not _follows(last, doubtful.packet).all():
+    def _select_between(self, last: Packets | None, candidate: _CandidatePacket) -> list[_CandidatePacket]:
+        """The doubtful packets whose bytes, numbers and times lie between the last packet that counts and `candidate`:
+        the board stamped or sent them late, so they count too."""
+        confirmed, used = [candidate][:0], self._used
+        for unconfirmed in self._unconfirmed:
+            lies_between = unconfirmed.start >= used and unconfirmed.start + SIZE <= candidate.start
+            if last is None or not lies_between or not _follows(last, unconfirmed.packet).all():
                 continue
-            if _follows(doubtful.packet, found.packet).all():
-                between.append(doubtful)
-                last, used = doubtful.packet, doubtful.at + SIZE
-        return between
+            if _follows(unconfirmed.packet, candidate.packet).all():
+                confirmed.append(unconfirmed)
+                last, used = unconfirmed.packet, unconfirmed.start + SIZE
+        return confirmed
 
-    def _chain_to(self, found: _Found, before: int) -> list[_Found]:
-        """A chain of `before` doubtful packets and `found`, in which each packet follows its predecessor; empty if
-        there is none. Sets the mean period from its last two packets."""
-        for before_it in combinations(self._doubtful[::-1], before):
-            chain = [*before_it[::-1], found]
-            if all(_follows(this.packet, other.packet).all() for this, other in pairwise(chain)):
-                steps, times = _steps(chain[-2].packet, found.packet)
+    def _chain_to(self, candidate: _CandidatePacket, predecessor_count: int) -> list[_CandidatePacket]:
+        """A chain of `predecessor_count` unconfirmed packets and `candidate`, in which each packet follows its
+        predecessor; empty if there is none. Sets the mean period from its last two packets."""
+        for predecessors in combinations(self._unconfirmed[::-1], predecessor_count):
+            chain = [*predecessors[::-1], candidate]
+            if all(_follows(packet.packet, next_packet.packet).all() for packet, next_packet in pairwise(chain)):
+                steps, times = _steps(chain[-2].packet, candidate.packet)
                 self._period_us = float(times[0] / steps[0])
                 return chain
         return []
 
-    def _count_on(self, last: Packets | None, packets: Packets, anew: npt.NDArray[np.int64]) -> Samples:
+    def _count_on(self, last: Packets | None, packets: Packets, restarted: npt.NDArray[np.int64]) -> Samples:
         """Samples of these packets, with number and time counted on without wrap-around; updates `counts`. last: the
         packet before these, (1,). At a restart of the firmware number and time increase by 1, because the number of
         packets lost meanwhile is not known."""
-        was = self.counts
+        previous = self.counts
         if last is None and len(packets):
             last = packets[:1]
             self._sequence, self._time_us = int(last["sequence"][0]) - 1, int(last["time_us"][0]) - 1
@@ -204,29 +204,35 @@ class PacketParser:
             steps[0] = times[0] = 1
         else:
             steps, times = _steps(last, packets) if last is not None else (np.zeros(0, np.int64),) * 2
-        steps, times = np.where(anew, 1, steps), np.where(anew, 1, times)
+        steps, times = np.where(restarted, 1, steps), np.where(restarted, 1, times)
         sequence, time_us = self._sequence + np.cumsum(steps), self._time_us + np.cumsum(times)
         if len(packets):
             self._sequence, self._time_us = int(sequence[-1]), int(time_us[-1])
         self.counts = Counts(
-            packets=was.packets + len(packets),
-            lost=was.lost + int((steps - 1).sum()),
-            spoiled_bytes=max(was.spoiled_bytes, self._count_judged_bytes() - SIZE * (was.packets + len(packets))),
-            restarts=was.restarts + int(anew.sum()),
+            packets=previous.packets + len(packets),
+            lost=previous.lost + int((steps - 1).sum()),
+            spoiled_bytes=max(
+                previous.spoiled_bytes, self._count_decided_bytes() - SIZE * (previous.packets + len(packets))
+            ),
+            restarts=previous.restarts + int(restarted.sum()),
         )
-        return Samples(sequence, time_us, packets["raw"], was.restarts + np.cumsum(anew))
+        return Samples(sequence, time_us, packets["raw"], previous.restarts + np.cumsum(restarted))
 
-    def _count_judged_bytes(self) -> int:
+    def _count_decided_bytes(self) -> int:
         """Number of bytes whose use is decided: no later byte can make them part of a further packet. Bytes of two
         overlapping packets count twice; bytes of doubtful packets do not count yet."""
-        judged = max(self._used, self._received - len(self._rest))
-        return judged + self._shared - sum(min(SIZE, max(0, judged - doubtful.at)) for doubtful in self._doubtful)
+        decided = max(self._used, self._received - len(self._remainder))
+        return (
+            decided
+            + self._shared
+            - sum(min(SIZE, max(0, decided - unconfirmed.start)) for unconfirmed in self._unconfirmed)
+        )
 
 
 def _steps(last: Packets, packets: Packets) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """(n,) each: increase of the number and of the time (µs) from each packet's predecessor, modulo the counters."""
-    both = np.concatenate((last, packets))
-    numbers, times = both["sequence"].astype(np.int64), both["time_us"].astype(np.int64)
+    sequence = np.concatenate((last, packets))
+    numbers, times = sequence["sequence"].astype(np.int64), sequence["time_us"].astype(np.int64)
     return np.diff(numbers) % 2**16, np.diff(times) % 2**32
 
 
@@ -242,7 +248,7 @@ def _is_repeat(last: Packets | None, packet: Packets) -> bool:
     return last is not None and packet.tobytes() == last.tobytes()
 
 
-def _comes_next(last: Packets, packets: Packets, period_us: float) -> npt.NDArray[np.bool_]:
+def _is_expected(last: Packets, packets: Packets, period_us: float) -> npt.NDArray[np.bool_]:
     """(n,): whether number and time of each packet are expected after its predecessor, at the mean period (see
     `NEXT_US`). False for a period of NaN."""
     steps, times = _steps(last, packets)
@@ -250,19 +256,19 @@ def _comes_next(last: Packets, packets: Packets, period_us: float) -> npt.NDArra
     return at_rate & (times < NEXT_US) & _follows(last, packets)
 
 
-def _whole_packets(stream: Bytes) -> Indices:
+def _find_packets(stream: Bytes) -> Indices:
     """Positions at which packets with a correct checksum begin."""
     last = len(stream) - SIZE + 1
     if last <= 0:
         return np.zeros(0, dtype=np.intp)
     starts: Indices = np.flatnonzero((stream[:last] == SYNC[0]) & (stream[1 : last + 1] == SYNC[1]))
-    packets = _packets_at(stream, starts)
+    packets = _read_packets(stream, starts)
     checked = packets.view(np.uint8).reshape(-1, SIZE)[:, CHECKED]
-    right: Indices = starts[crc_of(checked) == packets["crc"]]
-    return right
+    valid_starts: Indices = starts[compute_crc(checked) == packets["crc"]]
+    return valid_starts
 
 
-def _packets_at(stream: Bytes, starts: Indices) -> Packets:
+def _read_packets(stream: Bytes, starts: Indices) -> Packets:
     """(n,): packets of `SIZE` bytes from these positions of the stream."""
     packets: Packets = stream[starts[:, None] + np.arange(SIZE)].reshape(-1).view(LAYOUT)
     return packets

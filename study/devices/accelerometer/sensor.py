@@ -16,7 +16,7 @@ from study.devices.accelerometer.calibration import Calibration
 from study.devices.accelerometer.clock_fit import ClockFit
 from study.devices.accelerometer.history import History
 from study.devices.accelerometer.newest_sample import NewestSample
-from study.devices.accelerometer.placement import HALF_PERIODS, PlacedSamples, place
+from study.devices.accelerometer.placement import HALF_PERIODS, ResampledValues, fit_and_resample
 from study.devices.accelerometer.samples import Counts, Source
 from study.devices.rig import SensedAcceleration
 from study.errors import DeviceError
@@ -31,7 +31,8 @@ FITTED_S = 120.0
 enough that a quartz that warms up keeps its rate."""
 
 LATENESS_S = 0.05
-"""Wait (s) after the last tick for samples that are still on their way, in addition to half of the low-pass."""
+"""Wait (s) after the last tick for samples that are still on their way, in addition to half the length of the low-pass
+filter."""
 
 
 class Accelerometer:
@@ -56,11 +57,11 @@ class Accelerometer:
         """Measure for `seconds` at rest, and take the mean as zero. Raises `DeviceError` where no sample arrives."""
         since_s = time.monotonic()
         time.sleep(seconds)
-        raw = self._history.stretch(since_s, time.monotonic()).raw
+        raw = self._history.select_interval(since_s, time.monotonic()).raw
         if not len(raw):
-            raise silent(seconds, self.counts.spoiled_bytes)
+            raise silence_error(seconds, self.counts.spoiled_bytes)
         self._rest_mps2 = self._calibration.acceleration(raw.mean(axis=0))
-        self._newest.count_as_none(self._rest_mps2)
+        self._newest.set_rest(self._rest_mps2)
 
     @property
     def samples(self) -> FloatArray:
@@ -69,26 +70,30 @@ class Accelerometer:
 
     def latest(self) -> tuple[FloatArray, bool]:
         """Newest acceleration, (3,), m/s², zeroed at rest, NaN without a sample younger than
-        `newest_sample.FRESH_S`; and whether a channel is at its limit. May be called from any thread."""
-        return self._newest.fresh(time.monotonic())
+        `newest_sample.MAX_AGE_S`; and whether a channel is at its limit. May be called from any thread."""
+        return self._newest.read_zeroed(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration:
         """Accelerations at the ticks of a recording, as `study.devices.rig.OwnClockSensor` defines it. Waits until the
         samples after the last tick have arrived."""
         if len(tick_s):
             time.sleep(max(0.0, tick_s[-1] + HALF_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
-        placed = self._resample_to_ticks(tick_s, rate_hz) if len(tick_s) else PlacedSamples(np.zeros((0, 3)), None)
-        counts = self._history.counted(since_s)
-        return SensedAcceleration(placed.values, _health(counts, placed.values, placed.fit))
+        resampled = self._resample_to_ticks(tick_s, rate_hz) if len(tick_s) else ResampledValues(np.zeros((0, 3)), None)
+        counts = self._history.count_since(since_s)
+        return SensedAcceleration(resampled.values, _make_sensor_facts(counts, resampled.values, resampled.fit))
 
-    def rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
+    def measure_rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
         """Facts about the last `seconds`, during which the sensor was at rest; standard deviation of each axis (3,),
         m/s², NaN without samples; samples per second."""
         now_s = time.monotonic()
-        stretch = self._history.stretch(now_s - seconds, now_s)
-        noise = self._calibration.acceleration(stretch.raw).std(axis=0) if len(stretch.raw) else np.full(3, np.nan)
+        interval = self._history.select_interval(now_s - seconds, now_s)
+        noise = self._calibration.acceleration(interval.raw).std(axis=0) if len(interval.raw) else np.full(3, np.nan)
         fit = self._resample_to_ticks(np.array([now_s]), 1000.0).fit
-        return _health(self._history.counted(now_s - seconds), np.zeros((0, 3)), fit), noise, len(stretch.raw) / seconds
+        return (
+            _make_sensor_facts(self._history.count_since(now_s - seconds), np.zeros((0, 3)), fit),
+            noise,
+            len(interval.raw) / seconds,
+        )
 
     def close(self) -> None:
         """Stop reading and close the source. Never raises; waits at most 1 s for the reading thread."""
@@ -97,11 +102,11 @@ class Accelerometer:
         with contextlib.suppress(Exception):
             self._source.close()
 
-    def _resample_to_ticks(self, tick_s: FloatArray, rate_hz: float) -> PlacedSamples:
+    def _resample_to_ticks(self, tick_s: FloatArray, rate_hz: float) -> ResampledValues:
         """Accelerations at the ticks (m/s², zeroed at rest), and the fit of the clock. tick_s: at least one."""
-        stretch = self._history.stretch(tick_s[0] - FITTED_S, time.monotonic())
-        values = self._calibration.acceleration(stretch.raw) - self._rest_mps2
-        return place(stretch, values, tick_s, rate_hz)
+        interval = self._history.select_interval(tick_s[0] - FITTED_S, time.monotonic())
+        values = self._calibration.acceleration(interval.raw) - self._rest_mps2
+        return fit_and_resample(interval, values, tick_s, rate_hz)
 
     def _read(self) -> None:
         """Loop of the reading thread. An error of the source ends it; readers notice that by the age of the newest
@@ -112,11 +117,11 @@ class Accelerometer:
                 if len(samples):
                     clipped = bool((samples.raw <= self._range[0]).any() or (samples.raw >= self._range[1]).any())
                     value = self._calibration.acceleration(samples.raw[-1].astype(float))
-                    self._newest.put(arrived_s, value, clipped)
+                    self._newest.add_sample(arrived_s, value, clipped)
                     self._history.add(samples, arrived_s, self._source.counts)
 
 
-def silent(seconds: float, spoiled_bytes: int) -> DeviceError:
+def silence_error(seconds: float, spoiled_bytes: int) -> DeviceError:
     """Error for a sensor that sent no complete packet within `seconds`. spoiled_bytes: number of other bytes
     received."""
     return DeviceError(
@@ -128,15 +133,15 @@ def silent(seconds: float, spoiled_bytes: int) -> DeviceError:
     )
 
 
-def _health(counts: Counts, placed: FloatArray, fit: ClockFit | None) -> SensorFacts:
-    """Facts for the log. placed: accelerations at the ticks, (k, 3), NaN where unknown; fit: of the clock, if any."""
+def _make_sensor_facts(counts: Counts, resampled: FloatArray, fit: ClockFit | None) -> SensorFacts:
+    """Facts for the log. resampled: accelerations at the ticks, (k, 3), NaN where unknown; fit: of the clock."""
     return SensorFacts(
         packets=counts.packets,
         lost=counts.lost,
         spoiled_bytes=counts.spoiled_bytes,
         restarts=counts.restarts,
-        ticks=len(placed),
-        unplaced_ticks=int(np.isnan(placed).any(axis=1).sum()),
+        ticks=len(resampled),
+        unplaced_ticks=int(np.isnan(resampled).any(axis=1).sum()),
         drift_ppm=fit.drift_ppm if fit is not None else None,
         longest_delay_s=fit.longest_delay_s if fit is not None else None,
     )

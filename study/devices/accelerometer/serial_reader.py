@@ -11,7 +11,7 @@ from study.devices.accelerometer.parser import PacketParser
 from study.devices.accelerometer.samples import Counts, Samples
 from study.errors import DeviceError
 
-AT_ONCE = 4096
+READ_BYTES = 4096
 """Maximum number of bytes per read: 256 packets of 16 bytes, 0.13 s at 2 kHz."""
 
 WAIT_S = 0.01
@@ -43,7 +43,7 @@ class SerialSource:
 
     def read(self) -> tuple[Samples, float]:
         """New samples, and their time of arrival by `time.monotonic` (s)."""
-        data = self._port.read(AT_ONCE)
+        data = self._port.read(READ_BYTES)
         arrived_s = time.monotonic()
         return self._parser.feed(data), arrived_s
 

@@ -12,11 +12,11 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, Calibration, calibrate
 from study.devices.accelerometer.samples import Source
-from study.devices.accelerometer.sensor import silent
-from study.devices.accelerometer.sources import is_volts, open_source
+from study.devices.accelerometer.sensor import silence_error
+from study.devices.accelerometer.sources import open_source, reads_volts
 from study.errors import DeviceError
 
-BeforeEach = Callable[[str, tuple[float, float, float] | None], None]
+AwaitPosition = Callable[[str, tuple[float, float, float] | None], None]
 """before_each(position, heard): returns when the sensor lies in that position. heard: mean raw values of the three
 channels in the previous position, None for the first."""
 
@@ -26,7 +26,7 @@ REST_S = 2.0
 SETTLE_S = 0.3
 """Time (s) after a change of position in which samples may still belong to the old one; they are discarded."""
 
-MANY, DRAIN_S = 200, 2.0
+BACKLOG_SAMPLES, DRAIN_S = 200, 2.0
 """More than MANY samples in a single read are old ones from a buffer. They are discarded too, for at most DRAIN_S (s)
 after `SETTLE_S`."""
 
@@ -34,14 +34,14 @@ RANGE_G = 3.0
 """Guaranteed range of the ADXL335, in g; beyond it, a channel counts as clipped."""
 
 
-def calibrate_on_table(path: str, baud: int, before_each: BeforeEach, rest_s: float | None = None) -> str:
+def calibrate_on_table(path: str, baud: int, await_position: AwaitPosition, rest_s: float | None = None) -> str:
     """Record all positions and return the [accelerometer] table, as TOML. rest_s: None = `REST_S`.
 
     Raises `DeviceError` where no samples arrive, or the positions do not fit a linear sensor.
     """
     source = open_source(path, baud)
     try:
-        calibration = calibrate(_record_positions(source, before_each, REST_S if rest_s is None else rest_s))
+        calibration = calibrate(_record_positions(source, await_position, REST_S if rest_s is None else rest_s))
     except ValueError as error:
         raise DeviceError("The accelerometer was not calibrated", f"{error}.", "Do it again.") from error
     finally:
@@ -52,11 +52,11 @@ def calibrate_on_table(path: str, baud: int, before_each: BeforeEach, rest_s: fl
 def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
     """The [accelerometer] table for the laboratory's settings file. path: port of the sensor; baud: rate of a serial
     line. raw_range is the range of raw values for `RANGE_G` along any direction."""
-    reach = np.abs(calibration.sensitivity).sum(axis=1) * RANGE_G * GRAVITY_MPS2
-    lowest, highest = float((calibration.bias - reach).min()), float((calibration.bias + reach).max())
-    within = f"[{max(0, round(lowest))}, {min(65_535, round(highest))}]"
-    raw_range = _numbers(np.array([lowest, highest])) if is_volts(path) else within
-    rows = ", ".join(_numbers(row) for row in calibration.sensitivity)
+    half_range = np.abs(calibration.sensitivity).sum(axis=1) * RANGE_G * GRAVITY_MPS2
+    lowest, highest = float((calibration.bias - half_range).min()), float((calibration.bias + half_range).max())
+    count_range = f"[{max(0, round(lowest))}, {min(65_535, round(highest))}]"
+    raw_range = _toml_numbers(np.array([lowest, highest])) if reads_volts(path) else count_range
+    rows = ", ".join(_toml_numbers(row) for row in calibration.sensitivity)
     noise = ", ".join(f"{value:.3f}" for value in calibration.noise_mps2)
     return "\n".join(
         (
@@ -65,42 +65,42 @@ def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
             f"{calibration.residual_g:.3f} g.",
             f'port = "{path}"',
             f"baud = {baud}",
-            f"bias = {_numbers(calibration.bias)}",
+            f"bias = {_toml_numbers(calibration.bias)}",
             f"sensitivity = [{rows}]",
             f"raw_range = {raw_range}",
         )
     )
 
 
-def _record_positions(source: Source, before_each: BeforeEach, rest_s: float) -> tuple[FloatArray, ...]:
+def _record_positions(source: Source, await_position: AwaitPosition, rest_s: float) -> tuple[FloatArray, ...]:
     """Raw samples, (n, 3) for each of `POSITIONS`."""
-    found: list[FloatArray] = []
+    recordings: list[FloatArray] = []
     for position in POSITIONS:
-        x, y, z = found[-1].mean(axis=0).tolist() if found else (0.0, 0.0, 0.0)
-        before_each(position, (x, y, z) if found else None)
-        found.append(_record_position(source, rest_s))
-    return tuple(found)
+        x, y, z = recordings[-1].mean(axis=0).tolist() if recordings else (0.0, 0.0, 0.0)
+        await_position(position, (x, y, z) if recordings else None)
+        recordings.append(_record_position(source, rest_s))
+    return tuple(recordings)
 
 
 def _record_position(source: Source, rest_s: float) -> FloatArray:
     """Raw samples (n, 3) of one position. Raises `DeviceError` where fewer than two samples arrive."""
     settled_s = time.monotonic() + SETTLE_S
-    now_s, came = time.monotonic(), 0
+    now_s, sample_count = time.monotonic(), 0
     # Discard samples of the previous position: some are in the line's buffer, and where that is full, the board
     # itself holds more.
-    while now_s < settled_s or (came > MANY and now_s < settled_s + DRAIN_S):
-        samples_of_before, now_s = source.read()
-        came = len(samples_of_before)
-    spoiled, found = source.counts.spoiled_bytes, [np.zeros((0, 3))]
+    while now_s < settled_s or (sample_count > BACKLOG_SAMPLES and now_s < settled_s + DRAIN_S):
+        old_samples, now_s = source.read()
+        sample_count = len(old_samples)
+    spoiled_bytes, blocks = source.counts.spoiled_bytes, [np.zeros((0, 3))]
     until_s = time.monotonic() + rest_s
     while time.monotonic() < until_s:
-        found.append(source.read()[0].raw.astype(float))
-    samples = np.concatenate(found)
+        blocks.append(source.read()[0].raw.astype(float))
+    samples = np.concatenate(blocks)
     if len(samples) < 2:
-        raise silent(rest_s, source.counts.spoiled_bytes - spoiled)
+        raise silence_error(rest_s, source.counts.spoiled_bytes - spoiled_bytes)
     return samples
 
 
-def _numbers(row: FloatArray) -> str:
+def _toml_numbers(row: FloatArray) -> str:
     """A row as TOML: four decimals from 100 on (counts of 16 bits), else seven (volts)."""
     return f"[{', '.join(f'{value:.4f}' if abs(value) >= 100 else f'{value:.7f}' for value in row)}]"

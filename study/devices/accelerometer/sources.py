@@ -24,7 +24,7 @@ SCAN_HZ = 4000.0
 """Requested sample rate of each channel (Hz): twice the lowest useful rate of 2 kHz, within the range of both vendors'
 devices."""
 PAUSE_S = 0.01
-"""Interval between two reads (s), whose scans arrive together."""
+"""Interval between two reads (s); the scans of an interval are read together."""
 
 DUMMY_V = -9999.0
 """Value (V) that stands for a scan that a LabJack lost."""
@@ -42,7 +42,7 @@ def open_source(port: str, baud: int) -> Source:
     return open_serial(port, baud)
 
 
-def is_volts(port: str) -> bool:
+def reads_volts(port: str) -> bool:
     """Whether the raw values of this port are volts; else they are counts of 16 bits."""
     return port.startswith((NI, LABJACK))
 
@@ -52,19 +52,19 @@ class ScanCounter:
 
     def __init__(self, rate_hz: float) -> None:
         """rate_hz: sample rate that the device reports, by which scans are timed."""
-        self._rate_hz, self._next = rate_hz, 0
+        self._rate_hz, self._next_number = rate_hz, 0
         self.counts = Counts()
 
     def samples(self, volts: FloatArray) -> Samples:
         """The scans as numbered and timed samples. volts: (n, 3), in order; a row with `DUMMY_V` is a lost scan."""
-        numbers = self._next + np.arange(len(volts))
-        self._next += len(volts)
-        came = (volts != DUMMY_V).all(axis=1)
-        was, kept = self.counts, int(came.sum())
-        self.counts = Counts(was.packets + kept, was.lost + len(volts) - kept)
-        numbers = numbers[came]
+        numbers = self._next_number + np.arange(len(volts))
+        self._next_number += len(volts)
+        is_received = (volts != DUMMY_V).all(axis=1)
+        previous, received = self.counts, int(is_received.sum())
+        self.counts = Counts(previous.packets + received, previous.lost + len(volts) - received)
+        numbers = numbers[is_received]
         time_us = np.round(1e6 * numbers / self._rate_hz).astype(np.int64)
-        return Samples(numbers, time_us, volts[came], np.zeros(kept, dtype=np.int64))
+        return Samples(numbers, time_us, volts[is_received], np.zeros(received, dtype=np.int64))
 
 
 class NiSource:

@@ -12,27 +12,27 @@ from typing import Any
 from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
-from study.devices.governor.cells import LATE, LATEST_S, PHASE, STAMP_S, STILL
+from study.devices.governor.cells import IDLE, LATE, LATEST_S, PHASE, STAMP_S
 from study.devices.governor.compiling import fingerprint, part
 from study.devices.governor.govern import MISS_SIGNATURE, PUBLISH_SIGNATURE, ROWS, TICK_SIGNATURE, VECTOR
 from study.devices.native import now_s, sleep_until
 from study.devices.rig import READING_SIZE
 
 (
-    # Flags. GONE: the rig is no longer used. DECIDING: from before a force is decided until it was written; WRITING:
-    # during the write. STAMPS: each reading gets a time stamp. WANTED: the loop's thread is needed for other work.
-    GONE, DECIDING, WRITING, STAMPS, WANTED,
+    # Flags. RIG_GONE: the rig is no longer used. DECIDING: from before a force is decided until it was written;
+    # WRITING: during the write. STAMPS: each reading gets a time stamp. THREAD_NEEDED: the thread has other work.
+    RIG_GONE, DECIDING, WRITING, STAMPS, THREAD_NEEDED,
     # Real time: begin of the stimulus and of the last turn of the loop (s); number of the last tick, run or missed; due
     # time of the present tick (s); rate (Hz); gap between two turns that counts as a failure of the loop (s).
     STARTED_S, LAST_S, RUN, DUE_S, RATE_HZ, LONGEST_GAP_S,
-    # Readings of this call so far, of which `seen` holds the newest; size of the array.
-    SEEN, LOOP_STATE_SIZE,
+    # Readings of this call so far, of which `readings` holds the newest; size of the array.
+    READING_COUNT, LOOP_STATE_SIZE,
 ) = range(13)  # fmt: skip
 """Cells of `loop_state`. STARTED_S to LONGEST_GAP_S belong to `realtime_drive`."""
 
-GOES_ON, OVER, GAP = 0, -1, -2
-"""Return codes; a code above zero is the driver's own error. GOES_ON: more ticks may follow. OVER: that tick was the
-last, or the rig is gone. GAP: no tick was run, because the previous one was longer ago than LONGEST_GAP_S."""
+RUNNING, FINISHED, GAP = 0, -1, -2
+"""Return codes; a code above zero is the driver's own error. RUNNING: more ticks may follow. FINISHED: that tick was
+the last, or the rig is gone. GAP: no tick was run, because the previous one was longer ago than LONGEST_GAP_S."""
 
 SPIN_S = 0.00015
 """Time (s) before a tick at which the sleep ends and polling of the clock begins, because a sleep ends late."""
@@ -40,7 +40,7 @@ SPIN_S = 0.00015
 HAIR = 1e-6
 """Tolerance (ticks): a time that rounding puts just before a tick counts as that tick."""
 
-SEEN_ROWS = 8
+READING_ROWS = 8
 """Number of readings in the ring `seen`. A reading that another thread is copying is overwritten only SEEN_ROWS - 1
 ticks later."""
 
@@ -68,36 +68,36 @@ def _tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
     """A tick: sense, store the time of the reading, decide the force (`govern.tick`), write it, publish it to
     telemetry.
 
-    Returns `GOES_ON`, `OVER` where the force is off and stays off, or the driver's error code. The flags `DECIDING`
+    Returns `RUNNING`, `FINISHED` where the force is off and stays off, or the driver's error code. The flags `DECIDING`
     and `WRITING` show the watching thread where a tick hangs.
     """
     calls, cells, samples = rig
-    # `_nothing`, the reading of a missed tick, is used in `_attend_tick` only.
-    state, settings, loop, buffer, force, ring, _nothing = governor
-    flags, reading, seen = loop_state
+    # `_missed_reading`, the reading of a missed tick, is used in `_attend_tick` only.
+    state, settings, loop, buffer, force, ring, _missed_reading = governor
+    flags, reading, readings = loop_state
     code = sense(calls, cells, samples, reading)
     if code != 0:
         return int(code)
-    if flags[GONE] != 0.0:
-        return OVER
+    if flags[RIG_GONE] != 0.0:
+        return FINISHED
     if flags[STAMPS] != 0.0:
         state[STAMP_S] = now_s(calls)
     flags[DECIDING] = 1.0
-    over = govern(state, settings, loop, buffer, reading, force)
+    is_finished = govern(state, settings, loop, buffer, reading, force)
     flags[WRITING] = 1.0
-    row = int(flags[SEEN]) % SEEN_ROWS
+    row = int(flags[READING_COUNT]) % READING_ROWS
     for i in range(READING_SIZE):
-        seen[row, i] = reading[i]
+        readings[row, i] = reading[i]
     code = write(calls, cells, force)
     flags[WRITING] = 0.0
     if code != 0:
         return int(code)
     flags[DECIDING] = 0.0
     publish(state, settings, ring, reading)
-    if over:
-        return OVER
-    flags[SEEN] += 1.0
-    return GOES_ON
+    if is_finished:
+        return FINISHED
+    flags[READING_COUNT] += 1.0
+    return RUNNING
 
 
 @part
@@ -111,41 +111,41 @@ def _wait_for_tick(calls: Any, flags: FloatArray) -> float:
     """Sleep, then poll the clock, until the next tick is due. Returns the time (s)."""
     flags[DUE_S] = _due_s(flags, flags[RUN] + 1.0)
     sleep_until(calls, flags[DUE_S] - SPIN_S)
-    now = now_s(calls)
-    while now < flags[DUE_S]:
-        now = now_s(calls)
-    return float(now)
+    time_s = now_s(calls)
+    while time_s < flags[DUE_S]:
+        time_s = now_s(calls)
+    return float(time_s)
 
 
 @part
-def _is_called_away(governor: Any, loop_state: Any) -> bool:
+def _must_return(governor: Any, loop_state: Any) -> bool:
     """Whether `attend` has to return: the thread is needed, the rig is gone, or no force acts any more."""
     flags = loop_state[0]
-    return bool(flags[WANTED] != 0.0 or flags[GONE] != 0.0 or governor[0][PHASE] == STILL)
+    return bool(flags[THREAD_NEEDED] != 0.0 or flags[RIG_GONE] != 0.0 or governor[0][PHASE] == IDLE)
 
 
 @part
 def _attend_tick(  # noqa: PLR0913 - as above
-    sense: Any, write: Any, govern: Any, publish: Any, miss: Any, rig: Any, governor: Any, loop_state: Any
+    sense: Any, write: Any, govern: Any, publish: Any, record_missed: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:
     """Wait for the next tick, count ticks that were missed meanwhile, run the tick, and record how late it ended."""
-    calls, flags, state, code = rig[0], loop_state[0], governor[0], GOES_ON
-    now = _wait_for_tick(calls, flags)
-    if flags[GONE] != 0.0 or state[PHASE] == STILL:
-        return OVER
-    gap_s, flags[LAST_S] = now - flags[LAST_S], now
+    calls, flags, state, code = rig[0], loop_state[0], governor[0], RUNNING
+    time_s = _wait_for_tick(calls, flags)
+    if flags[RIG_GONE] != 0.0 or state[PHASE] == IDLE:
+        return FINISHED
+    gap_s, flags[LAST_S] = time_s - flags[LAST_S], time_s
     if gap_s > flags[LONGEST_GAP_S]:
         return GAP
-    due = int((now - flags[STARTED_S]) * flags[RATE_HZ] + HAIR)
-    late = due - int(flags[RUN]) - 1
+    due_tick = int((time_s - flags[STARTED_S]) * flags[RATE_HZ] + HAIR)
+    late = due_tick - int(flags[RUN]) - 1
     if late > 0:
-        miss(state, governor[3], governor[6], late)
+        record_missed(state, governor[3], governor[6], late)
     if late >= 0:
         code = _tick(sense, write, govern, publish, rig, governor, loop_state)
-    flags[RUN] = due
-    if code <= GOES_ON:
+    flags[RUN] = due_tick
+    if code <= RUNNING:
         done = now_s(calls)
-        state[LATE] += done > _due_s(flags, due + 1.0)
+        state[LATE] += done > _due_s(flags, due_tick + 1.0)
         state[LATEST_S] = max(state[LATEST_S], done - flags[DUE_S])
     return code
 
@@ -158,18 +158,18 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
         sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any, ticks: int
     ) -> int:
         """Run at most `ticks` ticks without waiting, fewer if the force is off for good before or a tick fails.
-        Returns `GOES_ON`, `OVER`, or the driver's error code."""
+        Returns `RUNNING`, `FINISHED`, or the driver's error code."""
         _ = sources
-        code = GOES_ON
+        code = RUNNING
         for _k in range(ticks):
             code = _tick(sense, write, govern, publish, rig, governor, loop_state)
-            if code != GOES_ON or loop_state[0][GONE] != 0.0:
+            if code != RUNNING or loop_state[0][RIG_GONE] != 0.0:
                 break
         return code
 
     @njit(_ATTEND, cache=True, nogil=True, error_model="numpy")
     def attend(  # noqa: PLR0913 - as above
-        sense: Any, write: Any, govern: Any, publish: Any, miss: Any, rig: Any, governor: Any, loop_state: Any
+        sense: Any, write: Any, govern: Any, publish: Any, record_missed: Any, rig: Any, governor: Any, loop_state: Any
     ) -> int:
         """Run ticks as they become due, until the force is off for good, a tick fails, or the thread is needed for
         other work. To be called only where the address at `study.devices.native.SLEEP` is not 0.
@@ -177,9 +177,9 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
         After an error code (above zero) the caller has to count the lateness of that tick.
         """
         _ = sources
-        code = GOES_ON
-        while code == GOES_ON and not _is_called_away(governor, loop_state):
-            code = _attend_tick(sense, write, govern, publish, miss, rig, governor, loop_state)
+        code = RUNNING
+        while code == RUNNING and not _must_return(governor, loop_state):
+            code = _attend_tick(sense, write, govern, publish, record_missed, rig, governor, loop_state)
         return code
 
     return run_due, attend

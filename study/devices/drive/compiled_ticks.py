@@ -6,23 +6,33 @@ The arguments are the compiled halves of the rig, the arrays of the governor, an
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from study.devices.drive.compiled_drive import MISS, PUBLISH, SEEN, SEEN_ROWS, SENSE, TICK, WRITE, attend, run_due
-from study.devices.drive.runner import Part
+from study.devices.drive.compiled_drive import (
+    MISS,
+    PUBLISH,
+    READING_COUNT,
+    READING_ROWS,
+    SENSE,
+    TICK,
+    WRITE,
+    attend,
+    run_due,
+)
+from study.devices.drive.runner import FunctionPointer
 from study.devices.governor import govern
 from study.devices.governor.governor import Governor
 from study.devices.native import SLEEP
 from study.devices.rig import READING_SIZE, CompiledIo, Rig
 
 
-def halves_of(rig: Rig) -> CompiledIo | None:
+def compiled_io_of(rig: Rig) -> CompiledIo | None:
     """The compiled `sense` and `write` of this rig; None where it has none."""
     halves = getattr(rig, "halves", None)
     return halves if isinstance(halves, CompiledIo) else None
 
 
-TICK_PARTS = Part(govern.tick, TICK), Part(govern.publish, PUBLISH)
+TICK_PARTS = FunctionPointer(govern.tick, TICK), FunctionPointer(govern.publish, PUBLISH)
 """Function pointers of the parts of a tick that are the same for every rig; their addresses are looked up once."""
-MISSED = Part(govern.miss, MISS)
+MISSED = FunctionPointer(govern.record_missed_ticks, MISS)
 """Function pointer of the part that records missed ticks."""
 
 
@@ -33,9 +43,9 @@ class CompiledTicks:
     def __init__(self, halves: CompiledIo, governor: Governor, loop_state: FloatArray) -> None:
         self._halves = halves
         self._governor = governor
-        self._parts = Part(halves.sense, SENSE), Part(halves.write, WRITE), *TICK_PARTS
+        self._parts = FunctionPointer(halves.sense, SENSE), FunctionPointer(halves.write, WRITE), *TICK_PARTS
         self._rig = halves.calls, halves.cells, halves.samples
-        self._seen: FloatArray = np.zeros((SEEN_ROWS, READING_SIZE))
+        self._seen: FloatArray = np.zeros((READING_ROWS, READING_SIZE))
         self._loop_state = loop_state, np.zeros(READING_SIZE), self._seen
         self._flags = loop_state
         self._running = False
@@ -48,9 +58,9 @@ class CompiledTicks:
         return bool(self._halves.calls[SLEEP] != 0)
 
     def run(self, ticks: int) -> int:
-        """Run at most `ticks` ticks, one after another without waiting. Returns `GOES_ON`, `OVER`, or the driver's
+        """Run at most `ticks` ticks, one after another without waiting. Returns `RUNNING`, `FINISHED`, or the driver's
         error code, > 0."""
-        self._flags[SEEN], self._running = 0.0, True
+        self._flags[READING_COUNT], self._running = 0.0, True
         try:
             return int(run_due(*self._parts, self._rig, self._arrays(), self._loop_state, ticks))
         finally:
@@ -59,7 +69,7 @@ class CompiledTicks:
     def attend(self) -> int:
         """Run ticks as they become due, until the force is off for good, a tick fails, or the loop's thread is needed.
         Returns as `run`, or `GAP`. To be called only where `attends`."""
-        self._flags[SEEN], self._running = 0.0, True
+        self._flags[READING_COUNT], self._running = 0.0, True
         try:
             return int(attend(*self._parts, MISSED, self._rig, self._arrays(), self._loop_state))
         finally:
@@ -67,14 +77,14 @@ class CompiledTicks:
 
     def seen(self) -> FloatArray | None:
         """Newest reading, shape (READING_SIZE,), of a call of `run` or `attend` in progress; else None."""
-        return self.last_seen() if self._running else None
+        return self.last_reading() if self._running else None
 
-    def last_seen(self) -> FloatArray | None:
+    def last_reading(self) -> FloatArray | None:
         """Last reading, shape (READING_SIZE,), of the present or else the last call; None before its first tick. May be
         called from any thread: a row that was overwritten while it was copied is copied again."""
-        while count := int(self._flags[SEEN]):
-            reading: FloatArray = self._seen[(count - 1) % SEEN_ROWS].copy()
-            if self._flags[SEEN] - count < SEEN_ROWS - 1:
+        while count := int(self._flags[READING_COUNT]):
+            reading: FloatArray = self._seen[(count - 1) % READING_ROWS].copy()
+            if self._flags[READING_COUNT] - count < READING_ROWS - 1:
                 return reading
         return None
 
@@ -88,5 +98,5 @@ class CompiledTicks:
             governor.buffer,
             governor.force,
             governor.ring,
-            governor.nothing,
+            governor.missed_reading,
         )

@@ -18,21 +18,21 @@ class LastReading:
     buttons: frozenset[int]
 
 
-def look_of(last: LastReading | None, missed_ticks: int) -> Look:
+def make_look(last: LastReading | None, missed_ticks: int) -> Look:
     """Convert a reading to a `Look`: position in m, acceleration in m/s². Both are None without a reading, or where
     their numbers are not finite. missed_ticks: of the present stimulus."""
     if last is None:
         return Look(None, None, sensor_clipped=False, buttons=frozenset(), missed_ticks=missed_ticks)
     return Look(
-        position_m=_numbers(last.reading[POSITION]),
-        acceleration_mps2=_numbers(last.reading[ACCELERATION]),
+        position_m=_finite_triple(last.reading[POSITION]),
+        acceleration_mps2=_finite_triple(last.reading[ACCELERATION]),
         sensor_clipped=bool(last.reading[SENSOR_CLIPPED] == 1.0),
         buttons=last.buttons,
         missed_ticks=missed_ticks,
     )
 
 
-def _numbers(components: FloatArray) -> tuple[float, float, float] | None:
+def _finite_triple(components: FloatArray) -> tuple[float, float, float] | None:
     """Three components as a tuple; None unless all are finite."""
     x, y, z = (float(component) for component in components)
     return (x, y, z) if math.isfinite(x + y + z) else None

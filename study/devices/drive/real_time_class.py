@@ -1,7 +1,7 @@
 """Real-time scheduling of the loop's thread, and locking of its memory (no swapping), where the system allows them.
 
-Where the system refuses them, `real_time_finding` reports that with the remedy, and the loop runs without them. The
-priority is below that of interrupt threads (50 on Linux), because the device's own USB transfers must come first. A
+Where the system refuses them, `check_real_time_rights` reports that with the remedy, and the loop runs without them.
+The priority is below that of interrupt threads (50 on Linux), because the device's own USB transfers must come first. A
 loop that hangs cannot starve the computer under Linux's default, which reserves 5 % of every second for ordinary
 threads (`sched_rt_runtime_us`); where that is switched off, the finding reports it.
 
@@ -74,7 +74,7 @@ class _Users:
         self._undos: list[Callable[[], object]] = []
         self._switch_s = 0.0
 
-    def enter(self) -> GrantedRights:
+    def add_user(self) -> GrantedRights:
         """Add a user, in whose thread the class is requested."""
         with self._lock:
             granted, undo = _request_class()  # for each user: the class belongs to a thread, memory grows
@@ -85,7 +85,7 @@ class _Users:
             self._undos.append(undo)
             return granted
 
-    def leave(self) -> None:
+    def remove_user(self) -> None:
         """Remove a user; the last one restores all settings."""
         with self._lock:
             self._count -= 1
@@ -103,25 +103,25 @@ _USERS = _Users()
 def real_time_class() -> Iterator[GrantedRights]:
     """Give the calling thread the real-time class until it ends, and lock the program's memory until the last user
     ends. Raises nothing."""
-    granted = _USERS.enter()
+    granted = _USERS.add_user()
     try:
         yield granted
     finally:
-        _USERS.leave()
+        _USERS.remove_user()
 
 
-def real_time_finding() -> DeviceFinding:
+def check_real_time_rights() -> DeviceFinding:
     """Finding on the rights that the system grants to this account, determined by a request in a separate thread."""
-    found: list[GrantedRights] = []
+    granted_rights: list[GrantedRights] = []
 
-    def ask() -> None:
+    def request_rights() -> None:
         with real_time_class() as granted:
-            found.append(granted)
+            granted_rights.append(granted)
 
-    thread = threading.Thread(target=ask, name="real-time class")
+    thread = threading.Thread(target=request_rights, name="real-time class")
     thread.start()
     thread.join()
-    (granted,) = found
+    (granted,) = granted_rights
     texts = [
         "the loop goes before all other programs" if granted.scheduled else "other programs may delay the loop",
         "its memory stays" if granted.locked else "its memory may be swapped",
@@ -146,14 +146,14 @@ def _request_class() -> tuple[GrantedRights, Callable[[], None]]:
     """Request the class of the calling thread and the memory lock. Also returns the function that undoes what does not
     end with the thread."""
     if platform.system() == "Linux":
-        return _of_linux(ctypes.CDLL(None, use_errno=True))
+        return _request_on_linux(ctypes.CDLL(None, use_errno=True))
     windows = getattr(ctypes, "windll", None)
     if windows is not None:
-        return _of_windows(windows)
+        return _request_on_windows(windows)
     return GrantedRights(False, False, "This system offers none: close other programs."), lambda: None
 
 
-def _of_linux(library: Any) -> tuple[GrantedRights, Callable[[], None]]:
+def _request_on_linux(library: Any) -> tuple[GrantedRights, Callable[[], None]]:
     """Request SCHED_FIFO for the calling thread, then the memory lock."""
     try:
         # RESET_ON_FORK: a program that is started from here does not inherit the class.
@@ -163,21 +163,21 @@ def _of_linux(library: Any) -> tuple[GrantedRights, Callable[[], None]]:
     except (OSError, AttributeError):  # AttributeError: a Python without these functions
         scheduled = False
     try:
-        locked = library.mlockall(PRESENT_WHEN_TOUCHED | (FUTURE_TOO if _memory_without_limit() else 0)) == 0
+        locked = library.mlockall(PRESENT_WHEN_TOUCHED | (FUTURE_TOO if _has_unlimited_memory() else 0)) == 0
     except AttributeError:
         locked = False
     advice = "" if scheduled and locked else LINUX_ADVICE
     return GrantedRights(scheduled, locked, advice), library.munlockall if locked else lambda: None
 
 
-def _memory_without_limit() -> bool:
+def _has_unlimited_memory() -> bool:
     """Whether the account may lock memory without a limit."""
     import resource  # not on Windows
 
     return resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
 
 
-def _of_windows(windows: Any) -> tuple[GrantedRights, Callable[[], None]]:
+def _request_on_windows(windows: Any) -> tuple[GrantedRights, Callable[[], None]]:
     """Request a timer resolution of 1 ms instead of 16 ms, and the priority `TIME_CRITICAL` for the calling thread. The
     memory of a whole program is not locked on Windows."""
     fine_sleep = windows.winmm.timeBeginPeriod(1) == 0

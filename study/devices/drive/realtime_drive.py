@@ -37,12 +37,12 @@ from study.devices.drive.compiled_drive import (
     RUN,
     SPIN_S,
     STARTED_S,
-    WANTED,
+    THREAD_NEEDED,
 )
 from study.devices.drive.real_time_class import real_time_class
 from study.devices.drive.runner import Runner
 from study.devices.drive.stepped_runner import SteppedRunner
-from study.devices.drive.virtual_drive import ticks_by
+from study.devices.drive.virtual_drive import count_due_ticks
 from study.devices.governor.governor import Governor
 
 PATIENCE_S = 0.1
@@ -58,12 +58,12 @@ class _Request:
         self.taken = threading.Event()
 
 
-class Glances:
+class ReadingRequests:
     """Requests for a reading while nothing moves, a single one at a time: callers that ask meanwhile get the same
     reading."""
 
     def __init__(self, clock: Clock, wake: Callable[[], None]) -> None:
-        """wake: makes the loop's thread check `wanted`."""
+        """wake: makes the loop's thread check `is_pending`."""
         self._clock = clock
         self._wake = wake
         self._asking = threading.Lock()
@@ -79,7 +79,7 @@ class Glances:
         return request.taken.wait(min(PATIENCE_S, max(0.0, request.until_s - self._clock.now_s())))
 
     @property
-    def wanted(self) -> bool:
+    def is_pending(self) -> bool:
         """Whether a request waits for a reading."""
         return self._request is not None and not self._request.taken.is_set()
 
@@ -134,13 +134,13 @@ class RealtimeDrive:
         self._loop_state[LONGEST_GAP_S] = longest_gap_s if runner.catches_up else min(longest_gap_s, LATE_S)
         self._lock = threading.Lock()
         self._awake = threading.Event()
-        self._glances = Glances(clock, wake=self._wake)
+        self._reading_requests = ReadingRequests(clock, wake=self._wake)
         self._closing = False
         self._thread = threading.Thread(target=self._run_ticks, name="haptic loop", daemon=True)
         self._thread.start()
 
-    def start(self, begin: Callable[[], None]) -> bool:
-        """Call `begin`, which prepares the governor, while no tick runs; from then on ticks fall due.
+    def start(self, begin_stimulus: Callable[[], None]) -> bool:
+        """Call `begin_stimulus`, which prepares the governor, while no tick runs; from then on ticks fall due.
 
         Returns False, without a begin, where a stimulus is in progress, or the drive has failed or is closing.
         """
@@ -151,10 +151,10 @@ class RealtimeDrive:
         try:
             if self._runner.moving or self._closing or self._runner.failure is not None:
                 return False
-            self._loop_state[LAST_S] = math.inf  # the time that `begin` takes is no late tick
-            begin()
+            self._loop_state[LAST_S] = math.inf  # the time that `begin_stimulus` takes is no late tick
+            begin_stimulus()
             self._loop_state[STARTED_S] = self._loop_state[LAST_S] = now_s = self._clock.now_s()
-            self._governor.note_begin(now_s)
+            self._governor.set_begin_time(now_s)
             self._loop_state[RUN] = 0.0
             self._awake.set()
             return True
@@ -164,9 +164,11 @@ class RealtimeDrive:
     def _take_lock(self) -> bool:
         """Take the lock from the loop's thread, within `JOIN_S`. Returns whether it was taken."""
         for _ in range(round(JOIN_S / ASK_EVERY_S)):
-            self._loop_state[WANTED] = 1.0
+            self._loop_state[THREAD_NEEDED] = 1.0
             if self._lock.acquire(timeout=ASK_EVERY_S):
-                self._loop_state[WANTED] = float(self._glances.wanted)  # the first tick is compiled too
+                self._loop_state[THREAD_NEEDED] = float(
+                    self._reading_requests.is_pending
+                )  # the first tick is compiled too
                 return True
         return False
 
@@ -181,7 +183,7 @@ class RealtimeDrive:
         """Update the last reading. Returns whether it is current. Waits for the loop's thread while nothing moves."""
         if self._runner.moving:
             return True
-        return self._thread.is_alive() and not self._closing and self._glances.ask()
+        return self._thread.is_alive() and not self._closing and self._reading_requests.ask()
 
     def stop(self) -> None:
         """After a stop was requested: wait until the loop has executed it, else stop without the loop."""
@@ -199,7 +201,7 @@ class RealtimeDrive:
 
     def _wake(self) -> None:
         """Make the loop's thread leave compiled code and its wait, and look for work."""
-        self._loop_state[WANTED] = 1.0
+        self._loop_state[THREAD_NEEDED] = 1.0
         self._awake.set()
 
     def pump(self, now_s: float) -> None:
@@ -210,9 +212,9 @@ class RealtimeDrive:
                 self._awake.clear()
                 if self._closing:
                     self._awake.set()
-                elif self._glances.wanted:
+                elif self._reading_requests.is_pending:
                     self._runner.glance()
-                    self._glances.mark_taken()
+                    self._reading_requests.mark_taken()
                 return
             loop_state, run = self._loop_state, int(self._loop_state[RUN])
             gap_s, loop_state[LAST_S] = now_s - loop_state[LAST_S], now_s
@@ -220,17 +222,17 @@ class RealtimeDrive:
                 self._runner.drop(Fault.STALLED)
                 return
             first_s = self._due_s(run + 1)
-            due = ticks_by(now_s - loop_state[STARTED_S], loop_state[RATE_HZ])
-            late = due - run - 1
+            due_ticks = count_due_ticks(now_s - loop_state[STARTED_S], loop_state[RATE_HZ])
+            late = due_ticks - run - 1
             if late > 0 and not self._runner.catches_up:
-                self._governor.miss(late)
+                self._governor.record_missed_ticks(late)
                 run += late
-            self._runner.run(due - run)
-            loop_state[RUN] = due
+            self._runner.run(due_ticks - run)
+            loop_state[RUN] = due_ticks
             if not self._runner.catches_up:
-                self._count_lateness(due, first_s)
-            if self._glances.wanted:  # requested directly before this stimulus began
-                self._glances.mark_taken()
+                self._count_lateness(due_ticks, first_s)
+            if self._reading_requests.is_pending:  # requested directly before this stimulus began
+                self._reading_requests.mark_taken()
 
     def _due_s(self, tick: int) -> float:
         return float(self._loop_state[STARTED_S] + tick / self._loop_state[RATE_HZ])
@@ -264,14 +266,14 @@ class RealtimeDrive:
                 self._runner.give_up(error)
                 return
         if self._runner.moving:
-            self._governor.ask_stop()
+            self._governor.request_stop()
             self._runner.run(1)
 
     def _attend_compiled(self) -> bool:
         """Run ticks in compiled code. Returns False where the rig has none or the thread is needed: `pump` then runs a
         tick from Python, before which other threads can take the lock."""
-        wanted, self._loop_state[WANTED] = self._loop_state[WANTED] != 0.0, 0.0
-        if self._attending is None or wanted:
+        thread_needed, self._loop_state[THREAD_NEEDED] = self._loop_state[THREAD_NEEDED] != 0.0, 0.0
+        if self._attending is None or thread_needed:
             return False
         with self._lock:
             code = self._attending.attend()

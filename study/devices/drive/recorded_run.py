@@ -9,7 +9,7 @@ import numpy as np
 
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
-from study.devices.device import DeviceInfo, Fault, Health, Played
+from study.devices.device import DeviceInfo, Fault, Health, PlaybackResult
 from study.devices.governor.cells import ROW_SIZE
 from study.devices.governor.governor import Governor
 from study.devices.rig import OwnClockSensor
@@ -19,51 +19,59 @@ COMMAND, EXCITATION, POSITION, ACCELERATION, TRUTH = (slice(start, start + 3) fo
 (m/s²). The command is the written force; the excitation is the stimulus alone, without spring and damper."""
 
 
-def record_held_stimulus(governor: Governor, info: DeviceInfo, apart: OwnClockSensor | None = None) -> Played:
+def record_held_stimulus(
+    governor: Governor, info: DeviceInfo, own_clock_sensor: OwnClockSensor | None = None
+) -> PlaybackResult:
     """Recording of a held stimulus: the end of its steady part, in whole loops unless a loop is longer than the ring.
-    None where not even that much was recorded. apart: an accelerometer with its own clock, if any."""
+    None where not even that much was recorded. own_clock_sensor: an accelerometer with its own clock, if any."""
     rows, loop = governor.rows(), governor.steady
-    whole = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
-    kept = len(rows) // whole * whole
-    rows, health = _with_acceleration(rows[len(rows) - kept :], governor, info, apart)
-    if not kept:
-        return Played(recording=None, health=health)
+    loop_rows = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
+    recorded_rows = len(rows) // loop_rows * loop_rows
+    rows, health = _insert_acceleration(rows[len(rows) - recorded_rows :], governor, info, own_clock_sensor)
+    if not recorded_rows:
+        return PlaybackResult(recording=None, health=health)
     amplitude_n = float(np.linalg.norm(loop, axis=1).max())
-    segment = Segment(start=0, stop=kept, kind="sine", amplitude=amplitude_n, period=len(loop))
-    return _make_played(rows, health, info, (segment,))
+    segment = Segment(start=0, stop=recorded_rows, kind="sine", amplitude=amplitude_n, period=len(loop))
+    return _make_result(rows, health, info, (segment,))
 
 
-def record_commands(governor: Governor, info: DeviceInfo, apart: OwnClockSensor | None = None) -> Played:
+def record_commands(
+    governor: Governor, info: DeviceInfo, own_clock_sensor: OwnClockSensor | None = None
+) -> PlaybackResult:
     """Recording of commands that were played once; None after a fault or where they ended early. It has no segments:
     the caller knows them."""
     rows = governor.rows()
     if governor.fault is not Fault.NONE or len(rows) < len(governor.loop):
-        return Played(recording=None, health=_with_acceleration(rows[:0], governor, info, apart)[1])
-    return _make_played(*_with_acceleration(rows, governor, info, apart), info, ())
+        return PlaybackResult(
+            recording=None, health=_insert_acceleration(rows[:0], governor, info, own_clock_sensor)[1]
+        )
+    return _make_result(*_insert_acceleration(rows, governor, info, own_clock_sensor), info, ())
 
 
-def _with_acceleration(
-    rows: FloatArray, governor: Governor, info: DeviceInfo, apart: OwnClockSensor | None
+def _insert_acceleration(
+    rows: FloatArray, governor: Governor, info: DeviceInfo, own_clock_sensor: OwnClockSensor | None
 ) -> tuple[FloatArray, Health]:
     """Insert the acceleration at the tick of each row, missed ticks included, and its counters. rows: the newest rows
     of the governor."""
-    due_s = governor.row_due_s()
+    due_s = governor.compute_row_times()
     due_s = due_s[len(due_s) - len(rows) :]
-    sensed = apart.sensed(governor.began_s, due_s, info.sample_rate_hz) if apart is not None else None
-    if sensed is None:
+    sensor_data = (
+        own_clock_sensor.sensed(governor.began_s, due_s, info.sample_rate_hz) if own_clock_sensor is not None else None
+    )
+    if sensor_data is None:
         return rows, governor.health()
     rows = rows.copy()
-    rows[:, ACCELERATION] = sensed.acceleration_mps2
-    return rows, replace(governor.health(), sensor=sensed.health)
+    rows[:, ACCELERATION] = sensor_data.acceleration_mps2
+    return rows, replace(governor.health(), sensor=sensor_data.health)
 
 
-def _make_played(rows: FloatArray, health: Health, info: DeviceInfo, segments: tuple[Segment, ...]) -> Played:
+def _make_result(rows: FloatArray, health: Health, info: DeviceInfo, segments: tuple[Segment, ...]) -> PlaybackResult:
     """Recording of rows (n, ROW_SIZE); the true acceleration only of a simulated device."""
     rate_hz = info.sample_rate_hz
     acceleration = ("acceleration", "m/s^2", ("ax", "ay", "az"))
     force = ("force", "N", ("fx", "fy", "fz"))
     truth = rows[:, TRUTH]
-    return Played(
+    return PlaybackResult(
         recording=Recording(
             device=info.name,
             command=Signal(rows[:, COMMAND], rate_hz, *force),

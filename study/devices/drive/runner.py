@@ -2,7 +2,7 @@
 
 A tick reads the sensors (sense), decides the force (govern) and applies it (advance). `CompiledRunner` runs whole
 blocks of ticks of a simulated device without Python; `stepped_runner` drives real devices. The parts of a tick are
-passed as function pointers, not inlined: one loop is compiled for all rigs, its machine code can be kept on disk, and
+passed as function pointers, not inlined: one loop is compiled for all rigs, its machine code can be cached on disk, and
 it never contains an outdated copy of a part.
 """
 
@@ -32,8 +32,8 @@ _GOVERNOR = types.Tuple((VECTOR, VECTOR, ROWS, ROWS, VECTOR, ROWS))  # type: ign
 """Type of the argument `governor` of `run_block`."""
 
 
-class Part(types.WrapperAddressProtocol):
-    """A compiled function as a function pointer whose address is looked up once.
+class FunctionPointer(types.WrapperAddressProtocol):
+    """Pointer to a compiled part of a tick, whose address is looked up once.
 
     For a plain function numba looks the address up at every call of the loop, which takes 0.3 ms, as long as a hundred
     ticks.
@@ -52,13 +52,13 @@ class Part(types.WrapperAddressProtocol):
         return self._signature
 
 
-def parts(sense: Any, advance: Any) -> tuple[Part, Part, Part]:
-    """The three parts of a tick of one rig, as the three first arguments of `run_block`."""
-    return Part(sense, _SENSE), Part(tick, _TICK), Part(advance, _ADVANCE)
+def make_tick_pointers(sense: Any, advance: Any) -> tuple[FunctionPointer, FunctionPointer, FunctionPointer]:
+    """Make the pointers to the three parts of a tick of one rig, the first three arguments of `run_block`."""
+    return FunctionPointer(sense, _SENSE), FunctionPointer(tick, _TICK), FunctionPointer(advance, _ADVANCE)
 
 
-PUBLISHED = Part(publish, _PUBLISH)
-"""The part that writes a tick into the telemetry ring, the same for every rig."""
+PUBLISH_POINTER = FunctionPointer(publish, _PUBLISH)
+"""Pointer to the part that writes a tick into the telemetry ring, the same for every rig."""
 _BLOCK = types.void(_SENSE, _TICK, _ADVANCE, _PUBLISH, _RIG, _GOVERNOR, types.int64)
 """Signature of `run_block`."""
 
@@ -69,17 +69,17 @@ def run_block(  # noqa: PLR0913 - compiled code takes function pointers one by o
 ) -> None:
     """Run at most `ticks` ticks, fewer if the force is off for good before. rig = (state, parameters, noise) of the
     CompiledRig, and an array for the reading; governor = (state, settings, loop, buffer, force) of
-    `study.devices.governor.govern.tick`, and the telemetry ring. sense, govern, advance: from `parts`; publish:
-    `PUBLISHED`. All arrays are changed in place."""
+    `study.devices.governor.govern.tick`, and the telemetry ring. sense, govern, advance: from `make_tick_pointers`;
+    publish: `PUBLISH_POINTER`. All arrays are changed in place."""
     rig_state, parameters, noise, reading = rig
     state, settings, loop, buffer, force, ring = governor
     for _ in range(ticks):
         sense(rig_state, parameters, noise, reading)
-        over = govern(state, settings, loop, buffer, reading, force)
+        is_finished = govern(state, settings, loop, buffer, reading, force)
         advance(rig_state, parameters, force)
         if ring.shape[0] > 1:  # no ring: an empty call would cost half of the time of a simple rig's tick
             publish(state, settings, ring, reading)
-        if over:
+        if is_finished:
             break
 
 
@@ -146,7 +146,7 @@ class CompiledRunner:
     force_off = disconnected = True
 
     def __init__(self, rig: CompiledRig, governor: Governor, block_ticks: int) -> None:
-        self._parts = parts(rig.sense, rig.advance)
+        self._pointers = make_tick_pointers(rig.sense, rig.advance)
         self._rig = rig
         self._arrays = (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE))
         # Separate random numbers: the number of glances must not change what is recorded.
@@ -155,7 +155,7 @@ class CompiledRunner:
         self._governor = governor
         self._block_ticks = block_ticks
         self.failure: BaseException | None = None
-        self._run_block(0)  # compile now, not when a stimulus is due
+        self._run_block(0)  # compiles in advance, so that no stimulus is delayed
 
     @property
     def moving(self) -> bool:
@@ -168,7 +168,7 @@ class CompiledRunner:
     def prepare(self) -> None:
         """Tell the rig what will be played (`CompiledRig.prepare`): rows, whether they repeat, and wait (ticks)."""
         state = self._governor.state
-        repeats, wait = bool(np.isinf(state[cells.LENGTH])), int(state[cells.LEAD] - state[cells.TICK])
+        repeats, wait = bool(np.isinf(state[cells.LENGTH])), int(state[cells.ONSET_TICKS] - state[cells.TICK])
         self._rig.prepare(self._governor.steady, repeats, wait)
 
     def glance(self) -> None:
@@ -210,4 +210,4 @@ class CompiledRunner:
     def _run_block(self, ticks: int) -> None:
         governor = self._governor
         arrays = (governor.state, governor.settings, governor.loop, governor.buffer, governor.force, governor.ring)
-        run_block(*self._parts, PUBLISHED, self._arrays, arrays, ticks)
+        run_block(*self._pointers, PUBLISH_POINTER, self._arrays, arrays, ticks)

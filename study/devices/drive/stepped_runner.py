@@ -1,8 +1,10 @@
-"""Control ticks of a real device, and the reaction to a driver that hangs or fails.
+"""Runner of a real device's control ticks, with timeouts for a driver that hangs or fails. Made by
+`study.devices.safe`.
 
-Ticks of rigs with compiled halves run in compiled code (`compiled_drive`), others from Python; both compute the same.
+Ticks of rigs with compiled input and output run in compiled code (`compiled_drive`), others from Python, with equal
+results.
 
-A call into a driver cannot be interrupted. A caller that gives up therefore marks the rig as gone (GONE) and lets a
+A call into a driver cannot be interrupted. A caller that gives up therefore marks the rig as gone (RIG_GONE) and lets a
 separate thread write zero force. When the call of the loop returns later, the loop writes zero once more, so that a
 late write leaves no force on the device.
 """
@@ -16,8 +18,8 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import Fault
-from study.devices.drive.compiled_drive import DECIDING, GONE, LOOP_STATE_SIZE, OVER, STAMPS, WRITING
-from study.devices.drive.compiled_ticks import CompiledTicks, halves_of
+from study.devices.drive.compiled_drive import DECIDING, FINISHED, LOOP_STATE_SIZE, RIG_GONE, STAMPS, WRITING
+from study.devices.drive.compiled_ticks import CompiledTicks, compiled_io_of
 from study.devices.drive.last_reading import LastReading
 from study.devices.governor import cells, govern
 from study.devices.governor.governor import Governor
@@ -30,35 +32,35 @@ class Standby:
 
     def __init__(self, action: Callable[[], bool | None], name: str) -> None:
         self._action = action
-        self._asked: SimpleQueue[SimpleQueue[bool] | None] = SimpleQueue()
+        self._requests: SimpleQueue[SimpleQueue[bool] | None] = SimpleQueue()
         threading.Thread(target=self._run_thread, name=name, daemon=True).start()
 
-    def run(self, patience_s: float) -> bool:
-        """Run the action. Returns whether it ended within patience_s (s) with neither an error nor False. The action
+    def run(self, timeout_s: float) -> bool:
+        """Run the action. Returns whether it ended within timeout_s (s) with neither an error nor False. The action
         continues even if the caller is interrupted."""
         answer: SimpleQueue[bool] = SimpleQueue()
-        self._asked.put(answer)
+        self._requests.put(answer)
         try:
-            return answer.get(timeout=patience_s)
+            return answer.get(timeout=timeout_s)
         except Empty:
             return False
 
     def end(self) -> None:
         """End the thread after the calls that are queued."""
-        self._asked.put(None)
+        self._requests.put(None)
 
     def _run_thread(self) -> None:
-        while (answer := self._asked.get()) is not None:
+        while (answer := self._requests.get()) is not None:
             try:
                 answer.put(self._action() is not False)
-            except BaseException:  # noqa: BLE001 - the answer says so, and the next one who asks needs this thread
+            except BaseException:  # noqa: BLE001 - reported to the caller; the thread must survive for the next request
                 answer.put(False)
 
 
-ZERO_PATIENCE_S = 0.1
+ZERO_TIMEOUT_S = 0.1
 """Longest wait for a zero force to be written (s): a hundred times the duration of a normal write."""
 
-CLOSE_PATIENCE_S = 1.0
+CLOSE_TIMEOUT_S = 1.0
 """Longest wait for the driver to close its device (s)."""
 
 
@@ -83,8 +85,8 @@ class SteppedRunner:
         self.force_off = self.disconnected = True
         self._seen: LastReading | None = None
         self.loop_state: FloatArray = np.zeros(LOOP_STATE_SIZE)
-        halves = halves_of(rig) if now_s is None or monotonic else None
-        self._compiled = CompiledTicks(halves, governor, self.loop_state) if halves is not None else None
+        compiled_io = compiled_io_of(rig) if now_s is None or monotonic else None
+        self._compiled = CompiledTicks(compiled_io, governor, self.loop_state) if compiled_io is not None else None
         self.loop_state[STAMPS] = now_s is not None
         self._closed = self._ended = False
         self._zero = Standby(lambda: rig.write(np.zeros(3)), "force off")
@@ -97,7 +99,7 @@ class SteppedRunner:
 
     @property
     def seen(self) -> LastReading | None:
-        if self._is_gone:
+        if self._is_rig_gone:
             return None
         reading = self._compiled.seen() if self._compiled is not None else None
         return self._seen if reading is None else LastReading(reading, self._rig.buttons())
@@ -111,22 +113,22 @@ class SteppedRunner:
         """Nothing to do for a real device."""
 
     @property
-    def _is_gone(self) -> bool:
-        return bool(self.loop_state[GONE])
+    def _is_rig_gone(self) -> bool:
+        return bool(self.loop_state[RIG_GONE])
 
     def glance(self) -> None:
         """Read the sensors once while nothing moves. Never raises for a driver that fails."""
-        if self._is_gone:
+        if self._is_rig_gone:
             return
         try:
             self._seen = LastReading(self._read(), self._rig.buttons())
-        except Exception:  # noqa: BLE001 - a look finds no reading; the next tick says why
+        except Exception:  # noqa: BLE001 - no reading; the next tick reports the error
             self._seen = None
 
     def run(self, ticks: int) -> None:
         """Run at most this many ticks, in compiled code where the rig has compiled halves, else from Python. Never
         raises for a failing rig."""
-        if self._is_gone:
+        if self._is_rig_gone:
             self._governor.abandon(Fault.LOST)
             return
         with self._handle_failures():
@@ -134,15 +136,15 @@ class SteppedRunner:
                 self._conclude(self._compiled.run(ticks))
                 return
             for _ in range(ticks):
-                if self._tick() or self._is_gone:
+                if self._tick() or self._is_rig_gone:
                     break
 
     def attend(self) -> int:
         """Run ticks in real time by `compiled_drive.attend`, and return its code. To be called only where `attends`.
         Never raises for a failing rig."""
         assert self._compiled is not None
-        code = OVER
-        if self._is_gone:
+        code = FINISHED
+        if self._is_rig_gone:
             self._governor.abandon(Fault.LOST)
             return code
         with self._handle_failures():
@@ -156,19 +158,19 @@ class SteppedRunner:
         again."""
         try:
             yield
-        except Exception as error:  # noqa: BLE001 - any error of a driver: the force goes off, the next call says why
+        except Exception as error:  # noqa: BLE001 - any error of a driver: force off; the next call reports it
             self.give_up(error)
         except BaseException:  # Ctrl-C in the middle of a tick
-            self._silence(Fault.STALLED)
+            self._stop_with_zero_force(Fault.STALLED)
             raise
         finally:
-            if self._is_gone:
-                self._once_more()
+            if self._is_rig_gone:
+                self._repeat_zero_force()
 
     def _conclude(self, code: int) -> None:
         """Keep the last reading of compiled ticks; raise the rig's error for a code above zero."""
         assert self._compiled is not None
-        if (reading := self._compiled.last_seen()) is not None:
+        if (reading := self._compiled.last_reading()) is not None:
             self._seen = LastReading(reading, self._rig.buttons())
         if code > 0:
             raise self._compiled.error(code)
@@ -176,30 +178,30 @@ class SteppedRunner:
     def give_up(self, failure: BaseException) -> None:
         """Force off permanently, because of this failure; the first one is kept."""
         self.failure = self.failure or failure
-        self.loop_state[GONE] = 1.0
-        self._silence(Fault.LOST)
+        self.loop_state[RIG_GONE] = 1.0
+        self._stop_with_zero_force(Fault.LOST)
 
     def drop(self, fault: Fault) -> None:
         """Force off at once with this fault; the rig stays usable if it takes the zero force."""
-        self._silence(fault)
+        self._stop_with_zero_force(fault)
 
     def cut(self) -> None:
         """Emergency stop: a separate thread writes zero force even if a call of the driver hangs; the rig is then
         gone."""
-        self.loop_state[GONE] = 1.0
-        self._silence(Fault.STOPPED)
+        self.loop_state[RIG_GONE] = 1.0
+        self._stop_with_zero_force(Fault.STOPPED)
 
     def disconnect(self) -> None:
         """Write zero force, then call the driver's `close`, each in a separate thread and with a timeout
-        (`ZERO_PATIENCE_S`, `CLOSE_PATIENCE_S`)."""
+        (`ZERO_TIMEOUT_S`, `CLOSE_TIMEOUT_S`)."""
         if self._ended:
             return
-        self.loop_state[GONE] = 1.0
+        self.loop_state[RIG_GONE] = 1.0
         try:
-            self._silence(Fault.LOST if self.moving else Fault.NONE)
+            self._stop_with_zero_force(Fault.LOST if self.moving else Fault.NONE)
         finally:
             self._closed = True
-            self.disconnected = self._disconnect.run(CLOSE_PATIENCE_S)
+            self.disconnected = self._disconnect.run(CLOSE_TIMEOUT_S)
         self._ended = True
         self._zero.end()
         self._disconnect.end()
@@ -209,12 +211,14 @@ class SteppedRunner:
         off."""
         governor = self._governor
         reading = self._read()
-        if self._is_gone:
+        if self._is_rig_gone:
             return True
         if self._now_s is not None:
             governor.state[cells.STAMP_S] = self._now_s()
         self.loop_state[DECIDING] = 1.0
-        over = govern.tick(governor.state, governor.settings, governor.loop, governor.buffer, reading, governor.force)
+        is_finished = govern.tick(
+            governor.state, governor.settings, governor.loop, governor.buffer, reading, governor.force
+        )
         self.loop_state[WRITING] = 1.0
         try:
             self._rig.write(governor.force.copy())
@@ -222,9 +226,9 @@ class SteppedRunner:
             self.loop_state[WRITING] = 0.0
         self.loop_state[DECIDING] = 0.0
         govern.publish(governor.state, governor.settings, governor.ring, reading)
-        if not over:
+        if not is_finished:
             self._seen = LastReading(reading, self._rig.buttons())
-        return bool(over)
+        return bool(is_finished)
 
     def _read(self) -> FloatArray:
         """A reading of the rig. Raises ValueError for a wrong shape, and what the driver raises."""
@@ -233,31 +237,31 @@ class SteppedRunner:
             raise ValueError(f"a reading has the shape {reading.shape}; it must be ({READING_SIZE},)")
         return reading
 
-    def _silence(self, fault: Fault) -> None:
+    def _stop_with_zero_force(self, fault: Fault) -> None:
         """Write zero force, then stop the governor with this fault: the end is reported only when no force acts.
 
         Where zero force could not be written in time, the rig is gone and the fault is FORCE_LEFT."""
-        written = False
+        zero_written = False
         try:
-            written = (
-                self._zero.run(ZERO_PATIENCE_S) and not self.loop_state[WRITING]
+            zero_written = (
+                self._zero.run(ZERO_TIMEOUT_S) and not self.loop_state[WRITING]
             )  # a write that still hangs may take effect after the zero
         finally:
-            self.force_off = written
-            if not written:
-                self.loop_state[GONE] = 1.0
+            self.force_off = zero_written
+            if not zero_written:
+                self.loop_state[RIG_GONE] = 1.0
                 self.failure = self.failure or TimeoutError("it took no zero force")
-            self._governor.abandon(fault if written else Fault.FORCE_LEFT)
+            self._governor.abandon(fault if zero_written else Fault.FORCE_LEFT)
             self.loop_state[DECIDING] = 0.0
 
-    def _once_more(self) -> None:
+    def _repeat_zero_force(self) -> None:
         """Write zero force again, and close the rig if that was requested: the caller gave up while this thread was in
         the driver, which may have written a force since."""
         self.force_off = False
         try:
             self._rig.write(np.zeros(3))
             self.force_off = True
-        except Exception:  # noqa: BLE001 - it is known to be gone; what matters is whether its force is
+        except Exception:  # noqa: BLE001 - the rig is gone already; only its force matters
             self._governor.abandon(Fault.FORCE_LEFT)
         if self._closed:
             with contextlib.suppress(Exception):

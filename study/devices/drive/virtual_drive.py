@@ -23,14 +23,14 @@ class VirtualDrive:
         self._closed = False
         clock.listen(self._pump)
 
-    def start(self, begin: Callable[[], None]) -> bool:
-        """Call `begin`, which prepares the governor; from then on ticks fall due. Returns False, without a begin, where
-        a stimulus is in progress or the drive is closed."""
+    def start(self, begin_stimulus: Callable[[], None]) -> bool:
+        """Call `begin_stimulus`, which prepares the governor; from then on ticks fall due. Returns False, without a
+        begin, where a stimulus is in progress or the drive is closed."""
         if self._runner.moving or self._closed:
             return False
-        begin()
+        begin_stimulus()
         self._started_s = self._clock.now_s()
-        self._governor.note_begin(self._started_s)
+        self._governor.set_begin_time(self._started_s)
         self._run = 0
         return True
 
@@ -55,12 +55,12 @@ class VirtualDrive:
     def _pump(self, now_s: float) -> None:
         """Run the ticks that have become due by now_s (s)."""
         if self._governor.moving:
-            due = ticks_by(now_s - self._started_s, self._rate_hz)
-            self._runner.run(due - self._run)
-            self._run = due
+            due_ticks = count_due_ticks(now_s - self._started_s, self._rate_hz)
+            self._runner.run(due_ticks - self._run)
+            self._run = due_ticks
 
 
-def ticks_by(elapsed_s: float, rate_hz: float) -> int:
+def count_due_ticks(elapsed_s: float, rate_hz: float) -> int:
     """Number of ticks that are due after elapsed_s. A time that rounding puts just before a tick counts as that
     tick."""
     return int(elapsed_s * rate_hz + 1e-6)

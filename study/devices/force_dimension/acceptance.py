@@ -56,9 +56,9 @@ def write_acceptance(acceptance: Acceptance) -> Path:
     OSError where the file cannot be written."""
     path = acceptance_file()
     path.parent.mkdir(parents=True, exist_ok=True)
-    written = path.with_suffix(".new")
-    written.write_text(json.dumps({"format": FORMAT, "version": VERSION, **asdict(acceptance)}, indent=2) + "\n")
-    written.replace(path)
+    new_path = path.with_suffix(".new")
+    new_path.write_text(json.dumps({"format": FORMAT, "version": VERSION, **asdict(acceptance)}, indent=2) + "\n")
+    new_path.replace(path)
     return path
 
 
@@ -69,24 +69,27 @@ def check_accepted(info: DeviceInfo, today: date) -> tuple[str, str]:
     try:
         document = json.loads(path.read_text("utf-8"))
         accepted_on = date.fromisoformat(document["accepted_on"])
-        known = (document["format"], document["version"], document["device"], document["details"])
+        accepted_device = (document["format"], document["version"], document["device"], document["details"])
         baseline = (str(document.get("baseline", "")), str(document.get("baseline_sha256", "")))
     except FileNotFoundError:
         raise _lock_error(info, f"There is no acceptance of it ({path})") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise _lock_error(info, f"{path} is no acceptance ({type(error).__name__})") from error
-    if known != (FORMAT, VERSION, info.name, info.details):
-        raise _lock_error(info, f"Another was accepted ({known[2]}, {known[3]}); this is {info.name}, {info.details}")
+    if accepted_device != (FORMAT, VERSION, info.name, info.details):
+        raise _lock_error(
+            info,
+            f"Another was accepted ({accepted_device[2]}, {accepted_device[3]}); this is {info.name}, {info.details}",
+        )
     if not accepted_on <= today <= accepted_on + VALID_FOR:
         raise _lock_error(info, f"It was accepted on {accepted_on}; that holds for {VALID_FOR.days} days")
     return baseline
 
 
-def _lock_error(info: DeviceInfo, happened: str) -> DeviceError:
+def _lock_error(info: DeviceInfo, reason: str) -> DeviceError:
     """Error for a device that must not be opened with a hand on the handle."""
     option = info.name.replace(".", "")
     return DeviceError(
         f"The {info.name} is locked for hands",
-        f"{happened}.",
+        f"{reason}.",
         f"With no hand on the handle: hapteq doctor --device {option} --accept 'NAME OF THE OPERATOR'.",
     )

@@ -8,7 +8,7 @@ import os
 
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.library import DEVICE_IN_USE, Library, LibraryError
-from study.devices.force_dimension.locate import Computer, find_library, library_patterns, this_computer
+from study.devices.force_dimension.locate import Computer, describe_this_computer, find_library, list_library_patterns
 from study.devices.force_dimension.models import DeviceModel, name_of_type
 from study.devices.force_dimension.usb import ADVICE, find_usb_devices
 from study.errors import DeviceError
@@ -30,7 +30,7 @@ CALIBRATE = (
 
 def load_library() -> Library:
     """Load the vendor's library. Raises `DeviceError`."""
-    computer = this_computer(os.environ)
+    computer = describe_this_computer(os.environ)
     path = find_library(computer)
     if path is None:
         raise make_missing_library_error(computer)
@@ -40,7 +40,7 @@ def load_library() -> Library:
 def open_model(library: Library, model: DeviceModel) -> Handle:
     """Open the first free device of this model; its watchdog is not armed and its forces are not enabled yet. Raises
     `DeviceError` where there is none."""
-    others: list[tuple[str, str | None]] = []
+    other_devices: list[tuple[str, str | None]] = []
     failures: list[LibraryError] = []
     count = max(0, int(library.function("dhdGetDeviceCount")()))
     for number in range(min(MOST_DEVICES, count)):
@@ -53,18 +53,18 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
             system_type = handle.system_type()
             if system_type in model.system_types:
                 return handle
-            others.append((handle.system_name(), name_of_type(system_type)))
+            other_devices.append((handle.system_name(), name_of_type(system_type)))
         except LibraryError as error:
             failures.append(error)
         except BaseException:
             handle.disconnect()
             raise
         handle.disconnect()
-    missing = _none_of_them(model, others, failures)
+    missing = _missing_device_error(model, other_devices, failures)
     if count <= MOST_DEVICES:
         raise missing
-    counted = f"The library counts {count} devices, of which the first {MOST_DEVICES} were looked at."
-    raise DeviceError(missing.title, f"{missing.happened} {counted}", missing.do_now)
+    count_note = f"The library counts {count} devices, of which the first {MOST_DEVICES} were looked at."
+    raise DeviceError(missing.title, f"{missing.happened} {count_note}", missing.do_now)
 
 
 def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_kg: float | None) -> float:
@@ -84,7 +84,7 @@ def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_k
         if not status.gives_forces:
             raise DeviceError(
                 f"The {model.name} accepts no forces",
-                f"It was told to switch its motors on, but they stay off: {status.why_off}.",
+                f"It was told to switch its motors on, but they stay off: {status.off_reason}.",
                 "Check that its power supply is on, and press its force button if it has one.",
             )
     except LibraryError as error:
@@ -101,7 +101,7 @@ def device_error(name: str, error: LibraryError) -> DeviceError:
 
 def make_missing_library_error(computer: Computer) -> DeviceError:
     """Error for a computer on which the vendor's library is not found; it lists the folders that were searched."""
-    places = list(dict.fromkeys(str(folder) for folder, _ in library_patterns(computer)))
+    places = list(dict.fromkeys(str(folder) for folder, _ in list_library_patterns(computer)))
     return DeviceError(
         "The device's library is not installed",
         f"Neither libdrd nor libdhd was found in {', '.join(places)}."
@@ -124,17 +124,17 @@ def _check_fit(handle: Handle, model: DeviceModel) -> None:
         raise DeviceError(f"The {model.name} is not calibrated", "It does not know where its handle is.", CALIBRATE)
 
 
-def _none_of_them(
-    model: DeviceModel, others: list[tuple[str, str | None]], failures: list[LibraryError]
+def _missing_device_error(
+    model: DeviceModel, other_devices: list[tuple[str, str | None]], failures: list[LibraryError]
 ) -> DeviceError:
-    """Error where no device of the model could be opened, with the most probable cause. others: the vendor's name of
-    each other device found, and the name that `--device` takes, if there is one; failures: of devices that did not
+    """Error where no device of the model could be opened, with the most probable cause. other_devices: the vendor's
+    name of each other device found, and the name that `--device` takes, if any; failures: of devices that did not
     open."""
     title = f"There is no {model.name}"
     if any(failure.code == DEVICE_IN_USE for failure in failures):
         return DeviceError(title, "A device is there, and another program has it.", "Close the other program.")
-    if others:
-        return _others_instead(model, others)
+    if other_devices:
+        return _other_models_error(model, other_devices)
     if any(not device.may_open for device in find_usb_devices() or ()):
         return DeviceError(title, "A device is plugged in, and this account may not open it.", ADVICE)
     if failures:
@@ -144,10 +144,10 @@ def _none_of_them(
     return DeviceError(title, "No device of the vendor answers.", "Plug its USB cable in and switch its power on.")
 
 
-def _others_instead(model: DeviceModel, others: list[tuple[str, str | None]]) -> DeviceError:
+def _other_models_error(model: DeviceModel, other_devices: list[tuple[str, str | None]]) -> DeviceError:
     """Error where only devices of other models were found; it names them."""
-    known = [f"`--device {name}`" for _, name in others if name is not None]
-    found = ", ".join(name or f"{reported!r}, which hapteq does not drive" for reported, name in others)
+    options = [f"`--device {name}`" for _, name in other_devices if name is not None]
+    device_names = ", ".join(name or f"{reported!r}, which hapteq does not drive" for reported, name in other_devices)
     plug_in = f"plug the {model.name} in and switch its power on."
-    do_now = f"Use {' or '.join(known)}, or {plug_in}" if known else plug_in[:1].upper() + plug_in[1:]
-    return DeviceError(f"There is no {model.name}", f"Found instead: {found}.", do_now)
+    remedy = f"Use {' or '.join(options)}, or {plug_in}" if options else plug_in[:1].upper() + plug_in[1:]
+    return DeviceError(f"There is no {model.name}", f"Found instead: {device_names}.", remedy)

@@ -7,14 +7,14 @@ compensation. Each finding that is not fine says what to do.
 import contextlib
 import time
 
-from study.devices.accelerometer.sensor_findings import sensor_findings
-from study.devices.drive.real_time_class import real_time_finding
+from study.devices.accelerometer.sensor_findings import check_sensor
+from study.devices.drive.real_time_class import check_real_time_rights
 from study.devices.force_dimension.connect import CALIBRATE, load_library, make_ready, open_model
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.lab import LabSettings, lab_file, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
-from study.devices.force_dimension.rigs import info_of
+from study.devices.force_dimension.rigs import read_info
 from study.devices.force_dimension.usb import ADVICE, find_usb_devices
 from study.devices.force_dimension.watchdog_check import check_watchdog
 from study.errors import DeviceError
@@ -47,21 +47,27 @@ def examine(name: str) -> tuple[DeviceFinding, ...]:
     try:
         lab = read_lab()
     except DeviceError as error:
-        return (_make_failed_finding("Driver", error), *_usb(), real_time_finding())
+        return (_make_failed_finding("Driver", error), *_check_usb(), check_real_time_rights())
     try:
         library = load_library()
     except DeviceError as error:
         return (
             _make_failed_finding("Driver", error),
-            *(_usb() or _find_if_unplugged()),
-            real_time_finding(),
-            *_sensor(lab),
+            *(_check_usb() or _find_if_unplugged()),
+            check_real_time_rights(),
+            *_check_sensor(lab),
         )
-    found = DeviceFinding("Library", f"{library.path}, SDK {library.version_text}", fine=True)
-    return (found, *_usb(), real_time_finding(), *_sensor(lab), *_of_device(library, MODELS[name], lab))
+    library_finding = DeviceFinding("Library", f"{library.path}, SDK {library.version_text}", fine=True)
+    return (
+        library_finding,
+        *_check_usb(),
+        check_real_time_rights(),
+        *_check_sensor(lab),
+        *_examine_device(library, MODELS[name], lab),
+    )
 
 
-def _of_device(library: Library, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
+def _examine_device(library: Library, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
     """Open the device, examine it, and disconnect it. Errors become findings."""
     findings: list[DeviceFinding] = []
     try:
@@ -69,9 +75,9 @@ def _of_device(library: Library, model: DeviceModel, lab: LabSettings) -> list[D
     except DeviceError as error:
         return [_make_failed_finding("Driver", error)]
     try:
-        info = info_of(handle, library, model, lab.effective_mass_kg)
+        info = read_info(handle, library, model, lab.effective_mass_kg)
         findings.append(DeviceFinding("Connection", f"{info.name}, {info.details}", fine=True))
-        findings += _of_opened(handle, model, lab)
+        findings += _examine_opened(handle, model, lab)
     except DeviceError as error:
         findings.append(_make_failed_finding("Driver", error))
     except LibraryError as error:
@@ -96,7 +102,7 @@ def calibrate(name: str, patience_s: float) -> None:
         handle.disconnect()
 
 
-def _usb() -> list[DeviceFinding]:
+def _check_usb() -> list[DeviceFinding]:
     """Findings on the USB permissions of the devices that are plugged in; empty on systems other than Linux."""
     return [
         DeviceFinding("USB", device.product, fine=True)
@@ -115,7 +121,7 @@ def _find_if_unplugged() -> list[DeviceFinding]:
     return [DeviceFinding("USB", value, fine=False, advice=advice, warning=True)]
 
 
-def _sensor(lab: LabSettings) -> list[DeviceFinding]:
+def _check_sensor(lab: LabSettings) -> list[DeviceFinding]:
     """Findings on the accelerometer. It is opened, read and closed again, because the loop's process opens it
     itself."""
     if lab.accelerometer is None:
@@ -127,58 +133,73 @@ def _sensor(lab: LabSettings) -> list[DeviceFinding]:
         return [DeviceFinding(SENSOR, f"none is configured in {lab_file()}", fine=False, advice=advice, warning=True)]
     try:
         with contextlib.closing(lab.accelerometer.open_sensor()) as sensor:
-            return list(sensor_findings(sensor))
+            return list(check_sensor(sensor))
     except DeviceError as error:
         return [_make_failed_finding(SENSOR, error)]
 
 
-def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
+def _examine_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
     """Findings on an opened device: power, calibration, watchdog, masses, gravity compensation. Raises `DeviceError`,
     `LibraryError`."""
     status = handle.status()
     power = DeviceFinding("Power", "on" if status.powered else "off", status.powered, "" if status.powered else POWER)
     calibrated = status.calibrated
-    place = "done" if calibrated else "not done since it was switched on: it does not know where its handle is"
-    advice = "" if calibrated else f"Run `hapteq doctor --device {_option(model)} --calibrate`, or: {CALIBRATE}"
-    findings = [power, DeviceFinding("Calibration", place, calibrated, advice)]
+    calibration_text = (
+        "done" if calibrated else "not done since it was switched on: it does not know where its handle is"
+    )
+    advice = (
+        "" if calibrated else f"Run `hapteq doctor --device {_find_option_name(model)} --calibrate`, or: {CALIBRATE}"
+    )
+    findings = [power, DeviceFinding("Calibration", calibration_text, calibrated, advice)]
     if not (status.powered and calibrated):
         return findings
     drops_after_s = make_ready(handle, model, CAP_N, lab.effector_mass_kg)
-    took_s = check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
-    watchdog = f"set to {1000 * drops_after_s:.1f} ms; without forces the device let go within {1000 * took_s:.0f} ms"
-    return [*findings, DeviceFinding("Watchdog", watchdog, fine=True), _masses(model, lab), *_gravity(handle)]
+    release_s = check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
+    watchdog = (
+        f"set to {1000 * drops_after_s:.1f} ms; without forces the device let go within {1000 * release_s:.0f} ms"
+    )
+    return [
+        *findings,
+        DeviceFinding("Watchdog", watchdog, fine=True),
+        _report_masses(model, lab),
+        *_check_gravity(handle),
+    ]
 
 
-def _masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
+def _report_masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
     """The masses in use (kg): for the gravity compensation, and for the stiffness of the centring spring."""
-    carried_kg = lab.effector_mass_kg or model.effector_mass_kg
-    carried = f"{carried_kg:g} kg" if carried_kg else "with the library's own mass"
-    moved = f"{lab.effective_mass_kg:g} kg" if lab.effective_mass_kg else f"{model.effective_mass_kg:g} kg, assumed"
-    return DeviceFinding("Masses", f"gravity compensation {carried}, spring {moved} ({lab_file()})", fine=True)
+    effector_mass_kg = lab.effector_mass_kg or model.effector_mass_kg
+    gravity_mass = f"{effector_mass_kg:g} kg" if effector_mass_kg else "with the library's own mass"
+    spring_mass = (
+        f"{lab.effective_mass_kg:g} kg" if lab.effective_mass_kg else f"{model.effective_mass_kg:g} kg, assumed"
+    )
+    return DeviceFinding(
+        "Masses", f"gravity compensation {gravity_mass}, spring {spring_mass} ({lab_file()})", fine=True
+    )
 
 
-def _gravity(handle: Handle) -> list[DeviceFinding]:
+def _check_gravity(handle: Handle) -> list[DeviceFinding]:
     """Findings on the vertical drift of the handle by its positions, and on a velocity of the library that differs from
     it; empty where positions cannot be read, which another finding reports. Raises `LibraryError`."""
-    _rest(handle, AT_REST_S)
+    _send_zero_forces(handle, AT_REST_S)
     try:
         began_s, from_m = time.monotonic(), handle.position_m()[2]
-        _rest(handle, COMPARED_S)
+        _send_zero_forces(handle, COMPARED_S)
         up_mps = (handle.position_m()[2] - from_m) / (time.monotonic() - began_s)
     except LibraryError as error:
         if error.function == "dhdGetPosition":
             return []
         raise
-    told_mps = handle.velocity_mps()[2]
-    findings = [_drift(up_mps)]
-    if not abs(told_mps - up_mps) <= DRIFTING_MPS + 0.5 * abs(up_mps):
-        value = f"the library says {told_mps:g} m/s along z; by its positions the handle moves at {up_mps:.2g} m/s"
+    reported_mps = handle.velocity_mps()[2]
+    findings = [_check_drift(up_mps)]
+    if not abs(reported_mps - up_mps) <= DRIFTING_MPS + 0.5 * abs(up_mps):
+        value = f"the library says {reported_mps:g} m/s along z; by its positions the handle moves at {up_mps:.2g} m/s"
         advice = "Nothing that hapteq plays depends on it. Other programs may: install the vendor's newest SDK."
         findings.append(DeviceFinding("Velocity", value, fine=False, advice=advice, warning=True))
     return findings
 
 
-def _rest(handle: Handle, seconds: float) -> None:
+def _send_zero_forces(handle: Handle, seconds: float) -> None:
     """Send zero forces for this time (s): the library compensates gravity only while forces are sent. Raises
     `LibraryError`."""
     until_s = time.monotonic() + seconds
@@ -187,19 +208,21 @@ def _rest(handle: Handle, seconds: float) -> None:
         time.sleep(EVERY_S)
 
 
-def _drift(up_mps: float) -> DeviceFinding:
+def _check_drift(up_mps: float) -> DeviceFinding:
     """Finding on the gravity compensation by the vertical speed of the free handle (m/s, > 0: it rises)."""
     if abs(up_mps) <= DRIFTING_MPS:
         return DeviceFinding("Gravity", "compensated: the handle stays where it is", fine=True)
-    sinks = up_mps < 0
-    advice = f"With no hand on it, make effector_mass_kg in {lab_file()} {'larger' if sinks else 'smaller'}."
-    way = "sinks" if sinks else "rises"
-    return DeviceFinding("Gravity", f"the handle {way} at {1000 * abs(up_mps):.0f} mm/s", False, advice, warning=True)
+    is_sinking = up_mps < 0
+    advice = f"With no hand on it, make effector_mass_kg in {lab_file()} {'larger' if is_sinking else 'smaller'}."
+    direction = "sinks" if is_sinking else "rises"
+    return DeviceFinding(
+        "Gravity", f"the handle {direction} at {1000 * abs(up_mps):.0f} mm/s", False, advice, warning=True
+    )
 
 
-def _option(model: DeviceModel) -> str:
+def _find_option_name(model: DeviceModel) -> str:
     """The name that `--device` takes for a model."""
-    return next(name for name, known in MODELS.items() if known is model)
+    return next(name for name, candidate in MODELS.items() if candidate is model)
 
 
 def _make_failed_finding(name: str, error: DeviceError) -> DeviceFinding:

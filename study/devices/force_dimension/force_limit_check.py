@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from equalizer.signals.signal import Signal
-from study.devices.device import Device, DeviceInfo, Fault, Played
+from study.devices.device import Device, DeviceInfo, Fault, PlaybackResult
 from study.devices.force_dimension.watchdog_check import MARGIN_S
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
@@ -54,7 +54,7 @@ class CappedDevice(Protocol):
 
     def fault(self) -> Fault: ...
 
-    def release(self) -> Played: ...
+    def release(self) -> PlaybackResult: ...
 
 
 class ForceReporting(Protocol):
@@ -107,42 +107,42 @@ def check_cap_holds(device: CappedDevice, rig: ForceReporting) -> float:
     device: opened without a spring and with caps of FORCE_N. Raises `DeviceError` where the cap was exceeded,
     or where the force was too small for the test to be valid.
     """
-    shaking = _oscillation(device.info.sample_rate_hz)
+    oscillation = _make_oscillation(device.info.sample_rate_hz)
     try:
-        device.hold(shaking)
+        device.hold(oscillation)
     except DeviceError:
         pass
     else:
         device.release()
         raise _not_accepted_error("A stimulus above its cap was not refused.")
-    device.hold_unchecked(shaking)
-    of_ticks_n = _largest_given_n(device, rig)
+    device.hold_unchecked(oscillation)
+    ticks_force_n = _measure_largest_n(device, rig)
     device.release()
-    _check_given("at each tick", of_ticks_n)
+    _check_given_force("at each tick", ticks_force_n)
     if device.fault() is not Fault.NONE:
         raise _not_accepted_error(f"The force did not last: {device.fault().value}.")
-    of_library_n = rig.given_past_this_n(COMMANDED_TO_CAP * FORCE_N)
-    _check_given("of the library", of_library_n)
-    return max(of_ticks_n, of_library_n)
+    library_force_n = rig.given_past_this_n(COMMANDED_TO_CAP * FORCE_N)
+    _check_given_force("of the library", library_force_n)
+    return max(ticks_force_n, library_force_n)
 
 
-def _largest_given_n(device: CappedDevice, rig: ForceReporting) -> float:
+def _measure_largest_n(device: CappedDevice, rig: ForceReporting) -> float:
     """The largest force that the device reports during `SHAKEN_S`."""
-    most_n, until_s = 0.0, time.monotonic() + SHAKEN_S
+    largest_n, until_s = 0.0, time.monotonic() + SHAKEN_S
     while time.monotonic() < until_s:
-        most_n = max(most_n, rig.given_n())
+        largest_n = max(largest_n, rig.given_n())
         device.keep_alive()
         time.sleep(EVERY_S)
-    return most_n
+    return largest_n
 
 
-def _check_given(which: str, given_n: float) -> None:
+def _check_given_force(cap_name: str, given_n: float) -> None:
     """Raise unless the given force is within the cap and large enough for a valid test."""
-    asked = f"{COMMANDED_TO_CAP * FORCE_N:g} N were commanded, and the device gave {given_n:.2f} N"
+    result_text = f"{COMMANDED_TO_CAP * FORCE_N:g} N were commanded, and the device gave {given_n:.2f} N"
     if not given_n <= ALLOWED_TO_CAP * FORCE_N:
-        raise _not_accepted_error(f"The cap {which} does not hold: {asked}, where {FORCE_N:g} N are allowed.")
+        raise _not_accepted_error(f"The cap {cap_name} does not hold: {result_text}, where {FORCE_N:g} N are allowed.")
     if given_n < LEAST_SHARE * FORCE_N:
-        raise _not_accepted_error(f"The cap {which} could not be tried: {asked}.")
+        raise _not_accepted_error(f"The cap {cap_name} could not be tried: {result_text}.")
 
 
 def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
@@ -151,7 +151,7 @@ def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
     device: opened without a spring; its loop counts as failed afterwards, so that it must be closed. Raises
     `DeviceError` where the force remained, or where there was none before.
     """
-    device.hold(_push(device.info.sample_rate_hz))
+    device.hold(_make_constant_force(device.info.sample_rate_hz))
     _keep_alive_for(device, HELD_S)
     if device.fault() is not Fault.NONE or not rig.force_on():
         raise _not_accepted_error(f"The force did not last: {device.fault().value}.")
@@ -165,18 +165,18 @@ def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
             device.stop()
             raise _not_accepted_error(f"The force was still there {1000 * limit_s:.0f} ms after the last command.")
         time.sleep(EVERY_S)
-    gone_after_s = time.monotonic() - silent_since_s
+    force_off_after_s = time.monotonic() - silent_since_s
     device.release()
-    return gone_after_s
+    return force_off_after_s
 
 
-def _push(rate_hz: float) -> HeldStimulus:
+def _make_constant_force(rate_hz: float) -> HeldStimulus:
     """A constant force of `FORCE_N` along x, towards the operator. rate_hz: of the device."""
     samples = np.tile([[FORCE_N, 0.0, 0.0]], (round(0.05 * rate_hz), 1))
     return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")
 
 
-def _oscillation(rate_hz: float) -> HeldStimulus:
+def _make_oscillation(rate_hz: float) -> HeldStimulus:
     """A sinusoidal force along x, with `COMMANDED_TO_CAP` times the cap as amplitude. rate_hz: of the device."""
     phase = 2 * np.pi * np.arange(round(rate_hz / SHAKEN_HZ)) * SHAKEN_HZ / rate_hz
     samples = COMMANDED_TO_CAP * FORCE_N * np.sin(phase)[:, None] * [1.0, 0.0, 0.0]
@@ -191,9 +191,9 @@ def _keep_alive_for(device: Device, seconds: float) -> None:
         device.keep_alive()
 
 
-def _not_accepted_error(happened: str) -> DeviceError:
+def _not_accepted_error(reason: str) -> DeviceError:
     return DeviceError(
         "The device was not accepted",
-        happened,
+        reason,
         "Do not let a person hold the handle. Check power and cable, close other programs, and try again.",
     )

@@ -47,7 +47,7 @@ BRAKED_WITHIN_S = 0.02
 """Longest wait after each attempt for the status "braking" (s): a status may be some transfers old. By hand."""
 
 
-def why_off(cause: int) -> str:
+def describe_off_cause(cause: int) -> str:
     """Words for a cause by which the device's force is off, as in `Status.off_cause`."""
     return OFF_CAUSES.get(cause, "the device does not say why")
 
@@ -64,9 +64,9 @@ class Status:
     """Why the force is off, 0 where that is not known."""
 
     @property
-    def why_off(self) -> str:
+    def off_reason(self) -> str:
         """The cause in words. Brakes that are on while the device reports forces as on are a cause of their own."""
-        return why_off(BRAKED_CAUSE if self.force_on and self.braking else self.off_cause)
+        return describe_off_cause(BRAKED_CAUSE if self.force_on and self.braking else self.off_cause)
 
     @property
     def gives_forces(self) -> bool:
@@ -182,11 +182,11 @@ class Handle:
         raises; may be called again."""
         if not self._open:
             return True
-        stopped = any(self._stop_once() for _ in range(STOP_ATTEMPTS))
+        is_braked = any(self._stop_once() for _ in range(STOP_ATTEMPTS))
         with contextlib.suppress(LibraryError):
             self.library.call("dhdClose", self.number)
             self._open = False
-        return stopped
+        return is_braked
 
     def _stop_once(self) -> bool:
         with contextlib.suppress(LibraryError):

@@ -75,8 +75,8 @@ class LabSettings:
 def lab_file() -> Path:
     """Path of the settings file: from the environment variable HAPTEQ_DEVICE_FILE, else ~/.config/hapteq/device.toml.
     The file need not exist."""
-    named = os.environ.get(FILE_VARIABLE)
-    return Path(named) if named else Path.home() / ".config" / "hapteq" / "device.toml"
+    environment_path = os.environ.get(FILE_VARIABLE)
+    return Path(environment_path) if environment_path else Path.home() / ".config" / "hapteq" / "device.toml"
 
 
 def read_lab() -> LabSettings:
@@ -98,21 +98,21 @@ def read_lab() -> LabSettings:
         raise _lab_file_error(path, f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
 
 
-def keep_sensor(table: str) -> Path:
+def write_sensor_table(table: str) -> Path:
     """Write an [accelerometer] table (TOML) into the settings file, replacing an older one, and return the path. The
     previous file is kept as `NAME.before`. Raises `DeviceError` where the file cannot be read or written."""
     read_lab()
     path = lab_file()
     try:
-        before = path.read_text("utf-8") if path.exists() else ""
-        text = _with_sensor(before, table)
+        previous_text = path.read_text("utf-8") if path.exists() else ""
+        text = _replace_sensor_table(previous_text, table)
         TypeAdapter(LabSettings).validate_python(tomllib.loads(text))
         path.parent.mkdir(parents=True, exist_ok=True)
-        written = path.with_name(f"{path.name}.new")
-        written.write_text(text, "utf-8")
-        if before:
+        new_path = path.with_name(f"{path.name}.new")
+        new_path.write_text(text, "utf-8")
+        if previous_text:
             path.replace(path.with_name(f"{path.name}.before"))
-        written.replace(path)
+        new_path.replace(path)
     except (OSError, ValueError) as error:
         raise DeviceError(
             "The calibration was not kept",
@@ -122,21 +122,21 @@ def keep_sensor(table: str) -> Path:
     return path
 
 
-def _with_sensor(text: str, table: str) -> str:
+def _replace_sensor_table(text: str, table: str) -> str:
     """The text of the file with its [accelerometer] table removed and the new one appended."""
-    lines, kept, skipping = text.splitlines(), [], False
+    lines, kept_lines, skipping = text.splitlines(), [], False
     for line in lines:
         if HEADER.fullmatch(line):
             skipping = line.split("#")[0].strip() == "[accelerometer]"
         if not skipping:
-            kept.append(line)
-    above = "\n".join(kept).rstrip()
-    return f"{above}\n\n{table.rstrip()}\n" if above else f"{table.rstrip()}\n"
+            kept_lines.append(line)
+    other_text = "\n".join(kept_lines).rstrip()
+    return f"{other_text}\n\n{table.rstrip()}\n" if other_text else f"{table.rstrip()}\n"
 
 
-def _lab_file_error(path: Path, happened: str) -> DeviceError:
+def _lab_file_error(path: Path, reason: str) -> DeviceError:
     return DeviceError(
         "The settings of the device cannot be used",
-        f"{path}: {happened}.",
+        f"{path}: {reason}.",
         "Correct it; docs/hardware.md lists its keys.",
     )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from study.devices.native import address_of
+from study.devices.native import find_address
 from study.errors import DeviceError
 
 OLDEST_SDK = (3, 16, 0)
@@ -96,18 +96,18 @@ class Library:
         self._functions = _bind(_load(path), path)
         self.version = self._version()
         if self.version[:3] < OLDEST_SDK:
-            raise _too_old(f"{path} is version {_version_words(self.version)}")
+            raise _outdated_error(f"{path} is version {_format_version(self.version)}")
 
     @property
     def version_text(self) -> str:
         """Version of the vendor's SDK in words, as "3.17.5"."""
-        return _version_words(self.version)
+        return _format_version(self.version)
 
     def function(self, name: str) -> Callable[..., Any]:
         """The bare function, for calls at every tick; its return value must be passed to `check_answer`. Raises
         `DeviceError` where the library lacks this function."""
         if name not in self._functions:
-            raise _too_old(f"{self.path} has no {name}")
+            raise _outdated_error(f"{self.path} has no {name}")
         return self._functions[name]
 
     def check_answer(self, name: str, answer: int) -> int:
@@ -127,7 +127,7 @@ class Library:
 
     def addresses(self, names: tuple[str, ...]) -> npt.NDArray[np.int64]:
         """(len(names),): addresses of the library's functions, for calls from compiled code."""
-        return np.array([address_of(self._functions[name]) for name in names], dtype=np.int64)
+        return np.array([find_address(self._functions[name]) for name in names], dtype=np.int64)
 
     def call(self, name: str, *arguments: Any) -> int:
         """Call a function of the library and check its return value. Raises `LibraryError`, and `DeviceError` where the
@@ -161,25 +161,25 @@ def _bind(loaded: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
     missing."""
     missing = [name for name in SIGNATURES if not hasattr(loaded, name)]
     if missing:
-        raise _too_old(f"{path} has no {', '.join(missing)}")
+        raise _outdated_error(f"{path} has no {', '.join(missing)}")
     functions: dict[str, Callable[..., Any]] = {}
-    there = {name: types for name, types in LINKAGE_SIGNATURES.items() if hasattr(loaded, name)}
-    for name, (result, arguments) in (SIGNATURES | there).items():
+    available = {name: types for name, types in LINKAGE_SIGNATURES.items() if hasattr(loaded, name)}
+    for name, (result, arguments) in (SIGNATURES | available).items():
         function = getattr(loaded, name)
         function.restype, function.argtypes = result, list(arguments)
         functions[name] = function
     return functions
 
 
-def _version_words(version: tuple[int, ...]) -> str:
+def _format_version(version: tuple[int, ...]) -> str:
     """Text of a version, such as 3.17.5.0."""
     return ".".join(map(str, version))
 
 
-def _too_old(happened: str) -> DeviceError:
-    """Error for a library that is too old. happened: what shows it."""
+def _outdated_error(reason: str) -> DeviceError:
+    """Error for a library that is too old. reason: what shows it."""
     return DeviceError(
         "The device's library is too old",
-        f"{happened}.",
-        f"Install the vendor's SDK {_version_words(OLDEST_SDK)} or newer, and set FDSDK to its folder.",
+        f"{reason}.",
+        f"Install the vendor's SDK {_format_version(OLDEST_SDK)} or newer, and set FDSDK to its folder.",
     )

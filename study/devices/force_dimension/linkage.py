@@ -20,10 +20,10 @@ from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.lab import read_lab
 from study.devices.force_dimension.library import GEOMETRY_ERROR, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
-from study.devices.force_dimension.rigs import info_of
+from study.devices.force_dimension.rigs import read_info
 from study.errors import DeviceError
 
-Told = TypeVar("Told")
+Result = TypeVar("Result")
 """Type of a result of the library."""
 
 JOINTS = 8
@@ -60,10 +60,10 @@ class VendorLinkage:
         handle's position and its joint angles do not agree, and `LibraryError` where the joint angles cannot be
         read."""
         try:
-            here = np.array(self._handle.position_m())
+            position_m = np.array(self._handle.position_m())
         except LibraryError as error:
             raise device_error(self._model.name, error) from error
-        reading = self.at(here)
+        reading = self.at(position_m)
         reported = (c_double * JOINTS)()
         self._library.call("dhdGetJointAngles", reported, self._number)
         if reading is not None and self._moves_by(reading, np.array(reported[:3])) <= SAME_M:
@@ -81,11 +81,13 @@ class VendorLinkage:
         jacobian = np.nan_to_num(reading.jacobian)
         return float(np.linalg.norm(jacobian @ (angles - reading.joint_angle_rad)))
 
-    def _ask_library(self, ask: Callable[[FloatArray], Told | None], position_m: FloatArray) -> Told | None:
-        """Call `ask` for a position; None where the library reports it as out of reach. Raises `DeviceError` for other
-        failures."""
+    def _ask_library(
+        self, read_library: Callable[[FloatArray], Result | None], position_m: FloatArray
+    ) -> Result | None:
+        """Call `read_library` for a position; None where the library reports it as out of reach. Raises `DeviceError`
+        for other failures."""
         try:
-            return ask(position_m)
+            return read_library(position_m)
         except LibraryError as error:
             if error.code == GEOMETRY_ERROR:
                 return None
@@ -94,34 +96,34 @@ class VendorLinkage:
     def _counts(self, position_m: FloatArray) -> list[c_int]:
         """Encoder counts of the base's three joints at a position (m)."""
         counts = [c_int() for _ in range(3)]
-        x, y, z = (float(each) for each in position_m)
+        x, y, z = (float(coordinate) for coordinate in position_m)
         self._library.call("dhdDeltaPositionToEncoder", x, y, z, *map(byref, counts), self._number)
         return counts
 
     def _angles(self, counts: list[c_int]) -> FloatArray:
         """Joint angles (3,), rad, of encoder counts."""
-        return self._three("dhdDeltaEncodersToJointAngles", *counts)
+        return self._read_position("dhdDeltaEncodersToJointAngles", *counts)
 
     def _read_at(self, position_m: FloatArray) -> LinkageReading | None:
         """Reading at a position (3,), m; None where that of its encoder counts differs by more than `NEAR_M`."""
         counts = self._counts(position_m)
-        back = self._three("dhdDeltaEncoderToPosition", *counts)
-        if not float(np.linalg.norm(back - position_m)) <= NEAR_M:
+        encoder_position_m = self._read_position("dhdDeltaEncoderToPosition", *counts)
+        if not float(np.linalg.norm(encoder_position_m - position_m)) <= NEAR_M:
             return None
         angles = self._angles(counts)
         jacobian, inertia = (c_double * 9)(), (c_double * 36)()
-        self._library.call("dhdDeltaJointAnglesToJacobian", *(float(each) for each in angles), jacobian, self._number)
+        self._library.call("dhdDeltaJointAnglesToJacobian", *(float(angle) for angle in angles), jacobian, self._number)
         # The joints of a wrist, which follow the base's three, keep their present angles.
         joints, torques = (c_double * JOINTS)(), (c_double * JOINTS)()
         self._library.call("dhdGetJointAngles", joints, self._number)
-        joints[:3] = [float(each) for each in angles]
+        joints[:3] = [float(angle) for angle in angles]
         self._library.call("dhdJointAnglesToInertiaMatrix", joints, inertia, self._number)
         self._library.call("dhdJointAnglesToGravityJointTorques", joints, torques, DELTA, self._number)
         j = np.array(jacobian).reshape(3, 3)
-        held = np.linalg.pinv(j.T) @ np.array(torques[:3]) if np.isfinite(j).all() else np.full(3, np.nan)
-        return LinkageReading(np.array(position_m), angles, j, np.array(inertia).reshape(6, 6)[:3, :3], held)
+        gravity_force_n = np.linalg.pinv(j.T) @ np.array(torques[:3]) if np.isfinite(j).all() else np.full(3, np.nan)
+        return LinkageReading(np.array(position_m), angles, j, np.array(inertia).reshape(6, 6)[:3, :3], gravity_force_n)
 
-    def _three(self, name: str, *counts: c_int) -> FloatArray:
+    def _read_position(self, name: str, *counts: c_int) -> FloatArray:
         """The three numbers that a function of the library returns for three encoder counts."""
         values = [c_double() for _ in range(3)]
         self._library.call(name, *counts, *map(byref, values), self._number)
@@ -135,7 +137,7 @@ def vendor_linkage(name: str) -> Iterator[VendorLinkage]:
     model, library = MODELS[name], load_library()
     handle = open_model(library, model)
     try:
-        info = info_of(handle, library, model, read_lab().effective_mass_kg)
+        info = read_info(handle, library, model, read_lab().effective_mass_kg)
         library.call("dhdEnableExpertMode")
         if not handle.status().calibrated:
             raise DeviceError(f"The {model.name} is not calibrated", "It does not know where its handle is.", CALIBRATE)

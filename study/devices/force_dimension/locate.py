@@ -31,33 +31,35 @@ class Computer:
     """The user's home folder."""
 
 
-def this_computer(environ: Mapping[str, str]) -> Computer:
+def describe_this_computer(environ: Mapping[str, str]) -> Computer:
     """The running computer, with these environment variables."""
     return Computer(sys.platform, platform.machine(), environ, Path.home())
 
 
 def find_library(computer: Computer) -> Path | None:
-    """Path of the newest library in the first folder that has any; None where none is found. In each folder libdrd
+    """Path of the newest library in the first folder that contains one; None where none is found. In each folder libdrd
     comes before libdhd: it has all functions of libdhd and the automatic calibration."""
-    return next((path for pattern in library_patterns(computer) if (path := _newest(*pattern)) is not None), None)
+    return next(
+        (path for pattern in list_library_patterns(computer) if (path := _find_newest(*pattern)) is not None), None
+    )
 
 
-def library_patterns(computer: Computer) -> Iterator[tuple[Path, str]]:
+def list_library_patterns(computer: Computer) -> Iterator[tuple[Path, str]]:
     """Pairs (folder, file pattern) in order of preference. Folders named by an environment variable come first, because
     the user chose them."""
-    for folder in _folders(computer):
+    for folder in _list_folders(computer):
         for library in ("drd", "dhd"):
-            yield folder, _file_pattern(library, computer)
+            yield folder, _make_file_pattern(library, computer)
 
 
-def _folders(computer: Computer) -> Iterator[Path]:
+def _list_folders(computer: Computer) -> Iterator[Path]:
     """Folders to search, in order of preference."""
     environ = computer.environ
     roots = [Path(environ[name]) for name in SDK_VARIABLES if environ.get(name)]
     if computer.system == "win32":
         for variable, vendor in WINDOWS_FOLDERS:
             if environ.get(variable):
-                roots += sorted((Path(environ[variable]) / vendor).glob("sdk-*"), key=_version_in, reverse=True)
+                roots += sorted((Path(environ[variable]) / vendor).glob("sdk-*"), key=_parse_version, reverse=True)
         yield from (root / "bin" for root in roots)
         return
     system, compiler = ("mac", "clang") if computer.system == "darwin" else ("lin", "gcc")
@@ -68,19 +70,19 @@ def _folders(computer: Computer) -> Iterator[Path]:
     yield Path("/usr/local/lib")
 
 
-def _file_pattern(library: str, computer: Computer) -> str:
+def _make_file_pattern(library: str, computer: Computer) -> str:
     """Glob pattern of a library's file names. library: drd or dhd."""
     if computer.system == "win32":
         return f"{library}64.dll"
     return f"lib{library}*.dylib" if computer.system == "darwin" else f"lib{library}.so*"
 
 
-def _newest(folder: Path, pattern: str) -> Path | None:
+def _find_newest(folder: Path, pattern: str) -> Path | None:
     """The file with the highest version number that matches the pattern; None where none does."""
-    found = [path for path in folder.glob(pattern) if path.is_file()]
-    return max(found, key=_version_in, default=None)
+    candidates = [path for path in folder.glob(pattern) if path.is_file()]
+    return max(candidates, key=_parse_version, default=None)
 
 
-def _version_in(path: Path) -> tuple[int, ...]:
+def _parse_version(path: Path) -> tuple[int, ...]:
     """Version as the numbers in a name, so that libdrd.so.3.17.5 counts as newer than libdrd.so.3.9.0."""
     return tuple(int(part) for part in path.name.replace("-", ".").split(".") if part.isdigit())

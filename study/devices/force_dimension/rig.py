@@ -18,7 +18,7 @@ from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
 from study.devices.drive.real_time_class import real_time_class
 from study.devices.force_dimension import loop_cells, tick_io
-from study.devices.force_dimension.handle import Handle, why_off
+from study.devices.force_dimension.handle import Handle, describe_off_cause
 from study.devices.force_dimension.library import LibraryError
 from study.devices.force_dimension.tick_io import LOCK_S
 from study.devices.native import SharedLock, system_calls
@@ -61,7 +61,7 @@ class ForceDimensionRig:
         drops_force_after_s: float,
         cap_n: float,
         accelerometer: Accelerometer | None = None,
-        rests: bool = True,
+        repeats_zero: bool = True,
     ) -> None:
         self.info = info
         self.drops_force_after_s = drops_force_after_s
@@ -80,9 +80,9 @@ class ForceDimensionRig:
         self._overlaid = accelerometer if shared is None else None
         self._failure: DeviceError | None = None
         self._closed = threading.Event()
-        self._resting = threading.Thread(target=self._repeat_zero_force, name="gravity compensation", daemon=True)
-        if rests and drops_force_after_s > 0:
-            self._resting.start()
+        self._zero_thread = threading.Thread(target=self._repeat_zero_force, name="gravity compensation", daemon=True)
+        if repeats_zero and drops_force_after_s > 0:
+            self._zero_thread.start()
 
     @property
     def halves(self) -> CompiledIo | None:
@@ -157,24 +157,24 @@ class ForceDimensionRig:
         self._cells[loop_cells.WITHHELD_UNTIL_S] = 0.0
         self._cells[loop_cells.CLOSED] = 1.0
         self._closed.set()
-        got = self._sending.acquire(LOCK_S)
+        is_locked = self._sending.acquire(LOCK_S)
         try:
             self._cells[loop_cells.LET_GO] = self._handle.disconnect()
         finally:
-            if got:
+            if is_locked:
                 self._sending.release()
             if self._accelerometer is not None:
                 self._accelerometer.close()
-        self._end_resting()
+        self._end_zero_thread()
         return bool(self._cells[loop_cells.LET_GO])
 
-    def _end_resting(self) -> None:
+    def _end_zero_thread(self) -> None:
         """Wait for the thread that repeats zeros, after the force is off and the brakes are on, so that a hanging call
         of that thread delays neither. The second disconnect undoes what such a call did late; if it fails, the release
         does not count as confirmed."""
-        if self._resting.ident is None or self._resting is threading.current_thread():
+        if self._zero_thread.ident is None or self._zero_thread is threading.current_thread():
             return
-        self._resting.join(JOIN_S)
+        self._zero_thread.join(JOIN_S)
         if not self._handle.disconnect():
             self._cells[loop_cells.LET_GO] = 0.0
 
@@ -185,7 +185,7 @@ class ForceDimensionRig:
         every_s, zero = REST_SHARE * self.drops_force_after_s, np.zeros(3)
         with real_time_class():
             while not self._closed.wait(every_s) and self._cells[loop_cells.FAILED] == 0.0:
-                code = tick_io.rest_once(self._calls, self._cells, every_s, zero)
+                code = tick_io.repeat_zero_once(self._calls, self._cells, every_s, zero)
                 if code:
                     self._error(code)
 
@@ -201,27 +201,27 @@ class ForceDimensionRig:
 
     def _error_text(self, code: int) -> str:
         """Description of a failure, without a full stop. code: as in `loop_cells`."""
-        function = code - loop_cells.OF_LIBRARY
+        function = code - loop_cells.LIBRARY_ERROR
         if 0 <= function < len(loop_cells.LIBRARY):
             return f"The library says: {self._handle.library.last_error(loop_cells.LIBRARY[function])}"
         cap_n, refused_n = self._cells[loop_cells.CAP_N], self._cells[loop_cells.REFUSED_N]
         return {
             loop_cells.REPEATS: "It repeatedly reports the same position",
-            loop_cells.RELEASED: f"It let its force go: {why_off(int(self._cells[loop_cells.OFF_CAUSE]))}",
+            loop_cells.RELEASED: f"It let its force go: {describe_off_cause(int(self._cells[loop_cells.OFF_CAUSE]))}",
             loop_cells.REFUSED: f"A force of {refused_n:g} N was refused; at most {cap_n:g} N may be sent",
             loop_cells.LOCKED: "An earlier force is still being sent",
             loop_cells.IS_CLOSED: "It is closed",
-            loop_cells.WEAK: "Its motors cannot give the commanded force, and give less",
-            loop_cells.GIVES_ANOTHER: "It repeatedly reports another force than the one that it was sent",
+            loop_cells.SCALED_DOWN: "Its motors cannot give the commanded force, and give less",
+            loop_cells.FORCE_MISMATCH: "It repeatedly reports another force than the one that it was sent",
         }[code]
 
-    def _fail(self, happened: str) -> DeviceError:
+    def _fail(self, reason: str) -> DeviceError:
         """Record a failure and return its error. Only the first failure is kept: later calls return the same error."""
         if self._failure is None:
-            self._cells[loop_cells.FAILED] = self._cells[loop_cells.FAILED] or loop_cells.SAID
+            self._cells[loop_cells.FAILED] = self._cells[loop_cells.FAILED] or loop_cells.RAISED_IN_PYTHON
             self._failure = DeviceError(
                 f"The {self.info.name} let go",
-                f"{happened}.",
+                f"{reason}.",
                 "Check its power and its cable, then open it again; a session is continued with `hapteq resume`.",
             )
         return self._failure

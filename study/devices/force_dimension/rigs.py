@@ -32,14 +32,14 @@ def force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRi
     library = load_library()
     sensor = lab.accelerometer.open_sensor() if lab.accelerometer is not None and settings.with_sensor else None
     try:
-        return _rig(library, model, lab, sensor, settings)
+        return _make_rig(library, model, lab, sensor, settings)
     except BaseException:
         if sensor is not None:
             sensor.close()
         raise
 
 
-def _rig(
+def _make_rig(
     library: Library,
     model: DeviceModel,
     lab: LabSettings,
@@ -49,7 +49,7 @@ def _rig(
     """Open the device and make it ready. After any error the device is disconnected. Raises `DeviceError`."""
     handle = open_model(library, model)
     try:
-        info = replace(info_of(handle, library, model, lab.effective_mass_kg), has_sensor=sensor is not None)
+        info = replace(read_info(handle, library, model, lab.effective_mass_kg), has_sensor=sensor is not None)
         if settings.hand_on_handle:
             check_accepted(info, datetime.now(UTC).date())
         cap_n = min(settings.limits.total_cap_n, model.max_force_n)
@@ -66,7 +66,7 @@ def _rig(
         raise
 
 
-def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
+def read_info(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
     """Facts about an open device. effective_mass_kg: of the laboratory's settings; None for the model's. Raises
     `LibraryError`, and `DeviceError` without a firmware or serial number: an acceptance holds for one device only, and
     could not be assigned."""
@@ -85,10 +85,11 @@ def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass
     )
 
 
-def _unknown_error(model: DeviceModel, what: str, said: str) -> DeviceError:
-    """Error for an unknown fact of the device. what: the fact; said: what the library gave instead, as a predicate."""
+def _unknown_error(model: DeviceModel, fact: str, library_answer: str) -> DeviceError:
+    """Error for an unknown fact of the device. fact: its name; library_answer: what the
+    library gave instead, as a predicate."""
     return DeviceError(
-        f"The {model.name} does not report its {what}",
-        f"Its library {said}, so no acceptance can be known to hold for it. Nothing has moved.",
+        f"The {model.name} does not report its {fact}",
+        f"Its library {library_answer}, so no acceptance can be known to hold for it. Nothing has moved.",
         "Switch the device off and on, then try again; else install the vendor's newest SDK or firmware.",
     )

@@ -13,7 +13,15 @@ import numpy as np
 from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
-from study.devices.accelerometer.newest_sample import CLIPPED, COUNT, FRESH_S, REST, ROWS, SENSED, TAKEN_S
+from study.devices.accelerometer.newest_sample import (
+    CLIPPED,
+    COUNT,
+    MAX_AGE_S,
+    REST_ACCELERATION,
+    ROWS,
+    SENSED,
+    TAKEN_S,
+)
 from study.devices.drive.compiled_drive import CALLS, SENSE_SIGNATURE, WRITE_SIGNATURE
 from study.devices.force_dimension.handle import STALE
 from study.devices.force_dimension.loop_cells import (
@@ -36,19 +44,19 @@ from study.devices.force_dimension.loop_cells import (
     RELEASED,
     REPEATED,
     REPEATS,
+    SCALED_COUNT,
+    SCALED_DOWN,
     SENT_S,
     SENT_ZERO,
-    TOO_STRONG,
-    WEAK,
     WITHHELD_UNTIL_S,
-    check_on,
+    check_force_on,
     check_status,
-    check_still,
+    check_zero_force,
     count_beyond_share,
     is_success,
-    note_sent,
     record_failure,
     record_library_failure,
+    record_sent_force,
 )
 from study.devices.governor.compiling import fingerprint, part
 from study.devices.governor.govern import VECTOR
@@ -76,17 +84,17 @@ LOCK_S = 0.002
 
 
 @part
-def _sense_acceleration(samples: FloatArray, now: float, reading: FloatArray) -> None:
-    """Read the accelerometer in compiled code, as `study.devices.accelerometer.newest_sample.NewestSample.fresh` does
-    in Python."""
+def _sense_acceleration(samples: FloatArray, time_s: float, reading: FloatArray) -> None:
+    """Read the accelerometer in compiled code, as `study.devices.accelerometer.newest_sample.NewestSample.read_zeroed`
+    does in Python."""
     count = samples[0, COUNT]
     while count > 0.0:
         row = 1 + int(count - 1.0) % ROWS
-        fresh = not now - samples[row, TAKEN_S] > FRESH_S
+        is_recent = not time_s - samples[row, TAKEN_S] > MAX_AGE_S
         for i in range(3):
-            value = samples[row, SENSED + i] - samples[0, REST + i]
-            reading[ACCELERATION.start + i] = value if fresh else math.nan
-        reading[SENSOR_CLIPPED] = 1.0 if fresh and samples[row, CLIPPED] != 0.0 else 0.0
+            value = samples[row, SENSED + i] - samples[0, REST_ACCELERATION + i]
+            reading[ACCELERATION.start + i] = value if is_recent else math.nan
+        reading[SENSOR_CLIPPED] = 1.0 if is_recent and samples[row, CLIPPED] != 0.0 else 0.0
         newer = samples[0, COUNT]
         if newer - count < ROWS - 1:
             break
@@ -100,9 +108,9 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
         return FAILED_BEFORE
     for i in range(READING_SIZE):
         reading[i] = math.nan
-    place = reading.ctypes.data
-    asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
-    answer = call_int(calls[POSITION], asked)
+    address = reading.ctypes.data
+    arguments = (np.int64(address), np.int64(address + 8), np.int64(address + 16), np.int32(cells[NUMBER]))
+    answer = call_int(calls[POSITION], arguments)
     if not is_success(answer):
         return record_library_failure(cells, POSITION)
     if cells[READS] % LOOKS_OF in LOOKS_AT:
@@ -120,7 +128,7 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
 
 
 @part
-def _is_silent(calls: Addresses, cells: FloatArray) -> bool:
+def _is_watchdog_expired(calls: Addresses, cells: FloatArray) -> bool:
     """Whether no force was sent for longer than the timeout of the device's watchdog."""
     return bool(now_s(calls) - cells[SENT_S] > cells[DROPS_AFTER_S] > 0.0)
 
@@ -136,7 +144,7 @@ def _wake_device(calls: Addresses, cells: FloatArray) -> int:
     """Enable forces after a pause longer than the watchdog's timeout. Returns an error code where the forces are off
     for another cause, or a force acted; a pause after a zero (nothing was played, or the computer slept) is no
     error."""
-    code = check_on(calls, cells)
+    code = check_force_on(calls, cells)
     if code >= 0:
         return code
     if cells[CLOSED] != 0.0:
@@ -163,7 +171,7 @@ def _brake(calls: Addresses, cells: FloatArray) -> None:
 @part
 def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     """Send a force. The caller must hold the lock."""
-    if _is_silent(calls, cells):
+    if _is_watchdog_expired(calls, cells):
         code = _wake_device(calls, cells)
         if code != 0:
             return code
@@ -173,11 +181,11 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     if not is_success(answer):
         return record_library_failure(cells, FORCE)
     cells[SENT_S] = began_s
-    note_sent(cells, x, y, z)
+    record_sent_force(cells, x, y, z)
     cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
-    cells[TOO_STRONG] = count_beyond_share(cells[TOO_STRONG], answer != 0, SCALED_SHARE)
-    if cells[TOO_STRONG] >= SCALED_FOR * (1.0 - SCALED_SHARE):
-        return record_failure(cells, WEAK)
+    cells[SCALED_COUNT] = count_beyond_share(cells[SCALED_COUNT], answer != 0, SCALED_SHARE)
+    if cells[SCALED_COUNT] >= SCALED_FOR * (1.0 - SCALED_SHARE):
+        return record_failure(cells, SCALED_DOWN)
     return 0
 
 
@@ -189,14 +197,14 @@ def _send_zero(calls: Addresses, cells: FloatArray) -> int:
         code = record_library_failure(cells, FORCE)
         _brake(calls, cells)  # the device may still give the previous force
         return code
-    if cells[SENT_ZERO] == 0.0 and _is_silent(calls, cells):
+    if cells[SENT_ZERO] == 0.0 and _is_watchdog_expired(calls, cells):
         # The watchdog cut off a force whose call may still hang: the device must take no forces when it continues.
-        code = check_on(calls, cells)
+        code = check_force_on(calls, cells)
         if code != 0 and code != RELEASED:
             return code
-    note_sent(cells, 0.0, 0.0, 0.0)
-    cells[SENT_ZERO], cells[TOO_STRONG] = 1.0, 0.0
-    if not _is_silent(calls, cells):
+    record_sent_force(cells, 0.0, 0.0, 0.0)
+    cells[SENT_ZERO], cells[SCALED_COUNT] = 1.0, 0.0
+    if not _is_watchdog_expired(calls, cells):
         cells[SENT_S] = began_s
     return 0
 
@@ -237,7 +245,7 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 
 
 @part
-def _rest(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
+def _repeat_zero(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
     """Repeat the zero force while nothing is played, and brake where the device does not take it. The lock is held
     without the interpreter, so that the loop's next force waits for it no longer than `LOCK_S`."""
     if not acquire(calls, LOCK_S):
@@ -247,7 +255,7 @@ def _rest(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray
     if resting and cells[CLOSED] == 0.0 and cells[FAILED] == 0.0:
         code = _send_force(calls, cells, force)
         if code == 0:
-            code = check_still(calls, cells)
+            code = check_zero_force(calls, cells)
         if code != 0:
             _brake(calls, cells)
     release(calls)
@@ -268,15 +276,15 @@ def _entry_points(sources: int) -> tuple[Any, Any, Any]:
         return _write(calls, cells, force)
 
     @njit(REST_SIGNATURE, cache=True, nogil=True, error_model="numpy")
-    def rest_once(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
+    def repeat_zero_once(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
         _ = sources
-        return _rest(calls, cells, every_s, force)
+        return _repeat_zero(calls, cells, every_s, force)
 
-    return sense_once, write_once, rest_once
+    return sense_once, write_once, repeat_zero_once
 
 
 _DEVICES = Path(__file__).parents[1]
-sense_once, write_once, rest_once = _entry_points(
+sense_once, write_once, repeat_zero_once = _entry_points(
     fingerprint(
         Path(__file__).parent,
         *(
@@ -285,5 +293,5 @@ sense_once, write_once, rest_once = _entry_points(
         ),
     )
 )
-"""`sense_once` and `write_once` as defined in `study.devices.rig.CompiledIo`; `rest_once(calls, cells, every_s, zero)`
-repeats the zero force where the last force was a zero, every_s (s) or longer ago."""
+"""`sense_once` and `write_once` as defined in `study.devices.rig.CompiledIo`; `repeat_zero_once(calls, cells, every_s,
+zero)` repeats the zero force where the last force was a zero, every_s (s) or longer ago."""

@@ -38,14 +38,14 @@ def find_usb_devices(
     with one folder per USB device. nodes: folder of the device files, BUS/NUMBER with three digits each."""
     if not devices.is_dir():
         return None
-    found = []
+    usb_devices = []
     for folder in sorted(devices.iterdir()):
         if _read(folder / "idVendor") != VENDOR:
             continue
         bus, number = _read(folder / "busnum"), _read(folder / "devnum")
         node = nodes / bus.zfill(3) / number.zfill(3)
-        found.append(UsbDevice(_read(folder / "product") or "unnamed", os.access(node, os.R_OK | os.W_OK)))
-    return tuple(found)
+        usb_devices.append(UsbDevice(_read(folder / "product") or "unnamed", os.access(node, os.R_OK | os.W_OK)))
+    return tuple(usb_devices)
 
 
 def _read(path: Path) -> str:

@@ -33,7 +33,7 @@ def check_watchdog(
     if drops_after_s <= 0:
         raise _watchdog_error("It has no watchdog, or none that can be set.")
     if not any(_send_zeros(handle, now_s, sleep) for _ in range(ATTEMPTS)):
-        raise _watchdog_error(f"It does not continue to accept forces: {handle.status().why_off}.")
+        raise _watchdog_error(f"It does not continue to accept forces: {handle.status().off_reason}.")
     silent_since_s = now_s()
     while (status := handle.status()).force_on:
         if now_s() - silent_since_s > drops_after_s + MARGIN_S and handle.status().force_on:
@@ -41,10 +41,10 @@ def check_watchdog(
                 f"{1000 * (now_s() - silent_since_s):.0f} ms after the last command it still accepts forces."
             )
         sleep(EVERY_S)
-    took_s = now_s() - silent_since_s
+    release_s = now_s() - silent_since_s
     _check_reason(status)
     handle.enable_force()
-    return took_s
+    return release_s
 
 
 def _send_zeros(handle: Handle, now_s: Callable[[], float], sleep: Callable[[float], None]) -> bool:
@@ -61,14 +61,14 @@ def _send_zeros(handle: Handle, now_s: Callable[[], float], sleep: Callable[[flo
 def _check_reason(status: Status) -> None:
     """Require the watchdog as the cause, and the brakes on. Raises `DeviceError`."""
     if status.off_cause != WATCHDOG_CAUSE:
-        raise _watchdog_error(f"It let go for another reason: {status.why_off}.")
+        raise _watchdog_error(f"It let go for another reason: {status.off_reason}.")
     if not status.braking:
         raise _watchdog_error("It let go without its brakes.")
 
 
-def _watchdog_error(happened: str) -> DeviceError:
+def _watchdog_error(reason: str) -> DeviceError:
     return DeviceError(
         "The device's watchdog failed its test",
-        f"{happened} If this program died, the device would hold its last force.",
+        f"{reason} If this program died, the device would hold its last force.",
         "Do not let a person hold the handle. Switch the device off and on and try again; else update its firmware.",
     )

@@ -24,13 +24,13 @@ PASSED_SHARE: coefficient c of a first-order low-pass y += c (x - y) per tick.""
     STAMP_S,
     # Time at which the tick before START was due, s, by the same clock.
     BEGAN_S,
-    # Stimulus, written while no force acts; in ticks. LENGTH is inf for a loop, whose first LEAD rows are played once.
-    START, FADE_IN, FADE_OUT, RAISED_COSINE, SPRING_RAMP, LENGTH, LEAD, LONGEST, RECORD_FROM,
+    # Stimulus, written while no force acts; in ticks. LENGTH is inf for a loop, its first ONSET_TICKS rows play once.
+    START, FADE_IN, FADE_OUT, RAISED_COSINE, SPRING_RAMP, LENGTH, ONSET_TICKS, LONGEST, RECORD_FROM,
     # Phase, fault, present tick, ticks of events, and gains (0 to 1).
     PHASE, FAULT, TICK, LAST_SIGN, RELEASED_AT, LET_GO_AT, STIMULUS_GAIN, SPRING_GAIN,
     # Counters of events in ticks; PEAK: largest force, N; RECORDED: rows.
     TICKS, MISSED, STIMULUS_CLIPPED, FEEDBACK_CLIPPED, TOTAL_CLIPPED, SLEW_LIMITED, SENSOR_CLIPS, PEAK, RECORDED,
-    # Number of ticks whose work ended after the next was due; longest time from when a tick was due to its end, s.
+    # Number of ticks that ended after the next was due; longest time from when a tick was due to its end, s.
     LATE, LATEST_S,
     # Ticks since the last reading, its tick and time (s); force of spring and damper together (N); low-passed
     # acceleration of the readings (m/s²); ticks in which the position did not change.
@@ -39,20 +39,21 @@ PASSED_SHARE: coefficient c of a first-order low-pass y += c (x - y) per tick.""
     EASED, EASED_BEFORE,
     # Vectors x, y, z: forces in N, positions in m, velocity in m/s.
     FORCE, _FY, _FZ, EXCITATION, _EY, _EZ, LAST_POSITION, _XY, _XZ, VELOCITY, _VY, _VZ, LET_GO_FROM, _LY, _LZ,
-    # LAST_STEP in m per tick; CHANGED: last reading that differed from its predecessor, m; then the motion expected of
-    # a gripped handle: force that exceeds dry friction (N), position (m), speed (m/s), range since CHANGED (m).
-    LAST_STEP, _SY, _SZ, CHANGED, _CY, _CZ, MOVING_FORCE, _MY, _MZ, EXPECTED, _DY, _DZ, EXPECTED_SPEED, _UY, _UZ,
-    LEAST, _AY, _AZ, MOST, _BY, _BZ,
+    # LAST_STEP in m per tick; REFERENCE: last reading that differed from its predecessor, m; then the motion
+    # expected of a gripped handle: force that exceeds dry friction (N), position (m), speed (m/s), and range since
+    # REFERENCE (m).
+    LAST_STEP, _SY, _SZ, REFERENCE, _CY, _CZ, MOVING_FORCE, _MY, _MZ, EXPECTED, _DY, _DZ, EXPECTED_SPEED, _UY, _UZ,
+    RANGE_LOW, _AY, _AZ, RANGE_HIGH, _BY, _BZ,
     # The same for each axis by itself; AXIS_UNCHANGED: ticks since the axis's reading changed.
-    AXIS_CHANGED, _A1, _A2, AXIS_FORCE, _A3, _A4, AXIS_EXPECTED, _A5, _A6, AXIS_SPEED, _A7, _A8,
-    AXIS_LEAST, _A9, _A10, AXIS_MOST, _A11, _A12, AXIS_UNCHANGED, _A13, _A14,
+    AXIS_REFERENCE, _A1, _A2, AXIS_FORCE, _A3, _A4, AXIS_EXPECTED, _A5, _A6, AXIS_SPEED, _A7, _A8,
+    AXIS_LOW, _A9, _A10, AXIS_HIGH, _A11, _A12, AXIS_UNCHANGED, _A13, _A14,
     # The stimulus after the first low-pass and after the second, N.
     PASSED, _P1, _P2, PASSED_TWICE, _P3, _P4,
     STATE_SIZE,
 ) = range(106)  # fmt: skip
 """Cells of `state`, which each tick updates."""
 
-STILL, PLAYING, RELEASING, LETTING_GO = range(4)
+IDLE, PLAYING, RELEASING, LETTING_GO = range(4)
 """Phases: no force; stimulus; fade-out of the stimulus on request or at its end, as the stimulus specifies; the safety
 layer's own fade of the last force, linear to zero, which needs neither sensor nor program and has no slew limit."""
 

@@ -16,10 +16,10 @@ part = njit(forceinline=True, nogil=True, error_model="numpy")
 `confine` handles, instead of an exception within a tick. Inlining halves the duration of a tick."""
 
 
-def fingerprint(folder: Path, *beyond: Path) -> int:
+def fingerprint(folder: Path, *further_sources: Path) -> int:
     """Checksum (the first 32 bits of SHA-256) of all Python sources in the folder, and of further files whose code or
     constants are compiled into an entry point."""
     digest = hashlib.sha256()
-    for source in (*sorted(folder.glob("*.py")), *beyond):
+    for source in (*sorted(folder.glob("*.py")), *further_sources):
         digest.update(source.read_bytes())
     return int.from_bytes(digest.digest()[:4], "big")

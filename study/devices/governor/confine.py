@@ -11,9 +11,9 @@ from study.devices.governor.compiling import part
 OVERFLOWING = 1e100
 """Component or norm (N) from which squares of components may overflow; such a force becomes zero."""
 
-WITHIN, BEYOND = 1 - 1e-12, 1 + 1e-9
-"""Factors on a limit. Forces are limited to WITHIN times the limit, so that rounding cannot exceed it. A force counts
-as limited only beyond BEYOND times the limit, so that a stimulus exactly at its cap does not count."""
+LIMIT_FACTOR, EXCESS_FACTOR = 1 - 1e-12, 1 + 1e-9
+"""Factors on a limit. Forces are limited to LIMIT_FACTOR times the limit, so that rounding cannot exceed it. A force
+counts as limited only beyond EXCESS_FACTOR times the limit, so that a stimulus exactly at its cap does not count."""
 
 
 @part
@@ -36,12 +36,12 @@ def clear(force: FloatArray) -> None:
 
 
 @part
-def kept_share(norm: float, cap: float) -> float:
+def limiting_factor(norm: float, cap: float) -> float:
     """Factor that limits a force of this norm (N) to the cap (N): 1 up to the cap, then cap / norm. 0 where either is
     not a number, the cap is not positive, or the norm is not below `OVERFLOWING`."""
     if not (cap > 0.0 and norm < OVERFLOWING):
         return 0.0
-    return 1.0 if norm <= cap * WITHIN else cap * WITHIN / norm
+    return 1.0 if norm <= cap * LIMIT_FACTOR else cap * LIMIT_FACTOR / norm
 
 
 @part
@@ -52,7 +52,7 @@ def confine(force: FloatArray, cap: float) -> bool:
         clear(force)
         return False
     norm = norm_of(force[0], force[1], force[2])
-    if norm > cap * WITHIN:
+    if norm > cap * LIMIT_FACTOR:
         for i in range(3):
-            force[i] *= cap * WITHIN / norm
-    return norm > cap * BEYOND
+            force[i] *= cap * LIMIT_FACTOR / norm
+    return norm > cap * EXCESS_FACTOR

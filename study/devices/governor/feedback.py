@@ -27,7 +27,7 @@ from study.devices.governor.cells import (
     VELOCITY_SHARE,
 )
 from study.devices.governor.compiling import part
-from study.devices.governor.confine import BEYOND, kept_share, norm_of
+from study.devices.governor.confine import EXCESS_FACTOR, limiting_factor, norm_of
 
 
 @part
@@ -45,7 +45,7 @@ def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray
 
 
 @part
-def _ease(state: FloatArray, settings: FloatArray) -> None:
+def _ease_feedback(state: FloatArray, settings: FloatArray) -> None:
     """Reduce the feedback force slowly while the position reading does not change (UNCHANGED, by `plausibility`).
 
     A handle that dry friction holds at rest looks like a frozen encoder. With the force reduced, a real handle moves
@@ -59,22 +59,26 @@ def _ease(state: FloatArray, settings: FloatArray) -> None:
 @part
 def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, gain: float, force: FloatArray) -> None:
     """Add spring and damper to `force` (3,), N, each and their sum limited to FEEDBACK_CAP. gain: 0 to 1, the ramp at
-    the start and end of a hold. PULL (N) is their magnitude before `_ease` reduces it."""
+    the start and end of a hold. PULL (N) is their magnitude before `_ease_feedback` reduces it."""
     _track_velocity(state, settings, reading)
     cap, stiffness, damping = settings[FEEDBACK_CAP], settings[STIFFNESS], settings[DAMPING]
     x = stiffness * (reading[0] - settings[CENTRE_X])
     y = stiffness * (reading[1] - settings[CENTRE_X + 1])
     z = stiffness * (reading[2] - settings[CENTRE_X + 2])
     u, v, w = damping * state[VELOCITY], damping * state[VELOCITY + 1], damping * state[VELOCITY + 2]
-    of_spring, of_damper = norm_of(x, y, z), norm_of(u, v, w)
-    spring, damper = kept_share(of_spring, cap), kept_share(of_damper, cap)
-    x, y, z = spring * x + damper * u, spring * y + damper * v, spring * z + damper * w
-    both = norm_of(x, y, z)
-    kept = kept_share(both, cap)
-    state[PULL] = abs(gain) * kept * both
-    _ease(state, settings)
+    spring_norm, damper_norm = norm_of(x, y, z), norm_of(u, v, w)
+    spring_factor, damper_factor = limiting_factor(spring_norm, cap), limiting_factor(damper_norm, cap)
+    x, y, z = (
+        spring_factor * x + damper_factor * u,
+        spring_factor * y + damper_factor * v,
+        spring_factor * z + damper_factor * w,
+    )
+    total_norm = norm_of(x, y, z)
+    total_factor = limiting_factor(total_norm, cap)
+    state[PULL] = abs(gain) * total_factor * total_norm
+    _ease_feedback(state, settings)
     share = gain * (1.0 - state[EASED])
-    force[0] -= share * (kept * x)
-    force[1] -= share * (kept * y)
-    force[2] -= share * (kept * z)
-    state[FEEDBACK_CLIPPED] += max(of_spring, of_damper, both) > cap * BEYOND
+    force[0] -= share * (total_factor * x)
+    force[1] -= share * (total_factor * y)
+    force[2] -= share * (total_factor * z)
+    state[FEEDBACK_CLIPPED] += max(spring_norm, damper_norm, total_norm) > cap * EXCESS_FACTOR

@@ -2,7 +2,7 @@
 
 Steps of `tick`, in this order:
 
-1. requests (stop, release) and timeouts change the phase (STILL, PLAYING, RELEASING, LETTING_GO: see `cells`);
+1. requests (stop, release) and timeouts change the phase (IDLE, PLAYING, RELEASING, LETTING_GO: see `cells`);
 2. the position reading is checked (`plausibility`); an implausible one is a fault, which starts the safety fade;
 3. the stimulus is capped, faded and added to spring and damper (`feedback`); the sum is capped, its slew rate limited;
 4. the result is capped once more, independent of all steps before: no force above the cap, and none that is not a
@@ -19,7 +19,7 @@ from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.compiling import fingerprint, part
-from study.devices.governor.confine import BEYOND, WITHIN, clear, confine, is_bounded, norm_of
+from study.devices.governor.confine import EXCESS_FACTOR, LIMIT_FACTOR, clear, confine, is_bounded, norm_of
 from study.devices.governor.feedback import add_feedback
 from study.devices.governor.plausibility import fault_of_reading
 from study.devices.governor.telemetry_row import write_row
@@ -28,11 +28,11 @@ from study.devices.rig import SENSOR_CLIPPED
 # isort: off
 # fmt: off
 from study.devices.governor.cells import (
-    ELAPSED, EXCITATION, FADE_IN, FADE_OUT, FAULT, FORCE, HELD_TOO_LONG, LAST_POSITION, LAST_SIGN, LEAD, LENGTH,
+    ELAPSED, EXCITATION, FADE_IN, FADE_OUT, FAULT, FORCE, HELD_TOO_LONG, LAST_POSITION, LAST_SIGN, ONSET_TICKS, LENGTH,
     LETTING_GO, LET_GO_ASKED, LET_GO_AT, LET_GO_FROM, LET_GO_TICKS, LONGEST, MISSED, NOT_A_NUMBER, NO_FAULT, PEAK,
     PHASE, PLAYING, RAISED_COSINE, READ_AT, READ_AT_S, RECORDED, RECORD_FROM, RELEASED_AT, RELEASE_ASKED,
     RELEASING, SENSOR_CLIPS, SIGN_OF_LIFE, SLEW_LIMITED, SLEW_STEP, SPRING_GAIN, SPRING_RAMP, STALLED, STAMP_S,
-    START, STILL, STIMULUS_CAP, STIMULUS_CLIPPED, STIMULUS_GAIN, STOPPED, STOP_ASKED, TICK, TICKS, TICK_S,
+    START, IDLE, STIMULUS_CAP, STIMULUS_CLIPPED, STIMULUS_GAIN, STOPPED, STOP_ASKED, TICK, TICKS, TICK_S,
     TOTAL_CAP, TOTAL_CLIPPED, WATCHDOG_TICKS,
 )
 # fmt: on
@@ -47,7 +47,8 @@ LEAST_ELAPSED = 1e-3
 VECTOR, ROWS = types.float64[::1], types.float64[:, ::1]
 """numba types of contiguous arrays with one and two dimensions."""
 TICK_SIGNATURE = types.boolean(VECTOR, VECTOR, ROWS, ROWS, VECTOR, VECTOR)
-"""Signature of the entry point `tick`, whose docstring names the arguments; those of `publish` and `miss` follow."""
+"""Signature of the entry point `tick`, whose docstring names the arguments; those of `publish` and
+`record_missed_ticks` follow."""
 PUBLISH_SIGNATURE = types.void(VECTOR, VECTOR, ROWS, VECTOR)
 MISS_SIGNATURE = types.void(VECTOR, ROWS, VECTOR, types.int64)
 
@@ -84,16 +85,16 @@ def _update_phase(state: FloatArray, settings: FloatArray) -> None:
     """Change of phase by requests and by time."""
     phase = state[PHASE]
     if state[STOP_ASKED] != 0.0:
-        if phase != STILL and state[FAULT] == NO_FAULT:
+        if phase != IDLE and state[FAULT] == NO_FAULT:
             state[FAULT] = STOPPED
-        state[PHASE] = STILL
+        state[PHASE] = IDLE
     elif state[LET_GO_ASKED] != 0.0 and phase in (PLAYING, RELEASING):
         _start_safety_fade(state, NO_FAULT)
     elif phase == PLAYING:
         _update_phase_while_playing(state, settings)
     elif phase == RELEASING and state[TICK] - state[RELEASED_AT] > state[FADE_OUT]:
         if state[FORCE] == 0.0 and state[FORCE + 1] == 0.0 and state[FORCE + 2] == 0.0:
-            state[PHASE] = STILL
+            state[PHASE] = IDLE
         else:
             _start_safety_fade(state, NO_FAULT)  # the slew limit delayed the fade-out: a force remains
 
@@ -111,7 +112,7 @@ def _fade_share(ticks: float, length: float, raised_cosine: float) -> float:
 
 
 @part
-def _gains(state: FloatArray) -> tuple[float, float]:
+def _compute_gains(state: FloatArray) -> tuple[float, float]:
     """Gains (0 to 1) of stimulus and of spring and damper at this tick. A release during a fade-in starts from the gain
     reached."""
     tick, cosine = state[TICK], state[RAISED_COSINE]
@@ -119,8 +120,8 @@ def _gains(state: FloatArray) -> tuple[float, float]:
         state[STIMULUS_GAIN] = _fade_share(tick, state[FADE_IN], cosine)
         state[SPRING_GAIN] = _fade_share(tick - state[START], state[SPRING_RAMP], cosine)
         return state[STIMULUS_GAIN], state[SPRING_GAIN]
-    left = 1.0 - _fade_share(tick - state[RELEASED_AT], state[FADE_OUT], cosine)
-    return left * state[STIMULUS_GAIN], left * state[SPRING_GAIN]
+    remaining = 1.0 - _fade_share(tick - state[RELEASED_AT], state[FADE_OUT], cosine)
+    return remaining * state[STIMULUS_GAIN], remaining * state[SPRING_GAIN]
 
 
 @part
@@ -139,12 +140,12 @@ def _limit_slew(state: FloatArray, settings: FloatArray, force: FloatArray) -> b
     that the new force lies within it too. Returns whether the step exceeded the limit by more than rounding."""
     x, y, z = force[0] - state[FORCE], force[1] - state[FORCE + 1], force[2] - state[FORCE + 2]
     step = norm_of(x, y, z)
-    if step > settings[SLEW_STEP] * WITHIN:
-        share = settings[SLEW_STEP] * WITHIN / step
+    if step > settings[SLEW_STEP] * LIMIT_FACTOR:
+        share = settings[SLEW_STEP] * LIMIT_FACTOR / step
         force[0] = state[FORCE] + share * x
         force[1] = state[FORCE + 1] + share * y
         force[2] = state[FORCE + 2] + share * z
-    return bool(step > settings[SLEW_STEP] * BEYOND)
+    return bool(step > settings[SLEW_STEP] * EXCESS_FACTOR)
 
 
 @part
@@ -156,8 +157,8 @@ def _compute_force(
     tick = int(state[TICK])
     clear(force)
     if 0 <= tick < state[LENGTH]:
-        lead = int(state[LEAD])
-        row = tick if tick < lead else lead + (tick - lead) % (loop.shape[0] - lead)
+        onset_ticks = int(state[ONSET_TICKS])
+        row = tick if tick < onset_ticks else onset_ticks + (tick - onset_ticks) % (loop.shape[0] - onset_ticks)
         for i in range(3):
             force[i] = loop[row, i]
     _update_elapsed(state, settings)
@@ -166,7 +167,7 @@ def _compute_force(
         _start_safety_fade(state, fault)
         return
     state[STIMULUS_CLIPPED] += confine(force, settings[STIMULUS_CAP])
-    stimulus_gain, spring_gain = _gains(state)
+    stimulus_gain, spring_gain = _compute_gains(state)
     for i in range(3):
         force[i] *= stimulus_gain
         state[EXCITATION + i] = force[i]
@@ -180,15 +181,15 @@ def _compute_force(
 @part
 def _apply_safety_fade(state: FloatArray, settings: FloatArray, force: FloatArray) -> None:
     """Safety fade: the last force before the fade, reduced linearly to zero within LET_GO_TICKS ticks."""
-    left = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0) / settings[LET_GO_TICKS]
+    remaining = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0) / settings[LET_GO_TICKS]
     for i in range(3):
-        force[i] = max(left, 0.0) * state[LET_GO_FROM + i]
-    if left <= 0.0:
-        state[PHASE] = STILL
+        force[i] = max(remaining, 0.0) * state[LET_GO_FROM + i]
+    if remaining <= 0.0:
+        state[PHASE] = IDLE
 
 
 @part
-def _record(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
+def _record_row(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
     """Write command, excitation and reading of a tick into the recording ring, where the oldest row was."""
     if state[PHASE] == PLAYING and state[RECORD_FROM] <= state[TICK] < state[LENGTH]:
         row = int(state[RECORDED]) % buffer.shape[0]
@@ -216,11 +217,11 @@ def _compile_publish(sources: int) -> Any:
 
 def _entry_points(sources: int) -> tuple[Any, Any]:
     @njit(MISS_SIGNATURE, cache=True, nogil=True, error_model="numpy")
-    def miss(state: FloatArray, buffer: FloatArray, nothing: FloatArray, ticks: int) -> None:
-        """Record missed ticks: their rows contain the last force, and `nothing` (NaN) as the reading."""
+    def record_missed_ticks(state: FloatArray, buffer: FloatArray, missed_reading: FloatArray, ticks: int) -> None:
+        """Record missed ticks: their rows contain the last force, and `missed_reading` (NaN) as the reading."""
         _ = sources
         for _k in range(ticks):
-            _record(state, buffer, nothing)
+            _record_row(state, buffer, missed_reading)
             state[TICK] += 1.0
             state[TICKS] += 1.0
             state[MISSED] += 1.0
@@ -241,7 +242,7 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
             _compute_force(state, settings, loop, reading, force)
         if state[PHASE] == LETTING_GO:
             _apply_safety_fade(state, settings, force)
-        if state[PHASE] == STILL:
+        if state[PHASE] == IDLE:
             clear(force)
         confine(force, settings[TOTAL_CAP])
         for i in range(3):
@@ -249,14 +250,14 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
         state[PEAK] = max(state[PEAK], norm_of(force[0], force[1], force[2]))
         state[SENSOR_CLIPS] += reading[SENSOR_CLIPPED] == 1.0
         state[TICKS] += 1
-        _record(state, buffer, reading)
+        _record_row(state, buffer, reading)
         state[TICK] += 1
-        return bool(state[PHASE] == STILL)
+        return bool(state[PHASE] == IDLE)
 
-    return tick, miss
+    return tick, record_missed_ticks
 
 
 _SOURCES = fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
 """Fingerprint of all files whose code is compiled into the entry points."""
-tick, miss = _entry_points(_SOURCES)
+tick, record_missed_ticks = _entry_points(_SOURCES)
 publish = _compile_publish(_SOURCES)

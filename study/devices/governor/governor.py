@@ -34,9 +34,8 @@ FAULTS = tuple(Fault)
 class Governor:
     """Settings, state, stimulus and recording ring of one device.
 
-    Requests (`ask_*`, `sign_of_life`) and queries may be made from any thread at any time, `begin_*` and `rows` only
-    while nothing moves.
-    """
+    Requests (`request_*`, `sign_of_life`) and queries may be made from any thread at any time, `begin_*` and `rows`
+    only while nothing moves."""
 
     def __init__(self, info: DeviceInfo, settings: DeviceSettings, ring: FloatArray | None = None) -> None:
         """ring: rows of the telemetry ring (`study.devices.telemetry`), where each tick writes a row; None: no
@@ -50,13 +49,13 @@ class Governor:
         self.buffer: FloatArray = np.zeros((1, cells.ROW_SIZE))
         self.ring: FloatArray = np.zeros((1, cells.RING_WIDTH)) if ring is None else ring
         self.force = np.zeros(3)
-        self.nothing: FloatArray = np.full(READING_SIZE, np.nan)
+        self.missed_reading: FloatArray = np.full(READING_SIZE, np.nan)
         """Reading of a missed tick: all NaN."""
 
     @property
     def moving(self) -> bool:
         """Whether a stimulus or one of its fades is in progress."""
-        return bool(self.state[cells.PHASE] != cells.STILL)
+        return bool(self.state[cells.PHASE] != cells.IDLE)
 
     @property
     def playing(self) -> bool:
@@ -81,24 +80,24 @@ class Governor:
     def begin_hold(self, stimulus: HeldStimulus) -> None:
         """Set up a stimulus that is repeated until its release; the next tick is its first. The limits are checked
         before, in `admission`."""
-        fade_in, fade_out = self._ticks(stimulus.fade_in_s), self._ticks(stimulus.fade_out_s)
-        self._begin(stimulus.played_once_then_loop, self._kept_of_loop(len(stimulus.loop)))
-        state, lead = self.state, len(stimulus.onset) if stimulus.onset is not None else 0
-        state[cells.LEAD] = lead
+        fade_in, fade_out = self._count_ticks(stimulus.fade_in_s), self._count_ticks(stimulus.fade_out_s)
+        self._reset_run(stimulus.played_once_then_loop, self._count_recorded_rows(len(stimulus.loop)))
+        state, onset_ticks = self.state, len(stimulus.onset) if stimulus.onset is not None else 0
+        state[cells.ONSET_TICKS] = onset_ticks
         # An onset replaces the fade-in.
-        state[cells.FADE_IN], state[cells.FADE_OUT] = 0 if lead else fade_in, fade_out
+        state[cells.FADE_IN], state[cells.FADE_OUT] = 0 if onset_ticks else fade_in, fade_out
         state[cells.RAISED_COSINE] = stimulus.fade_shape == "raised_cosine"
         state[cells.SPRING_RAMP] = max(fade_in, self.settings[cells.LET_GO_TICKS])
         state[cells.LENGTH] = math.inf
-        state[cells.LONGEST] = self._ticks(self._longest_s)
-        state[cells.RECORD_FROM] = max(fade_in, lead)
+        state[cells.LONGEST] = self._count_ticks(self._longest_s)
+        state[cells.RECORD_FROM] = max(fade_in, onset_ticks)
         state[cells.PHASE] = cells.PLAYING
 
     def begin_play(self, commands: Signal) -> None:
         """Set up commands that are played once, after `SETTLE_S` with the spring alone; the next tick is the first of
         these."""
-        settle = self._ticks(SETTLE_S)
-        self._begin(commands.samples, len(commands))
+        settle = self._count_ticks(SETTLE_S)
+        self._reset_run(commands.samples, len(commands))
         state = self.state
         state[cells.START] = state[cells.TICK] = state[cells.LAST_SIGN] = -settle
         state[cells.FADE_OUT] = self.settings[cells.LET_GO_TICKS]
@@ -108,7 +107,7 @@ class Governor:
         state[cells.LONGEST] = math.inf
         state[cells.PHASE] = cells.PLAYING
 
-    def note_begin(self, now_s: float) -> None:
+    def set_begin_time(self, now_s: float) -> None:
         """Store the time of the begin (s, by the loop's clock); the first tick is due one tick later."""
         self.state[cells.BEGAN_S] = now_s
 
@@ -116,21 +115,21 @@ class Governor:
         """Restart the watchdog's timeout, at the next tick."""
         self.state[cells.SIGN_OF_LIFE] = 1.0
 
-    def ask_release(self) -> None:
+    def request_release(self) -> None:
         """Request the fade-out that the stimulus specifies."""
         self.state[cells.RELEASE_ASKED] = 1.0
 
-    def ask_let_go(self) -> None:
+    def request_let_go(self) -> None:
         """Request the safety fade within `release_s`, for any stimulus."""
         self.state[cells.LET_GO_ASKED] = 1.0
 
-    def ask_stop(self) -> None:
+    def request_stop(self) -> None:
         """Request the emergency stop: no force from the next tick on. It cannot be undone."""
         self.state[cells.STOP_ASKED] = 1.0
 
     @property
-    def stop_asked(self) -> bool:
-        """Whether `ask_stop` was called; it stays True."""
+    def stop_requested(self) -> bool:
+        """Whether `request_stop` was called; it stays True."""
         return bool(self.state[cells.STOP_ASKED] != 0.0)
 
     def abandon(self, fault: Fault) -> None:
@@ -138,12 +137,12 @@ class Governor:
         caller must ensure that the device gets zero force."""
         if fault is Fault.FORCE_LEFT or self.fault is Fault.NONE:
             self.state[cells.FAULT] = FAULTS.index(fault)
-        self.state[cells.PHASE] = cells.STILL
+        self.state[cells.PHASE] = cells.IDLE
         self.state[cells.FORCE : cells.FORCE + 3] = 0.0
 
-    def miss(self, ticks: int) -> None:
+    def record_missed_ticks(self, ticks: int) -> None:
         """Record missed ticks: the device held its last force, and its sensors were not read."""
-        govern.miss(self.state, self.buffer, self.nothing, ticks)
+        govern.record_missed_ticks(self.state, self.buffer, self.missed_reading, ticks)
 
     def count_lateness(self, late: bool, after_s: float) -> None:
         """Record whether the latest tick ended after the next was due, and the time from its due time to its end
@@ -171,42 +170,42 @@ class Governor:
     def rows(self) -> FloatArray:
         """The recorded rows, shape (n, cells.ROW_SIZE), n at most the length of the ring."""
         recorded, size = int(self.state[cells.RECORDED]), len(self.buffer)
-        kept = min(recorded, size)
-        return self.buffer[np.arange(recorded - kept, recorded) % size]
+        row_count = min(recorded, size)
+        return self.buffer[np.arange(recorded - row_count, recorded) % size]
 
-    def row_due_s(self) -> FloatArray:
-        """Times at which the ticks of `rows` were due, (n,), s, by the clock of `note_begin`."""
-        state, kept = self.state, len(self.rows())
+    def compute_row_times(self) -> FloatArray:
+        """Times at which the ticks of `rows` were due, (n,), s, by the clock of `set_begin_time`."""
+        state, row_count = self.state, len(self.rows())
         last = state[cells.RECORD_FROM] + state[cells.RECORDED] - 1.0
-        ticks = last - np.arange(kept)[::-1]
+        ticks = last - np.arange(row_count)[::-1]
         due_s: FloatArray = state[cells.BEGAN_S] + (ticks - state[cells.START] + 1.0) * self.settings[cells.TICK_S]
         return due_s
 
     @property
     def began_s(self) -> float:
-        """Time of the begin of the stimulus (s), by the clock of `note_begin`."""
+        """Time of the begin of the stimulus (s), by the clock of `set_begin_time`."""
         return float(self.state[cells.BEGAN_S])
 
     @property
     def steady(self) -> FloatArray:
         """The repeated part of the stimulus, (n, 3), N, without its onset."""
-        return self.loop[int(self.state[cells.LEAD]) :]
+        return self.loop[int(self.state[cells.ONSET_TICKS]) :]
 
-    def _begin(self, played: FloatArray, rows: int) -> None:
+    def _reset_run(self, stimulus_n: FloatArray, rows: int) -> None:
         """Reset the state for a stimulus (n, 3), N, and a recording ring of this many rows."""
-        self.loop = np.array(played, order="C")
+        self.loop = np.array(stimulus_n, order="C")
         self.buffer = np.full((max(rows, 1), cells.ROW_SIZE), np.nan)
         # Never clear the stop request, not even briefly: another thread may be setting it at this moment.
         self.state[cells.STOP_ASKED + 1 :] = 0.0
         self.state[cells.LAST_POSITION : cells.LAST_POSITION + 3] = np.nan
         self.state[cells.LAST_STEP] = np.nan
 
-    def _kept_of_loop(self, length: int) -> int:
+    def _count_recorded_rows(self, length: int) -> int:
         """Rows recorded of a loop: as many whole loops as fit in `keep_s`, or `keep_s` of a longer loop."""
-        keep = self._ticks(self._keep_s)
+        keep = self._count_ticks(self._keep_s)
         return keep // length * length if length <= keep else keep
 
-    def _ticks(self, seconds: float) -> int:
+    def _count_ticks(self, seconds: float) -> int:
         """The nearest number of ticks."""
         return round(seconds * self._rate_hz)
 
@@ -216,37 +215,37 @@ NEVER_TICKS = 1e15
 
 
 def pack_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
-    """The array `settings` of `govern.tick`, fixed from opening to closing: SI units, times in ticks (`cells`).
+    """Compute the array `settings` of `govern.tick`, fixed from opening to closing: SI units, times in ticks (`cells`).
     Stiffness K = m (2 pi f)²; low-pass coefficients 1 - exp(-2 pi f_c / rate)."""
     limits, rate_hz = settings.limits, info.sample_rate_hz
-    packed = np.zeros(cells.SETTINGS_SIZE)
-    packed[cells.TICK_S] = 1.0 / rate_hz
-    packed[cells.STIFFNESS] = info.effective_mass_kg * (2 * math.pi * settings.spring_frequency_hz) ** 2
-    packed[cells.DAMPING] = settings.spring_damping_n_s_per_m
-    packed[cells.VELOCITY_SHARE] = 1.0 - math.exp(-2 * math.pi * VELOCITY_CORNER_HZ / rate_hz)
-    packed[cells.CENTRE_X : cells.CENTRE_Z + 1] = settings.place_m
-    packed[cells.STIMULUS_CAP] = limits.stimulus_cap_n
-    packed[cells.FEEDBACK_CAP] = min(limits.feedback_cap_n, limits.total_cap_n)
-    packed[cells.TOTAL_CAP] = limits.total_cap_n
-    packed[cells.SLEW_STEP] = limits.slew_n_per_s / rate_hz
-    packed[cells.WATCHDOG_TICKS] = round(limits.watchdog_s * rate_hz)
-    packed[cells.LET_GO_TICKS] = max(1, math.floor(limits.release_s * rate_hz))
-    _pack_plausibility(packed, limits.plausibility, rate_hz)
+    values = np.zeros(cells.SETTINGS_SIZE)
+    values[cells.TICK_S] = 1.0 / rate_hz
+    values[cells.STIFFNESS] = info.effective_mass_kg * (2 * math.pi * settings.spring_frequency_hz) ** 2
+    values[cells.DAMPING] = settings.spring_damping_n_s_per_m
+    values[cells.VELOCITY_SHARE] = 1.0 - math.exp(-2 * math.pi * VELOCITY_CORNER_HZ / rate_hz)
+    values[cells.CENTRE_X : cells.CENTRE_Z + 1] = settings.place_m
+    values[cells.STIMULUS_CAP] = limits.stimulus_cap_n
+    values[cells.FEEDBACK_CAP] = min(limits.feedback_cap_n, limits.total_cap_n)
+    values[cells.TOTAL_CAP] = limits.total_cap_n
+    values[cells.SLEW_STEP] = limits.slew_n_per_s / rate_hz
+    values[cells.WATCHDOG_TICKS] = round(limits.watchdog_s * rate_hz)
+    values[cells.LET_GO_TICKS] = max(1, math.floor(limits.release_s * rate_hz))
+    _pack_plausibility(values, limits.plausibility, rate_hz)
     if info.simulated and not info.moved_by_force:
-        packed[cells.STALE_TICKS] = NEVER_TICKS
-    return packed
+        values[cells.STALE_TICKS] = NEVER_TICKS
+    return values
 
 
-def _pack_plausibility(packed: FloatArray, bounds: PlausibilitySettings, rate_hz: float) -> None:
-    """Bounds of plausible position readings (`protocols.definition.plausibility`), converted to ticks."""
-    packed[cells.WORKSPACE] = bounds.workspace_m
-    packed[cells.LONGEST_JUMP] = bounds.longest_jump_m
-    packed[cells.FASTEST_STEP] = bounds.fastest_m_per_s / rate_hz
-    packed[cells.ACCELERATION] = bounds.acceleration_mps2
-    packed[cells.ACCELERATION_SHARE] = 1.0 - math.exp(-1.0 / (ACCELERATION_S * rate_hz))
-    packed[cells.PASSED_SHARE] = 1.0 - math.exp(-2 * math.pi * MOVING_BELOW_HZ / rate_hz)
-    packed[cells.RESOLUTION] = bounds.resolution_m
-    packed[cells.FRICTION] = bounds.friction_n
-    packed[cells.STALE_TICKS] = math.ceil(bounds.stale_s * rate_hz)
+def _pack_plausibility(values: FloatArray, bounds: PlausibilitySettings, rate_hz: float) -> None:
+    """Fill in the bounds of plausible position readings (`protocols.definition.plausibility`), converted to ticks."""
+    values[cells.WORKSPACE] = bounds.workspace_m
+    values[cells.LONGEST_JUMP] = bounds.longest_jump_m
+    values[cells.FASTEST_STEP] = bounds.fastest_m_per_s / rate_hz
+    values[cells.ACCELERATION] = bounds.acceleration_mps2
+    values[cells.ACCELERATION_SHARE] = 1.0 - math.exp(-1.0 / (ACCELERATION_S * rate_hz))
+    values[cells.PASSED_SHARE] = 1.0 - math.exp(-2 * math.pi * MOVING_BELOW_HZ / rate_hz)
+    values[cells.RESOLUTION] = bounds.resolution_m
+    values[cells.FRICTION] = bounds.friction_n
+    values[cells.STALE_TICKS] = math.ceil(bounds.stale_s * rate_hz)
     # Half of still_s until the feedback force begins to be reduced at an unchanged reading, half for the reduction.
-    packed[cells.EASE_TICKS] = max(1, math.floor(bounds.still_s * rate_hz / 2))
+    values[cells.EASE_TICKS] = max(1, math.floor(bounds.still_s * rate_hz / 2))

@@ -12,14 +12,13 @@ from equalizer.signals.signal import FloatArray
 from study.devices.governor.cells import (
     ACCELERATION,
     ACCELERATION_SHARE,
-    AXIS_CHANGED,
     AXIS_EXPECTED,
     AXIS_FORCE,
-    AXIS_LEAST,
-    AXIS_MOST,
+    AXIS_HIGH,
+    AXIS_LOW,
+    AXIS_REFERENCE,
     AXIS_SPEED,
     AXIS_UNCHANGED,
-    CHANGED,
     EASED,
     EASED_BEFORE,
     ELAPSED,
@@ -31,9 +30,7 @@ from study.devices.governor.cells import (
     JUMPED,
     LAST_POSITION,
     LAST_STEP,
-    LEAST,
     LONGEST_JUMP,
-    MOST,
     MOVING_FORCE,
     NO_FAULT,
     NOT_A_NUMBER,
@@ -42,6 +39,9 @@ from study.devices.governor.cells import (
     PASSED_SHARE,
     PASSED_TWICE,
     PULL,
+    RANGE_HIGH,
+    RANGE_LOW,
+    REFERENCE,
     RESOLUTION,
     SHAKEN,
     SHAKING,
@@ -77,16 +77,16 @@ half a step. Also the expected motion from which an unchanged reading is stale."
 
 
 @part
-def _move_gripped(state: FloatArray, tick_s: float, force_n: float, at: tuple[int, int, int, int]) -> None:
+def _move_gripped(state: FloatArray, tick_s: float, force_n: float, cell_indices: tuple[int, int, int, int]) -> None:
     """Integrate the gripped handle along one axis over a tick (semi-implicit Euler), and extend its range. force_n: N.
-    at: indices of position (m), velocity (m/s), least and greatest position in `state`."""
-    place, speed, least, most = at
-    left = force_n - GRIPPED_N_PER_M * state[place]
-    left -= GRIPPED_N_S_PER_M * state[speed]
-    state[speed] += tick_s / GRIPPED_KG * left
-    state[place] += tick_s * state[speed]
-    state[least] = min(state[least], state[place])
-    state[most] = max(state[most], state[place])
+    cell_indices: of position (m), velocity (m/s), least and greatest position in `state`."""
+    position, speed, low, high = cell_indices
+    net_force_n = force_n - GRIPPED_N_PER_M * state[position]
+    net_force_n -= GRIPPED_N_S_PER_M * state[speed]
+    state[speed] += tick_s / GRIPPED_KG * net_force_n
+    state[position] += tick_s * state[speed]
+    state[low] = min(state[low], state[position])
+    state[high] = max(state[high], state[position])
 
 
 @part
@@ -100,36 +100,38 @@ def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
     x = state[PASSED_TWICE] - state[MOVING_FORCE]
     y = state[PASSED_TWICE + 1] - state[MOVING_FORCE + 1]
     z = state[PASSED_TWICE + 2] - state[MOVING_FORCE + 2]
-    beyond = norm_of(x, y, z)
-    share = 1.0 - settings[FRICTION] / beyond if beyond > settings[FRICTION] else 0.0
+    difference_n = norm_of(x, y, z)
+    share = 1.0 - settings[FRICTION] / difference_n if difference_n > settings[FRICTION] else 0.0
     state[MOVING_FORCE] += share * x
     state[MOVING_FORCE + 1] += share * y
     state[MOVING_FORCE + 2] += share * z
     for i in range(3):
-        at = EXPECTED + i, EXPECTED_SPEED + i, LEAST + i, MOST + i
-        _move_gripped(state, settings[TICK_S], state[MOVING_FORCE + i], at)
+        cell_indices = EXPECTED + i, EXPECTED_SPEED + i, RANGE_LOW + i, RANGE_HIGH + i
+        _move_gripped(state, settings[TICK_S], state[MOVING_FORCE + i], cell_indices)
 
 
 @part
 def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
     """Whether the reading differs by half the resolution or more from the reference, the last reading that had changed.
     If so, it becomes the new reference, and the expected range starts anew."""
-    away = norm_of(reading[0] - state[CHANGED], reading[1] - state[CHANGED + 1], reading[2] - state[CHANGED + 2])
-    if away < 0.5 * settings[RESOLUTION]:
+    distance_m = norm_of(
+        reading[0] - state[REFERENCE], reading[1] - state[REFERENCE + 1], reading[2] - state[REFERENCE + 2]
+    )
+    if distance_m < 0.5 * settings[RESOLUTION]:
         return False
     for i in range(3):
-        state[CHANGED + i] = reading[i]
-        state[LEAST + i] = state[MOST + i] = state[EXPECTED + i]
+        state[REFERENCE + i] = reading[i]
+        state[RANGE_LOW + i] = state[RANGE_HIGH + i] = state[EXPECTED + i]
     state[EASED_BEFORE] = state[EASED]
     return True
 
 
 @part
-def _gave_way(state: FloatArray, settings: FloatArray, way: float) -> bool:
+def _must_have_moved(state: FloatArray, settings: FloatArray, distance_m: float) -> bool:
     """Whether the spring's force has been reduced so far, since the last change, that even a gripped handle must have
-    moved by `way` (m): by more than friction + stiffness of the grip * way."""
-    taken_back = (state[EASED] - state[EASED_BEFORE]) * state[PULL]
-    return bool(taken_back > settings[FRICTION] + GRIPPED_N_PER_M * way)
+    moved by `distance_m` (m): by more than friction + stiffness of the grip * way."""
+    released_n = (state[EASED] - state[EASED_BEFORE]) * state[PULL]
+    return bool(released_n > settings[FRICTION] + GRIPPED_N_PER_M * distance_m)
 
 
 @part
@@ -139,39 +141,46 @@ def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> b
         state[UNCHANGED] = 0.0
         return False
     state[UNCHANGED] += 1.0
-    expected = max(state[MOST] - state[LEAST], state[MOST + 1] - state[LEAST + 1], state[MOST + 2] - state[LEAST + 2])
-    way = STEPS_OF_RESOLUTION * settings[RESOLUTION]
-    return bool(state[UNCHANGED] >= settings[STALE_TICKS] and (expected > way or _gave_way(state, settings, way)))
+    expected = max(
+        state[RANGE_HIGH] - state[RANGE_LOW],
+        state[RANGE_HIGH + 1] - state[RANGE_LOW + 1],
+        state[RANGE_HIGH + 2] - state[RANGE_LOW + 2],
+    )
+    distance_m = STEPS_OF_RESOLUTION * settings[RESOLUTION]
+    return bool(
+        state[UNCHANGED] >= settings[STALE_TICKS]
+        and (expected > distance_m or _must_have_moved(state, settings, distance_m))
+    )
 
 
 @part
 def _expect_along_axis(state: FloatArray, settings: FloatArray, i: int) -> None:
     """As `_expect_motion` for axis i by itself, with the full friction on its component of the force."""
-    beyond = state[PASSED_TWICE + i] - state[AXIS_FORCE + i]
-    if abs(beyond) > settings[FRICTION]:
-        state[AXIS_FORCE + i] += beyond - math.copysign(settings[FRICTION], beyond)
-    at = AXIS_EXPECTED + i, AXIS_SPEED + i, AXIS_LEAST + i, AXIS_MOST + i
-    _move_gripped(state, settings[TICK_S], state[AXIS_FORCE + i], at)
+    difference_n = state[PASSED_TWICE + i] - state[AXIS_FORCE + i]
+    if abs(difference_n) > settings[FRICTION]:
+        state[AXIS_FORCE + i] += difference_n - math.copysign(settings[FRICTION], difference_n)
+    cell_indices = AXIS_EXPECTED + i, AXIS_SPEED + i, AXIS_LOW + i, AXIS_HIGH + i
+    _move_gripped(state, settings[TICK_S], state[AXIS_FORCE + i], cell_indices)
 
 
 @part
 def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
     """Whether the reading of a single axis is stale: unchanged although its component of the force must have moved
     it."""
-    stale, stretch, half = False, AXIS_TIMES * settings[STALE_TICKS], 0.5 * settings[RESOLUTION]
+    stale, stretch_ticks, half_resolution = False, AXIS_TIMES * settings[STALE_TICKS], 0.5 * settings[RESOLUTION]
     for i in range(3):
         _expect_along_axis(state, settings, i)
-        if abs(reading[i] - state[AXIS_CHANGED + i]) >= half:
-            state[AXIS_CHANGED + i], state[AXIS_UNCHANGED + i] = reading[i], 0.0
-            state[AXIS_LEAST + i] = state[AXIS_MOST + i] = state[AXIS_EXPECTED + i]
+        if abs(reading[i] - state[AXIS_REFERENCE + i]) >= half_resolution:
+            state[AXIS_REFERENCE + i], state[AXIS_UNCHANGED + i] = reading[i], 0.0
+            state[AXIS_LOW + i] = state[AXIS_HIGH + i] = state[AXIS_EXPECTED + i]
             continue
         state[AXIS_UNCHANGED + i] += 1.0
-        if state[AXIS_UNCHANGED + i] % stretch != 0.0:
+        if state[AXIS_UNCHANGED + i] % stretch_ticks != 0.0:
             continue
-        if state[AXIS_MOST + i] - state[AXIS_LEAST + i] <= STEPS_OF_RESOLUTION * settings[RESOLUTION]:
+        if state[AXIS_HIGH + i] - state[AXIS_LOW + i] <= STEPS_OF_RESOLUTION * settings[RESOLUTION]:
             state[AXIS_UNCHANGED + i] = 0.0
-        stale = stale or state[AXIS_UNCHANGED + i] >= AXIS_STRETCHES * stretch
-        state[AXIS_LEAST + i] = state[AXIS_MOST + i] = state[AXIS_EXPECTED + i]
+        stale = stale or state[AXIS_UNCHANGED + i] >= AXIS_STRETCHES * stretch_ticks
+        state[AXIS_LOW + i] = state[AXIS_HIGH + i] = state[AXIS_EXPECTED + i]
     return stale
 
 
@@ -201,13 +210,13 @@ def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArra
     if math.isnan(last_x):  # the first reading
         _has_changed(state, settings, reading)
         for i in range(3):
-            state[AXIS_CHANGED + i] = reading[i]
+            state[AXIS_REFERENCE + i] = reading[i]
         return NO_FAULT
     x, y, z = reading[0] - last_x, reading[1] - state[LAST_POSITION + 1], reading[2] - state[LAST_POSITION + 2]
     # Driver and loop have separate clocks: successive samples of the driver may seem to be less than a tick apart.
     ticks = max(1.0, state[ELAPSED])
-    way = norm_of(x, y, z)
-    if not (way <= settings[LONGEST_JUMP] and way <= settings[FASTEST_STEP] * ticks + settings[RESOLUTION]):
+    step_m = norm_of(x, y, z)
+    if not (step_m <= settings[LONGEST_JUMP] and step_m <= settings[FASTEST_STEP] * ticks + settings[RESOLUTION]):
         return JUMPED
     if _is_shaken(state, settings, x / ticks, y / ticks, z / ticks):
         return SHAKEN

@@ -40,8 +40,8 @@ CLOSE_S = 6.0
 class LoopGoneError(Exception):
     """The loop's process ended, or hangs (`hangs`: it did not answer within the timeout)."""
 
-    def __init__(self, happened: str, hangs: bool) -> None:
-        super().__init__(happened)
+    def __init__(self, reason: str, hangs: bool) -> None:
+        super().__init__(reason)
         self.hangs = hangs
 
 
@@ -58,11 +58,11 @@ class Call:
         self._news = threading.Event()
 
     @property
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether the answer has arrived, or is known never to arrive."""
         return self._last is not None
 
-    def hear(self, message: tuple[int, Any]) -> None:
+    def receive(self, message: tuple[int, Any]) -> None:
         """Take a message of the process: progress, or the answer that ends the call. Called by the line's thread."""
         if message[0] == PROGRESS:
             self._progress.put(message[1])
@@ -124,7 +124,7 @@ class Line:
         self._ended = threading.Event()
         threading.Thread(target=self._run_thread, name=f"line {name}", daemon=True).start()
 
-    def begin(self, name: str, *arguments: Any) -> Call:
+    def queue_call(self, name: str, *arguments: Any) -> Call:
         """Queue a call and return at once. It is sent when all earlier calls of this line are over. Raises as `Call`
         does."""
         call = Call(name, arguments)
@@ -145,7 +145,7 @@ class Line:
                     try:
                         self._transact(call)
                     except Exception as error:  # noqa: BLE001 - a broken pipe, or an answer that cannot be read
-                        call.hear((ERROR, _loop_gone_error(error)))
+                        call.receive((ERROR, _make_loop_gone_error(error)))
         finally:
             self._ended.set()
             self._refuse_all()
@@ -155,7 +155,7 @@ class Line:
         with contextlib.suppress(Empty):
             while True:
                 if (call := self._calls.get_nowait()) is not None:
-                    call.hear((ERROR, LoopGoneError("it was given up", hangs=False)))
+                    call.receive((ERROR, LoopGoneError("it was given up", hangs=False)))
 
     def _transact(self, call: Call) -> None:
         """Send a request and pass its messages to the call, until the answer has come."""
@@ -163,14 +163,14 @@ class Line:
         connection.send_bytes(call.request)
         message = connection.recv()
         while message[0] == PROGRESS:
-            call.hear(message)
+            call.receive(message)
             # No timeout: where the caller hangs, its signs of life stop and the device fades the force.
             connection.send(call.goes_on.get())
             message = connection.recv()
-        call.hear(message)
+        call.receive(message)
 
 
-def _loop_gone_error(error: Exception) -> LoopGoneError:
+def _make_loop_gone_error(error: Exception) -> LoopGoneError:
     if isinstance(error, EOFError | OSError):
         return LoopGoneError("it ended", hangs=False)
     return LoopGoneError(f"its answer cannot be read ({type(error).__name__}: {error})", hangs=False)

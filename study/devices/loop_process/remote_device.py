@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from equalizer.signals.signal import Signal
-from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, Played
+from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, PlaybackResult
 from study.devices.loop_process.line import CLOSE_S, Call, Line, LoopGoneError
 from study.devices.loop_process.start import LoopProcess
 from study.devices.telemetry import Ring
@@ -34,7 +34,7 @@ SENT_S_PER_RECORDED_S = 0.05
 """Additional timeout (s) per recorded second, which is some 100 kB: a pipe takes it in 2 ms, on a busy computer more
 slowly."""
 
-NEVER_HELD = Health(Fault.NONE, 0, 0, 0, 0, 0, 0, 0.0)
+INITIAL_HEALTH = Health(Fault.NONE, 0, 0, 0, 0, 0, 0, 0.0)
 """Health before the first stimulus: no fault, nothing counted."""
 
 
@@ -45,17 +45,17 @@ def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevi
     ring = Ring()
     try:
         process = LoopProcess()
-        info: DeviceInfo = process.work.begin("open", name, settings, seed, ring.path).answer(OPENING_S)
+        info: DeviceInfo = process.work.queue_call("open", name, settings, seed, ring.path).answer(OPENING_S)
         return RemoteDevice(process, info, settings, ring)
-    except LoopGoneError as gone:
+    except LoopGoneError as loop_error:
         assert process is not None
         ring.remove()
         process.hang_up()
         raise DeviceError(
             "The device was not opened",
-            f"The process of its loop failed while it was opened: {gone}, {process.end(0.5)}.",
+            f"The process of its loop failed while it was opened: {loop_error}, {process.end(0.5)}.",
             "Try again. If it happens again, report what was written above.",
-        ) from gone
+        ) from loop_error
     except BaseException:
         ring.remove()
         if process is not None:
@@ -76,15 +76,15 @@ class RemoteDevice:
         limits = settings.limits
         self._fade_s = limits.release_s + limits.watchdog_s
         self._keep_s = settings.keep_s
-        self._held: HeldStimulus | None = None
+        self._held_stimulus: HeldStimulus | None = None
         self._releasing: Call | None = None
-        self._health = NEVER_HELD
+        self._health = INITIAL_HEALTH
         self._force_left = self._stopped = False
         """Whether the process reported FORCE_LEFT or an executed stop; both remain true after its end."""
         self._closing = self._closed = self._ended = False
         """Closing has begun; no further calls are sent; the process has ended."""
-        self._losing = threading.Lock()
-        self._lost = ""
+        self._loss_lock = threading.Lock()
+        self._loss_reason = ""
         """Reason why the device was lost; empty while it is not."""
         # Registered twice: a pending KeyboardInterrupt may end the first call before its first line.
         atexit.register(self._close_at_exit)
@@ -100,12 +100,12 @@ class RemoteDevice:
         return self._ring.path if self._ring is not None else ""
 
     def hold(self, stimulus: HeldStimulus) -> None:
-        self._must_be_idle()
-        before, self._held = self._held, stimulus
+        self._require_idle()
+        previous, self._held_stimulus = self._held_stimulus, stimulus
         try:
             self._call_remote(self._process.work, "hold", stimulus)
         except Exception:
-            self._held = before
+            self._held_stimulus = previous
             raise
 
     def keep_alive(self) -> None:
@@ -119,7 +119,7 @@ class RemoteDevice:
         try:
             fault: Fault = self._call_remote(self._process.signs, "fault")
         except DeviceError:
-            return self._fault_of_the_lost()
+            return self._fault_when_lost()
         self._force_left |= fault is Fault.FORCE_LEFT
         return fault
 
@@ -128,46 +128,48 @@ class RemoteDevice:
         try:
             return self._note_health(self._call_remote(self._process.signs, "health"))
         except DeviceError:
-            return self._health_of_the_lost()
+            return self._health_when_lost()
 
-    def release(self) -> Played:
+    def release(self) -> PlaybackResult:
         """Release the stimulus and return what was played. Where the process is lost: no recording, and the counters
         that it reported last. May be called again after an interruption."""
-        if self._lost or self._closed:
-            if self._held is None:
-                self._must_be_there()
-            self._held = None
-            return Played(recording=None, health=self._health_of_the_lost())
-        fade_out_s = self._held.fade_out_s if self._held is not None else 0.0
+        if self._loss_reason or self._closed:
+            if self._held_stimulus is None:
+                self._require_connected()
+            self._held_stimulus = None
+            return PlaybackResult(recording=None, health=self._health_when_lost())
+        fade_out_s = self._held_stimulus.fade_out_s if self._held_stimulus is not None else 0.0
         # A caller that was interrupted while it waited gets the answer of the same release.
-        self._releasing = self._releasing or self._process.work.begin("release")
+        self._releasing = self._releasing or self._process.work.queue_call("release")
         try:
-            played: Played = self._releasing.answer(fade_out_s + self._patience_s(self._keep_s))
-        except LoopGoneError as gone:
-            self._lose(gone)
-            played = Played(recording=None, health=self._health_of_the_lost())
+            result: PlaybackResult = self._releasing.answer(fade_out_s + self._patience_s(self._keep_s))
+        except LoopGoneError as loop_error:
+            self._mark_lost(loop_error)
+            result = PlaybackResult(recording=None, health=self._health_when_lost())
         except Exception:  # raised in the process. After an interruption the answer is awaited again.
-            self._releasing = self._held = None
+            self._releasing = self._held_stimulus = None
             raise
-        self._note_health(played.health)
-        self._releasing = self._held = None
-        return played
+        self._note_health(result.health)
+        self._releasing = self._held_stimulus = None
+        return result
 
-    def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
-        self._must_be_idle()
-        call = self._process.work.begin("play", commands)
+    def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> PlaybackResult:
+        self._require_idle()
+        call = self._process.work.queue_call("play", commands)
         patience_s = self._patience_s(0.0)
         try:
-            played: Played = call.answer(patience_s, on_progress, sending_s=SENT_S_PER_RECORDED_S * commands.duration_s)
-        except LoopGoneError as gone:
-            self._lose(gone)
-            raise self._absence() from gone
+            result: PlaybackResult = call.answer(
+                patience_s, on_progress, sending_s=SENT_S_PER_RECORDED_S * commands.duration_s
+            )
+        except LoopGoneError as loop_error:
+            self._mark_lost(loop_error)
+            raise self._lost_error() from loop_error
         except BaseException:
-            if not call.over:
+            if not call.is_over:
                 self._break_off(call, patience_s)
             raise
-        self._note_health(played.health)
-        return played
+        self._note_health(result.health)
+        return result
 
     def look(self) -> Look:
         with contextlib.suppress(DeviceError):
@@ -181,16 +183,16 @@ class RemoteDevice:
     def stop(self) -> None:
         """Emergency stop. The process is killed where it does not answer within `STOP_S`; the device's own watchdog
         then switches the force off."""
-        if self._lost or self._ended:
+        if self._loss_reason or self._ended:
             return
         try:
             with contextlib.suppress(DeviceError):
-                self._process.stop.begin("stop").answer(STOP_S, grace_s=0.0)
+                self._process.stop.queue_call("stop").answer(STOP_S, grace_s=0.0)
                 self._stopped = True
-        except LoopGoneError as gone:
-            # Kill here: `_lose` may wait for another call that waits for the process to fade its force and end.
+        except LoopGoneError as loop_error:
+            # Kill here: `_mark_lost` may wait for another call that waits for the process to fade its force and end.
             self._process.kill()
-            self._lose(gone)
+            self._mark_lost(loop_error)
 
     def close(self) -> None:
         """Close device and process. Waits at most for the fade and twice `CLOSE_S`; a process that does not end is
@@ -199,7 +201,7 @@ class RemoteDevice:
             return
         self._closing = True
         try:
-            if not (self._lost or self._closed):
+            if not (self._loss_reason or self._closed):
                 with contextlib.suppress(DeviceError):
                     self._note_health(
                         self._call_remote(self._process.close, "close", patience_s=self._fade_s + CLOSE_S)
@@ -229,64 +231,66 @@ class RemoteDevice:
     def _call_remote(self, line: Line, name: str, *arguments: Any, patience_s: float | None = None) -> Any:
         """Call a method in the process. Raises `DeviceError` for a device that is lost or closed, and what the method
         raised."""
-        self._must_be_there()
+        self._require_connected()
         try:
-            return line.begin(name, *arguments).answer(ANSWER_S if patience_s is None else patience_s)
-        except LoopGoneError as gone:
-            self._lose(gone)
-            raise self._absence() from gone
+            return line.queue_call(name, *arguments).answer(ANSWER_S if patience_s is None else patience_s)
+        except LoopGoneError as loop_error:
+            self._mark_lost(loop_error)
+            raise self._lost_error() from loop_error
 
     def _break_off(self, call: Call, patience_s: float) -> None:
         """Cancel `play` with a fade, and wait for its end."""
         try:
             call.break_off(patience_s)
-        except LoopGoneError as gone:
-            self._lose(gone)
+        except LoopGoneError as loop_error:
+            self._mark_lost(loop_error)
         except BaseException:  # interrupted again: stop without a fade
             self.stop()
             raise
 
-    def _lose(self, gone: LoopGoneError) -> None:
+    def _mark_lost(self, loop_error: LoopGoneError) -> None:
         """Mark the device as lost, at the first failure, and end the process."""
-        with self._losing:
-            if not self._lost and not self._closed:
+        with self._loss_lock:
+            if not self._loss_reason and not self._closed:
                 self._process.hang_up()
                 # A process that closed its pipes may still be fading the force: wait for its end.
-                self._lost = f"{gone}, {self._process.end(0.0 if gone.hangs else self._fade_s + CLOSE_S)}"
+                self._loss_reason = (
+                    f"{loop_error}, {self._process.end(0.0 if loop_error.hangs else self._fade_s + CLOSE_S)}"
+                )
 
     def _note_health(self, health: Health) -> Health:
         self._health = health
         self._force_left |= health.fault is Fault.FORCE_LEFT
         return health
 
-    def _must_be_idle(self) -> None:
-        self._must_be_there()
+    def _require_idle(self) -> None:
+        self._require_connected()
         if self._releasing is not None:  # its pending answer must not be taken for that of the next call
             raise DeviceError("The device cannot do this now", "It is still playing.", "Call release first.")
 
-    def _must_be_there(self) -> None:
-        if self._closed or self._lost:
-            raise self._absence()
+    def _require_connected(self) -> None:
+        if self._closed or self._loss_reason:
+            raise self._lost_error()
 
-    def _absence(self) -> DeviceError:
+    def _lost_error(self) -> DeviceError:
         """Error for a call on a closed or lost device."""
         if self._closing:
             return DeviceError("The device cannot do this now", "The device is closed.", "Open it again.")
         return DeviceError(
             "The device was lost",
-            f"The process of its loop is gone: {self._lost}.",
+            f"The process of its loop is gone: {self._loss_reason}.",
             "Take the hand off the handle until you know that no force is on: the device's own watchdog drops it. Then "
             "open the device again; a session is continued with `hapteq resume`.",
         )
 
-    def _fault_of_the_lost(self) -> Fault:
+    def _fault_when_lost(self) -> Fault:
         """Fault without the process; see `fault`."""
         if self._force_left:
             return Fault.FORCE_LEFT
-        if self._closed and not self._lost:
+        if self._closed and not self._loss_reason:
             return self._health.fault
         return Fault.STOPPED if self._stopped else Fault.LOST
 
-    def _health_of_the_lost(self) -> Health:
-        why = f"the process of its loop is gone: {self._lost}" if self._lost else self._health.why
-        return replace(self._health, fault=self._fault_of_the_lost(), why=why)
+    def _health_when_lost(self) -> Health:
+        reason = f"the process of its loop is gone: {self._loss_reason}" if self._loss_reason else self._health.why
+        return replace(self._health, fault=self._fault_when_lost(), why=reason)

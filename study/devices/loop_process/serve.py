@@ -19,7 +19,7 @@ from typing import Any
 
 from equalizer.signals.signal import Signal
 from study.devices.clock import RealClock
-from study.devices.device import Device, Played
+from study.devices.device import Device, PlaybackResult
 from study.devices.loop_process.line import CLOSE_S, ERROR, LINES, PROGRESS, VALUE, End
 from study.devices.opening import open_device, raise_thread_priority
 
@@ -99,7 +99,7 @@ class DeviceServer:
             with self._raise_priority() if urgent else contextlib.nullcontext():
                 while not self._closed.is_set():
                     name, arguments = end.recv()
-                    end.send(_answer(table[name], arguments))
+                    end.send(_call_function(table[name], arguments))
                     if name in ("release", "play"):
                         self._at_rest()
         except (EOFError, OSError):
@@ -107,15 +107,15 @@ class DeviceServer:
         finally:
             self.ended.set()
 
-    def _play_commands(self, end: End, commands: Signal) -> Played:
+    def _play_commands(self, end: End, commands: Signal) -> PlaybackResult:
         """Play commands; after each progress, continue only with the caller's consent."""
 
-        def go_on(share: float) -> None:
+        def await_consent(share: float) -> None:
             end.send((PROGRESS, share))
             if not end.recv():
                 raise BrokenOffError
 
-        return self._device.play(commands, go_on)
+        return self._device.play(commands, await_consent)
 
     def _await_closed(self) -> Any:
         """Ask the main thread to close the device, and wait for that. Returns the final counters."""
@@ -146,14 +146,14 @@ class Lifetime:
         self.patience_s = OPENING_GRACE_S
         """Time (s) granted to the main thread from then on."""
 
-    def is_over(self) -> bool:
+    def must_end(self) -> bool:
         """Whether the process was told to end, or the one that started it is gone."""
         return bool(self._told_to_end) or os.getppid() != self._parent
 
     def watch(self) -> None:
         """Terminate the process where its main thread does not end it in time; the device's own watchdog then switches
         the force off."""
-        while not self.is_over():
+        while not self.must_end():
             time.sleep(POLL_EVERY_S)
         due_s = time.monotonic()
         while time.monotonic() < due_s + self.patience_s:
@@ -168,7 +168,7 @@ def _open_and_serve(lifetime: Lifetime, ends: tuple[End, ...]) -> None:
     try:
         device = open_device(name, settings, RealClock(), seed, own_process=False, telemetry=telemetry)
     except BaseException as error:  # noqa: BLE001 - the caller raises it
-        ends[0].send((ERROR, _sendable(error)))
+        ends[0].send((ERROR, _make_sendable(error)))
         return
     lifetime.patience_s = settings.limits.release_s + settings.limits.watchdog_s + OVERDUE_S
     with contextlib.closing(device):
@@ -180,7 +180,7 @@ def _open_and_serve(lifetime: Lifetime, ends: tuple[End, ...]) -> None:
         ends[0].send((VALUE, device.info))
         server = DeviceServer(device, ends, at_rest=gc.collect, raise_thread_priority=raise_thread_priority)
         server.start()
-        while not (server.ended.wait(POLL_EVERY_S) or lifetime.is_over()):
+        while not (server.ended.wait(POLL_EVERY_S) or lifetime.must_end()):
             pass
         server.close()
 
@@ -198,17 +198,17 @@ def _leave_signals_to_the_caller(told_to_end: list[int]) -> None:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
 
 
-def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[int, Any]:
+def _call_function(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[int, Any]:
     """Call a function. Returns its value or its exception as a message (kind, value)."""
     try:
         return VALUE, function(*arguments)
     except (EOFError, ConnectionError):  # the caller ended during its answer to a progress
         raise
     except BaseException as error:  # noqa: BLE001 - the caller raises it
-        return ERROR, _sendable(error)
+        return ERROR, _make_sendable(error)
 
 
-def _sendable(error: BaseException) -> Exception:
+def _make_sendable(error: BaseException) -> Exception:
     """The exception itself if it can be pickled and restored, else a RuntimeError with its type and text."""
     if isinstance(error, Exception):
         with contextlib.suppress(Exception):

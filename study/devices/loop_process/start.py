@@ -81,15 +81,15 @@ class LoopProcess:
 def _start(handles: list[int], ends: list[End]) -> "subprocess.Popen[bytes]":
     call = f"run({', '.join(map(str, (os.getpid(), *handles)))})"
     program = f"import sys; sys.path[:] = {sys.path!r}; from study.devices.loop_process.serve import run; {call}"
-    apart: dict[str, Any]
+    popen_options: dict[str, Any]
     if sys.platform == "win32":
         for handle in handles:
             os.set_handle_inheritable(handle, True)
-        apart = {"close_fds": False, "creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+        popen_options = {"close_fds": False, "creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     else:
-        apart = {"pass_fds": handles, "start_new_session": True}
+        popen_options = {"pass_fds": handles, "start_new_session": True}
     return subprocess.Popen(
-        [sys.executable, "-c", program], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, **apart
+        [sys.executable, "-c", program], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, **popen_options
     )
 
 

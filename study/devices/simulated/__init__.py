@@ -3,6 +3,6 @@ recordings; otherwise a diagnosis would only find its own model again. Not a rep
 
 `parameters` -> `packing` into the flat arrays of `layout` -> each millisecond `dynamics`: `drives` (amplifier, motor,
 cable), `linkage` (kinematics), `inertia`, `handle` (hand, bending) -> `sensors`. `compiled` holds the entry points,
-`inlined` their compiler settings; `own_linkage` reports the linkage to a calibration and fits it to a calibration.
-Begin at `omega3.py`, then `dynamics.py`.
+`inlined` their compiler settings; `simulated_linkage` reports the linkage to a calibration and fits it to a
+calibration. Begin at `omega3.py`, then `dynamics.py`.
 """

@@ -31,7 +31,7 @@ from study.devices.simulated.layout import (
 
 
 @inlined
-def bent_bristle(bristle: float, travel: float, longest: float) -> float:
+def bend_bristle(bristle: float, travel: float, longest: float) -> float:
     """Deflection of the bristle after a `travel` of the motor, both rad: an implicit Euler step of
     dz = dx - |dx| z / longest, so that |z| <= longest for a travel of any size."""
     return (bristle + travel) / (1.0 + abs(travel) / longest)
@@ -56,7 +56,7 @@ def step_drives(
         slip = speed - arm_speed
         cables[drive] = parameters[CABLE + drive] * stretch[drive] + parameters[CABLE_DAMPING + drive] * slip
         state[TORQUE + drive] += parameters[AMPLIFIER] * (command[drive] - state[TORQUE + drive])
-        bend = bent_bristle(state[BRISTLE + drive], STEP_S * speed, parameters[PRESLIDING])
+        bend = bend_bristle(state[BRISTLE + drive], STEP_S * speed, parameters[PRESLIDING])
         state[BRISTLE + drive] = bend
         resistance = parameters[FRICTION] * bend / parameters[PRESLIDING] + parameters[DRIVE_DAMPING] * speed
         torque = state[TORQUE + drive] - cables[drive] - resistance

@@ -17,8 +17,8 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.simulated.drives import step_cables, step_drives
-from study.devices.simulated.handle import handle_force, step_bending, step_sensor
-from study.devices.simulated.inertia import SIZE, invert_in_place, mass_matrix, solve_transposed
+from study.devices.simulated.handle import fill_handle_force, step_bending, step_sensor
+from study.devices.simulated.inertia import SIZE, fill_mass_matrix, invert_in_place, solve_transposed
 from study.devices.simulated.inlined import inlined
 from study.devices.simulated.layout import (
     ARM_INERTIA,
@@ -52,13 +52,13 @@ def add_stops(state: FloatArray, parameters: FloatArray, pull: FloatArray) -> No
     if depth <= 0.0:
         return
     outwards = (x * state[VELOCITY] + y * state[VELOCITY + 1] + z * state[VELOCITY + 2]) / radius
-    push = parameters[STOP_STIFFNESS] * depth + parameters[STOP_DAMPING] * max(outwards, 0.0)
-    pull[0] -= push * x / radius
-    pull[1] -= push * y / radius
-    pull[2] -= push * z / radius
+    stop_force = parameters[STOP_STIFFNESS] * depth + parameters[STOP_DAMPING] * max(outwards, 0.0)
+    pull[0] -= stop_force * x / radius
+    pull[1] -= stop_force * y / radius
+    pull[2] -= stop_force * z / radius
 
 
-class Held(NamedTuple):
+class TickConstants(NamedTuple):
     """Quantities that stay constant during one tick, except `stretch`."""
 
     command: FloatArray
@@ -66,7 +66,7 @@ class Held(NamedTuple):
     jacobian: FloatArray
     """(3, 3), joint speed per handle velocity at the midpoint, rad/m."""
     inverse_mass: FloatArray
-    """(5, 5), inverse of `mass_matrix` at the midpoint, 1/kg."""
+    """(5, 5), inverse of `fill_mass_matrix` at the midpoint, 1/kg."""
     stretch: FloatArray
     """(3,), of the cables, rad; changes at each step."""
     centrifugal: FloatArray
@@ -76,59 +76,66 @@ class Held(NamedTuple):
 @inlined
 def integrate_tick(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> None:
     """Advance `state` by a tick under a constant command. force_n: (3,), N, the intended force at the handle."""
-    held = _hold(state, parameters, force_n)
+    constants = _compute_constants(state, parameters, force_n)
     cables, pulls, force, change = np.empty(3), np.empty(MODES), np.empty(3), np.empty(SIZE)
     for _ in range(SUBSTEPS):
-        step_drives(state, parameters, held.command, held.jacobian, held.stretch, cables)
-        handle_force(state, parameters, pulls, force)
-        _accelerations(state, parameters, held, cables, force, change)
+        step_drives(state, parameters, constants.command, constants.jacobian, constants.stretch, cables)
+        fill_handle_force(state, parameters, pulls, force)
+        _accelerations(state, parameters, constants, cables, force, change)
         for axis in range(3):
             state[VELOCITY + axis] += STEP_S * change[axis]
             state[RELATIVE + axis] += STEP_S * state[VELOCITY + axis]
-        step_cables(state, held.jacobian, held.stretch)
+        step_cables(state, constants.jacobian, constants.stretch)
         for mode in range(MOUNTS):
             state[ROCKING_SPEED + mode] += STEP_S * change[3 + mode]
             state[ROCKING + mode] += STEP_S * state[ROCKING_SPEED + mode]
-        _absolute(parameters, change)
+        _convert_to_absolute(parameters, change)
         step_bending(state, parameters, pulls, change)
         step_sensor(state, parameters)
 
 
 @inlined
-def _hold(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> Held:
+def _compute_constants(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> TickConstants:
     """Quantities of a tick. The torques are J^-T force_n with J at the present position, as of a controller; dJ/dt is
     the difference between the midpoint and the present position over half a tick."""
-    angles, midpoint, begin = np.empty(3), np.empty(3), np.empty((3, 3))
-    held = Held(np.empty(3), np.empty((3, 3)), np.empty((SIZE, SIZE)), np.empty(3), np.empty(3))
+    angles, midpoint, start_jacobian = np.empty(3), np.empty(3), np.empty((3, 3))
+    constants = TickConstants(np.empty(3), np.empty((3, 3)), np.empty((SIZE, SIZE)), np.empty(3), np.empty(3))
     for axis in range(3):
         midpoint[axis] = state[RELATIVE + axis] + 0.5 * TICK_S * state[VELOCITY + axis]
-    inverse_kinematics(parameters, midpoint, angles, held.jacobian)
-    inverse_kinematics(parameters, state[RELATIVE : RELATIVE + 3], angles, begin)
-    solve_transposed(begin, force_n, held.command)
-    held.centrifugal[:] = 0.0
+    inverse_kinematics(parameters, midpoint, angles, constants.jacobian)
+    inverse_kinematics(parameters, state[RELATIVE : RELATIVE + 3], angles, start_jacobian)
+    solve_transposed(start_jacobian, force_n, constants.command)
+    constants.centrifugal[:] = 0.0
     for number in range(3):
-        held.stretch[number] = state[MOTOR + number] - angles[number]
-        turning = 0.0
+        constants.stretch[number] = state[MOTOR + number] - angles[number]
+        rate_change = 0.0
         for axis in range(3):
-            turning += (held.jacobian[number, axis] - begin[number, axis]) * state[VELOCITY + axis]
+            rate_change += (constants.jacobian[number, axis] - start_jacobian[number, axis]) * state[VELOCITY + axis]
         for axis in range(3):
-            held.centrifugal[axis] -= parameters[ARM_INERTIA] * held.jacobian[number, axis] * turning * 2.0 / TICK_S
-    mass_matrix(parameters, held.jacobian, held.inverse_mass)
-    invert_in_place(held.inverse_mass)
-    return held
+            constants.centrifugal[axis] -= (
+                parameters[ARM_INERTIA] * constants.jacobian[number, axis] * rate_change * 2.0 / TICK_S
+            )
+    fill_mass_matrix(parameters, constants.jacobian, constants.inverse_mass)
+    invert_in_place(constants.inverse_mass)
+    return constants
 
 
 @inlined
 def _accelerations(
-    state: FloatArray, parameters: FloatArray, held: Held, cables: FloatArray, force: FloatArray, change: FloatArray
+    state: FloatArray,
+    parameters: FloatArray,
+    constants: TickConstants,
+    cables: FloatArray,
+    force: FloatArray,
+    change: FloatArray,
 ) -> None:
     """Fill change (5,), m/s²: acceleration of the handle against the base, then of the two rocking modes. cables: (3,),
     N m. force: (3,), N, on the handle."""
     pull = np.empty(SIZE)
     for axis in range(3):
-        pull[axis] = force[axis] + held.centrifugal[axis]
+        pull[axis] = force[axis] + constants.centrifugal[axis]
         for number in range(3):
-            pull[axis] += held.jacobian[number, axis] * cables[number]
+            pull[axis] += constants.jacobian[number, axis] * cables[number]
     add_stops(state, parameters, pull)
     for mode in range(MOUNTS):
         pull[3 + mode] = -(
@@ -140,12 +147,12 @@ def _accelerations(
     for row in range(SIZE):
         total = 0.0
         for column in range(SIZE):
-            total += held.inverse_mass[row, column] * pull[column]
+            total += constants.inverse_mass[row, column] * pull[column]
         change[row] = total
 
 
 @inlined
-def _absolute(parameters: FloatArray, change: FloatArray) -> None:
+def _convert_to_absolute(parameters: FloatArray, change: FloatArray) -> None:
     """Add the base's acceleration to change[:3], which then is the handle's acceleration in the room."""
     for mode in range(MOUNTS):
         for axis in range(3):

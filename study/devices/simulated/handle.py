@@ -36,17 +36,17 @@ from study.devices.simulated.layout import (
 
 
 @inlined
-def handle_force(state: FloatArray, parameters: FloatArray, pulls: FloatArray, force: FloatArray) -> None:
+def fill_handle_force(state: FloatArray, parameters: FloatArray, pulls: FloatArray, force: FloatArray) -> None:
     """Fill force (3,), N, of hand and handle modes on the platform, and pulls (MODES,), N, the force of each mode along
     its direction."""
     for axis in range(3):
-        away = state[RELATIVE + axis] - parameters[HAND_REST + axis]
+        displacement = state[RELATIVE + axis] - parameters[HAND_REST + axis]
         speed = state[VELOCITY + axis]
         for mode in range(MOUNTS):
             direction = parameters[MOUNT_DIRECTION + 3 * mode + axis]
-            away += direction * state[ROCKING + mode]
+            displacement += direction * state[ROCKING + mode]
             speed += direction * state[ROCKING_SPEED + mode]
-        force[axis] = -parameters[HAND_STIFFNESS + axis] * away - parameters[HAND_DAMPING + axis] * speed
+        force[axis] = -parameters[HAND_STIFFNESS + axis] * displacement - parameters[HAND_DAMPING + axis] * speed
     for mode in range(MODES):
         pulls[mode] = (
             parameters[MODE_STIFFNESS + mode] * state[BENDING + mode]
@@ -58,7 +58,7 @@ def handle_force(state: FloatArray, parameters: FloatArray, pulls: FloatArray, f
 
 @inlined
 def step_bending(state: FloatArray, parameters: FloatArray, pulls: FloatArray, platform: FloatArray) -> None:
-    """One step of the handle modes, and the acceleration at the sensor, in `state`. pulls: from `handle_force`.
+    """One step of the handle modes, and the acceleration at the sensor, in `state`. pulls: from `fill_handle_force`.
     platform: acceleration of the platform in the room, (3,), m/s²."""
     for axis in range(3):
         state[TRUE + axis] = platform[axis]

@@ -13,31 +13,31 @@ SIZE = 3 + MOUNTS
 
 
 @inlined
-def mass_matrix(parameters: FloatArray, jacobian: FloatArray, mass: FloatArray) -> None:
+def fill_mass_matrix(parameters: FloatArray, jacobian: FloatArray, mass: FloatArray) -> None:
     """Fill mass (5, 5), kg, of the velocities (v, r), from the kinetic energy T:
     2 T = (v + N r)^T S (v + N r) + I |J v|² + r^T M r.
     v: handle against the base; r: rocking speeds, N their directions; S: mass that moves with the handle; I: inertia of
     an arm; J: jacobian (3, 3), rad/m; M: modal masses of the base."""
     directions = parameters[MOUNT_DIRECTION : MOUNT_DIRECTION + 3 * MOUNTS].reshape((MOUNTS, 3))
-    carried = parameters[PLATFORM_MASS : PLATFORM_MASS + 9].reshape((3, 3))
+    platform_mass = parameters[PLATFORM_MASS : PLATFORM_MASS + 9].reshape((3, 3))
     for row in range(3):
         for column in range(3):
             arms = 0.0
             for number in range(3):
                 arms += jacobian[number, row] * jacobian[number, column]
-            mass[row, column] = carried[row, column] + parameters[ARM_INERTIA] * arms
+            mass[row, column] = platform_mass[row, column] + parameters[ARM_INERTIA] * arms
         for mode in range(MOUNTS):
             shared = 0.0
             for axis in range(3):
-                shared += carried[row, axis] * directions[mode, axis]
+                shared += platform_mass[row, axis] * directions[mode, axis]
             mass[row, 3 + mode] = shared
             mass[3 + mode, row] = shared
     for mode in range(MOUNTS):
-        for other in range(MOUNTS):
+        for second_mode in range(MOUNTS):
             shared = 0.0
             for axis in range(3):
-                shared += directions[mode, axis] * mass[axis, 3 + other]
-            mass[3 + mode, 3 + other] = shared
+                shared += directions[mode, axis] * mass[axis, 3 + second_mode]
+            mass[3 + mode, 3 + second_mode] = shared
         mass[3 + mode, 3 + mode] += parameters[MOUNT_MASS + mode]
 
 

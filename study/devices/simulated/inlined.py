@@ -1,7 +1,7 @@
-"""Compiler settings of every function within a tick."""
+"""The numba decorator of all functions that run within a tick of the simulated device."""
 
 from numba import njit
 
 inlined = njit(forceinline=True, error_model="numpy")
-"""A third faster than calls. Division by zero gives inf or NaN, which the safety layer knows, and never an exception
-halfway through a tick."""
+"""Compiles a function inline into its callers, which is a third faster than calls. Division by zero gives inf or NaN,
+which the safety layer detects, and raises no exception halfway through a tick."""

@@ -24,7 +24,7 @@ from study.devices.simulated.layout import AZIMUTH, FOREARM, PLATFORM_DEPTH, RAD
 
 
 @inlined
-def leg(parameters: FloatArray, position: FloatArray, number: int, row: FloatArray) -> float:
+def solve_leg(parameters: FloatArray, position: FloatArray, number: int, row: FloatArray) -> float:
     """Joint angle of one leg, rad, with the elbow outwards; `row` (3,) becomes d angle / d position, rad/m.
 
     Where the handle is out of reach, which the mechanical stops exclude, the cosine is clipped: the angle is that of an
@@ -34,21 +34,21 @@ def leg(parameters: FloatArray, position: FloatArray, number: int, row: FloatArr
     cosine, sine = parameters[AZIMUTH + 2 * number], parameters[AZIMUTH + 2 * number + 1]
     depth = position[0] + parameters[PLATFORM_DEPTH]
     inward = position[1] * cosine + position[2] * sine - parameters[RADIUS]
-    across = position[2] * cosine - position[1] * sine
+    lateral = position[2] * cosine - position[1] * sine
     reach = math.sqrt(inward * inward + depth * depth)
     # Law of cosines for the angle between the upper arm and the line from its pivot to the handle, in the leg's plane.
-    closing = (reach * reach + across * across + upper * upper - forearm * forearm) / (2.0 * upper * reach)
-    closing = min(1.0, max(-1.0, closing))
-    opening = math.sqrt(1.0 - closing * closing)
-    cos_q = (inward * closing + depth * opening) / reach
-    sin_q = (depth * closing - inward * opening) / reach
+    cos_elbow = (reach * reach + lateral * lateral + upper * upper - forearm * forearm) / (2.0 * upper * reach)
+    cos_elbow = min(1.0, max(-1.0, cos_elbow))
+    sin_elbow = math.sqrt(1.0 - cos_elbow * cos_elbow)
+    cos_q = (inward * cos_elbow + depth * sin_elbow) / reach
+    sin_q = (depth * cos_elbow - inward * sin_elbow) / reach
     radial = inward - upper * cos_q
     axial = depth - upper * sin_q
     # (p - e) . (dp - de/dq dq) = 0, from the forearm's constant length; lever = (p - e) . de/dq.
     lever = upper * (axial * cos_q - radial * sin_q)
     row[0] = axial / lever
-    row[1] = (radial * cosine - across * sine) / lever
-    row[2] = (radial * sine + across * cosine) / lever
+    row[1] = (radial * cosine - lateral * sine) / lever
+    row[2] = (radial * sine + lateral * cosine) / lever
     return math.atan2(sin_q, cos_q)
 
 
@@ -57,7 +57,7 @@ def inverse_kinematics(parameters: FloatArray, position: FloatArray, angles: Flo
     """Fill angles (3,), rad, and jacobian (3, 3), rad/m: joint speeds = jacobian @ handle velocity. position: (3,),
     m."""
     for number in range(3):
-        angles[number] = leg(parameters, position, number, jacobian[number])
+        angles[number] = solve_leg(parameters, position, number, jacobian[number])
 
 
 @inlined
@@ -98,8 +98,8 @@ def _dot(a: FloatArray, b: FloatArray) -> float:
 
 
 @inlined
-def _cross(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
+def _cross(a: FloatArray, b: FloatArray, product: FloatArray) -> None:
     """Fill out (3,) with the vector product a x b."""
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
+    product[0] = a[1] * b[2] - a[2] * b[1]
+    product[1] = a[2] * b[0] - a[0] * b[2]
+    product[2] = a[0] * b[1] - a[1] * b[0]

@@ -12,7 +12,7 @@ from study.devices.device import DeviceInfo
 from study.devices.rig import CompiledRig
 from study.devices.simulated.compiled import advance, sense
 from study.devices.simulated.layout import TICK_S
-from study.devices.simulated.packing import effective_mass_kg, pack_parameters, state_at_rest
+from study.devices.simulated.packing import effective_mass_kg, make_rest_state, pack_parameters
 from study.devices.simulated.parameters import Omega3Parameters, Vector
 
 NAME = "simulated omega.3"
@@ -34,7 +34,7 @@ def build_omega3(
 
     Raises ValueError where place_m is not closer to the origin than the end stop.
     """
-    named = NAME if parameters is None else f"{NAME} as calibrated"
+    device_name = NAME if parameters is None else f"{NAME} as calibrated"
     set_words = "parameter set 1" if parameters is None else "linkage and masses of a calibration"
     parameters = parameters or Omega3Parameters()
     if not friction:
@@ -42,18 +42,18 @@ def build_omega3(
     if not math.dist(place_m, (0.0, 0.0, 0.0)) < parameters.stops.radius_m:
         raise ValueError(f"place_m must be within {parameters.stops.radius_m} m of the centre, not {place_m}")
     packed = pack_parameters(parameters, hand, place_m)
-    free, held = pack_parameters(parameters, False, place_m), packed.copy()
+    without_hand, with_hand = pack_parameters(parameters, False, place_m), packed.copy()
 
     def simulate_hand(on_handle: bool) -> None:
         """Set only the parameters that the hand changes; others, which a test may have altered, stay."""
-        changed = free != held
-        packed[changed] = (held if on_handle and hand else free)[changed]
+        hand_cells = without_hand != with_hand
+        packed[hand_cells] = (with_hand if on_handle and hand else without_hand)[hand_cells]
 
     details = f"{set_words}, {'with' if hand else 'without'} a hand, sensor noise from seed {seed}"
     mass_kg = effective_mass_kg(parameters, packed)
     return CompiledRig(
-        info=omega3_info(named if friction else f"{named} without friction", mass_kg, details),
-        state=state_at_rest(packed, place_m),
+        info=make_omega3_info(device_name if friction else f"{device_name} without friction", mass_kg, details),
+        state=make_rest_state(packed, place_m),
         parameters=packed,
         noise=np.array(np.random.SeedSequence(seed).generate_state(1, np.uint64), dtype=np.uint64),
         sense=sense,
@@ -62,7 +62,7 @@ def build_omega3(
     )
 
 
-def omega3_info(name: str, effective_mass_kg: float, details: str) -> DeviceInfo:
+def make_omega3_info(name: str, effective_mass_kg: float, details: str) -> DeviceInfo:
     """`DeviceInfo` of a simulated omega.3: 1 kHz and `MAX_FORCE_N`, with the given mass (kg)."""
     return DeviceInfo(
         name=name,

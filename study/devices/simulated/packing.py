@@ -37,16 +37,16 @@ def pack_parameters(parameters: Omega3Parameters, hand: bool, place_m: Vector) -
     _pack_mount(packed, parameters)
     _pack_handle(packed, parameters, hand)
     _pack_sensor(packed, parameters)
-    _put(packed, layout.HAND_REST, place_m)
+    _write_cells(packed, layout.HAND_REST, place_m)
     stops = parameters.stops
-    _put(packed, layout.STOP_RADIUS, (stops.radius_m, stops.stiffness_n_per_m, stops.damping_n_s_per_m))
+    _write_cells(packed, layout.STOP_RADIUS, (stops.radius_m, stops.stiffness_n_per_m, stops.damping_n_s_per_m))
     return packed
 
 
-def state_at_rest(packed: FloatArray, place_m: Vector) -> FloatArray:
+def make_rest_state(packed: FloatArray, place_m: Vector) -> FloatArray:
     """The state (layout.STATE_SIZE,) at rest without stress, the handle at place_m, the motors at its joint angles."""
     state = np.zeros(layout.STATE_SIZE)
-    _put(state, layout.RELATIVE, place_m)
+    _write_cells(state, layout.RELATIVE, place_m)
     pose(packed, np.array(place_m, dtype=float), state[layout.MOTOR : layout.MOTOR + 3], np.empty((3, 3)))
     return state
 
@@ -57,22 +57,22 @@ def effective_mass_kg(parameters: Omega3Parameters, packed: FloatArray) -> float
     jacobian = np.empty((3, 3))
     pose(packed, np.zeros(3), np.empty(3), jacobian)
     masses = parameters.masses
-    turning = packed[layout.ARM_INERTIA] + masses.drive_kg_m2
-    return masses.handle_kg + masses.forearm_kg + float(turning * np.trace(jacobian.T @ jacobian) / 3)
+    joint_inertia = packed[layout.ARM_INERTIA] + masses.drive_kg_m2
+    return masses.handle_kg + masses.forearm_kg + float(joint_inertia * np.trace(jacobian.T @ jacobian) / 3)
 
 
-def _put(packed: FloatArray, start: int, values: tuple[float, ...] | FloatArray) -> None:
+def _write_cells(packed: FloatArray, start: int, values: tuple[float, ...] | FloatArray) -> None:
     flat = np.ravel(np.asarray(values, dtype=float))
     packed[start : start + flat.size] = flat
 
 
-def _unit(directions: tuple[Vector, ...]) -> FloatArray:
+def _normalise(directions: tuple[Vector, ...]) -> FloatArray:
     rows = np.array(directions, dtype=float)
     units: FloatArray = rows / np.linalg.norm(rows, axis=1, keepdims=True)
     return units
 
 
-def _pole(frequency_hz: float) -> float:
+def _compute_pole(frequency_hz: float) -> float:
     """Coefficient of a first-order low pass: share of the difference to its input that vanishes in a step, exactly."""
     return 1.0 - math.exp(-2 * math.pi * frequency_hz * layout.STEP_S)
 
@@ -84,7 +84,7 @@ def _pack_linkage(packed: FloatArray, parameters: Omega3Parameters) -> None:
     packed[layout.RADIUS] = linkage.radius_m
     packed[layout.PLATFORM_DEPTH] = isotropic_depth_m(linkage) if linkage.depth_m is None else linkage.depth_m
     azimuths = np.radians(linkage.azimuths_deg)
-    _put(packed, layout.AZIMUTH, np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1))
+    _write_cells(packed, layout.AZIMUTH, np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1))
     masses = parameters.masses
     packed[layout.ARM_INERTIA] = masses.upper_arm_kg_m2 + 2 / 3 * masses.forearm_kg * linkage.upper_arm_m**2
     packed[layout.DRIVE_INERTIA] = masses.drive_kg_m2
@@ -92,43 +92,43 @@ def _pack_linkage(packed: FloatArray, parameters: Omega3Parameters) -> None:
 
 def _pack_drives(packed: FloatArray, parameters: Omega3Parameters) -> None:
     drives = parameters.drives
-    packed[layout.AMPLIFIER] = _pole(drives.amplifier_hz)
+    packed[layout.AMPLIFIER] = _compute_pole(drives.amplifier_hz)
     packed[layout.FRICTION] = drives.friction_n_m
     packed[layout.PRESLIDING] = drives.presliding_rad
     packed[layout.DRIVE_DAMPING] = drives.damping_n_m_s
     packed[layout.COUNT] = 2 * math.pi / drives.counts_per_turn
     stiffness = np.array(drives.cable_n_m_per_rad)
-    _put(packed, layout.CABLE, stiffness)
+    _write_cells(packed, layout.CABLE, stiffness)
     damping = 2 * drives.cable_damping_ratio * np.sqrt(stiffness * parameters.masses.drive_kg_m2)
-    _put(packed, layout.CABLE_DAMPING, damping)
+    _write_cells(packed, layout.CABLE_DAMPING, damping)
 
 
 def _pack_mount(packed: FloatArray, parameters: Omega3Parameters) -> None:
     mount = parameters.mount
-    masses, natural = np.array(mount.masses_kg), 2 * math.pi * np.array(mount.frequencies_hz)
-    _put(packed, layout.MOUNT_MASS, masses)
-    _put(packed, layout.MOUNT_STIFFNESS, masses * natural**2)
-    _put(packed, layout.MOUNT_DAMPING, 2 * np.array(mount.damping_ratios) * masses * natural)
-    _put(packed, layout.MOUNT_DIRECTION, _unit(mount.directions))
+    masses, natural_rad_per_s = np.array(mount.masses_kg), 2 * math.pi * np.array(mount.frequencies_hz)
+    _write_cells(packed, layout.MOUNT_MASS, masses)
+    _write_cells(packed, layout.MOUNT_STIFFNESS, masses * natural_rad_per_s**2)
+    _write_cells(packed, layout.MOUNT_DAMPING, 2 * np.array(mount.damping_ratios) * masses * natural_rad_per_s)
+    _write_cells(packed, layout.MOUNT_DIRECTION, _normalise(mount.directions))
 
 
 def _pack_handle(packed: FloatArray, parameters: Omega3Parameters, hand: bool) -> None:
     modes = parameters.handle_modes
-    masses, natural = np.array(modes.masses_kg), 2 * math.pi * np.array(modes.frequencies_hz)
-    directions = _unit(modes.directions)
-    _put(packed, layout.MODE_MASS, masses)
-    _put(packed, layout.MODE_STIFFNESS, masses * natural**2)
-    _put(packed, layout.MODE_DAMPING, 2 * np.array(modes.damping_ratios) * masses * natural)
-    _put(packed, layout.MODE_GAIN, modes.gains)
-    _put(packed, layout.MODE_DIRECTION, directions)
-    carried = parameters.masses.handle_kg + parameters.masses.forearm_kg
+    masses, natural_rad_per_s = np.array(modes.masses_kg), 2 * math.pi * np.array(modes.frequencies_hz)
+    directions = _normalise(modes.directions)
+    _write_cells(packed, layout.MODE_MASS, masses)
+    _write_cells(packed, layout.MODE_STIFFNESS, masses * natural_rad_per_s**2)
+    _write_cells(packed, layout.MODE_DAMPING, 2 * np.array(modes.damping_ratios) * masses * natural_rad_per_s)
+    _write_cells(packed, layout.MODE_GAIN, modes.gains)
+    _write_cells(packed, layout.MODE_DIRECTION, directions)
+    moving_mass_kg = parameters.masses.handle_kg + parameters.masses.forearm_kg
     # The modes' masses are part of the handle, so that its mass at low frequency is the same in all directions.
-    platform = carried * np.eye(3) - np.einsum("m,mi,mj->ij", masses, directions, directions)
+    platform = moving_mass_kg * np.eye(3) - np.einsum("m,mi,mj->ij", masses, directions, directions)
     if hand:
         platform += np.diag(parameters.hand.mass_kg)
-        _put(packed, layout.HAND_DAMPING, parameters.hand.damping_n_s_per_m)
-        _put(packed, layout.HAND_STIFFNESS, parameters.hand.stiffness_n_per_m)
-    _put(packed, layout.PLATFORM_MASS, platform)
+        _write_cells(packed, layout.HAND_DAMPING, parameters.hand.damping_n_s_per_m)
+        _write_cells(packed, layout.HAND_STIFFNESS, parameters.hand.stiffness_n_per_m)
+    _write_cells(packed, layout.PLATFORM_MASS, platform)
 
 
 def _pack_sensor(packed: FloatArray, parameters: Omega3Parameters) -> None:
@@ -139,9 +139,9 @@ def _pack_sensor(packed: FloatArray, parameters: Omega3Parameters) -> None:
     yz, zx, xy = sensor.cross_axis
     rotation = np.array([[1, about_z, -about_y], [-about_z, 1, about_x], [about_y, -about_x, 1]])
     cross_axis = np.array([[1, xy, zx], [xy, 1, yz], [zx, yz, 1]])
-    _put(packed, layout.SENSOR_MATRIX, cross_axis @ rotation)
-    packed[layout.SENSOR_POLE] = _pole(sensor.bandwidth_hz)
+    _write_cells(packed, layout.SENSOR_MATRIX, cross_axis @ rotation)
+    packed[layout.SENSOR_POLE] = _compute_pole(sensor.bandwidth_hz)
     noise_bandwidth_hz = math.pi / 2 * sensor.bandwidth_hz
     density = np.array(sensor.noise_g_per_rthz)
-    _put(packed, layout.SENSOR_NOISE, density * math.sqrt(noise_bandwidth_hz) * GRAVITY_M_S2)
+    _write_cells(packed, layout.SENSOR_NOISE, density * math.sqrt(noise_bandwidth_hz) * GRAVITY_M_S2)
     packed[layout.SENSOR_RANGE] = sensor.range_g * GRAVITY_M_S2

@@ -36,7 +36,7 @@ _ULP = 2.0**-53
 
 
 @inlined
-def uniform(noise: npt.NDArray[np.uint64]) -> Any:
+def draw_uniform(noise: npt.NDArray[np.uint64]) -> Any:
     """Draw a uniform number in (0, 1]. Advances noise[0]."""
     noise[0] += _STEP
     word = noise[0]
@@ -47,14 +47,14 @@ def uniform(noise: npt.NDArray[np.uint64]) -> Any:
 
 
 @inlined
-def three_normals(noise: npt.NDArray[np.uint64], out: FloatArray) -> None:
+def draw_three_normals(noise: npt.NDArray[np.uint64], normals: FloatArray) -> None:
     """Fill out (3,) with independent standard normal numbers (Box and Muller)."""
-    radius = math.sqrt(-2.0 * math.log(uniform(noise)))
-    turn = 2.0 * math.pi * uniform(noise)
-    out[0] = radius * math.cos(turn)
-    out[1] = radius * math.sin(turn)
-    radius = math.sqrt(-2.0 * math.log(uniform(noise)))
-    out[2] = radius * math.cos(2.0 * math.pi * uniform(noise))
+    radius = math.sqrt(-2.0 * math.log(draw_uniform(noise)))
+    turn = 2.0 * math.pi * draw_uniform(noise)
+    normals[0] = radius * math.cos(turn)
+    normals[1] = radius * math.sin(turn)
+    radius = math.sqrt(-2.0 * math.log(draw_uniform(noise)))
+    normals[2] = radius * math.cos(2.0 * math.pi * draw_uniform(noise))
 
 
 _POSITION, _ACCELERATION, _TRUE = rig.POSITION.start, rig.ACCELERATION.start, rig.TRUE_ACCELERATION.start
@@ -70,28 +70,28 @@ def read_sensors(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[n
     for drive in range(3):
         angles[drive] = count * math.floor(state[MOTOR + drive] / count + 0.5)
     forward_kinematics(parameters, angles, reading[_POSITION:_ACCELERATION])
-    reading[rig.SENSOR_CLIPPED] = _accelerometer(state, parameters, noise, reading[_ACCELERATION:_TRUE])
+    reading[rig.SENSOR_CLIPPED] = _read_accelerometer(state, parameters, noise, reading[_ACCELERATION:_TRUE])
     for axis in range(3):
         reading[_TRUE + axis] = state[TRUE + axis]
 
 
 @inlined
-def _accelerometer(
+def _read_accelerometer(
     state: FloatArray, parameters: FloatArray, noise: npt.NDArray[np.uint64], channels: FloatArray
 ) -> float:
     """Fill channels (3,), m/s². The range limits the specific force, which contains gravity; the reading at rest is
     then subtracted. Returns 1 if a channel was at its limit, else 0."""
-    three_normals(noise, channels)
+    draw_three_normals(noise, channels)
     limit = parameters[SENSOR_RANGE]
     clipped = 0.0
     for axis in range(3):
         row = SENSOR_MATRIX + 3 * axis
-        rest = parameters[row + 2] * GRAVITY_M_S2
-        force = rest + parameters[SENSOR_NOISE + axis] * channels[axis]
-        for other in range(3):
-            force += parameters[row + other] * state[FILTERED + other]
+        gravity_mps2 = parameters[row + 2] * GRAVITY_M_S2
+        force = gravity_mps2 + parameters[SENSOR_NOISE + axis] * channels[axis]
+        for column in range(3):
+            force += parameters[row + column] * state[FILTERED + column]
         if abs(force) >= limit:
             force = math.copysign(limit, force)
             clipped = 1.0
-        channels[axis] = force - rest
+        channels[axis] = force - gravity_mps2
     return clipped

@@ -20,16 +20,16 @@ from typing import Any, cast
 import analysis.diagnosis
 import equalizer
 import study
-from study.evaluation.bank.proof_folder import ANSWER, CLEAN, MODEL, RECORDING, SETTINGS
+from study.evaluation.bank.proof_folder import ANSWER, CLEAN_FOLDER, MODEL, RECORDING, SETTINGS
 from study.store.disk.provenance import sha256_of
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 
-APART = "study.evaluation.challenge"
+CHALLENGE_PACKAGE = "study.evaluation.challenge"
 """Package that makes the cases: while cases are answered, it cannot be imported, and its files cannot be opened."""
-OPENED = ("open", "os.listdir", "os.scandir", "os.chdir", "os.rename", "os.link", "os.symlink", "shutil.copyfile")
+FILE_EVENTS = ("open", "os.listdir", "os.scandir", "os.chdir", "os.rename", "os.link", "os.symlink", "shutil.copyfile")
 """Python's audit events when files or folders are opened, listed, renamed, linked or copied."""
-STARTED = ("subprocess.Popen", "os.exec", "os.posix_spawn", "os.spawn", "os.system", "os.fork", "os.forkpty")
+PROCESS_EVENTS = ("subprocess.Popen", "os.exec", "os.posix_spawn", "os.spawn", "os.system", "os.fork", "os.forkpty")
 """Python's audit events when a program is started. HDF5 opens files in C without any audit event, but only gets paths
 that this module has built."""
 
@@ -39,9 +39,9 @@ def main(arguments: list[str]) -> None:
     cases = Path(arguments[0]).resolve()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C reaches all; the parent ends this process
     isolate_process(cases)
-    digest = engine_digest()
+    engine_hash = engine_digest()
     for line in sys.stdin:
-        answer(cases / line.strip(), digest)
+        answer(cases / line.strip(), engine_hash)
         sys.stdout.write(line)
         sys.stdout.flush()
 
@@ -50,56 +50,60 @@ def isolate_process(cases: Path) -> None:
     """Install an audit hook: from now on this process cannot import the challenge or open its files, open or list
     anything in the parent folder of `cases` but `cases` itself, or start a program. The import then
     raises ImportError, the rest PermissionError."""
-    sys.modules[APART] = cast(ModuleType, None)
-    beside, inside = os.path.realpath(cases.parent), os.path.realpath(cases)
-    maker = os.path.realpath(Path(study.__path__[0]).joinpath(*APART.split(".")[1:]))
+    sys.modules[CHALLENGE_PACKAGE] = cast(ModuleType, None)
+    bank_folder, cases_folder = os.path.realpath(cases.parent), os.path.realpath(cases)
+    challenge_folder = os.path.realpath(Path(study.__path__[0]).joinpath(*CHALLENGE_PACKAGE.split(".")[1:]))
 
     def lies_in(path: str, folder: str) -> bool:
         return path == folder or path.startswith(f"{folder}{os.sep}")
 
-    def watch(event: str, arguments: tuple[Any, ...]) -> None:
-        if event in STARTED:
+    def audit(event: str, arguments: tuple[Any, ...]) -> None:
+        if event in PROCESS_EVENTS:
             raise PermissionError(f"a diagnosis must not start a program ({event})")
-        if event not in OPENED or not arguments or not isinstance(arguments[0], str | bytes | os.PathLike):
+        if event not in FILE_EVENTS or not arguments or not isinstance(arguments[0], str | bytes | os.PathLike):
             return
         path = os.path.realpath(os.fsdecode(arguments[0]))
-        if (lies_in(path, beside) and not lies_in(path, inside)) or lies_in(path, maker):
+        if (lies_in(path, bank_folder) and not lies_in(path, cases_folder)) or lies_in(path, challenge_folder):
             raise PermissionError(f"a diagnosis must not open {path}")
 
-    sys.addaudithook(watch)
+    sys.addaudithook(audit)
 
 
-def others_sha256(place: Path) -> dict[str, str]:
-    """SHA-256 of every recording of a case but the first, by its path relative to the case's folder `place`."""
-    paths = [path for path in sorted(place.rglob("*.h5")) if path != place / RECORDING]
-    return {str(path.relative_to(place)): sha256_of(path) for path in paths}
+def others_sha256(case_folder: Path) -> dict[str, str]:
+    """SHA-256 of every recording of a case but the first, by its path relative to the case's folder `case_folder`."""
+    paths = [path for path in sorted(case_folder.rglob("*.h5")) if path != case_folder / RECORDING]
+    return {str(path.relative_to(case_folder)): sha256_of(path) for path in paths}
 
 
-def answer(place: Path, digest: str) -> None:
-    """Diagnose the case in `place` and write answer.json atomically. A crash of the diagnosis is written as a failed
-    answer."""
-    began, worked = time.perf_counter(), time.process_time()
+def answer(case_folder: Path, digest: str) -> None:
+    """Diagnose the case in `case_folder` and write answer.json atomically. A crash of the diagnosis is written as a
+    failed answer."""
+    start_s, processor_start_s = time.perf_counter(), time.process_time()
     try:
-        document = _diagnose_case(place)
+        document = _diagnose_case(case_folder)
     except Exception:  # noqa: BLE001 - the bank goes on, and the score counts it
         document = {"failed": traceback.format_exc()}
     document |= {
-        "name": place.name,
-        "seconds": time.perf_counter() - began,
-        "cpu_seconds": time.process_time() - worked,
-        "recording_sha256": sha256_of(place / RECORDING),
-        "model_sha256": sha256_of(place / MODEL),
-        "others_sha256": others_sha256(place),
+        "name": case_folder.name,
+        "seconds": time.perf_counter() - start_s,
+        "cpu_seconds": time.process_time() - processor_start_s,
+        "recording_sha256": sha256_of(case_folder / RECORDING),
+        "model_sha256": sha256_of(case_folder / MODEL),
+        "others_sha256": others_sha256(case_folder),
         "engine": digest,
         "knows_the_challenge": challenge_is_loaded(),
     }
-    write_text(place / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
+    write_text(case_folder / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
 
 
 def challenge_is_loaded() -> bool:
     """Whether the challenge package has been imported. A blocked import leaves None in sys.modules, which does not
     count."""
-    return any(name.split(".")[:2] == APART.split(".") for name, var in vars(sys)["modules"].items() if var is not None)
+    return any(
+        name.split(".")[:2] == CHALLENGE_PACKAGE.split(".")
+        for name, var in vars(sys)["modules"].items()
+        if var is not None
+    )
 
 
 def engine_digest() -> str:
@@ -116,35 +120,35 @@ def engine_digest() -> str:
 def _time_budget(processor_s: float | None) -> Callable[[], bool]:
     """Function that says whether processor time is left; None: always. Processor time (s), not wall-clock time, so that
     the load of the machine does not change an answer."""
-    begun = time.process_time()
-    return lambda: processor_s is None or time.process_time() - begun < processor_s
+    start_s = time.process_time()
+    return lambda: processor_s is None or time.process_time() - start_s < processor_s
 
 
-def _diagnose_case(place: Path) -> dict[str, Any]:
-    """Diagnose the recordings in `place` with the settings of the case; the answer as JSON values."""
+def _diagnose_case(case_folder: Path) -> dict[str, Any]:
+    """Diagnose the recordings in `case_folder` with the settings of the case; the answer as JSON values."""
     from analysis.diagnosis.diagnose import diagnose
     from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
     from analysis.diagnosis.document import diagnosis_to_json
     from study.store.formats.mechanical_model_file import read_mechanical_model
     from study.store.formats.recording_file import read_recording
 
-    asked = load_json(read_text(place / SETTINGS))
-    recordings = [read_recording(path) for path in sorted(place.glob("*.h5"))]
-    clean = tuple(read_recording(path) for path in sorted(place.glob(f"{CLEAN}/*.h5")))
+    case_settings = load_json(read_text(case_folder / SETTINGS))
+    recordings = [read_recording(path) for path in sorted(case_folder.glob("*.h5"))]
+    clean = tuple(read_recording(path) for path in sorted(case_folder.glob(f"{CLEAN_FOLDER}/*.h5")))
     settings = DiagnosisSettings(
-        without=tuple(asked["without"]),
+        without=tuple(case_settings["without"]),
         clean=clean,
-        discovery=bool(asked.get("discovery")),
-        time_left=_time_budget(asked.get("processor_s")),
+        discovery=bool(case_settings.get("discovery")),
+        time_left=_time_budget(case_settings.get("processor_s")),
     )
-    found = diagnose(recordings, read_mechanical_model(place / MODEL), settings, map, lambda what, share: None)
-    errors = {stage: dict(channels) for stage, channels in found.channel_errors.items()}
+    findings = diagnose(recordings, read_mechanical_model(case_folder / MODEL), settings, map, lambda step, share: None)
+    errors = {stage: dict(channels) for stage, channels in findings.channel_errors.items()}
     answer = {
-        "diagnosis": diagnosis_to_json(found.diagnosis),
+        "diagnosis": diagnosis_to_json(findings.diagnosis),
         "channel_errors": errors,
-        "remarks": list(found.remarks),
+        "remarks": list(findings.remarks),
     }
-    if (proposal := found.proposal) is not None:
+    if (proposal := findings.proposal) is not None:
         best = [experiment.words for experiment in proposal.chosen.experiments]
         answer["proposal"] = {"axis": proposal.axis, "level": proposal.level, "best": best}
     return answer

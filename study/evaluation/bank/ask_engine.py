@@ -16,11 +16,11 @@ from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
 
 from study.errors import StudyError
-from study.evaluation.bank.proof_folder import ANSWER, DIED, FURTHER, RECORDING, ProofFolder
+from study.evaluation.bank.proof_folder import ANSWER, FURTHER_RECORDING, RECORDING, WORKER_DIED, ProofFolder
 from study.evaluation.bank.proof_seals import read_answer
 from study.store.disk.folder_contents import Files, read_files, write_files
 from study.store.disk.text_file import read_text, write_text
-from study.workflows.run_on_executor import run_pieces
+from study.workflows.run_on_executor import run_tasks
 
 PATIENCE_S = 1200.0
 """Longest wait for one case (s); a case takes seconds to a minute."""
@@ -36,12 +36,12 @@ class Engine:
     def __init__(self, folder: ProofFolder) -> None:
         self._folder = folder
         self._process: subprocess.Popen[str] | None = None
-        self._beginning = threading.Lock()
+        self._lock = threading.Lock()
         self.ended = False
 
     def ask(self, name: str) -> bool:
         """Send one case name and block until its answer; False if the process failed, timed out or was ended."""
-        with self._beginning:
+        with self._lock:
             if self.ended:
                 return False
             if self._process is None or self._process.poll() is not None:
@@ -57,7 +57,7 @@ class Engine:
 
     def end(self) -> None:
         """Kill the process permanently; a caller that is waiting gets False."""
-        with self._beginning:
+        with self._lock:
             self.ended = True
             if self._process is not None:
                 self._process.kill()
@@ -71,7 +71,7 @@ class Engine:
                     pipe.close()
 
     def _start_process(self) -> subprocess.Popen[str]:
-        with self._folder.log.open("a", encoding="utf-8") as log:
+        with self._folder.log_file.open("a", encoding="utf-8") as log:
             return subprocess.Popen(
                 [sys.executable, "-m", "study.evaluation.bank.answer_cases", str(self._folder.open)],
                 stdin=subprocess.PIPE,
@@ -83,9 +83,9 @@ class Engine:
 
 def _ask_process(process: "subprocess.Popen[str]", name: str) -> bool:
     """Send a case name and wait for its echo. Kills the process after `PATIENCE_S`, which ends the wait."""
-    impatience = threading.Timer(PATIENCE_S, process.kill)
-    impatience.daemon = True
-    impatience.start()
+    timeout = threading.Timer(PATIENCE_S, process.kill)
+    timeout.daemon = True
+    timeout.start()
     try:
         if process.stdin is None or process.stdout is None:
             return False
@@ -95,7 +95,7 @@ def _ask_process(process: "subprocess.Popen[str]", name: str) -> bool:
     except OSError:
         return False
     finally:
-        impatience.cancel()
+        timeout.cancel()
 
 
 Workers = int | Executor
@@ -109,10 +109,10 @@ def ask_and_count(
     on_done: Callable[[int, int], None],
     *,
     keep: bool,
-    asked: Sequence[str] | None = None,
+    diagnosable: Sequence[str] | None = None,
 ) -> None:
     """Diagnose the cases `names` that have no answer, calling `on_done(answered, total)`. keep: do not delete
-    recordings of answered cases. asked: those of `names` that can be diagnosed; None = all. Raises StudyError as
+    recordings of answered cases. diagnosable: those of `names` that can be diagnosed; None = all. Raises StudyError as
     `ask_engine`."""
     done = sum(is_answered(folder.open / name) for name in names)
     on_done(done, len(names))
@@ -124,38 +124,38 @@ def ask_and_count(
             forget_recordings(folder.open / name)
         on_done(done, len(names))
 
-    ask_engine(folder, names if asked is None else asked, workers, on_answered)
+    ask_engine(folder, names if diagnosable is None else diagnosable, workers, on_answered)
 
 
 def ask_engine(folder: ProofFolder, names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]) -> None:
     """Diagnose the cases `names` that have no answer yet; blocks until done. `on_answered(name)` is called in this
     thread after each case. Raises StudyError if all worker processes ended early."""
-    left, answered = SimpleQueue[str](), SimpleQueue[str]()
-    wanted = [name for name in names if not is_answered(folder.open / name)]
+    pending, answered = SimpleQueue[str](), SimpleQueue[str]()
+    unanswered = [name for name in names if not is_answered(folder.open / name)]
     if isinstance(workers, Executor):
-        _send_cases(folder, wanted, workers, on_answered)
+        _send_cases(folder, unanswered, workers, on_answered)
         return
-    for name in wanted:
-        left.put(name)
-    with _engines(folder, min(workers, len(wanted)), left, answered) as threads:
-        missing = len(wanted)
-        while missing:
+    for name in unanswered:
+        pending.put(name)
+    with _start_engines(folder, min(workers, len(unanswered)), pending, answered) as threads:
+        missing_count = len(unanswered)
+        while missing_count:
             try:
                 name = answered.get(timeout=GLANCE_S)
             except Empty:
                 if not any(thread.is_alive() for thread in threads) and answered.empty():
-                    raise _processes_ended_error(folder, missing) from None
+                    raise _processes_ended_error(folder, missing_count) from None
                 continue
-            missing -= 1
+            missing_count -= 1
             on_answered(name)
 
 
 def _send_cases(
-    folder: ProofFolder, wanted: Sequence[str], executor: Executor, on_answered: Callable[[str], None]
+    folder: ProofFolder, names: Sequence[str], executor: Executor, on_answered: Callable[[str], None]
 ) -> None:
     """Diagnose the cases on an executor, and write the answers that it returns."""
-    cases = ((name, (name, read_files(folder.open / name))) for name in wanted)
-    for name, document in run_pieces(executor, answer_sent_case, cases):
+    cases = ((name, (name, read_files(folder.open / name))) for name in names)
+    for name, document in run_tasks(executor, answer_sent_case, cases):
         if document is None:
             _write_failure(folder.open / name)
         else:
@@ -166,8 +166,8 @@ def _send_cases(
 def answer_sent_case(name: str, case: Files) -> str | None:
     """Runs on a worker of an executor: the text of answer.json, from a process in a temporary folder with nothing but
     the files of the case. None if the process died or timed out at every attempt."""
-    with TemporaryDirectory() as place:
-        folder = ProofFolder(Path(place))
+    with TemporaryDirectory() as temporary:
+        folder = ProofFolder(Path(temporary))
         write_files(folder.open / name, case)
         engine = Engine(folder)
         try:
@@ -179,21 +179,22 @@ def answer_sent_case(name: str, case: Files) -> str | None:
 
 
 @contextmanager
-def _engines(
-    folder: ProofFolder, workers: int, left: SimpleQueue[str], answered: SimpleQueue[str]
+def _start_engines(
+    folder: ProofFolder, workers: int, pending: SimpleQueue[str], answered: SimpleQueue[str]
 ) -> Iterator[list[threading.Thread]]:
     """Context with a thread per worker process. On exit, also by an exception, the processes are killed."""
     engines = [Engine(folder) for _ in range(workers)]
     threads = [
-        threading.Thread(target=_run_worker, args=(each, folder, left, answered), daemon=True) for each in engines
+        threading.Thread(target=_run_worker, args=(worker, folder, pending, answered), daemon=True)
+        for worker in engines
     ]
     for thread in threads:
         thread.start()
     try:
         yield threads
     finally:
-        while not left.empty():
-            left.get()
+        while not pending.empty():
+            pending.get()
         for engine in engines:
             engine.end()
         for thread, engine in zip(threads, engines, strict=True):
@@ -201,11 +202,11 @@ def _engines(
             engine.close()
 
 
-def _run_worker(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], answered: SimpleQueue[str]) -> None:
-    """Take names from `left` until it is empty; put them into `answered` once an answer or a failure is written."""
+def _run_worker(engine: Engine, folder: ProofFolder, pending: SimpleQueue[str], answered: SimpleQueue[str]) -> None:
+    """Take names from `pending` until it is empty; put them into `answered` once an answer or a failure is written."""
     while True:
         try:
-            name = left.get_nowait()
+            name = pending.get_nowait()
         except Empty:
             return
         if not any(engine.ask(name) for _ in range(TRIES)):
@@ -218,29 +219,29 @@ def _run_worker(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], ans
 def _processes_ended_error(folder: ProofFolder, missing: int) -> StudyError:
     return StudyError(
         "The processes of the diagnosis ended before their work was done",
-        f"{missing} cases have no answer; the last output of the processes is in {folder.log}.",
+        f"{missing} cases have no answer; the last output of the processes is in {folder.log_file}.",
         "Run the same command again: it continues where it stopped.",
         saved=f"All answers so far are in {folder.open}.",
     )
 
 
-def is_answered(place: Path) -> bool:
+def is_answered(case_folder: Path) -> bool:
     """Whether the case has an answer. The failure of a process that died does not count, because it may have been
     killed: the next run diagnoses the case again."""
-    return (place / ANSWER).exists() and DIED not in read_answer(place)
+    return (case_folder / ANSWER).exists() and WORKER_DIED not in read_answer(case_folder)
 
 
-def _write_failure(place: Path) -> None:
+def _write_failure(case_folder: Path) -> None:
     """Write an answer that says that the process died or timed out."""
-    how = f"the process died {TRIES} times, or took longer than {PATIENCE_S:g} s"
-    document = {"name": place.name, "failed": how, DIED: True}
-    write_text(place / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
+    reason = f"the process died {TRIES} times, or took longer than {PATIENCE_S:g} s"
+    document = {"name": case_folder.name, "failed": reason, WORKER_DIED: True}
+    write_text(case_folder / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
 
 
-def forget_recordings(place: Path) -> None:
+def forget_recordings(case_folder: Path) -> None:
     """Delete the recordings of an answered case to save disk space; the label has their hash, and the seed reproduces
     them."""
-    if is_answered(place):
-        for path in (place / RECORDING, *place.glob(FURTHER.format("*"))):
+    if is_answered(case_folder):
+        for path in (case_folder / RECORDING, *case_folder.glob(FURTHER_RECORDING.format("*"))):
             with suppress(OSError):
                 path.unlink(missing_ok=True)

@@ -22,15 +22,15 @@ NAME_BYTES = 6
 
 def begin_case(folder: ProofFolder) -> Path:
     """Make a folder for the files of a new case; its random name is the name of the case."""
-    place = folder.begun / secrets.token_hex(NAME_BYTES)
-    place.mkdir(parents=True)
-    return place
+    case_folder = folder.unfinished / secrets.token_hex(NAME_BYTES)
+    case_folder.mkdir(parents=True)
+    return case_folder
 
 
-def show_case(folder: ProofFolder, place: Path) -> None:
+def show_case(folder: ProofFolder, case_folder: Path) -> None:
     """Rename the folder of a case into `open`, after its label was written."""
-    sync_folder(place)
-    place.rename(folder.open / place.name)
+    sync_folder(case_folder)
+    case_folder.rename(folder.open / case_folder.name)
     sync_folder(folder.open)
 
 
@@ -41,16 +41,16 @@ def finish_begun_cases(folder: ProofFolder) -> Iterator[None]:
     _finish_begun(folder)
     yield
     with suppress(FileNotFoundError):
-        folder.begun.rmdir()
+        folder.unfinished.rmdir()
 
 
 def _finish_begun(folder: ProofFolder) -> None:
     """Rename begun cases that have a label into `open`, and remove the others."""
-    begun = sorted(folder.begun.iterdir()) if folder.begun.exists() else []
-    labels = [read_text(path) for path in sorted(folder.sealed.glob("*.json"))] if begun else []
-    for place in begun:
+    begun_folders = sorted(folder.unfinished.iterdir()) if folder.unfinished.exists() else []
+    labels = [read_text(path) for path in sorted(folder.sealed.glob("*.json"))] if begun_folders else []
+    for case_folder in begun_folders:
         # A label of follow-ups names several cases, each by its quoted name.
-        if any(f'"{place.name}"' in label for label in labels):
-            show_case(folder, place)
+        if any(f'"{case_folder.name}"' in label for label in labels):
+            show_case(folder, case_folder)
         else:
-            shutil.rmtree(place)
+            shutil.rmtree(case_folder)

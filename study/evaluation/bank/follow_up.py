@@ -20,7 +20,14 @@ from analysis.evaluation.blind_test.outcome import Outcome
 from study.evaluation.bank.answer_cases import others_sha256
 from study.evaluation.bank.ask_engine import Workers, ask_and_count
 from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
-from study.evaluation.bank.proof_folder import FURTHER, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_folder import (
+    FURTHER_RECORDING,
+    MODEL,
+    RECORDING,
+    SETTINGS,
+    ProofFolder,
+    open_proof_folder,
+)
 from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
 from study.evaluation.bank.seal_cases import SALT_BYTES, BankPlan, redraw_recording
 from study.evaluation.challenge.drive_plan import RATE_HZ
@@ -29,9 +36,9 @@ from study.store.disk.text_file import read_text, write_text
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import write_recording
 
-NEXT = "next"
+FOLLOW_UP_FOLDER = "next"
 """Folder of the follow-up cases: a bank of its own, whose labels name the case they follow."""
-PROPOSED, DRAWN = "proposed", "drawn"
+PROPOSED_KEY, RANDOM_KEY = "proposed", "drawn"
 """Keys of the two follow-up cases in a label."""
 NOISE_SEED = 7
 """Part of the seeds of a follow-up's noise and random order: makes them independent of all other draws of a case."""
@@ -48,78 +55,86 @@ def follow_up(
     and named any. options: the workers, and whether to keep recordings after they are answered. After an
     interruption the same call continues. Raises StudyError."""
     workers, keep = options
-    starts = [
+    undecided = [
         outcome for outcome in outcomes if outcome.kind == "single" and len(outcome.returned) > len(outcome.named) > 0
     ]
-    if not starts:
+    if not undecided:
         return ()
-    again = open_proof_folder(folder.path / NEXT, plan.seed, plan.brief)
-    with finish_begun_cases(again):
-        for start in starts:
-            if not again.label(start.number).exists():
-                _seal(folder, again, plan, start)
-    seal(again)
-    labels = [read_label(again.label(each.number)) for each in starts]
-    names = [label[which]["name"] for label in labels for which in (PROPOSED, DRAWN) if which in label]
-    ask_and_count(again, names, workers, on_done, keep=keep)
-    return tuple(_follow_up_outcome(again, each, label) for each, label in zip(starts, labels, strict=True))
+    next_bank = open_proof_folder(folder.path / FOLLOW_UP_FOLDER, plan.seed, plan.brief)
+    with finish_begun_cases(next_bank):
+        for start in undecided:
+            if not next_bank.label_file(start.number).exists():
+                _seal(folder, next_bank, plan, start)
+    seal(next_bank)
+    labels = [read_label(next_bank.label_file(undecided_case.number)) for undecided_case in undecided]
+    names = [label[key]["name"] for label in labels for key in (PROPOSED_KEY, RANDOM_KEY) if key in label]
+    ask_and_count(next_bank, names, workers, on_done, keep=keep)
+    return tuple(
+        _follow_up_outcome(next_bank, undecided_case, label)
+        for undecided_case, label in zip(undecided, labels, strict=True)
+    )
 
 
-def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcome) -> None:
+def _seal(folder: ProofFolder, next_bank: ProofFolder, plan: BankPlan, start: Outcome) -> None:
     """Write both follow-up cases of `start` and their label, which is written last, when both are complete."""
-    first = read_label(folder.label(start.number))
-    place = folder.open / first["name"]
-    proposal = read_answer(place).get("proposal")
+    first_label = read_label(folder.label_file(start.number))
+    first_folder = folder.open / first_label["name"]
+    proposal = read_answer(first_folder).get("proposal")
     label: dict[str, Any] = {"number": start.number, "salt": secrets.token_hex(SALT_BYTES)}
     if proposal is not None:
-        model = read_mechanical_model(place / MODEL)
+        model = read_mechanical_model(first_folder / MODEL)
         menu = experiment_menu(model, RATE_HZ, proposal["axis"], proposal["level"])
         best = proposal["best"]
-        wanted_words = [best] if isinstance(best, str) else best or ()  # a single text in answers of older versions
-        proposed = [each for each in menu if each.words in wanted_words]
+        proposed_words = [best] if isinstance(best, str) else best or ()  # a single text in answers of older versions
+        proposed = [experiment for experiment in menu if experiment.words in proposed_words]
         order = np.random.default_rng([plan.seed, start.number, NOISE_SEED]).permutation(len(menu))
-        drawn = [menu[number] for number in order[: max(len(proposed), 1)]]
-        wanted = {DRAWN: drawn} | ({PROPOSED: proposed} if proposed else {})
-        label |= {which: _write_case(again, plan, (first, place), several) for which, several in wanted.items()}
-    write_text(again.label(start.number), json.dumps(label, indent=1) + "\n")
-    for which in {PROPOSED, DRAWN} & label.keys():
-        show_case(again, again.begun / label[which]["name"])
+        random_experiments = [menu[number] for number in order[: max(len(proposed), 1)]]
+        experiments_by_key = {RANDOM_KEY: random_experiments} | ({PROPOSED_KEY: proposed} if proposed else {})
+        label |= {
+            key: _write_case(next_bank, plan, (first_label, first_folder), experiments)
+            for key, experiments in experiments_by_key.items()
+        }
+    write_text(next_bank.label_file(start.number), json.dumps(label, indent=1) + "\n")
+    for key in {PROPOSED_KEY, RANDOM_KEY} & label.keys():
+        show_case(next_bank, next_bank.unfinished / label[key]["name"])
 
 
 def _write_case(
-    again: ProofFolder, plan: BankPlan, start: tuple[dict[str, Any], Path], experiments: Sequence[Experiment]
+    next_bank: ProofFolder, plan: BankPlan, start: tuple[dict[str, Any], Path], experiments: Sequence[Experiment]
 ) -> dict[str, Any]:
     """Write a follow-up case and return its part of the label. `redraw_recording` draws the first recording again and
     checks it against its label."""
-    label, first = start
-    place = begin_case(again)
-    case = redraw_recording(place, plan, label)
-    for number, each in enumerate(experiments):
-        further = case.again(each.commands, each.kind, each.added, NOISE_SEED + number)
-        write_recording(place / FURTHER.format(number + 2), further, precision="float32")
-    for kept in (MODEL, SETTINGS):
-        write_text(place / kept, read_text(first / kept))
+    label, first_folder = start
+    case_folder = begin_case(next_bank)
+    case = redraw_recording(case_folder, plan, label)
+    for number, experiment in enumerate(experiments):
+        recording = case.record_again(experiment.commands, experiment.kind, experiment.added, NOISE_SEED + number)
+        write_recording(case_folder / FURTHER_RECORDING.format(number + 2), recording, precision="float32")
+    for file_name in (MODEL, SETTINGS):
+        write_text(case_folder / file_name, read_text(first_folder / file_name))
     return {
-        "name": place.name,
-        "words": "; ".join(each.words for each in experiments),
-        "recording_sha256": sha256_of(place / RECORDING),
-        "model_sha256": sha256_of(place / MODEL),
-        "others_sha256": others_sha256(place),
+        "name": case_folder.name,
+        "words": "; ".join(experiment.words for experiment in experiments),
+        "recording_sha256": sha256_of(case_folder / RECORDING),
+        "model_sha256": sha256_of(case_folder / MODEL),
+        "others_sha256": others_sha256(case_folder),
     }
 
 
-def _follow_up_outcome(again: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowUp:
+def _follow_up_outcome(next_bank: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowUp:
     """The effects returned after the proposed and after the random experiments. Raises StudyError for a broken seal."""
 
-    def read_follow_up(which: str) -> tuple[str, tuple[str, ...]]:
-        if which not in label:
+    def read_follow_up(key: str) -> tuple[str, tuple[str, ...]]:
+        if key not in label:
             return "", ()
-        answer = read_answer(again.open / label[which]["name"])
-        if not answers_sealed_case(label[which], answer):
-            raise broken_seal_error([label[which]["name"]], again.path)
-        returned = () if "failed" in answer else diagnosis_from_json(answer["diagnosis"]).returned_set
-        return label[which]["words"], returned
+        answer = read_answer(next_bank.open / label[key]["name"])
+        if not answers_sealed_case(label[key], answer):
+            raise broken_seal_error([label[key]["name"]], next_bank.path)
+        returned_effects = () if "failed" in answer else diagnosis_from_json(answer["diagnosis"]).returned_set
+        return label[key]["words"], returned_effects
 
-    proposed, after_proposed = read_follow_up(PROPOSED)
-    drawn, after_drawn = read_follow_up(DRAWN)
-    return FollowUp(start.number, start.names[0], start.returned, proposed, after_proposed, drawn, after_drawn)
+    proposed_words, after_proposed = read_follow_up(PROPOSED_KEY)
+    random_words, after_random = read_follow_up(RANDOM_KEY)
+    return FollowUp(
+        start.number, start.names[0], start.returned, proposed_words, after_proposed, random_words, after_random
+    )

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from study.errors import StudyError
-from study.evaluation.bank.proof_folder import ANSWER, DIED, ProofFolder
+from study.evaluation.bank.proof_folder import ANSWER, WORKER_DIED, ProofFolder
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.json_document import parse_json
 from study.store.disk.provenance import sha256_of
@@ -27,24 +27,24 @@ def seal(folder: ProofFolder) -> str:
 
     Raises StudyError where a label has changed since it was sealed.
     """
-    known = read_seals(folder)
-    if broken := [name for name, digest in known.items() if _digest(folder.path / name) != digest]:
-        raise broken_seal_error(broken, folder.path)
-    fresh = [path for path in sorted(folder.sealed.glob("*.json")) if f"sealed/{path.name}" not in known]
-    lines = [f"{digest}  {name}\n" for name, digest in known.items()]
-    lines += [f"{sha256_of(path)}  sealed/{path.name}\n" for path in fresh]
-    if fresh or not folder.seals.exists():
-        write_text(folder.seals, "".join(lines), overwrite=True)
+    sealed_hashes = read_seals(folder)
+    if changed_names := [name for name, digest in sealed_hashes.items() if _hash_file(folder.path / name) != digest]:
+        raise broken_seal_error(changed_names, folder.path)
+    new_labels = [path for path in sorted(folder.sealed.glob("*.json")) if f"sealed/{path.name}" not in sealed_hashes]
+    lines = [f"{digest}  {name}\n" for name, digest in sealed_hashes.items()]
+    lines += [f"{sha256_of(path)}  sealed/{path.name}\n" for path in new_labels]
+    if new_labels or not folder.seals_file.exists():
+        write_text(folder.seals_file, "".join(lines), overwrite=True)
     return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
 def read_seals(folder: ProofFolder) -> dict[str, str]:
     """SHA-256 by file name; empty if nothing is sealed yet. Raises StudyError for a malformed file."""
-    if not folder.seals.exists():
+    if not folder.seals_file.exists():
         return {}
-    parts = [line.split() for line in read_text(folder.seals).splitlines()]
-    if any(len(each) != 2 or len(each[0]) != 64 for each in parts):
-        raise broken_seal_error([folder.seals.name], folder.path)
+    parts = [line.split() for line in read_text(folder.seals_file).splitlines()]
+    if any(len(part) != 2 or len(part[0]) != 64 for part in parts):
+        raise broken_seal_error([folder.seals_file.name], folder.path)
     return {name: digest for digest, name in parts}
 
 
@@ -53,21 +53,23 @@ def read_label(path: Path) -> dict[str, Any]:
     return parse_json(path, read_text(path), "sealed label")
 
 
-def read_answer(place: Path) -> dict[str, Any]:
-    """The answer.json in `place`, parsed; it may contain NaN (an unknown error). Raises StudyError."""
+def read_answer(case_folder: Path) -> dict[str, Any]:
+    """The answer.json in `case_folder`, parsed; it may contain NaN (an unknown error). Raises StudyError."""
     try:
-        document = load_json(read_text(place / ANSWER), with_nan=True)
+        document = load_json(read_text(case_folder / ANSWER), with_nan=True)
     except ValueError as problem:
-        raise UnusableFileError(place / ANSWER, "answer of a diagnosis", (f"this is not JSON: {problem}",)) from problem
+        raise UnusableFileError(
+            case_folder / ANSWER, "answer of a diagnosis", (f"this is not JSON: {problem}",)
+        ) from problem
     if not isinstance(document, dict):
-        raise UnusableFileError(place / ANSWER, "answer of a diagnosis", ("it contains no JSON object",))
+        raise UnusableFileError(case_folder / ANSWER, "answer of a diagnosis", ("it contains no JSON object",))
     return document
 
 
 def answers_sealed_case(label: dict[str, Any], answer: dict[str, Any]) -> bool:
     """Whether an answer belongs to the sealed files and comes from a process that had not imported the challenge. True
     for the answer of a process that died, which contains no diagnosis."""
-    if DIED in answer:
+    if WORKER_DIED in answer:
         return True
     return answer.get("knows_the_challenge") is False and all(
         key in answer and answer[key] == label[key] for key in HASHED if key in label
@@ -86,6 +88,6 @@ def broken_seal_error(names: list[str], path: Path) -> StudyError:
     )
 
 
-def _digest(path: Path) -> str:
+def _hash_file(path: Path) -> str:
     """SHA-256 of a file; empty where there is none."""
     return sha256_of(path) if path.exists() else ""

@@ -13,10 +13,10 @@ from typing import Any
 from analysis.evaluation.blind_test.controlled import ControlOutcome
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
-from analysis.evaluation.blind_test.score import Score, score
+from analysis.evaluation.blind_test.score import Score, compute_score
 from study.errors import resumable
 from study.evaluation.bank.ask_engine import ask_and_count, is_answered
-from study.evaluation.bank.follow_up import NEXT, follow_up
+from study.evaluation.bank.follow_up import FOLLOW_UP_FOLDER, follow_up
 from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.run_controls import run_controls
@@ -27,8 +27,8 @@ from study.evaluation.bank.sealed_bank import BankOptions, Progress, answered_fi
 def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
     """The outcome of a case from its revealed label and the answer of the diagnosis."""
     concealed = tuple(
-        Concealed(each["effect"], each["place"], each["axis"], {**each["values"], **each["unseen"]})
-        for each in label["truth"]
+        Concealed(truth["effect"], truth["place"], truth["axis"], {**truth["values"], **truth["unseen"]})
+        for truth in label["truth"]
     )
     return Outcome(
         bank=label["bank"],
@@ -55,12 +55,12 @@ class BlindTest:
     score: Score
     engines: tuple[str, ...]
     """Digests of the code that diagnosed the bank."""
-    beside: tuple[str, ...]
+    other_engines: tuple[str, ...]
     """Digests of the code that diagnosed follow-ups and controls."""
     controls: tuple[ControlOutcome, ...]
-    followed: tuple[FollowUp, ...]
+    follow_ups: tuple[FollowUp, ...]
     """Cases that were followed up by further experiments."""
-    left_out: int
+    omitted_cases: int
     """Number of cases of the second physics engine, where it is not installed; else 0."""
 
 
@@ -68,29 +68,34 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
     """Run the bank in the folder `path`, or continue it after an interruption. on_progress: called with the step, the
     number done and the total. Raises StudyError."""
     folder = open_proof_folder(path, plan.seed, plan.brief)
-    numbers = [each.number for each in drawable_cases(plan)]
+    numbers = [case_draw.number for case_draw in drawable_cases(plan)]
     with resumable("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, len(numbers)))
         names = read_case_names(folder, numbers)
         _answer_cases(folder, plan, options, dict(zip(names, numbers, strict=True)), on_progress)
         outcomes = reveal_bank(folder, plan.cases, outcome_of)
-        followed = follow_up(
+        follow_ups = follow_up(
             folder, plan, outcomes, (options.answering, options.keep), partial(on_progress, "following up")
         )
-        controls = _controls(path, plan, options, on_progress)
+        controls = _run_all_controls(path, plan, options, on_progress)
     return BlindTest(
-        folder, plan, seal, outcomes, score(outcomes, followed), engines(folder, names), _other_digests(path), controls,
-        followed, plan.cases - len(numbers),
+        folder, plan, seal, outcomes, compute_score(outcomes, follow_ups), engines(folder, names),
+        _collect_other_digests(path), controls, follow_ups, plan.cases - len(numbers),
     )  # fmt: skip
 
 
-def _other_digests(path: Path) -> tuple[str, ...]:
+def _collect_other_digests(path: Path) -> tuple[str, ...]:
     """Digests of the code that answered follow-ups and controls."""
-    folders = [ProofFolder(path / NEXT), *(ProofFolder(each) for each in sorted(path.glob("controls/*")))]
-    found = {
-        digest for folder in folders for digest in engines(folder, [place.name for place in folder.open.glob("*")])
+    folders = [
+        ProofFolder(path / FOLLOW_UP_FOLDER),
+        *(ProofFolder(control_folder) for control_folder in sorted(path.glob("controls/*"))),
+    ]
+    digests = {
+        digest
+        for folder in folders
+        for digest in engines(folder, [case_folder.name for case_folder in folder.open.glob("*")])
     }
-    return tuple(sorted(found))
+    return tuple(sorted(digests))
 
 
 def _answer_cases(
@@ -99,14 +104,16 @@ def _answer_cases(
     """Diagnose the open cases without an answer; a deleted recording is drawn again. numbers: case number by name."""
     for name, number in numbers.items():
         if not is_answered(folder.open / name) and not (folder.open / name / RECORDING).exists():
-            redraw_recording(folder.open / name, plan, read_label(folder.label(number)))
+            redraw_recording(folder.open / name, plan, read_label(folder.label_file(number)))
     ask_and_count(folder, tuple(numbers), options.answering, partial(on_progress, "diagnosing"), keep=options.keep)
 
 
-def _controls(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> tuple[ControlOutcome, ...]:
+def _run_all_controls(
+    path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress
+) -> tuple[ControlOutcome, ...]:
     """Outcomes of the controls, `CONTROL_TURNS` times, where the options request them."""
-    found: tuple[ControlOutcome, ...] = ()
+    outcomes: tuple[ControlOutcome, ...] = ()
     for seed in range(plan.seed, plan.seed + CONTROL_TURNS) if options.controls else ():
-        there = path / "controls" / str(seed)
-        found += run_controls(there, seed, options.answering, partial(on_progress, "controls"))
-    return found
+        control_folder = path / "controls" / str(seed)
+        outcomes += run_controls(control_folder, seed, options.answering, partial(on_progress, "controls"))
+    return outcomes

@@ -11,14 +11,14 @@ from study.errors import StudyError
 from study.evaluation.bank.ask_engine import Workers, ask_and_count
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import read_answer
+from study.evaluation.challenge.case_settings import CaseSettings
 from study.evaluation.challenge.controls import CONTROLS, Control, ControlInput
-from study.evaluation.challenge.rig import Rig
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
 
-SHORT = Rig((0,), 1000, 3, steps=80)
+CONTROL_SETTINGS = CaseSettings((0,), 1000, 3, steps=80)
 """One axis and three periods of 1000 samples: a control asks what is said, not how well."""
 
 
@@ -28,15 +28,15 @@ def run_controls(
     workers: Workers,
     on_done: Callable[[int, int], None],
     controls: Sequence[Control] = CONTROLS,
-    rig: Rig = SHORT,
+    settings: CaseSettings = CONTROL_SETTINGS,
 ) -> tuple[ControlOutcome, ...]:
     """Write, diagnose and judge the controls in the folder `path`. `on_done(answered, total)`. Resumable. Raises
     StudyError."""
     folder = ProofFolder(path)
     folder.open.mkdir(parents=True, exist_ok=True)
-    names = {control.name: _prepare_control(folder, seed, control, rig) for control in controls}
-    every = [name for each in names.values() for name in each]
-    ask_and_count(folder, every, workers, on_done, keep=False)
+    names = {control.name: _prepare_control(folder, seed, control, settings) for control in controls}
+    all_names = [name for control_names in names.values() for name in control_names]
+    ask_and_count(folder, all_names, workers, on_done, keep=False)
     return tuple(
         judge_control(
             f"{control.name}, seed {seed}",
@@ -47,38 +47,40 @@ def run_controls(
     )
 
 
-def _prepare_control(folder: ProofFolder, seed: int, control: Control, rig: Rig) -> tuple[str, ...]:
+def _prepare_control(folder: ProofFolder, seed: int, control: Control, settings: CaseSettings) -> tuple[str, ...]:
     """Write the inputs of one control if missing and return their case names; the settings file is written last."""
-    known = folder.path / f"{control.name.replace(' ', '-')}.json"
-    begun = f"{CONTROLS.index(control):02d}"
-    if (written := _names(known, begun)) is not None:
-        return written
-    asked = control.draw(seed, rig)
-    names = tuple(f"{begun}{number}" for number in range(len(asked)))
-    for name, each in zip(names, asked, strict=True):
-        _write(folder.open / name, each)
-    write_text(known, json.dumps(names) + "\n", overwrite=True)
+    names_path = folder.path / f"{control.name.replace(' ', '-')}.json"
+    prefix = f"{CONTROLS.index(control):02d}"
+    if (written_names := _read_case_names(names_path, prefix)) is not None:
+        return written_names
+    inputs = control.draw(seed, settings)
+    names = tuple(f"{prefix}{number}" for number in range(len(inputs)))
+    for name, control_input in zip(names, inputs, strict=True):
+        _write_input(folder.open / name, control_input)
+    write_text(names_path, json.dumps(names) + "\n", overwrite=True)
     return names
 
 
-def _names(known: Path, begun: str) -> tuple[str, ...] | None:
+def _read_case_names(names_path: Path, prefix: str) -> tuple[str, ...] | None:
     """Case names of a control; None where they are not written yet or do not match this program: they are then drawn
     again."""
     try:
-        names = load_json(read_text(known))
+        names = load_json(read_text(names_path))
     except (StudyError, ValueError):
         return None
-    is_complete = isinstance(names, list) and names == [f"{begun}{number}" for number in range(len(names))]
+    is_complete = isinstance(names, list) and names == [f"{prefix}{number}" for number in range(len(names))]
     return tuple(names) if is_complete and names else None
 
 
-def _write(place: Path, asked: ControlInput) -> None:
-    place.mkdir(exist_ok=True)
-    write_recording(place / RECORDING, asked.recording, precision="float32", overwrite=True)
-    write_mechanical_model(place / MODEL, asked.model, overwrite=True)
-    write_text(place / SETTINGS, json.dumps({"without": list(asked.without)}) + "\n", overwrite=True)
+def _write_input(case_folder: Path, control_input: ControlInput) -> None:
+    case_folder.mkdir(exist_ok=True)
+    write_recording(case_folder / RECORDING, control_input.recording, precision="float32", overwrite=True)
+    write_mechanical_model(case_folder / MODEL, control_input.model, overwrite=True)
+    write_text(
+        case_folder / SETTINGS, json.dumps({"without": list(control_input.excluded_effects)}) + "\n", overwrite=True
+    )
 
 
-def _read_answer(place: Path) -> Diagnosis | None:
-    answer = read_answer(place)
+def _read_answer(case_folder: Path) -> Diagnosis | None:
+    answer = read_answer(case_folder)
     return None if "failed" in answer else diagnosis_from_json(answer["diagnosis"])

@@ -18,7 +18,7 @@ from study.errors import StudyError
 from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import read_label, seal
-from study.evaluation.challenge.draw_bank import Draw, case_of, draw
+from study.evaluation.challenge.draw_bank import CaseDraw, draw_case_plan, generate_case
 from study.evaluation.challenge.draw_case import Case
 from study.evaluation.challenge.second_engine import second_engine
 from study.store.disk.provenance import sha256_of
@@ -28,7 +28,7 @@ from study.store.formats.recording_file import write_recording
 from study.workflows.worker_processes import worker_processes
 
 
-def truths(case: Case) -> list[dict[str, Any]]:
+def concealed_effects_json(case: Case) -> list[dict[str, Any]]:
     """Concealed effects of a case as JSON values: name, place, axis, parameters; empty where the model lacks
     nothing."""
     return [asdict(truth) for truth in case.truth]
@@ -50,16 +50,16 @@ class BankPlan:
     """One axis and short periods: for tests, and for a quick try."""
 
 
-def drawable_cases(plan: BankPlan) -> tuple[Draw, ...]:
+def drawable_cases(plan: BankPlan) -> tuple[CaseDraw, ...]:
     """All cases that can be drawn on this machine: without MuJoCo its cases are left out."""
-    whole = (draw(plan.seed, number, plan.brief) for number in range(plan.cases))
-    return tuple(each for each in whole if each.bank != "engine" or second_engine.is_installed())
+    draws = (draw_case_plan(plan.seed, number, plan.brief) for number in range(plan.cases))
+    return tuple(case_draw for case_draw in draws if case_draw.bank != "engine" or second_engine.is_installed())
 
 
 def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
     """Draw, write and seal the missing cases, calling `on_sealed(count)`. Returns the SHA-256 of labels.sha256, to
     be published before anything is diagnosed. Raises StudyError."""
-    write_case = {each.number: partial(seal_one, folder, each) for each in drawable_cases(plan)}
+    write_case = {case_draw.number: partial(seal_one, folder, case_draw) for case_draw in drawable_cases(plan)}
     return seal_missing(folder, write_case, workers, on_sealed)
 
 
@@ -67,7 +67,7 @@ def seal_missing(
     folder: ProofFolder, write_case: Mapping[int, Callable[[], None]], workers: int, on_sealed: Callable[[int], None]
 ) -> str:
     """Write the cases without a label in worker processes, and seal the bank. write_case: by the case's number."""
-    missing = [write for number, write in write_case.items() if not folder.label(number).exists()]
+    missing = [write for number, write in write_case.items() if not folder.label_file(number).exists()]
     done = len(write_case) - len(missing)
     on_sealed(done)
     with finish_begun_cases(folder), worker_processes(workers if len(missing) > 1 else 1) as pool:
@@ -78,29 +78,32 @@ def seal_missing(
     return seal(folder)
 
 
-def seal_one(folder: ProofFolder, each: Draw) -> None:
+def seal_one(folder: ProofFolder, case_draw: CaseDraw) -> None:
     """Write one case: recording, model and settings for the diagnosis, then the label, without which the case counts as
     unfinished."""
-    place = begin_case(folder)
-    case = case_of(each, place.name)
-    write_recording(place / RECORDING, case.recording, precision="float32")
-    write_mechanical_model(place / MODEL, case.model)
-    write_text(place / SETTINGS, settings_text(each.without, PROCESSOR_S))
-    write_text(folder.label(each.number), json.dumps(_label(each, case, place), indent=1, allow_nan=False) + "\n")
-    show_case(folder, place)
+    case_folder = begin_case(folder)
+    case = generate_case(case_draw, case_folder.name)
+    write_recording(case_folder / RECORDING, case.recording, precision="float32")
+    write_mechanical_model(case_folder / MODEL, case.model)
+    write_text(case_folder / SETTINGS, settings_text(case_draw.excluded_effects, PROCESSOR_S))
+    write_text(
+        folder.label_file(case_draw.number),
+        json.dumps(_make_label(case_draw, case, case_folder), indent=1, allow_nan=False) + "\n",
+    )
+    show_case(folder, case_folder)
 
 
-def settings_text(without: Sequence[str], processor_s: float | None = None) -> str:
-    """Settings of a diagnosis as JSON. without: effects that it must not consider; processor_s: limit of the search
-    (s)."""
-    return json.dumps({"without": list(without), "processor_s": processor_s}) + "\n"
+def settings_text(excluded_effects: Sequence[str], processor_s: float | None = None) -> str:
+    """Settings of a diagnosis as JSON. excluded_effects: effects that it must not consider; processor_s: limit of the
+    search (s)."""
+    return json.dumps({"without": list(excluded_effects), "processor_s": processor_s}) + "\n"
 
 
-def redraw_recording(place: Path, plan: BankPlan, label: dict[str, Any]) -> Case:
+def redraw_recording(case_folder: Path, plan: BankPlan, label: dict[str, Any]) -> Case:
     """Draw and write the recording of a sealed case again. Raises StudyError where its hash is not the sealed one."""
-    case = case_of(draw(plan.seed, label["number"], plan.brief), label["name"])
-    write_recording(place / RECORDING, case.recording, precision="float32", overwrite=True)
-    if sha256_of(place / RECORDING) != label["recording_sha256"]:
+    case = generate_case(draw_case_plan(plan.seed, label["number"], plan.brief), label["name"])
+    write_recording(case_folder / RECORDING, case.recording, precision="float32", overwrite=True)
+    if sha256_of(case_folder / RECORDING) != label["recording_sha256"]:
         raise StudyError(
             "A device of the bank cannot be drawn again",
             f"Case {label['number']} gives another recording than the one that was sealed.",
@@ -110,25 +113,25 @@ def redraw_recording(place: Path, plan: BankPlan, label: dict[str, Any]) -> Case
     return case
 
 
-def _label(each: Draw, case: Case, place: Path) -> dict[str, Any]:
+def _make_label(case_draw: CaseDraw, case: Case, case_folder: Path) -> dict[str, Any]:
     """Everything that is concealed. A random salt keeps the content from being guessed from its hash: there are few
     effects."""
-    drawn = asdict(each)
+    draw_fields = asdict(case_draw)
     return {
-        "name": place.name,
-        **{key: drawn[key] for key in ("number", "seed", "kind", "bank", "strengths", "concealed")},
-        "axes": ["xyz"[axis] for axis in each.rig.axes],
-        "extras": each.rig.extras,
-        "without": list(each.without),
-        "truth": truths(case),
-        "adds": case.adds,
-        "recording_sha256": sha256_of(place / RECORDING),
-        "model_sha256": sha256_of(place / MODEL),
+        "name": case_folder.name,
+        **{key: draw_fields[key] for key in ("number", "seed", "kind", "bank", "strengths", "concealed")},
+        "axes": ["xyz"[axis] for axis in case_draw.settings.axes],
+        "extras": case_draw.settings.extras,
+        "without": list(case_draw.excluded_effects),
+        "truth": concealed_effects_json(case),
+        "adds": case.detectability,
+        "recording_sha256": sha256_of(case_folder / RECORDING),
+        "model_sha256": sha256_of(case_folder / MODEL),
         "salt": secrets.token_hex(SALT_BYTES),
     }
 
 
 def read_case_names(folder: ProofFolder, numbers: Sequence[int]) -> tuple[str, ...]:
     """Folder names of the cases under `open`, in the order of their numbers."""
-    found = [read_label(folder.label(number)) for number in numbers]
-    return tuple(str(label["name"]) for label in found)
+    labels = [read_label(folder.label_file(number)) for number in numbers]
+    return tuple(str(label["name"]) for label in labels)

@@ -23,7 +23,7 @@ from study.store.disk.provenance import sha256_of
 
 Progress = Callable[[str, int, int], None]
 """Called with the current step, the number done, the total."""
-Found = TypeVar("Found")
+OutcomeT = TypeVar("OutcomeT")
 """Type of an outcome."""
 
 
@@ -49,33 +49,33 @@ class BankOptions:
 def reveal_bank(
     folder: ProofFolder,
     cases: int,
-    outcome_of: Callable[[dict[str, Any], dict[str, Any]], Found],
-    is_whole: Callable[[dict[str, Any]], bool] = lambda label: True,
-) -> tuple[Found, ...]:
+    outcome_of: Callable[[dict[str, Any], dict[str, Any]], OutcomeT],
+    is_unchanged: Callable[[dict[str, Any]], bool] = lambda label: True,
+) -> tuple[OutcomeT, ...]:
     """Outcomes of the answered cases with numbers below `cases`. outcome_of: makes an outcome from a label and its
-    answer. is_whole: whether further files whose hashes the label holds are unchanged. Raises StudyError where a seal
-    is broken."""
+    answer. is_unchanged: whether further files whose hashes the label holds are unchanged. Raises StudyError where a
+    seal is broken."""
     seals = read_seals(folder)
-    found: list[Found] = []
-    broken: list[str] = []
+    outcomes: list[OutcomeT] = []
+    broken_names: list[str] = []
     for path in sorted(folder.sealed.glob("*.json")):
         if seals.get(f"sealed/{path.name}") != sha256_of(path):
-            broken.append(path.name)
+            broken_names.append(path.name)
             continue
         label = read_label(path)
-        if not is_whole(label):
-            broken.append(path.name)
+        if not is_unchanged(label):
+            broken_names.append(path.name)
             continue
-        place = folder.open / label["name"]
-        if label["number"] >= cases or not (place / ANSWER).exists():
+        case_folder = folder.open / label["name"]
+        if label["number"] >= cases or not (case_folder / ANSWER).exists():
             continue
-        answer = read_answer(place)
+        answer = read_answer(case_folder)
         if not answers_sealed_case(label, answer):
-            broken.append(path.name)
-        found.append(outcome_of(label, answer))
-    if broken:
-        raise broken_seal_error(broken, folder.path)
-    return tuple(found)
+            broken_names.append(path.name)
+        outcomes.append(outcome_of(label, answer))
+    if broken_names:
+        raise broken_seal_error(broken_names, folder.path)
+    return tuple(outcomes)
 
 
 def answered_fields(label: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:

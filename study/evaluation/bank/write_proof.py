@@ -13,7 +13,7 @@ from pathlib import Path
 
 import analysis.diagnosis
 from analysis.evaluation.blind_test.outcome import Outcome
-from analysis.evaluation.blind_test.score import main_error
+from analysis.evaluation.blind_test.score import compute_main_error
 from analysis.figures.blind_test_pictures import blind_test_pictures
 from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test_report
 from study.evaluation.bank.answer_cases import engine_digest
@@ -22,7 +22,7 @@ from study.evaluation.bank.prove import BlindTest
 from study.local_clock import local_now
 from study.store.disk.csv_rows import rows_to_csv
 from study.store.disk.json_document import read_json, write_json
-from study.store.disk.provenance import command_line, gather_provenance, versions
+from study.store.disk.provenance import anonymise_arguments, gather_provenance, list_versions
 from study.store.disk.text_file import write_text
 from study.workflows.picture_files import write_pictures
 
@@ -85,117 +85,136 @@ class FigureRow:
     of: int
 
 
-def write_proof(done: BlindTest) -> None:
+def write_proof(result: BlindTest) -> None:
     """Write document, table, pictures and page into the test's folder, replacing earlier files. Raises StudyError."""
-    folder, at = done.folder.path, read_answering_commit(done)
-    score = done.score
+    folder, commit_hash = result.folder.path, read_answering_commit(result)
+    score = result.score
     document = {
-        "seed": done.plan.seed,
-        "cases": done.plan.cases,
-        "brief": done.plan.brief,
-        "left_out": done.left_out,
-        "seal": done.seal,
-        "engines": list(done.engines),
-        "engines_beside": list(done.beside),
-        "commit": at,
+        "seed": result.plan.seed,
+        "cases": result.plan.cases,
+        "brief": result.plan.brief,
+        "left_out": result.omitted_cases,
+        "seal": result.seal,
+        "engines": list(result.engines),
+        "engines_beside": list(result.other_engines),
+        "commit": commit_hash,
         "figures": [asdict(figure) for figure in score.figures],
         "calibration": asdict(score.calibration),
-        "followed": [asdict(each) for each in done.followed],
-        "controls": [asdict(control) for control in done.controls],
+        "followed": [asdict(follow_up) for follow_up in result.follow_ups],
+        "controls": [asdict(control) for control in result.controls],
         "misses": [miss.number for miss in score.misses],
     }
     write_json(folder / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
-    rows = [_row(outcome, outcome in score.misses) for outcome in done.outcomes]
+    rows = [_make_row(outcome, outcome in score.misses) for outcome in result.outcomes]
     write_text(folder / TABLE, rows_to_csv(rows, CaseRow), overwrite=True)
-    pictures = blind_test_pictures(done.outcomes, score.calibration)
+    pictures = blind_test_pictures(result.outcomes, score.calibration)
     write_pictures(folder / "figures", pictures)
-    facts = BlindTestFacts(seeds(done), done.seal, at, done.engines, tuple(remarks(done)), done.controls, done.followed)
+    facts = BlindTestFacts(
+        format_seed_range(result),
+        result.seal,
+        commit_hash,
+        result.engines,
+        tuple(remarks(result)),
+        result.controls,
+        result.follow_ups,
+    )
     page = render_blind_test_report(
-        done.outcomes, score, pictures, facts, {"command": " ".join(command_line(sys.argv))}, local_now()
+        result.outcomes, score, pictures, facts, {"command": " ".join(anonymise_arguments(sys.argv))}, local_now()
     )
     write_text(folder / PAGE, page, overwrite=True)
 
 
-def write_table(path: Path, done: BlindTest) -> None:
-    """Write the figures to `path` and the misses to `misses_table(path)`. Comment lines at the head of the first table
-    state the cases, the code and the seal of the labels. Raises StudyError."""
-    calibration = done.score.calibration
+def write_table(path: Path, result: BlindTest) -> None:
+    """Write the figures to `path` and the misses to `misses_table_path(path)`. Comment lines at the head of the first
+    table state the cases, the code and the seal of the labels. Raises StudyError."""
+    calibration = result.score.calibration
     figures = [
-        FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in done.score.figures
+        FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in result.score.figures
     ]
-    named = sum(part.of for part in calibration.bins)
-    figures.append(FigureRow("expected calibration error", calibration.error, calibration.low, calibration.high, named))
-    failed = [control.name for control in done.controls if not control.held]
-    held = f"{len(done.controls) - len(failed)} of {len(done.controls)} held" if done.controls else "not asked"
+    named_count = sum(probability_bin.of for probability_bin in calibration.bins)
+    figures.append(
+        FigureRow("expected calibration error", calibration.error, calibration.low, calibration.high, named_count)
+    )
+    failed_controls = [control.name for control in result.controls if not control.held]
+    controls_text = (
+        f"{len(result.controls) - len(failed_controls)} of {len(result.controls)} held"
+        if result.controls
+        else "not asked"
+    )
     lines = [
-        f"# {len(done.outcomes)} cases, seeds {seeds(done)}",
-        f"# commit {read_answering_commit(done)}, code of the diagnosis {' '.join(done.engines)}",
-        f"# follow-ups and controls by code {' '.join(done.beside) or 'none'}",
-        f"# seal of the labels {done.seal}",
-        f"# versions {json.dumps(versions())}",
-        f"# controls {', not '.join((held, *failed))}",
+        f"# {len(result.outcomes)} cases, seeds {format_seed_range(result)}",
+        f"# commit {read_answering_commit(result)}, code of the diagnosis {' '.join(result.engines)}",
+        f"# follow-ups and controls by code {' '.join(result.other_engines) or 'none'}",
+        f"# seal of the labels {result.seal}",
+        f"# versions {json.dumps(list_versions())}",
+        f"# controls {', not '.join((controls_text, *failed_controls))}",
     ]
     write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
-    misses = [_row(miss, True) for miss in done.score.misses]
-    write_text(misses_table(path), rows_to_csv(misses, CaseRow), overwrite=True)
+    misses = [_make_row(miss, True) for miss in result.score.misses]
+    write_text(misses_table_path(path), rows_to_csv(misses, CaseRow), overwrite=True)
 
 
-def misses_table(path: Path) -> Path:
+def misses_table_path(path: Path) -> Path:
     """Path of the table of misses, in the folder of the table of figures."""
     return path.with_name(f"{path.stem}-misses{path.suffix}")
 
 
-def read_answering_commit(done: BlindTest) -> str:
+def read_answering_commit(result: BlindTest) -> str:
     """The commit in an earlier `proof.json` by the same code; else the current commit, where the current code gave the
     answers; else "unknown: …"."""
-    document = done.folder.path / DOCUMENT
+    document = result.folder.path / DOCUMENT
     if document.exists():
-        before = read_json(document, FORMAT, VERSION)
-        if before.get("engines") == list(done.engines) and isinstance(before.get("commit"), str):
-            return str(before["commit"])
-    return commit() if done.engines in ((), (engine_digest(),)) else "unknown: the code has changed since"
+        earlier = read_json(document, FORMAT, VERSION)
+        if earlier.get("engines") == list(result.engines) and isinstance(earlier.get("commit"), str):
+            return str(earlier["commit"])
+    return (
+        read_current_commit() if result.engines in ((), (engine_digest(),)) else "unknown: the code has changed since"
+    )
 
 
-def seeds(done: BlindTest) -> str:
+def format_seed_range(result: BlindTest) -> str:
     """First and last seed of the cases, as text: "1 to 500"."""
-    return f"{done.plan.seed} to {done.plan.seed + done.plan.cases - 1}"
+    return f"{result.plan.seed} to {result.plan.seed + result.plan.cases - 1}"
 
 
-def commit() -> str:
+def read_current_commit() -> str:
     """Commit of the running checkout, with "+" appended if files of its analysis or equalizer are changed; "unknown"
     where git gives none."""
     root = Path(analysis.diagnosis.__path__[0]).parent
     try:
-        at = _git(root, "rev-parse", "HEAD")
-        return at + ("+" if _git(root, "status", "--porcelain", "--untracked-files=no", ".", "../equalizer") else "")
+        commit_hash = _run_git(root, "rev-parse", "HEAD")
+        return commit_hash + (
+            "+" if _run_git(root, "status", "--porcelain", "--untracked-files=no", ".", "../equalizer") else ""
+        )
     except (OSError, subprocess.SubprocessError):
         return "unknown"
 
 
-def _git(folder: Path, *words: str) -> str:
+def _run_git(folder: Path, *arguments: str) -> str:
     """Output of a git command. Raises OSError, CalledProcessError; TimeoutExpired after 60 s."""
-    done = subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=True, timeout=60)
-    return done.stdout.strip()
+    completed = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=True, timeout=60)
+    return completed.stdout.strip()
 
 
-def _row(outcome: Outcome, miss: bool) -> CaseRow:
-    """The row of a case. miss: whether the case counts as a miss."""
-    known = outcome.kind == "single" and outcome.right and bool(outcome.concealed)
+def _make_row(outcome: Outcome, counts_as_miss: bool) -> CaseRow:
+    """The row of a case. counts_as_miss: whether it counts as a miss in the score."""
+    is_named_right = outcome.kind == "single" and outcome.right and bool(outcome.concealed)
     return CaseRow(
         outcome.number, outcome.seed, outcome.kind, outcome.bank, " ".join(outcome.axes), outcome.model,
         " ".join(outcome.names),
-        " ".join(c.axis or "all" for c in outcome.concealed),
+        " ".join(concealed.axis or "all" for concealed in outcome.concealed),
         " ".join(f"{value:.3f}" for value in outcome.strengths),
         round(outcome.adds, 4), outcome.detectable, outcome.verdict,
         " ".join(outcome.named_names),
         " ".join(effect.axis or "all" for effect in outcome.named),
         " ".join(f"{effect.probability:.3f}" for effect in outcome.named),
         " ".join(outcome.returned),
-        _short(main_error(outcome.concealed[0], outcome.named[0]) if known else None),
-        _short(outcome.left("retuned")), _short(outcome.left("after")), _short(outcome.seconds), miss,
+        _round(compute_main_error(outcome.concealed[0], outcome.named[0]) if is_named_right else None),
+        _round(outcome.worst_error("retuned")), _round(outcome.worst_error("after")), _round(outcome.seconds),
+        counts_as_miss,
     )  # fmt: skip
 
 
-def _short(value: float | None) -> float | None:
+def _round(value: float | None) -> float | None:
     """The value with four decimals; None for NaN."""
     return None if value is None or value != value else round(value, 4)

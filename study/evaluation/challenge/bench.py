@@ -28,7 +28,7 @@ class Oscillators:
     direction: FloatArray
     """(k, 3), unit vectors"""
 
-    def and_one(
+    def with_oscillator(
         self, frequency_hz: float, mass_kg: float, damping_ratio: float, direction: FloatArray
     ) -> "Oscillators":
         """Copy with a further oscillator. direction: unit vector (3,)."""
@@ -54,16 +54,16 @@ class Bench:
 
     def matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Mass (kg), damping (N s/m) and stiffness (N/m) of handle and k oscillators, (3 + k, 3 + k) each."""
-        parts = self.oscillators
-        spring = parts.mass_kg * (2 * np.pi * parts.frequency_hz) ** 2
-        damper = 2 * parts.damping_ratio * np.sqrt(spring * parts.mass_kg)
+        oscillators = self.oscillators
+        spring = oscillators.mass_kg * (2 * np.pi * oscillators.frequency_hz) ** 2
+        damper = 2 * oscillators.damping_ratio * np.sqrt(spring * oscillators.mass_kg)
         mass = np.zeros((3 + len(spring),) * 2)
         mass[:3, :3] = self.mass
-        mass[3:, 3:] = np.diag(parts.mass_kg)
+        mass[3:, 3:] = np.diag(oscillators.mass_kg)
         return (
             mass,
-            _with_oscillators(self.damping, damper, parts.direction),
-            _with_oscillators(self.stiffness, spring, parts.direction),
+            _with_oscillators(self.damping, damper, oscillators.direction),
+            _with_oscillators(self.stiffness, spring, oscillators.direction),
         )
 
 
@@ -86,19 +86,20 @@ def draw_bench(random: np.random.Generator) -> Bench:
     return Bench(mass, np.diag(random.uniform(2.6, 6.5, 3)), stiffness, oscillators)
 
 
-def _symmetric(random: np.random.Generator, reach: float) -> FloatArray:
+def _symmetric(random: np.random.Generator, limit: float) -> FloatArray:
     """Symmetric matrix (3, 3) with zero diagonal and uniform elements between -reach and reach."""
-    upper = np.triu(random.uniform(-reach, reach, (3, 3)), 1)
-    both: FloatArray = upper + upper.T
-    return both
+    upper = np.triu(random.uniform(-limit, limit, (3, 3)), 1)
+    symmetric: FloatArray = upper + upper.T
+    return symmetric
 
 
-def _with_oscillators(ground: FloatArray, each: FloatArray, direction: FloatArray) -> FloatArray:
-    """Damping or stiffness matrix (3 + k, 3 + k). ground: (3, 3); each: (k,), of the oscillators; direction: (k, 3)."""
-    size = 3 + len(each)
-    joined = np.zeros((size, size))
-    joined[:3, :3] = ground + direction.T @ np.diag(each) @ direction
-    joined[:3, 3:] = -direction.T * each
-    joined[3:, :3] = joined[:3, 3:].T
-    joined[3:, 3:] = np.diag(each)
-    return joined
+def _with_oscillators(ground: FloatArray, coefficients: FloatArray, direction: FloatArray) -> FloatArray:
+    """Damping or stiffness matrix (3 + k, 3 + k). ground: (3, 3); coefficients: (k,), of the oscillators; direction:
+    (k, 3)."""
+    size = 3 + len(coefficients)
+    matrix = np.zeros((size, size))
+    matrix[:3, :3] = ground + direction.T @ np.diag(coefficients) @ direction
+    matrix[:3, 3:] = -direction.T * coefficients
+    matrix[3:, :3] = matrix[:3, 3:].T
+    matrix[3:, 3:] = np.diag(coefficients)
+    return matrix

@@ -46,14 +46,14 @@ class EffectContext:
         """Log-uniform random value, independent of the strength."""
         return float(np.exp(self.random.uniform(np.log(lowest), np.log(highest))))
 
-    def sign(self) -> float:
+    def draw_sign(self) -> float:
         """+1 or -1 with equal probability."""
         return float(self.random.choice((-1.0, 1.0)))
 
-    def direction(self) -> FloatArray:
+    def draw_direction(self) -> FloatArray:
         """Unit vector (3,), uniformly distributed."""
-        drawn = self.random.normal(size=3)
-        unit: FloatArray = drawn / np.linalg.norm(drawn)
+        components = self.random.normal(size=3)
+        unit: FloatArray = components / np.linalg.norm(components)
         return unit
 
 
@@ -74,10 +74,10 @@ class ConcealedEffect:
 
 def with_cells(table: FloatArray, axis: int, cells: Mapping[int, float]) -> FloatArray:
     """Copy of a table (3, columns) in which the columns `cells` of the row `axis` are set."""
-    changed = table.copy()
+    new_table = table.copy()
     for column, value in cells.items():
-        changed[axis, column] = value
-    return changed
+        new_table[axis, column] = value
+    return new_table
 
 
 def with_forces(device: Device, axis: int, cells: Mapping[int, float]) -> Device:

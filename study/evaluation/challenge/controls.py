@@ -14,25 +14,25 @@ from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
+from study.evaluation.challenge.case_settings import CaseSettings
 from study.evaluation.challenge.draw_case import Case, draw_case
-from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.sensor import NOISE_MPS2
 
-CONCEALED, STRONG = "force_saturation", 0.9
+CONTROL_EFFECT, CONTROL_STRENGTH = "force_saturation", 0.9
 """Effect and strength of most control cases; the effect acts on a single axis, and no other effect resembles it."""
-PUSHED = "constant_force"
+MIRRORED_EFFECT = "constant_force"
 """Effect of the control whose signs are mirrored."""
-WRONG = "mains_hum"
+WRONG_EFFECT = "mains_hum"
 """The only hypothesis in the control with a wrong catalogue."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlInput:
-    """Input of a diagnosis."""
+    """Input of one diagnosis of a control."""
 
     recording: Recording
     model: MechanicalModel
-    without: tuple[str, ...] = ()
+    excluded_effects: tuple[str, ...] = ()
     """Effects that the diagnosis must not consider."""
 
 
@@ -43,43 +43,43 @@ class Control:
     name: str
     claim: str
     """Name of the claim in `analysis.evaluation.blind_test.controlled.CLAIMS`."""
-    draw: Callable[[int, Rig], tuple[ControlInput, ...]]
-    """Makes the inputs from a seed and a rig."""
+    draw: Callable[[int, CaseSettings], tuple[ControlInput, ...]]
+    """Makes the inputs from a seed and the settings of a case."""
 
 
-def _draw_strong(seed: int, rig: Rig) -> Case:
-    """A case with the effect `CONCEALED` at strength `STRONG`."""
-    return draw_case(seed, (CONCEALED,), "calibrated", STRONG, "a", rig)
+def _draw_control_case(seed: int, settings: CaseSettings) -> Case:
+    """A case with the effect `CONTROL_EFFECT` at strength `CONTROL_STRENGTH`."""
+    return draw_case(seed, (CONTROL_EFFECT,), "calibrated", CONTROL_STRENGTH, "a", settings)
 
 
-def _draw_clean(seed: int, rig: Rig) -> Case:
+def _draw_intact_case(seed: int, settings: CaseSettings) -> Case:
     """A case in which the model lacks nothing."""
-    return draw_case(seed, (), "calibrated", None, "a", rig)
+    return draw_case(seed, (), "calibrated", None, "a", settings)
 
 
-def _plain_input(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+def _draw_intact_input(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
     """A case in which the model lacks nothing, unchanged."""
-    case = _draw_clean(seed, rig)
+    case = _draw_intact_case(seed, settings)
     return (ControlInput(case.recording, case.model),)
 
 
-def _shuffle_in_time(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+def _shuffle_samples(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
     """Response and position in a random order of the samples, the same for both; the command is unchanged."""
-    case = _draw_strong(seed, rig)
+    case = _draw_control_case(seed, settings)
     order = np.random.default_rng(seed).permutation(len(case.recording))
     return (ControlInput(_map_samples(case.recording, lambda samples: samples[order], command=False), case.model),)
 
 
-def _other_model_input(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+def _exchange_models(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
     """Recording of a device with the model of another device, whose stated tolerances are as tight."""
-    return (ControlInput(_draw_strong(seed, rig).recording, _draw_clean(seed + 1, rig).model),)
+    return (ControlInput(_draw_control_case(seed, settings).recording, _draw_intact_case(seed + 1, settings).model),)
 
 
-def _silent_input(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+def _draw_sensor_noise(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
     """A recording of sensor noise alone, with zero command and no position."""
-    case, random = _draw_clean(seed, rig), np.random.default_rng(seed)
+    case, random = _draw_intact_case(seed, settings), np.random.default_rng(seed)
     shape = case.recording.response.samples.shape
-    noise = np.array(NOISE_MPS2)[list(rig.axes)] * random.normal(size=shape)
+    noise = np.array(NOISE_MPS2)[list(settings.axes)] * random.normal(size=shape)
     recording = replace(
         case.recording,
         command=_replace_samples(case.recording.command, np.zeros(shape)),
@@ -90,101 +90,108 @@ def _silent_input(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
     return (ControlInput(recording, case.model),)
 
 
-def _permute_channels(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+def _permute_channels(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
     """Channels of command, response and position in reverse order; each keeps its name."""
-    two = replace(rig, axes=(0, 1))
-    case = _draw_strong(seed, two)
+    two_axes = replace(settings, axes=(0, 1))
+    case = _draw_control_case(seed, two_axes)
     recording, model = case.recording, case.model
     if recording.position is None:
         return ()
-    turned = replace(
+    permuted = replace(
         recording,
         command=_reverse_channels(recording.command),
         response=_reverse_channels(recording.response),
         position=_reverse_channels(recording.position),
     )
-    other = replace(model, input=model.input[:, ::-1], output=model.output[::-1])
-    return ControlInput(recording, model), ControlInput(turned, other)
+    permuted_model = replace(model, input=model.input[:, ::-1], output=model.output[::-1])
+    return ControlInput(recording, model), ControlInput(permuted, permuted_model)
 
 
-def _exchange_axes(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+def _exchange_axes(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
     """The readings of two axes exchange their names, in command, response, position and model."""
-    two = replace(rig, axes=(0, 1))
-    case = _draw_strong(seed, two)
-    turned = _map_samples(case.recording, lambda samples: samples[:, ::-1])
-    other = replace(case.model, input=case.model.input[:, ::-1], output=case.model.output[::-1])
-    return ControlInput(case.recording, case.model), ControlInput(turned, other)
+    two_axes = replace(settings, axes=(0, 1))
+    case = _draw_control_case(seed, two_axes)
+    exchanged = _map_samples(case.recording, lambda samples: samples[:, ::-1])
+    exchanged_model = replace(case.model, input=case.model.input[:, ::-1], output=case.model.output[::-1])
+    return ControlInput(case.recording, case.model), ControlInput(exchanged, exchanged_model)
 
 
-def _mirror_signs(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+def _mirror_signs(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
     """A recording with a constant force, and the same with command, response and position negated."""
-    case = draw_case(seed, (PUSHED,), "calibrated", STRONG, "a", rig)
-    turned = _map_samples(case.recording, lambda samples: -samples)
-    return ControlInput(case.recording, case.model), ControlInput(turned, case.model)
+    case = draw_case(seed, (MIRRORED_EFFECT,), "calibrated", CONTROL_STRENGTH, "a", settings)
+    mirrored = _map_samples(case.recording, lambda samples: -samples)
+    return ControlInput(case.recording, case.model), ControlInput(mirrored, case.model)
 
 
-def _exclude_irrelevant(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
-    """The same input without and with the hypotheses of the sensor, none of which is the concealed effect."""
-    case = _draw_strong(seed, rig)
+def _add_irrelevant_hypotheses(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
+    """The same input, first with all hypotheses about the sensor excluded, then with all hypotheses; the concealed
+    effect is not among those of the sensor."""
+    case = _draw_control_case(seed, settings)
     irrelevant = tuple(effect_name.name for effect_name in EFFECT_NAMES if effect_name.place == "sensor")
     return ControlInput(case.recording, case.model, irrelevant), ControlInput(case.recording, case.model)
 
 
-def _rename_channels(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
+def _rename_channels(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
     """The same data under other names of device and channels."""
-    case = _draw_strong(seed, rig)
-    recording, new = case.recording, tuple(f"q{number}" for number in range(len(rig.axes)))
-    other = replace(
+    case = _draw_control_case(seed, settings)
+    recording, channel_names = case.recording, tuple(f"q{number}" for number in range(len(settings.axes)))
+    renamed = replace(
         recording,
         device="another",
-        command=replace(recording.command, channels=tuple(f"f{name}" for name in new)),
-        response=replace(recording.response, channels=tuple(f"a{name}" for name in new)),
-        position=None if recording.position is None else replace(recording.position, channels=new),
+        command=replace(recording.command, channels=tuple(f"f{name}" for name in channel_names)),
+        response=replace(recording.response, channels=tuple(f"a{name}" for name in channel_names)),
+        position=None if recording.position is None else replace(recording.position, channels=channel_names),
     )
-    return ControlInput(recording, case.model), ControlInput(other, replace(case.model, name="another"))
+    return ControlInput(recording, case.model), ControlInput(renamed, replace(case.model, name="another"))
 
 
-def _allow_one_wrong(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
-    """The diagnosis may consider the effect `WRONG` only, which is not the concealed effect."""
-    case = _draw_strong(seed, rig)
+def _allow_wrong_effect_only(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
+    """The diagnosis may consider the effect `WRONG_EFFECT` only, which is not the concealed effect."""
+    case = _draw_control_case(seed, settings)
     return (
         ControlInput(
             case.recording,
             case.model,
-            tuple(effect_name.name for effect_name in EFFECT_NAMES if effect_name.name != WRONG),
+            tuple(effect_name.name for effect_name in EFFECT_NAMES if effect_name.name != WRONG_EFFECT),
         ),
     )
 
 
-def _map_samples(recording: Recording, how: Callable[[FloatArray], FloatArray], command: bool = True) -> Recording:
-    """The recording with `how` applied to response and position, and to the command if `command` is True."""
+def _map_samples(
+    recording: Recording, transform: Callable[[FloatArray], FloatArray], command: bool = True
+) -> Recording:
+    """The recording with `transform` applied to response and position, and to the command if `command` is True."""
     position = recording.position
     return replace(
         recording,
-        command=_replace_samples(recording.command, how(recording.command.samples)) if command else recording.command,
-        response=_replace_samples(recording.response, how(recording.response.samples)),
-        position=None if position is None else _replace_samples(position, how(position.samples)),
+        command=_replace_samples(recording.command, transform(recording.command.samples))
+        if command
+        else recording.command,
+        response=_replace_samples(recording.response, transform(recording.response.samples)),
+        position=None if position is None else _replace_samples(position, transform(position.samples)),
     )
 
 
 def _replace_samples(signal: Signal, samples: FloatArray) -> Signal:
+    """The signal with other samples, (n, channels)."""
     return Signal(samples, signal.sample_rate_hz, signal.quantity, signal.unit, signal.channels)
 
 
 def _reverse_channels(signal: Signal) -> Signal:
+    """The signal with the samples and the names of its channels in reverse order."""
     return Signal(signal.samples[:, ::-1], signal.sample_rate_hz, signal.quantity, signal.unit, signal.channels[::-1])
 
 
 CONTROLS = (
-    Control("a recording shuffled in time", "no name", _shuffle_in_time),
-    Control("the model of another device", "not explained", _other_model_input),
-    Control("a silent recording", "no name", _silent_input),
+    Control("a recording shuffled in time", "no name", _shuffle_samples),
+    Control("the model of another device", "not explained", _exchange_models),
+    Control("a silent recording", "no name", _draw_sensor_noise),
     Control("axes in another order", "same", _permute_channels),
     Control("axes exchanged", "axis exchanged", _exchange_axes),
     Control("everything mirrored", "opposite", _mirror_signs),
-    Control("strength zero", "nothing", _plain_input),
-    Control("irrelevant hypotheses added", "same", _exclude_irrelevant),
+    Control("strength zero", "nothing", _draw_intact_input),
+    Control("irrelevant hypotheses added", "same", _add_irrelevant_hypotheses),
     Control("other names of device and channels", "same but axes", _rename_channels),
-    Control("a catalogue of one wrong hypothesis", "not explained", _allow_one_wrong),
+    Control("a catalogue of one wrong hypothesis", "not explained", _allow_wrong_effect_only),
 )
 """All controls: name, claim, and how their inputs are drawn."""

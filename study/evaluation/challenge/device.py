@@ -11,12 +11,12 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge import handle_force_kernel as handle
-from study.evaluation.challenge.actuator_kernel import GAIN, drive
+from study.evaluation.challenge.actuator_kernel import GAIN, drive_actuators
 from study.evaluation.challenge.bench import Bench
 from study.evaluation.challenge.drive_plan import RATE_HZ
 from study.evaluation.challenge.law_kernel import COLUMNS
-from study.evaluation.challenge.mechanism_kernel import AXIS, MOTOR_MASS, Mechanism, Motion, move
-from study.evaluation.challenge.sensor import Sensor, read
+from study.evaluation.challenge.mechanism_kernel import AXIS, MOTOR_MASS, Mechanism, Motion, integrate_motion
+from study.evaluation.challenge.sensor import Sensor, read_sensor
 
 STEPS = 20
 """Default number of integration steps per sample."""
@@ -92,30 +92,30 @@ class Device:
         )  # fmt: skip
 
 
-def motion(device: Device, command: FloatArray) -> tuple[FloatArray, FloatArray]:
+def simulate_motion(device: Device, command: FloatArray) -> tuple[FloatArray, FloatArray]:
     """True acceleration (m/s^2) and position (m) of the handle at the samples, (samples, 3) each. Raises ValueError
-    as `whole_motion`."""
-    moved = whole_motion(device, command)
-    return moved.acceleration, moved.position
+    as `simulate_full_motion`."""
+    full_motion = simulate_full_motion(device, command)
+    return full_motion.acceleration, full_motion.position
 
 
-def whole_motion(device: Device, command: FloatArray) -> Motion:
+def simulate_full_motion(device: Device, command: FloatArray) -> Motion:
     """True motion of the handle, with velocity and the forces of its laws. command: (samples, 3), N.
 
     Raises ValueError where the motion is not finite or exceeds 1 m: the parameters make the integration unstable.
     """
-    written = command.copy() if device.drive_law is None else device.drive_law(command)
+    written_command = command.copy() if device.drive_law is None else device.drive_law(command)
     if device.skipped:
-        written[device.skipped :: device.skipped] = written[device.skipped - 1 : -1 : device.skipped]
-    force = drive(written, device.amplifiers, device.steps, RATE_HZ)
-    moved = move(device.mechanism(), force, device.steps, RATE_HZ)
-    if not (np.isfinite(moved.acceleration).all() and np.abs(moved.position).max() < 1.0):
+        written_command[device.skipped :: device.skipped] = written_command[device.skipped - 1 : -1 : device.skipped]
+    force = drive_actuators(written_command, device.amplifiers, device.steps, RATE_HZ)
+    full_motion = integrate_motion(device.mechanism(), force, device.steps, RATE_HZ)
+    if not (np.isfinite(full_motion.acceleration).all() and np.abs(full_motion.position).max() < 1.0):
         raise ValueError("the simulated device ran away: a stiffness, mass or per_m is too large for its step")
-    return moved
+    return full_motion
 
 
 def record(device: Device, command: FloatArray, random: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Measured acceleration (m/s^2) and position (m), (samples, 3) each. command: (samples, 3), N; random: of the
-    sensor's noise. Raises ValueError as `whole_motion`."""
-    acceleration, position = motion(device, command)
-    return read(device.sensor, acceleration, position, RATE_HZ, random)
+    sensor's noise. Raises ValueError as `simulate_full_motion`."""
+    acceleration, position = simulate_motion(device, command)
+    return read_sensor(device.sensor, acceleration, position, RATE_HZ, random)

@@ -15,14 +15,14 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 from study.evaluation.challenge.bench import draw_bench
+from study.evaluation.challenge.case_settings import DEFAULT_SETTINGS, CaseSettings
 from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext
-from study.evaluation.challenge.device import Device, motion
+from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ, DrivePlan, draw_plan
 from study.evaluation.challenge.effects import actuator, decoys, friction, hand, inertia_and_drag, sensor, springs
 from study.evaluation.challenge.extras import with_extras
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
-from study.evaluation.challenge.rig import WHOLE, Rig
-from study.evaluation.challenge.sensor import NOISE_MPS2, POSITION_NOISE_M, POSITION_STEP_M, RANGE_MPS2, read
+from study.evaluation.challenge.sensor import NOISE_MPS2, POSITION_NOISE_M, POSITION_STEP_M, RANGE_MPS2, read_sensor
 
 EFFECTS: dict[str, ConcealedEffect] = {
     effect.name: effect
@@ -33,7 +33,7 @@ EFFECTS: dict[str, ConcealedEffect] = {
 DECOYS: dict[str, ConcealedEffect] = {effect.name: effect for effect in decoys.DECOYS}
 """Effects outside the vocabulary, which a diagnosis must not name."""
 
-Concealed = Literal["calibrated", "retuned"]
+ModelOrigin = Literal["calibrated", "retuned"]
 """How the given model was made: `calibrated` from the device without the effect, `retuned` on the recording itself."""
 MotionPair = tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 """Acceleration (m/s^2) and position (m), (samples, 3) each, of a first device, then of a second."""
@@ -52,7 +52,7 @@ class Truth:
     """Parameters without a name in the vocabulary, which select the variant of the effect."""
 
 
-Again = Callable[[FloatArray, str, float, int], Recording]
+RecordAgain = Callable[[FloatArray, str, float, int], Recording]
 """Makes a further recording of the same device: commands (samples, axes) in N, kind of excitation, added mass (kg),
 noise seed."""
 
@@ -64,9 +64,9 @@ class Case:
     recording: Recording
     model: MechanicalModel
     truth: tuple[Truth, ...]
-    again: Again
+    record_again: RecordAgain
     """Records the same device again under other commands."""
-    adds: float = 0.0
+    detectability: float = 0.0
     """Detectability: change of the readings by the concealed effects over the noise, both rms, in the worst channel."""
 
 
@@ -77,10 +77,10 @@ NOISE = np.array([*NOISE_MPS2, *[float(np.hypot(POSITION_NOISE_M, POSITION_STEP_
 def draw_case(
     seed: int,
     effects: Sequence[str] = (),
-    concealed: Concealed = "calibrated",
+    origin: ModelOrigin = "calibrated",
     strength: float | Sequence[float] | None = None,
     name: str = "",
-    rig: Rig = WHOLE,
+    settings: CaseSettings = DEFAULT_SETTINGS,
 ) -> Case:
     """Draw a case. effects: names from EFFECTS or DECOYS; none = nothing is missing. strength: 0 (weakest) to 1, a
     single value for all or a value each; None draws it uniformly. The same arguments give the same case.
@@ -88,91 +88,103 @@ def draw_case(
     Raises ValueError for an unknown name, a strength outside 0..1, or a hand with a re-tuned model, which would absorb
     the hand into the device.
     """
-    chosen = [_find_effect(effect) for effect in effects]
-    if concealed == "retuned" and any(effect.name == "hand_impedance" for effect in chosen):
+    chosen_effects = [_find_effect(effect) for effect in effects]
+    if origin == "retuned" and any(effect.name == "hand_impedance" for effect in chosen_effects):
         raise ValueError("a hand can be concealed from a calibrated model only: a re-tuned one contains it")
-    random = np.random.default_rng([seed, len(chosen)])
-    bench, plan = draw_bench(random), draw_plan(random, rig)
-    bare = with_extras(Device(bench, steps=rig.steps), rig.extras, seed)
-    strengths = _strengths(strength, len(chosen), random)
-    free = motion(bare, plan.command)
-    device, truth = _conceal(bare, free, (chosen, strengths), random, rig)
-    moved = motion(device, plan.command) if chosen else free
-    response, position = read(device.sensor, *moved, RATE_HZ, random)
-    if concealed == "calibrated":
-        known, tolerance = draw_calibration(bench, random, rig.axes)
+    random = np.random.default_rng([seed, len(chosen_effects)])
+    bench, plan = draw_bench(random), draw_plan(random, settings)
+    baseline = with_extras(Device(bench, steps=settings.steps), settings.extras, seed)
+    strengths = _draw_strengths(strength, len(chosen_effects), random)
+    base_motion = simulate_motion(baseline, plan.command)
+    device, truth = _conceal_effects(baseline, base_motion, (chosen_effects, strengths), random, settings)
+    true_motion = simulate_motion(device, plan.command) if chosen_effects else base_motion
+    response, position = read_sensor(device.sensor, *true_motion, RATE_HZ, random)
+    if origin == "calibrated":
+        nominal, tolerance = draw_calibration(bench, random, settings.axes)
     else:
-        known, tolerance = retune(bench, response, plan, rig.axes)
+        nominal, tolerance = retune(bench, response, plan, settings.axes)
     label = name or f"bench {seed}"
-    model = as_model(label, known, tolerance, rig.axes)
-    recording = make_recording(label, plan, response, position, rig)
+    model = as_model(label, nominal, tolerance, settings.axes)
+    recording = make_recording(label, plan, response, position, settings)
 
-    def again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
-        further = further_plan(command, kind, rig)
+    def record_again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
+        repeat_plan = make_further_plan(command, kind, settings)
         heavier = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
-        readings = read(device.sensor, *motion(heavier, further.command), RATE_HZ, np.random.default_rng([seed, noise]))
-        return replace(make_recording(label, further, *readings, rig), meta=describe_added_mass(added_kg))
+        readings = read_sensor(
+            device.sensor, *simulate_motion(heavier, repeat_plan.command), RATE_HZ, np.random.default_rng([seed, noise])
+        )
+        return replace(make_recording(label, repeat_plan, *readings, settings), meta=describe_added_mass(added_kg))
 
-    return Case(recording, model, truth, again, visibility(bare, device, (free, moved), rig) if chosen else 0.0)
+    return Case(
+        recording, model, truth, record_again,
+        measure_detectability(baseline, device, (base_motion, true_motion), settings) if chosen_effects else 0.0,
+    )  # fmt: skip
 
 
-def visibility(bare: Device, device: Device, moved: MotionPair, rig: Rig) -> float:
+def measure_detectability(baseline: Device, device: Device, motions: MotionPair, settings: CaseSettings) -> float:
     """Difference between the readings of two devices over the noise, both rms, in the worst channel of acceleration or
-    position. moved: the motion of each device."""
+    position. motions: acceleration and position of each device."""
     readings = []
-    for each, (acceleration, position) in zip((bare, device), moved, strict=True):
+    for measured_device, (acceleration, position) in zip((baseline, device), motions, strict=True):
         # The same noise and lost samples for both, so that the difference of the readings is that of the devices.
-        seen, _ = read(each.sensor, acceleration, position, RATE_HZ, np.random.default_rng(0))
-        readings.append(np.hstack([seen[:, rig.axes], position[:, rig.axes]]))
-    noise = NOISE[[*rig.axes, *(3 + axis for axis in rig.axes)]]
+        acceleration_reading, _ = read_sensor(
+            measured_device.sensor, acceleration, position, RATE_HZ, np.random.default_rng(0)
+        )
+        readings.append(np.hstack([acceleration_reading[:, settings.axes], position[:, settings.axes]]))
+    noise = NOISE[[*settings.axes, *(3 + axis for axis in settings.axes)]]
     power = np.mean(((readings[1] - readings[0]) / noise) ** 2, axis=0)
     return float(np.sqrt(power.max()))
 
 
 def _find_effect(name: str) -> ConcealedEffect:
     """The effect or decoy with this name. Raises ValueError for an unknown name."""
-    found = EFFECTS.get(name) or DECOYS.get(name)
-    if found is None:
+    effect = EFFECTS.get(name) or DECOYS.get(name)
+    if effect is None:
         raise ValueError(f"there is no way to conceal '{name}'; known are {', '.join((*EFFECTS, *DECOYS))}")
-    return found
+    return effect
 
 
-def _strengths(given: float | Sequence[float] | None, count: int, random: np.random.Generator) -> FloatArray:
+def _draw_strengths(requested: float | Sequence[float] | None, count: int, random: np.random.Generator) -> FloatArray:
     """(count,): the given strengths, or uniform draws. Raises ValueError for a strength outside 0..1."""
-    drawn = random.random(count) if given is None else np.broadcast_to(np.asarray(given, dtype=np.float64), (count,))
-    if ((drawn < 0.0) | (drawn > 1.0)).any():
-        raise ValueError(f"strength is {given}; it must lie between 0 and 1")
-    return drawn
+    strengths = (
+        random.random(count)
+        if requested is None
+        else np.broadcast_to(np.asarray(requested, dtype=np.float64), (count,))
+    )
+    if ((strengths < 0.0) | (strengths > 1.0)).any():
+        raise ValueError(f"strength is {requested}; it must lie between 0 and 1")
+    return strengths
 
 
-def _conceal(
+def _conceal_effects(
     device: Device,
-    free: tuple[FloatArray, FloatArray],
-    wanted: tuple[Sequence[ConcealedEffect], FloatArray],
+    base_motion: tuple[FloatArray, FloatArray],
+    effects_and_strengths: tuple[Sequence[ConcealedEffect], FloatArray],
     random: np.random.Generator,
-    rig: Rig,
+    settings: CaseSettings,
 ) -> tuple[Device, tuple[Truth, ...]]:
-    """Draw the parameters of the effects, each for a random axis of the rig, and build them into the device. free:
-    acceleration and position without the effects. wanted: the effects and their strengths."""
-    (chosen, strengths), (acceleration, position) = wanted, free
+    """Draw the parameters of the effects, each for a random driven axis, and build them into the device.
+    base_motion: acceleration and position without the effects. effects_and_strengths: the effects and their
+    strengths."""
+    (effects, strengths), (acceleration, position) = effects_and_strengths, base_motion
     bench, truth = device.bench, []
-    peak = np.minimum(np.abs(acceleration).max(axis=0), RANGE_MPS2)
-    for effect, strength in zip(chosen, strengths, strict=True):
-        axis = rig.axes[int(random.integers(len(rig.axes)))]
-        travel = np.abs(position).max(axis=0)
-        at = EffectContext(random, float(strength), bench, axis, travel, peak, rig.axes)
-        values = effect.draw(at)
+    peak_mps2 = np.minimum(np.abs(acceleration).max(axis=0), RANGE_MPS2)
+    for effect, strength in zip(effects, strengths, strict=True):
+        axis = settings.axes[int(random.integers(len(settings.axes)))]
+        travel_m = np.abs(position).max(axis=0)
+        context = EffectContext(random, float(strength), bench, axis, travel_m, peak_mps2, settings.axes)
+        values = effect.draw(context)
         device = effect.build(device, axis, values)
-        truth.append(truth_of(effect, axis, values))
+        truth.append(make_truth(effect, axis, values))
     return device, tuple(truth)
 
 
-def further_plan(command: FloatArray, kind: str, rig: Rig) -> DrivePlan:
+def make_further_plan(command: FloatArray, kind: str, settings: CaseSettings) -> DrivePlan:
     """Excitation plan of a further recording, a single segment to fit. command: (samples, axes), N; kind: of
     excitation."""
-    whole = np.zeros((len(command), 3))
-    whole[:, rig.axes] = command
-    return DrivePlan(whole, (Segment(0, len(whole), kind, float(np.abs(whole).max()), 0, "fit"),))
+    full_command = np.zeros((len(command), 3))
+    full_command[:, settings.axes] = command
+    return DrivePlan(full_command, (Segment(0, len(full_command), kind, float(np.abs(full_command).max()), 0, "fit"),))
 
 
 def describe_added_mass(added_kg: float) -> dict[str, float]:
@@ -180,10 +192,10 @@ def describe_added_mass(added_kg: float) -> dict[str, float]:
     return {"added_mass_kg": added_kg} if added_kg else {}
 
 
-def truth_of(effect: ConcealedEffect, axis: int, values: dict[str, float]) -> Truth:
+def make_truth(effect: ConcealedEffect, axis: int, values: dict[str, float]) -> Truth:
     """The label of one concealed effect."""
-    known = EFFECTS_BY_NAME.get(effect.name)
-    names = set(values) if known is None else {parameter.name for parameter in known.parameters}
+    vocabulary_entry = EFFECTS_BY_NAME.get(effect.name)
+    names = set(values) if vocabulary_entry is None else {parameter.name for parameter in vocabulary_entry.parameters}
     return Truth(
         effect.name,
         effect.place,
@@ -193,13 +205,15 @@ def truth_of(effect: ConcealedEffect, axis: int, values: dict[str, float]) -> Tr
     )
 
 
-def make_recording(name: str, plan: DrivePlan, response: FloatArray, position: FloatArray, rig: Rig) -> Recording:
-    """Recording of the rig's axes. response (m/s^2), position (m): (samples, 3)."""
-    axes, names = list(rig.axes), tuple(AXES[axis] for axis in rig.axes)
+def make_recording(
+    name: str, plan: DrivePlan, response: FloatArray, position: FloatArray, settings: CaseSettings
+) -> Recording:
+    """Recording of the driven axes. response (m/s^2), position (m): (samples, 3)."""
+    axes, axis_names = list(settings.axes), tuple(AXES[axis] for axis in settings.axes)
     return Recording(
         device=name,
-        command=Signal(plan.command[:, axes], RATE_HZ, "force", "N", tuple(f"f{axis}" for axis in names)),
-        response=Signal(response[:, axes], RATE_HZ, "acceleration", "m/s^2", tuple(f"a{axis}" for axis in names)),
-        position=Signal(position[:, axes], RATE_HZ, "position", "m", names),
+        command=Signal(plan.command[:, axes], RATE_HZ, "force", "N", tuple(f"f{axis}" for axis in axis_names)),
+        response=Signal(response[:, axes], RATE_HZ, "acceleration", "m/s^2", tuple(f"a{axis}" for axis in axis_names)),
+        position=Signal(position[:, axes], RATE_HZ, "position", "m", axis_names),
         segments=plan.segments,
     )

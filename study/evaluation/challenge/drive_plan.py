@@ -6,7 +6,7 @@ import numpy as np
 
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge.rig import WHOLE, Rig
+from study.evaluation.challenge.case_settings import DEFAULT_SETTINGS, CaseSettings
 
 RATE_HZ = 1000.0
 """Sample rate of all challenge recordings."""
@@ -15,7 +15,7 @@ AXES = ("x", "y", "z")
 LEVELS_N = (0.5, 1.5, 3.0)
 """Peaks of the multisines."""
 PERIOD, PERIODS, TEST_PERIODS = 2000, 4, 2
-REST = 500
+REST_SAMPLES = 500
 """Samples of rest between two segments."""
 FIRST_LINE, LAST_LINE = 3, 479
 """Lines of a 2 s period: 1.5 to 239.5 Hz, odd lines only."""
@@ -38,43 +38,45 @@ def multisine(random: np.random.Generator, level_n: float, period: int = PERIOD)
     """One period, (period,), N, with peak `level_n`: odd lines of amplitude f^-1/2 and random phase. One of every
     four neighbouring lines is left out, so that it shows odd distortion."""
     lines = np.arange(FIRST_LINE * period // PERIOD | 1, LAST_LINE * period // PERIOD + 1, 2)
-    silent = [group[random.integers(len(group))] for group in np.array_split(lines, -(-len(lines) // 4))]
+    omitted_lines = [group[random.integers(len(group))] for group in np.array_split(lines, -(-len(lines) // 4))]
     spectrum = np.zeros(period // 2 + 1, dtype=complex)
     spectrum[lines] = np.exp(2j * np.pi * random.random(len(lines))) / np.sqrt(lines)
-    spectrum[silent] = 0.0
+    spectrum[omitted_lines] = 0.0
     wave = np.fft.irfft(spectrum, period)
-    shaped: FloatArray = level_n * wave / np.abs(wave).max()
-    return shaped
+    scaled_wave: FloatArray = level_n * wave / np.abs(wave).max()
+    return scaled_wave
 
 
-def draw_plan(random: np.random.Generator, rig: Rig = WHOLE) -> DrivePlan:
+def draw_plan(random: np.random.Generator, settings: CaseSettings = DEFAULT_SETTINGS) -> DrivePlan:
     """Commands and segments of a recording; 105 s for the whole bench."""
     blocks: list[FloatArray] = []
     segments: list[Segment] = []
     start = 0
 
-    def add(block: FloatArray, kind: str, level_n: float, period: int, role: str) -> None:
+    def append_segment(block: FloatArray, kind: str, level_n: float, period: int, role: str) -> None:
         nonlocal start
         segments.append(Segment(start, start + len(block), kind, level_n, period, role))
-        blocks.extend((block, np.zeros((REST, 3))))
-        start += len(block) + REST
+        blocks.extend((block, np.zeros((REST_SAMPLES, 3))))
+        start += len(block) + REST_SAMPLES
 
-    for axis in rig.axes:
+    for axis in settings.axes:
         for level_n in LEVELS_N:
-            wave = np.tile(multisine(random, level_n, rig.period), rig.periods)
-            add(_place_on_axis(axis, wave), "multisine", level_n, rig.period, "fit")
-    for axis in rig.axes:
-        add(_place_on_axis(axis, _sweep(rig.along(SWEEP_SAMPLES))), "sweep", SWEEP_N, 0, "test")
-    together = np.zeros((rig.period, 3))
-    for axis in rig.axes:
-        together[:, axis] = multisine(random, LEVELS_N[1], rig.period)
-    add(np.tile(together, (TEST_PERIODS, 1)), "multisine", LEVELS_N[1], rig.period, "test")
-    add(_slow_sines(rig), "slow", SLOW_N, 0, "test")
-    if rig.loud_n:
-        strong = np.zeros((rig.period, 3))
-        for axis in rig.axes:
-            strong[:, axis] = multisine(random, rig.loud_n, rig.period)
-        add(np.tile(strong, (TEST_PERIODS, 1)), "multisine", rig.loud_n, rig.period, "test")
+            wave = np.tile(multisine(random, level_n, settings.period), settings.periods)
+            append_segment(_place_on_axis(axis, wave), "multisine", level_n, settings.period, "fit")
+    for axis in settings.axes:
+        append_segment(
+            _place_on_axis(axis, _sweep(settings.scale_duration(SWEEP_SAMPLES))), "sweep", SWEEP_N, 0, "test"
+        )
+    common_command = np.zeros((settings.period, 3))
+    for axis in settings.axes:
+        common_command[:, axis] = multisine(random, LEVELS_N[1], settings.period)
+    append_segment(np.tile(common_command, (TEST_PERIODS, 1)), "multisine", LEVELS_N[1], settings.period, "test")
+    append_segment(_slow_sines(settings), "slow", SLOW_N, 0, "test")
+    if settings.loud_n:
+        loud_command = np.zeros((settings.period, 3))
+        for axis in settings.axes:
+            loud_command[:, axis] = multisine(random, settings.loud_n, settings.period)
+        append_segment(np.tile(loud_command, (TEST_PERIODS, 1)), "multisine", settings.loud_n, settings.period, "test")
     return DrivePlan(np.vstack(blocks), tuple(segments))
 
 
@@ -94,10 +96,10 @@ def _sweep(samples: int) -> FloatArray:
     return wave
 
 
-def _slow_sines(rig: Rig) -> FloatArray:
+def _slow_sines(settings: CaseSettings) -> FloatArray:
     """All axes at once, each at its own frequency; no fade-out at the end."""
-    samples = np.arange(rig.along(SLOW_SAMPLES))
+    samples = np.arange(settings.scale_duration(SLOW_SAMPLES))
     rise = np.minimum(samples / SLOW_FADE, 1.0)
     block: FloatArray = SLOW_N * np.sin(2 * np.pi * np.outer(samples / RATE_HZ, SLOW_HZ)) * rise[:, None]
-    block[:, [axis for axis in range(3) if axis not in rig.axes]] = 0.0
+    block[:, [axis for axis in range(3) if axis not in settings.axes]] = 0.0
     return block

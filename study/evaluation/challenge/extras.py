@@ -34,10 +34,10 @@ def with_extras(device: Device, factor: float, seed: int) -> Device:
 
 def _with_columns(table: FloatArray, cells: dict[int, FloatArray | float]) -> FloatArray:
     """A copy of a parameter table (3 axes, columns) with these columns replaced. cells: by column, (3,) or a number."""
-    changed = table.copy()
+    new_table = table.copy()
     for column, values in cells.items():
-        changed[:, column] = values
-    return changed
+        new_table[:, column] = values
+    return new_table
 
 
 def _add_friction(device: Device, factor: float, random: np.random.Generator) -> Device:
@@ -68,10 +68,11 @@ def _add_drag(device: Device, factor: float, random: np.random.Generator) -> Dev
 
 def _shift_modes(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Frequencies of the structural modes changed by up to 0.04 %."""
-    parts = device.bench.oscillators
-    off = 1.0 + factor * random.uniform(-4e-4, 4e-4, parts.frequency_hz.shape)
+    oscillators = device.bench.oscillators
+    factors = 1.0 + factor * random.uniform(-4e-4, 4e-4, oscillators.frequency_hz.shape)
     return replace(
-        device, bench=replace(device.bench, oscillators=replace(parts, frequency_hz=off * parts.frequency_hz))
+        device,
+        bench=replace(device.bench, oscillators=replace(oscillators, frequency_hz=factors * oscillators.frequency_hz)),
     )
 
 

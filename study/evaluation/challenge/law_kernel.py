@@ -9,7 +9,7 @@ from numba import njit
 
 from equalizer.signals.signal import FloatArray
 
-KIND, AXIS, OTHER, FACTOR, FIRST, SECOND, SIDE = range(7)
+KIND, AXIS, OTHER_AXIS, FACTOR, FIRST, SECOND, SIDE = range(7)
 """Columns of a row: kind of law; axis on which it acts; another axis; size k and parameters a and b of its formula; its
 sign s, +1 or -1."""
 COLUMNS = 7
@@ -23,14 +23,14 @@ order matters for `law_force`; `LAW_KINDS` in `laws.concealed_laws` gives the fo
 
 
 @njit(cache=True, nogil=True)
-def law_force(row: FloatArray, q: FloatArray, v: FloatArray, drive: FloatArray, kept: float, t: float) -> float:
-    """Force along the row's axis, N. q: positions (m); v: velocities (m/s); drive: forces of the drives (N); kept:
+def law_force(row: FloatArray, q: FloatArray, v: FloatArray, drive: FloatArray, memory: float, t: float) -> float:
+    """Force along the row's axis, N. q: positions (m); v: velocities (m/s); drive: forces of the drives (N); memory:
     state of a law with memory (`law_memory`); t: time (s)."""
-    kind, j, k = int(row[KIND]), int(row[AXIS]), int(row[OTHER])
+    kind, j, k = int(row[KIND]), int(row[AXIS]), int(row[OTHER_AXIS])
     if kind >= CROSS_SQUARE:
         return _cross_axis_force(row, q[j], v[j], q[k], v[k])
     if kind >= GAIN_RIPPLE:
-        return _command_or_memory_force(row, q[j], drive[j], kept, t)
+        return _command_or_memory_force(row, q[j], drive[j], memory, t)
     return _own_motion_force(row, q[j], v[j])
 
 
@@ -58,12 +58,12 @@ def _own_motion_force(row: FloatArray, x: float, speed: float) -> float:
         force = side * max(side * x - first, 0.0) ** row[SECOND]
     else:
         force = speed if side * x > first else 0.0
-    pushed: float = -row[FACTOR] * force
-    return pushed
+    scaled_force: float = -row[FACTOR] * force
+    return scaled_force
 
 
 @njit(cache=True, nogil=True)
-def _command_or_memory_force(row: FloatArray, x: float, drive: float, kept: float, t: float) -> float:
+def _command_or_memory_force(row: FloatArray, x: float, drive: float, memory: float, t: float) -> float:
     """Force of a law of the drive force, the time or a memory state, N."""
     kind, first, second = int(row[KIND]), row[FIRST], row[SECOND]
     if kind == GAIN_RIPPLE:
@@ -71,11 +71,11 @@ def _command_or_memory_force(row: FloatArray, x: float, drive: float, kept: floa
     elif kind == PUMPED:
         force = x * sin(2.0 * pi * first * t + second)
     elif kind == RELAXATION:
-        force = x - kept
+        force = x - memory
     else:
-        force = drive * kept
-    pushed: float = -row[FACTOR] * force
-    return pushed
+        force = drive * memory
+    scaled_force: float = -row[FACTOR] * force
+    return scaled_force
 
 
 @njit(cache=True, nogil=True)
@@ -92,28 +92,32 @@ def _cross_axis_force(row: FloatArray, x: float, speed: float, other_x: float, o
         force = -side * other_speed
     else:
         force = speed * sqrt(speed * speed + other_speed * other_speed)
-    pushed: float = -row[FACTOR] * force
-    return pushed
+    scaled_force: float = -row[FACTOR] * force
+    return scaled_force
 
 
 @njit(cache=True, nogil=True)
-def law_memory(row: FloatArray, q: FloatArray, drive: FloatArray, kept: float, step_s: float) -> float:
+def law_memory(row: FloatArray, q: FloatArray, drive: FloatArray, memory: float, step_s: float) -> float:
     """Memory state at the end of a step, a first-order low pass (explicit Euler) with the time constant a (s): of the
     position (RELAXATION, m) or of the squared drive force (HEATING, N^2). Other laws have none."""
-    kind, j, now = int(row[KIND]), int(row[AXIS]), kept
+    kind, j, new_memory = int(row[KIND]), int(row[AXIS]), memory
     if kind == RELAXATION:
-        now += (q[j] - kept) * step_s / row[FIRST]
+        new_memory += (q[j] - memory) * step_s / row[FIRST]
     elif kind == HEATING:
-        now += (drive[j] * drive[j] - kept) * step_s / row[FIRST]
-    return now
+        new_memory += (drive[j] * drive[j] - memory) * step_s / row[FIRST]
+    return new_memory
 
 
 @njit(cache=True, nogil=True)
 def law_forces(
-    rows: FloatArray, at: tuple[FloatArray, FloatArray, FloatArray], kept: FloatArray, t: float, out: FloatArray
+    rows: FloatArray,
+    state: tuple[FloatArray, FloatArray, FloatArray],
+    memory: FloatArray,
+    t: float,
+    total_n: FloatArray,
 ) -> None:
-    """Sum of the forces of all laws, in `out` (3,), N. at: positions, velocities and drive forces, of which the first
-    three elements (the handle's) are used. kept: memory states (laws,)."""
-    out[:] = 0.0
-    for number in range(rows.shape[0]):
-        out[int(rows[number, AXIS])] += law_force(rows[number], at[0], at[1], at[2], kept[number], t)
+    """Sum of the forces of all laws, in `total_n` (3,), N. state: positions, velocities and drive forces, of which the
+    first three elements (the handle's) are used. memory: memory states (laws,)."""
+    total_n[:] = 0.0
+    for index in range(rows.shape[0]):
+        total_n[int(rows[index, AXIS])] += law_force(rows[index], state[0], state[1], state[2], memory[index], t)

@@ -20,7 +20,7 @@ from study.evaluation.challenge.friction_kernel import bristle_force
 from study.evaluation.challenge.handle_force_kernel import handle_force
 from study.evaluation.challenge.law_kernel import law_forces, law_memory
 
-RATE, DAMPING_DEPTH, STIFFNESS_DEPTH, TURN, SQUARE = range(5)
+RATE, DAMPING_DEPTH, STIFFNESS_DEPTH, PHASE, SQUARE = range(5)
 """Columns of `varying`: frequency (Hz, 0 = none), amplitude of the modulation of the ground's damping (N s/m) and
 stiffness (N/m), phase (rad), 1 = square wave, 0 = sine."""
 AXIS, MOTOR_MASS, GAP, CONTACT, CONTACT_DAMPING = range(5)
@@ -69,7 +69,7 @@ class Motion(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def move(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> Motion:
+def integrate_motion(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> Motion:
     """Integrate the motion from rest. force: (samples * steps, 3), N.
 
     A sample is read just before the force of its own step acts, so its acceleration belongs to the previous force.
@@ -77,62 +77,62 @@ def move(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> Motion:
     n, samples, h = m.inverse_mass.shape[0], force.shape[0] // steps, 1.0 / (rate_hz * steps)
     acceleration, position = np.zeros((samples, 3)), np.zeros((samples, 3))
     velocity, lawful = np.zeros((samples, 3)), np.zeros((samples, 3))
-    kept, pushed = np.zeros(m.laws.shape[0]), np.zeros(3)
+    memory, law_n = np.zeros(m.laws.shape[0]), np.zeros(3)
     q, v, f, a = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    bend, motor, slow = np.zeros(3), np.zeros(2), np.zeros(m.creep_stiffness.shape)
-    drive, before, now = np.zeros(3), np.zeros(3), np.zeros(n)
+    deflection, motor, creep = np.zeros(3), np.zeros(2), np.zeros(m.creep_stiffness.shape)
+    drive, previous_drive, v_now = np.zeros(3), np.zeros(3), np.zeros(n)
     for k in range(force.shape[0]):
-        now[:] = v + 0.5 * h * a
-        _inner(m, q, now, f)
-        _ground(m, q, now, bend, h, f)
-        _slow_ground(m, q, now, slow, k * h, f)
+        v_now[:] = v + 0.5 * h * a
+        _set_linear_forces(m, q, v_now, f)
+        _add_ground_forces(m, q, v_now, deflection, h, f)
+        _add_slow_forces(m, q, v_now, creep, k * h, f)
         for j in range(3):
             drive[j] = force[k, j]
         if m.laws.shape[0] > 0:
-            law_forces(m.laws, (q, now, drive), kept, k * h, pushed)
-            for number in range(m.laws.shape[0]):
-                kept[number] = law_memory(m.laws[number], q, drive, kept[number], h)
+            law_forces(m.laws, (q, v_now, drive), memory, k * h, law_n)
+            for index in range(m.laws.shape[0]):
+                memory[index] = law_memory(m.laws[index], q, drive, memory[index], h)
             for j in range(3):
-                f[j] += pushed[j]
+                f[j] += law_n[j]
         if m.play[AXIS] >= 0.0:
-            _through_play(m.play, q, v, motor, drive, h)
+            _apply_play(m.play, q, v, motor, drive, h)
         if k % steps == 0:
-            _accelerate_before(m, (q, now, before), (kept, k * h, pushed), f, a)
+            _accelerate_before(m, (q, v_now, previous_drive), (memory, k * h, law_n), f, a)
             for j in range(3):
                 acceleration[k // steps, j], position[k // steps, j] = a[j], q[j]
-                velocity[k // steps, j], lawful[k // steps, j] = now[j], pushed[j]
+                velocity[k // steps, j], lawful[k // steps, j] = v_now[j], law_n[j]
         _accelerate(m, q, f, drive, a)
         for i in range(n):
             v[i] += h * a[i]
             q[i] += h * v[i]
-        before[:] = drive
+        previous_drive[:] = drive
     return Motion(acceleration, position, velocity, lawful)
 
 
 @njit(cache=True, nogil=True)
 def _accelerate_before(
     m: Mechanism,
-    at: tuple[FloatArray, FloatArray, FloatArray],
+    state: tuple[FloatArray, FloatArray, FloatArray],
     laws: tuple[FloatArray, float, FloatArray],
     f: FloatArray,
     a: FloatArray,
 ) -> None:
-    """Acceleration `a` (n,) under the drive force of the previous step, also in laws of the command. at: positions,
+    """Acceleration `a` (n,) under the drive force of the previous step, also in laws of the command. state: positions,
     velocities, that drive force. laws: memory states, time (s), and the forces of the laws under the drive force of
     this step, which `f` contains."""
-    kept, t, pushed = laws
+    memory, t, law_n = laws
     if m.laws.shape[0] == 0:
-        _accelerate(m, at[0], f, at[2], a)
+        _accelerate(m, state[0], f, state[2], a)
         return
-    until, there = np.zeros(3), f.copy()
-    law_forces(m.laws, at, kept, t, until)
+    previous_law_n, previous_f = np.zeros(3), f.copy()
+    law_forces(m.laws, state, memory, t, previous_law_n)
     for j in range(3):
-        there[j] += until[j] - pushed[j]
-    _accelerate(m, at[0], there, at[2], a)
+        previous_f[j] += previous_law_n[j] - law_n[j]
+    _accelerate(m, state[0], previous_f, state[2], a)
 
 
 @njit(cache=True, nogil=True)
-def _inner(m: Mechanism, q: FloatArray, v: FloatArray, f: FloatArray) -> None:
+def _set_linear_forces(m: Mechanism, q: FloatArray, v: FloatArray, f: FloatArray) -> None:
     """Set `f` (n,) to the linear forces -K q - C v, N."""
     n = f.shape[0]
     for i in range(n):
@@ -143,43 +143,44 @@ def _inner(m: Mechanism, q: FloatArray, v: FloatArray, f: FloatArray) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _ground(m: Mechanism, q: FloatArray, v: FloatArray, bend: FloatArray, h: float, f: FloatArray) -> None:
-    """Add friction, `handle_force` and the coupling of x and y to `f`. bend: deflections of the bristles, updated."""
+def _add_ground_forces(
+    m: Mechanism, q: FloatArray, v: FloatArray, deflection: FloatArray, h: float, f: FloatArray
+) -> None:
+    """Add friction, `handle_force` and the coupling of x and y to `f`. deflection: deflections of the bristles,
+    updated."""
     for j in range(3):
-        rubbing, bend[j] = bristle_force(m.friction[j], q[j], v[j], bend[j], h)
-        f[j] += rubbing + handle_force(m.forces[j], q[j], v[j])
+        friction_n, deflection[j] = bristle_force(m.friction[j], q[j], v[j], deflection[j], h)
+        f[j] += friction_n + handle_force(m.forces[j], q[j], v[j])
     if m.coupling != 0.0:
         f[0] -= m.coupling * q[0] * q[1]
         f[1] -= 0.5 * m.coupling * q[0] * q[0]
 
 
 @njit(cache=True, nogil=True)
-def _slow_ground(m: Mechanism, q: FloatArray, v: FloatArray, slow: FloatArray, t: float, f: FloatArray) -> None:
-    """Add creep and time-varying forces to `f`. slow: relaxed part of the creep springs' deflection, updated; t: s."""
+def _add_slow_forces(m: Mechanism, q: FloatArray, v: FloatArray, creep: FloatArray, t: float, f: FloatArray) -> None:
+    """Add creep and time-varying forces to `f`. creep: relaxed part of the creep springs' deflection, updated; t: s."""
     for j in range(3):
-        for e in range(slow.shape[1]):
+        for e in range(creep.shape[1]):
             if m.creep_stiffness[j, e] != 0.0:
-                slow[j, e] += m.creep_share[e] * (q[j] - slow[j, e])
-                f[j] -= m.creep_stiffness[j, e] * (q[j] - slow[j, e])
+                creep[j, e] += m.creep_share[e] * (q[j] - creep[j, e])
+                f[j] -= m.creep_stiffness[j, e] * (q[j] - creep[j, e])
         row = m.varying[j]
         if row[RATE] > 0.0:
-            swing = sin(2.0 * pi * row[RATE] * t + row[TURN])
+            swing = sin(2.0 * pi * row[RATE] * t + row[PHASE])
             if row[SQUARE] > 0.0:
                 swing = 1.0 if swing > 0.0 else -1.0
             f[j] -= swing * (row[DAMPING_DEPTH] * v[j] + row[STIFFNESS_DEPTH] * q[j])
 
 
 @njit(cache=True, nogil=True)
-def _through_play(
-    play: FloatArray, q: FloatArray, v: FloatArray, motor: FloatArray, drive: FloatArray, h: float
-) -> None:
+def _apply_play(play: FloatArray, q: FloatArray, v: FloatArray, motor: FloatArray, drive: FloatArray, h: float) -> None:
     """Move the motor and replace its drive force by the contact force: a spring and a damper where the motor, relative
     to the handle, is beyond half of the gap. motor: its position and velocity, updated."""
     j = int(play[AXIS])
-    apart, closing = motor[0] - q[j], motor[1] - v[j]
-    into = max(apart - 0.5 * play[GAP], 0.0) + min(apart + 0.5 * play[GAP], 0.0)
-    contact = play[CONTACT] * into
-    if into != 0.0:
+    separation, closing = motor[0] - q[j], motor[1] - v[j]
+    penetration = max(separation - 0.5 * play[GAP], 0.0) + min(separation + 0.5 * play[GAP], 0.0)
+    contact = play[CONTACT] * penetration
+    if penetration != 0.0:
         contact += play[CONTACT_DAMPING] * closing
     motor[1] += h * (drive[j] - contact) / play[MOTOR_MASS]
     motor[0] += h * motor[1]
@@ -190,15 +191,15 @@ def _through_play(
 def _accelerate(m: Mechanism, q: FloatArray, f: FloatArray, drive: FloatArray, a: FloatArray) -> None:
     """Acceleration `a` (n,). A mass added to a single axis enters by the Sherman-Morrison formula."""
     n = f.shape[0]
-    heavier = 1.0 + m.inertia_per_m[0] * q[0] + m.inertia_per_m[1] * q[1] + m.inertia_per_m[2] * q[2]
+    inertia_factor = 1.0 + m.inertia_per_m[0] * q[0] + m.inertia_per_m[1] * q[1] + m.inertia_per_m[2] * q[2]
     for i in range(n):
         total = 0.0
         for j in range(n):
             total += m.inverse_mass[i, j] * (f[j] + drive[j] if j < 3 else f[j])
-        a[i] = total / heavier if i < 3 else total
+        a[i] = total / inertia_factor if i < 3 else total
     for j in range(3):
-        more = m.axis_mass_per_m[j] * q[j]
-        if more != 0.0:
-            own = a[j] / (1.0 + more * m.inverse_mass[j, j])
+        added_kg = m.axis_mass_per_m[j] * q[j]
+        if added_kg != 0.0:
+            axis_acceleration = a[j] / (1.0 + added_kg * m.inverse_mass[j, j])
             for i in range(3):
-                a[i] -= m.inverse_mass[i, j] * more * own
+                a[i] -= m.inverse_mass[i, j] * added_kg * axis_acceleration

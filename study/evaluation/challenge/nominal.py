@@ -13,7 +13,7 @@ import numpy as np
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits, Tolerance
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.bench import Bench
-from study.evaluation.challenge.device import Device, motion
+from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.drive_plan import AXES, LEVELS_N, RATE_HZ, DrivePlan
 from study.evaluation.challenge.sensor import BANDWIDTH_HZ, NOISE_MPS2, RANGE_MPS2
 from study.evaluation.challenge.sensor_kernel import one_pole
@@ -22,7 +22,7 @@ MODES_TOLERANCE = 0.005
 """Relative tolerance (standard deviation) of the modes, stated by every model of the challenge."""
 WIDE = Tolerance(0.05, 3.0, 100.0, MODES_TOLERANCE)
 """Tolerance of a re-tuned model: mass (kg), damping (N s/m), stiffness (N/m), modes."""
-ROUNDS, SLOPES_ANEW = 6, 2
+ROUNDS, JACOBIAN_UPDATES = 6, 2
 """Most Gauss-Newton steps of the re-tuning, and the number of first steps in which the Jacobian is recomputed."""
 DECIMALS = 8
 """Significant digits of the matrices in the model file."""
@@ -41,8 +41,8 @@ def draw_calibration(
         modes=MODES_TOLERANCE,
     )
     sizes = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
-    off = random.normal(size=9) * np.repeat(np.array(sizes, dtype=np.float64), 3)
-    return shift_diagonals(bench, off * _axes_mask(axes)), tolerance
+    errors = random.normal(size=9) * np.repeat(np.array(sizes, dtype=np.float64), 3)
+    return shift_diagonals(bench, errors * _axes_mask(axes)), tolerance
 
 
 def retune(
@@ -51,36 +51,40 @@ def retune(
     """The bench whose mass, damping and stiffness at these axes best fit the response to the multisines at 1.5 N, and
     the tolerance `WIDE`. response: (samples, 3), m/s^2; its residuals are divided by the sensor noise. Gauss-Newton
     with forward differences, at most `ROUNDS` steps, until every change is below a twentieth of its difference step."""
-    parts = [s for s in plan.segments if s.role == "fit" and s.amplitude == LEVELS_N[1]]
-    commands = [plan.command[s.start : s.stop] for s in parts]
-    seen, free = list(axes), _axes_mask(axes)
-    noise = np.array(NOISE_MPS2)[seen]
-    wanted = np.vstack([response[s.start : s.stop, seen] for s in parts]) / noise
+    fit_segments = [s for s in plan.segments if s.role == "fit" and s.amplitude == LEVELS_N[1]]
+    commands = [plan.command[s.start : s.stop] for s in fit_segments]
+    channels, axes_mask = list(axes), _axes_mask(axes)
+    noise = np.array(NOISE_MPS2)[channels]
+    measured = np.vstack([response[s.start : s.stop, channels] for s in fit_segments]) / noise
     # Difference steps: kg, N s/m, N/m, for three axes each.
     steps = np.repeat((1e-3, 1e-2, 1.0), 3)
     shift = np.zeros(9)
 
-    def predicted(at: FloatArray) -> FloatArray:
-        played = np.vstack([_linear_response(shift_diagonals(bench, at), command)[:, seen] for command in commands])
-        return np.asarray(played / noise)
+    def predict(trial_shift: FloatArray) -> FloatArray:
+        responses = np.vstack(
+            [_linear_response(shift_diagonals(bench, trial_shift), command)[:, channels] for command in commands]
+        )
+        return np.asarray(responses / noise)
 
-    slopes = np.zeros((wanted.size, 9))
-    for turn in range(ROUNDS):
-        here = predicted(shift)
-        if turn < SLOPES_ANEW:
-            each = [(predicted(shift + h * unit) - here).ravel() / h for h, unit in zip(steps, np.eye(9), strict=True)]
-            slopes = np.column_stack(each) * free
-        change = np.linalg.lstsq(slopes, (wanted - here).ravel(), rcond=None)[0]
+    jacobian = np.zeros((measured.size, 9))
+    for iteration in range(ROUNDS):
+        prediction = predict(shift)
+        if iteration < JACOBIAN_UPDATES:
+            columns = [
+                (predict(shift + h * unit) - prediction).ravel() / h for h, unit in zip(steps, np.eye(9), strict=True)
+            ]
+            jacobian = np.column_stack(columns) * axes_mask
+        change = np.linalg.lstsq(jacobian, (measured - prediction).ravel(), rcond=None)[0]
         shift = _limit_shift(shift + change, bench)
         if np.abs(change / steps).max() < 0.05:
             break
     return shift_diagonals(bench, shift), WIDE
 
 
-def shift_diagonals(bench: Bench, by: FloatArray) -> Bench:
-    """The bench with the diagonals of mass, damping and stiffness at the handle changed. by: (9,): changes in kg, N s/m
-    and N/m, for x, y, z each."""
-    mass, damping, stiffness = (np.diag(part) for part in np.asarray(by).reshape(3, 3))
+def shift_diagonals(bench: Bench, changes: FloatArray) -> Bench:
+    """The bench with the diagonals of mass, damping and stiffness at the handle changed. changes: (9,): changes in kg,
+    N s/m and N/m, for x, y, z each."""
+    mass, damping, stiffness = (np.diag(part) for part in np.asarray(changes).reshape(3, 3))
     return replace(
         bench, mass=bench.mass + mass, damping=bench.damping + damping, stiffness=bench.stiffness + stiffness
     )
@@ -90,9 +94,9 @@ def as_model(name: str, bench: Bench, tolerance: Tolerance, axes: tuple[int, ...
     """The mechanical model as it is written to the file, with `DECIMALS` significant digits: driven and measured at
     these axes, with the limits of the sensor and the tolerance."""
     mass, damping, stiffness = (_round_significant(matrix) for matrix in bench.matrices())
-    seen = np.eye(len(AXES), len(mass))[list(axes)]
+    selection = np.eye(len(AXES), len(mass))[list(axes)]
     return MechanicalModel(
-        name, "acceleration", mass, damping, stiffness, seen.T, seen,
+        name, "acceleration", mass, damping, stiffness, selection.T, selection,
         sensor=SensorLimits(BANDWIDTH_HZ, RANGE_MPS2), tolerance=tolerance,
     )  # fmt: skip
 
@@ -106,7 +110,7 @@ def _axes_mask(axes: tuple[int, ...]) -> FloatArray:
 def _linear_response(bench: Bench, command: FloatArray) -> FloatArray:
     """(samples, 3): acceleration of the bench, m/s^2, behind the sensor's first-order low pass. command: (samples, 3),
     N."""
-    acceleration, _ = motion(Device(bench), command)
+    acceleration, _ = simulate_motion(Device(bench), command)
     smoothed: FloatArray = one_pole(acceleration, 1.0 - np.exp(-2 * np.pi * BANDWIDTH_HZ / RATE_HZ))
     return smoothed
 

@@ -57,26 +57,30 @@ class Sensor:
     """Maps the readings (samples, 3)."""
 
 
-def read(
+def read_sensor(
     sensor: Sensor, acceleration: FloatArray, position: FloatArray, rate_hz: float, random: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
     """Measured acceleration and position, (samples, 3) each."""
     smoothed = one_pole(acceleration, 1.0 - np.exp(-2 * np.pi * sensor.bandwidth_hz / rate_hz))
     signal = _apply_nonlinearity(sensor, smoothed @ sensor.orientation.T)
-    part = np.linspace(0.0, 1.0, len(signal))[:, None]
+    elapsed_share = np.linspace(0.0, 1.0, len(signal))[:, None]
     turns = 2 * np.pi * sensor.hum_hz * np.arange(len(signal))[:, None] / rate_hz
     signal = (
-        signal + sensor.offset + sensor.drift * part + sensor.hum[0] * np.sin(turns) + sensor.hum[1] * np.cos(turns)
+        signal
+        + sensor.offset
+        + sensor.drift * elapsed_share
+        + sensor.hum[0] * np.sin(turns)
+        + sensor.hum[1] * np.cos(turns)
     )
     signal = _resample(signal, sensor.ppm, sensor.late_s * rate_hz)
-    where = _resample(position, sensor.ppm, 0.0)
+    position_reading = _resample(position, sensor.ppm, 0.0)
     signal = np.clip(signal + random.normal(size=signal.shape) * NOISE_MPS2, -sensor.limit, sensor.limit)
     if sensor.step > 0.0:
         signal = sensor.step * np.round(signal / sensor.step)
-    where = where + POSITION_NOISE_M * random.normal(size=where.shape)
-    where = POSITION_STEP_M * np.round(where / POSITION_STEP_M)
-    kept = _last_kept(len(signal), sensor.lost, random)
-    return signal[kept], where[kept]
+    position_reading = position_reading + POSITION_NOISE_M * random.normal(size=position_reading.shape)
+    position_reading = POSITION_STEP_M * np.round(position_reading / POSITION_STEP_M)
+    sample_index = _last_received(len(signal), sensor.lost, random)
+    return signal[sample_index], position_reading[sample_index]
 
 
 def _apply_nonlinearity(sensor: Sensor, signal: FloatArray) -> FloatArray:
@@ -88,18 +92,22 @@ def _apply_nonlinearity(sensor: Sensor, signal: FloatArray) -> FloatArray:
     return signal if sensor.play == 0.0 else play_hysteresis(signal, sensor.play)
 
 
-def _resample(samples: FloatArray, ppm: float, late: float) -> FloatArray:
-    """Resample with linear interpolation for a clock error (ppm) and a delay. late: in samples."""
-    if ppm == 0.0 and late == 0.0:
+def _resample(samples: FloatArray, ppm: float, delay_samples: float) -> FloatArray:
+    """Resample with linear interpolation for a clock error (ppm) and a delay. delay_samples: in samples."""
+    if ppm == 0.0 and delay_samples == 0.0:
         return samples
     k = np.arange(len(samples), dtype=np.float64)
-    times = k * (1.0 + 1e-6 * ppm) - late
+    times = k * (1.0 + 1e-6 * ppm) - delay_samples
     return np.column_stack([np.interp(times, k, column) for column in samples.T])
 
 
-def _last_kept(samples: int, lost: float, random: np.random.Generator) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+def _last_received(
+    samples: int, lost: float, random: np.random.Generator
+) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     """Index of the last sample that was not lost, for every sample."""
-    there = random.random(samples) >= lost
-    there[0] = True
-    kept: np.ndarray[tuple[int], np.dtype[np.int64]] = np.maximum.accumulate(np.where(there, np.arange(samples), 0))
-    return kept
+    is_received = random.random(samples) >= lost
+    is_received[0] = True
+    sample_index: np.ndarray[tuple[int], np.dtype[np.int64]] = np.maximum.accumulate(
+        np.where(is_received, np.arange(samples), 0)
+    )
+    return sample_index

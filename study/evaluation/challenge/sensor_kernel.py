@@ -22,10 +22,10 @@ def one_pole(samples: FloatArray, share: float) -> FloatArray:
 def play_hysteresis(samples: FloatArray, half_width: float) -> FloatArray:
     """Play operator: the output stays within `half_width` of the input and moves only when it must; 0 at the start.
     samples: (n, channels)."""
-    followed = np.zeros(samples.shape)
+    output = np.zeros(samples.shape)
     for j in range(samples.shape[1]):
         y = 0.0
         for k in range(samples.shape[0]):
             y = min(max(y, samples[k, j] - half_width), samples[k, j] + half_width)
-            followed[k, j] = y
-    return followed
+            output[k, j] = y
+    return output

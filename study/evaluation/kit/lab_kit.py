@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.evaluation.blind_test.lab_kit import CHANGES, CHANGES_BY_NAME, NOTHING, Label
+from analysis.evaluation.blind_test.lab_kit import CHANGES, CHANGES_BY_NAME, CONTROL_CHANGE, Label
 from equalizer.plant.mechanical_model import suggest_word
 from study.errors import StudyError
 from study.store.disk.csv_rows import CsvError, rows_from_csv, rows_to_csv
@@ -23,17 +23,19 @@ CORRECT_FIRST = "Correct it before it is sealed; from then on nothing in it may 
 """Advice for an invalid table."""
 
 
-def draw_labels(out: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
+def draw_labels(table_path: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
     """Write a table with every change `repeats` times, and the control (nothing is changed) twice as often, in random
     order. Each row has a random salt, so that the order cannot be found by trying all orders against the seal's hash.
     seed: of the order; None draws a secret seed. Raises AlreadyThereError, CannotWriteError."""
-    every = [change.name for change in CHANGES for _ in range(repeats * (2 if change.name == NOTHING else 1))]
-    order = np.random.default_rng(secrets.randbits(64) if seed is None else seed).permutation(len(every))
+    change_names = [
+        change.name for change in CHANGES for _ in range(repeats * (2 if change.name == CONTROL_CHANGE else 1))
+    ]
+    order = np.random.default_rng(secrets.randbits(64) if seed is None else seed).permutation(len(change_names))
     labels = tuple(
-        Label(f"rec_{number:02d}", every[int(place)], None, "", secrets.token_hex(8))
-        for number, place in enumerate(order, start=1)
+        Label(f"rec_{number:02d}", change_names[int(index)], None, "", secrets.token_hex(8))
+        for number, index in enumerate(order, start=1)
     )
-    write_text(out, rows_to_csv(labels, Label))
+    write_text(table_path, rows_to_csv(labels, Label))
     return labels
 
 
@@ -64,10 +66,10 @@ def seal_labels(path: Path) -> str:
     digest, seal = sha256_of(path), seal_of(path)
     if not seal.exists():
         write_text(seal, f"{digest}  {path.name}\n")
-    elif (before := read_sealed_hash(path)) != digest:
+    elif (earlier_hash := read_sealed_hash(path)) != digest:
         raise StudyError(
             "The table was sealed before, with another hash",
-            f"{seal.name} says {before or 'no hash'}; {path.name} has {digest} now.",
+            f"{seal.name} says {earlier_hash or 'no hash'}; {path.name} has {digest} now.",
             "Put the table back as it was sealed. If it was wrong then, draw a new one under another name, and record "
             "again: the first hash is known to those who diagnose.",
             saved="Nothing was changed.",

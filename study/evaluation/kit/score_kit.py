@@ -10,7 +10,14 @@ from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis
 from analysis.evaluation.blind_test.confidence_intervals import Figure
-from analysis.evaluation.blind_test.lab_kit import MISSING, Label, Scored, kit_figures, score_label, score_unanswered
+from analysis.evaluation.blind_test.lab_kit import (
+    MISSING,
+    Label,
+    Scored,
+    compute_kit_figures,
+    score_label,
+    score_unanswered,
+)
 from study.errors import StudyError, WrongUseError
 from study.evaluation.kit.lab_kit import read_labels, read_sealed_hash, seal_of
 from study.store.disk.csv_rows import rows_to_csv
@@ -36,30 +43,30 @@ class KitScore:
     """Source of the hash with which `sha256` was compared, in words."""
 
 
-def score_kit(path: Path, diagnoses: Path, out: Path, seal: str | None = None) -> KitScore:
-    """Score a laboratory's diagnoses against its revealed table, and write the scored rows to `out` as CSV. diagnoses:
-    a folder per recording, as `hapteq diagnose --out` writes them. seal: the hash that was handed over before the
-    diagnoses; None: the table is compared only with the seal file next to it. Raises StudyError."""
+def score_kit(path: Path, diagnoses: Path, scores_path: Path, seal: str | None = None) -> KitScore:
+    """Score a laboratory's diagnoses against its revealed table, and write the scored rows to `scores_path` as CSV.
+    diagnoses: a folder per recording, as `hapteq diagnose --out` writes them. seal: the hash that was handed over
+    before the diagnoses; None: the table is compared only with the seal file next to it. Raises StudyError."""
     digest = sha256_of(path)
     compared_with = _require_sealed(path, digest, seal)
     labels = read_labels(path)
-    found = _diagnoses(diagnoses, labels)
+    diagnosis_of_labels = _read_diagnoses(diagnoses, labels)
     rows = tuple(
-        score_unanswered(label) if each is None else score_label(label, each)
-        for label, each in zip(labels, found, strict=True)
+        score_unanswered(label) if diagnosis is None else score_label(label, diagnosis)
+        for label, diagnosis in zip(labels, diagnosis_of_labels, strict=True)
     )
-    write_text(out, rows_to_csv(rows, Scored))
-    return KitScore(rows, kit_figures(rows), digest, compared_with)
+    write_text(scores_path, rows_to_csv(rows, Scored))
+    return KitScore(rows, compute_kit_figures(rows), digest, compared_with)
 
 
 def score_lines(score: KitScore) -> tuple[str, ...]:
     """The score as lines for a terminal: rates, labels that were missed or have no diagnosis, and the hash."""
-    figures = (_figure_line(figure) for figure in score.figures)
-    rows = (_row_line(row) for row in score.rows if not row.right)
+    figures = (_format_figure(figure) for figure in score.figures)
+    rows = (_format_row(row) for row in score.rows if not row.right)
     return (*figures, *rows, f"Labels: SHA-256 {score.sha256}, {score.compared_with}.")
 
 
-def _figure_line(figure: Figure) -> str:
+def _format_figure(figure: Figure) -> str:
     """A rate in percent, with its 95 % confidence interval in brackets."""
     if figure.value is None or figure.low is None or figure.high is None:
         return f"{figure.name}: none"
@@ -67,16 +74,14 @@ def _figure_line(figure: Figure) -> str:
     return f"{figure.name}: {figure.hits} of {figure.of}, {100 * figure.value:.0f} % {interval}"
 
 
-def _row_line(each: Scored) -> str:
+def _format_row(row: Scored) -> str:
     """A label that was missed by its diagnosis, or has none."""
-    if each.verdict == MISSING:
-        return f"Missing: {each.recording}, {each.change}: no diagnosis; it counts as not right."
-    return (
-        f"Missed: {each.recording}, {each.change}: {each.verdict.replace('_', ' ')}, named {each.named or 'nothing'}."
-    )
+    if row.verdict == MISSING:
+        return f"Missing: {row.recording}, {row.change}: no diagnosis; it counts as not right."
+    return f"Missed: {row.recording}, {row.change}: {row.verdict.replace('_', ' ')}, named {row.named or 'nothing'}."
 
 
-def _diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | None, ...]:
+def _read_diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | None, ...]:
     """Diagnosis of each label, in order; None for a label without one. Raises StudyError where the folder is missing or
     no label has a diagnosis."""
     if not folder.is_dir():
@@ -86,9 +91,9 @@ def _diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | Non
             "Give --diagnoses the folder that holds one folder per recording, by its name.",
             saved=UNSCORED,
         )
-    found = tuple(_diagnosis(folder, label.recording) for label in labels)
-    if any(each is not None for each in found):
-        return found
+    diagnoses = tuple(_read_one_diagnosis(folder, label.recording) for label in labels)
+    if any(diagnosis is not None for diagnosis in diagnoses):
+        return diagnoses
     raise StudyError(
         "There is no diagnosis to score",
         f"{folder} holds no {DIAGNOSIS_NAME} of any recording in the table, such as "
@@ -98,18 +103,18 @@ def _diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | Non
     )
 
 
-def _diagnosis(folder: Path, recording: str) -> Diagnosis | None:
+def _read_one_diagnosis(folder: Path, recording: str) -> Diagnosis | None:
     """Diagnosis of a recording; None where its file is missing. Raises StudyError where the file is unusable."""
-    place = folder / recording / DIAGNOSIS_NAME
-    if not place.is_file():
+    path = folder / recording / DIAGNOSIS_NAME
+    if not path.is_file():
         return None
     try:
-        return read_diagnosis(place)
+        return read_diagnosis(path)
     except StudyError as error:
         raise StudyError(
             f"{recording}/{error.title}",
             error.happened,
-            f"Get {place.parent} again as `hapteq diagnose` wrote it, or move it away: then it counts as not right.",
+            f"Get {path.parent} again as `hapteq diagnose` wrote it, or move it away: then it counts as not right.",
             saved=UNSCORED,
         ) from error
 
@@ -117,36 +122,36 @@ def _diagnosis(folder: Path, recording: str) -> Diagnosis | None:
 def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
     """The hash with which the hash of the table was compared, in words. Raises StudyError where they differ, or without
     a seal."""
-    beside = seal_of(path)
+    seal_path = seal_of(path)
     if seal is None:
-        sealed_digest, who = read_sealed_hash(path), f"{beside.name} says"
-        how = (
-            f"compared only with {beside.name} in the same folder, which can be rewritten together with the table: "
+        sealed_digest, source = read_sealed_hash(path), f"{seal_path.name} says"
+        comparison = (
+            f"compared only with {seal_path.name} in the same folder, which can be rewritten together with the table: "
             "give --seal the hash that was handed over before the diagnoses"
         )
     else:
-        sealed_digest, who, how = _hash(seal), "--seal gives", "the hash that --seal gives"
+        sealed_digest, source, comparison = _parse_hash(seal), "--seal gives", "the hash that --seal gives"
     if sealed_digest == digest:
-        return how
+        return comparison
     raise StudyError(
         "The labels are not those that were sealed",
-        f"{path.name} has the hash {digest}; {who} {sealed_digest}."
+        f"{path.name} has the hash {digest}; {source} {sealed_digest}."
         if sealed_digest
-        else f"There is no seal in {beside.name}.",
+        else f"There is no seal in {seal_path.name}.",
         "Score the table as it was sealed before the diagnoses; changes made to it since cannot be trusted.",
         saved=UNSCORED,
     )
 
 
-def _hash(typed: str) -> str:
+def _parse_hash(seal_text: str) -> str:
     """The hash in the value of --seal, which may be the whole line of the seal file. Raises WrongUseError without a
     hash."""
-    first_word = (typed.split() or [""])[0].lower()
+    first_word = (seal_text.split() or [""])[0].lower()
     if re.fullmatch("[0-9a-f]{64}", first_word):
         return first_word
     raise WrongUseError(
         "That is no SHA-256",
-        f"--seal gives '{typed}'; a hash has 64 digits from 0 to 9 and a to f.",
+        f"--seal gives '{seal_text}'; a hash has 64 digits from 0 to 9 and a to f.",
         "Give the whole hash, as `hapteq kit seal` printed it.",
         saved=UNSCORED,
     )

@@ -22,7 +22,7 @@ from analysis.diagnosis.errors.prediction_error import PredictionError, predicti
 from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
 from analysis.diagnosis.localisation.clean_floor import NothingLearned
-from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare
+from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare_recordings
 from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, describe_named
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from analysis.diagnosis.result.findings import Findings
@@ -58,124 +58,140 @@ class _ImportedCase:
     model: MechanicalModel
     balances: tuple[Balance, ...] | None
     remarks: tuple[str, ...]
-    before: Recording | None
+    reference: Recording | None
     """Recording of the same device before the change, where there is one."""
 
 
-def report_crash(wanted: RealRecording, crash: Exception) -> RealDiagnosis:
+def report_crash(real_recording: RealRecording, crash: Exception) -> RealDiagnosis:
     """Result for a recording at which the program crashed."""
     error = f"{type(crash).__name__}: {crash}".rstrip(": .")
-    broken = (
+    crash_text = (
         f"The program crashed at this recording ({error}). That is a fault of the program; the others are answered."
     )
-    return RealDiagnosis(_refusal(wanted, broken), None, wanted.parents)
+    return RealDiagnosis(_make_refusal(real_recording, crash_text), None, real_recording.parents)
 
 
-def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on_progress: Progress) -> RealDiagnosis:
+def diagnose_real(
+    real_recording: RealRecording, time_left: TimeBudget, guard: Guard, on_progress: Progress
+) -> RealDiagnosis:
     """Diagnose one recording. One that cannot be diagnosed is returned as refused, with the reason. Raises only
     UserInterruptError."""
-    parents = wanted.parents
+    parents = real_recording.parents
     try:
-        case = _import_case(wanted, (time_left, guard), on_progress)
+        case = _import_case(real_recording, (time_left, guard), on_progress)
         settings = DiagnosisSettings(
-            names=(wanted.name,),
-            clean=() if case.before is None else (case.before,),
-            fitted=wanted.model() is None,
+            names=(real_recording.name,),
+            clean=() if case.reference is None else (case.reference,),
+            fitted=real_recording.model() is None,
             balances=case.balances,
             time_left=time_left,
             guard=guard,
         )
-        found = diagnose((case.recording,), case.model, settings, map_forked, on_progress)
-        found = replace(found, remarks=(*case.remarks, *found.remarks))
-        diagnosis = wanted.found.source.map.diagnosis
-        names = (wanted.folder.name, wanted.name, wanted.found.source.map.title)
-        answer = answer_of_findings(found, case.recording, names, diagnosis.nominal)
+        findings = diagnose((case.recording,), case.model, settings, map_forked, on_progress)
+        findings = replace(findings, remarks=(*case.remarks, *findings.remarks))
+        diagnosis = real_recording.found_map.source.map.diagnosis
+        names = (real_recording.folder.name, real_recording.name, real_recording.found_map.source.map.title)
+        answer = answer_of_findings(findings, case.recording, names, diagnosis.nominal)
     except StudyError as refusal:
-        return RealDiagnosis(_refusal(wanted, f"{refusal.title}: {refusal.happened}"), None, parents)
+        return RealDiagnosis(_make_refusal(real_recording, f"{refusal.title}: {refusal.happened}"), None, parents)
     except (NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:
-        return RealDiagnosis(_refusal(wanted, f"The fits broke down: {refusal}."), None, parents)
-    further = tuple(_test_on_further(each, wanted, found) for each in wanted.tests)
-    pair = None if case.before is None else _compare_pair(wanted, case, found)
+        return RealDiagnosis(_make_refusal(real_recording, f"The fits broke down: {refusal}."), None, parents)
+    further_tests = tuple(_test_on_further(test, real_recording, findings) for test in real_recording.tests)
+    pair = None if case.reference is None else _compare_pair(real_recording, case, findings)
     objections = (
         *diagnosis.objections,
-        *(objection for each in wanted.tests for objection in each.source.map.diagnosis.objections),
+        *(objection for test in real_recording.tests for objection in test.source.map.diagnosis.objections),
     )
-    answer = replace(answer, further=further, pair=pair, objections=objections)
-    return RealDiagnosis(answer if pair is None else _downgrade_if_remainder(answer, pair), found, parents)
+    answer = replace(answer, further=further_tests, pair=pair, objections=objections)
+    return RealDiagnosis(answer if pair is None else _downgrade_if_remainder(answer, pair), findings, parents)
 
 
 def _downgrade_if_remainder(answer: RealAnswer, pair: PairOutcome) -> RealAnswer:
     """Downgrade "explained" to "partly explained" where the recording made before the change shows a remainder
     beyond what the model missed then: a single reference recording leaves wide uncertainty."""
-    left, missed = pair.with_effects, pair.expected_left
-    if answer.verdict != "explained" or left is None or missed is None or left <= EXPLAINED_ERROR * missed:
+    remaining_error, reference_error = pair.with_effects, pair.expected_left
+    if (
+        answer.verdict != "explained"
+        or remaining_error is None
+        or reference_error is None
+        or remaining_error <= EXPLAINED_ERROR * reference_error
+    ):
         return answer
     text = (
-        f"Still unexplained: the error on held-out data is {100 * left:.3g} % of the signal; before the change it was "
-        f"{100 * missed:.3g} %."
+        f"Still unexplained: the error on held-out data is {100 * remaining_error:.3g} % of the signal; "
+        f"before the change it was {100 * reference_error:.3g} %."
     )
     return replace(answer, verdict="partly_explained", left=text, pair=replace(pair, verdict="partly_explained"))
 
 
-def import_real_recording(found: FoundMap) -> Recording:
+def import_real_recording(found_map: FoundMap) -> Recording:
     """The one force-driven recording of a map. Raises StudyError."""
-    recording = build_recording(found.source.map, found.files, lambda share: None).recording
+    recording = build_recording(found_map.source.map, found_map.files, lambda share: None).recording
     return all_as_force_driven([recording])[0]
 
 
-def _import_case(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: Progress) -> _ImportedCase:
+def _import_case(
+    real_recording: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: Progress
+) -> _ImportedCase:
     """Import the recording, its model and the recording made before. Raises StudyError where there is nothing to
     diagnose."""
     on_progress("importing", 0.0)
-    if why := wanted.found.source.map.diagnosis.skip:
-        raise not_diagnosable_error((why,))
+    if skip_reason := real_recording.found_map.source.map.diagnosis.skip:
+        raise not_diagnosable_error((skip_reason,))
     # Of a real recording, for which there is no other, few cycles are a remark.
     try:
-        ready = prepare((import_real_recording(wanted.found),), (wanted.name,), _is_plain(wanted), short=True)
+        prepared = prepare_recordings(
+            (import_real_recording(real_recording.found_map),),
+            (real_recording.name,),
+            _allows_force_balance(real_recording),
+            accept_short=True,
+        )
     except NothingToDiagnose as refusal:
         raise not_diagnosable_error(refusal.problems) from refusal
-    before = () if wanted.before is None else (import_real_recording(wanted.before),)
-    alike = keep_common_signals((*ready.recordings, *before))
-    recording = alike.recordings[0]
-    first = _model(wanted, recording, bounds, on_progress)
-    remarks = (*ready.remarks, *alike.remarks, *first.remarks)
-    return _ImportedCase(recording, first.model, first.balances, remarks, alike.recordings[1] if before else None)
+    references = () if real_recording.reference is None else (import_real_recording(real_recording.reference),)
+    common = keep_common_signals((*prepared.recordings, *references))
+    recording = common.recordings[0]
+    first_model = _choose_model(real_recording, recording, bounds, on_progress)
+    remarks = (*prepared.remarks, *common.remarks, *first_model.remarks)
+    return _ImportedCase(
+        recording, first_model.model, first_model.balances, remarks, common.recordings[1] if references else None
+    )
 
 
-def _is_plain(wanted: RealRecording) -> bool:
+def _allows_force_balance(real_recording: RealRecording) -> bool:
     """Whether a force balance of the recording is possible: neither a given model nor a reference recording fixes its
     commands and responses."""
-    return wanted.before is None and wanted.model() is None
+    return real_recording.reference is None and real_recording.model() is None
 
 
-def _model(
-    wanted: RealRecording, recording: Recording, bounds: tuple[TimeBudget, Guard], on_progress: Progress
+def _choose_model(
+    real_recording: RealRecording, recording: Recording, bounds: tuple[TimeBudget, Guard], on_progress: Progress
 ) -> FirstModel:
     """The given model, else a linear model fitted to the recording, and its force balance where there is no reference
     recording. Raises StudyError."""
-    given = wanted.model()
-    if given is None:
-        alone = DiagnosisInput((recording,), (wanted.name,), wanted.found.files, ())
-        if wanted.before is not None:
+    given_model = real_recording.model()
+    if given_model is None:
+        diagnosis_input = DiagnosisInput((recording,), (real_recording.name,), real_recording.found_map.files, ())
+        if real_recording.reference is not None:
             return FirstModel(
-                *fit_linear_model(alone, lambda share: on_progress("fitting a linear model", 0.1 * share))
+                *fit_linear_model(diagnosis_input, lambda share: on_progress("fitting a linear model", 0.1 * share))
             )
-        return first_model_of(alone, (), bounds, lambda what, share: on_progress(what, 0.1 * share))
+        return first_model_of(diagnosis_input, (), bounds, lambda step, share: on_progress(step, 0.1 * share))
     try:
-        require_model_of(given, (recording,))
+        require_model_of(given_model, (recording,))
     except NothingToDiagnose as refusal:
         raise not_diagnosable_error(refusal.problems) from refusal
-    return FirstModel(given, ())
+    return FirstModel(given_model, ())
 
 
-def _refusal(wanted: RealRecording, answer: str) -> RealAnswer:
+def _make_refusal(real_recording: RealRecording, answer: str) -> RealAnswer:
     """The answer for a recording that is not diagnosed."""
-    diagnosis = wanted.found.source.map.diagnosis
+    diagnosis = real_recording.found_map.source.map.diagnosis
     return RealAnswer(
-        folder=wanted.folder.name,
-        recording=wanted.name,
-        title=wanted.found.source.map.title,
-        device=wanted.found.source.map.device,
+        folder=real_recording.folder.name,
+        recording=real_recording.name,
+        title=real_recording.found_map.source.map.title,
+        device=real_recording.found_map.source.map.device,
         verdict="refused",
         answer=answer,
         model="",
@@ -198,65 +214,69 @@ def _refusal(wanted: RealRecording, answer: str) -> RealAnswer:
     )
 
 
-def _test_on_further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherTest:
+def _test_on_further(test: FoundMap, real_recording: RealRecording, findings: Findings) -> FurtherTest:
     """Test on a further recording; nothing is fitted to it except, where the map says so, its gain. The models are as
     recorded, so that the direction in which commands are counted was decided once, for all recordings of the device."""
-    title, free = test.source.map.title, test.source.map.diagnosis.volume_free
+    title, has_free_gain = test.source.map.title, test.source.map.diagnosis.volume_free
     try:
         recording = import_real_recording(test)
-        if _is_plain(wanted):
+        if _allows_force_balance(real_recording):
             (recording,) = all_as_force_driven(one_motion_per_force((recording,), turns=False)[0])
         retuned, after = (
-            prediction_error(recording, model, "all") for model in (_require_retuned(found), found.improved)
+            prediction_error(recording, model, "all") for model in (_require_retuned(findings), findings.improved)
         )
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
         text = problem.happened if isinstance(problem, StudyError) else f"{problem}."
         return FurtherTest(test.name, title, "", None, None, problem=text)
-    without, with_it = (each.with_gain if free else each.without_gain for each in (retuned, after))
-    text = after.error + (", one factor fitted" if free else "")
-    stretches = (
-        () if free or after.error == "predicted force" else _stretch_of_whole(test.name, recording, retuned, after)
+    error_without, error_with = (
+        errors.with_gain if has_free_gain else errors.without_gain for errors in (retuned, after)
     )
-    return FurtherTest(test.name, title, text, without, with_it, stretches)
+    text = after.error + (", one factor fitted" if has_free_gain else "")
+    stretches = (
+        ()
+        if has_free_gain or after.error == "predicted force"
+        else _full_record_stretches(test.name, recording, retuned, after)
+    )
+    return FurtherTest(test.name, title, text, error_without, error_with, stretches)
 
 
-def _stretch_of_whole(
+def _full_record_stretches(
     name: str, recording: Recording, retuned: PredictionError, after: PredictionError
 ) -> tuple[HeldOutStretch, ...]:
     """The whole recording as one held-out stretch per channel, with the errors of both models."""
     seconds = len(recording) / recording.sample_rate_hz
     return tuple(
-        HeldOutStretch(name, channel.name, channel.unit, 0.0, seconds, channel.signal, channel.error, with_it.error)
-        for channel, with_it in zip(retuned.channels, after.channels, strict=False)
+        HeldOutStretch(name, channel.name, channel.unit, 0.0, seconds, channel.signal, channel.error, improved.error)
+        for channel, improved in zip(retuned.channels, after.channels, strict=False)
     )
 
 
-def _require_retuned(found: Findings) -> MechanicalModel:
-    assert found.retuned is not None
-    return found.retuned
+def _require_retuned(findings: Findings) -> MechanicalModel:
+    assert findings.retuned is not None
+    return findings.retuned
 
 
-def _compare_pair(wanted: RealRecording, case: _ImportedCase, found: Findings) -> PairOutcome:
+def _compare_pair(real_recording: RealRecording, case: _ImportedCase, findings: Findings) -> PairOutcome:
     """The recordings before and after a change of the device: what was named, and the errors of the model before and
     after it was re-tuned and effects were added."""
-    assert wanted.before is not None and case.before is not None
-    given = prediction_error(case.recording, case.model, "test")
-    missed = prediction_error(case.before, case.model, "test")
-    errors = found.diagnosis.fit.test
+    assert real_recording.reference is not None and case.reference is not None
+    given_errors = prediction_error(case.recording, case.model, "test")
+    reference_errors = prediction_error(case.reference, case.model, "test")
+    errors = findings.diagnosis.fit.test
     return PairOutcome(
-        changed=wanted.changed,
-        before=_file_names(wanted.before.files),
-        after=_file_names(wanted.found.files),
-        verdict=found.diagnosis.verdict,
-        named=describe_named(found),
-        returned=found.diagnosis.returned_set,
-        as_before=given.without_gain,
-        gain=given.with_gain,
+        changed=real_recording.changed,
+        before=_join_file_names(real_recording.reference.files),
+        after=_join_file_names(real_recording.found_map.files),
+        verdict=findings.diagnosis.verdict,
+        named=describe_named(findings),
+        returned=findings.diagnosis.returned_set,
+        as_before=given_errors.without_gain,
+        gain=given_errors.with_gain,
         retuned=errors.retuned,
-        with_effects=errors.after if found.diagnosis.effects else None,
-        expected_left=missed.without_gain,
+        with_effects=errors.after if findings.diagnosis.effects else None,
+        expected_left=reference_errors.without_gain,
     )
 
 
-def _file_names(files: Sequence[Path]) -> str:
+def _join_file_names(files: Sequence[Path]) -> str:
     return ", ".join(path.name for path in files)

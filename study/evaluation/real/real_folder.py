@@ -21,10 +21,10 @@ class RealRecording:
     """One recording to diagnose."""
 
     folder: Path
-    found: FoundMap
+    found_map: FoundMap
     tests: tuple[FoundMap, ...] = ()
     """Recordings of the same device that are only predicted."""
-    before: FoundMap | None = None
+    reference: FoundMap | None = None
     """Recording of the same device before something was changed on it."""
     changed: str = ""
     """That change in words."""
@@ -32,7 +32,7 @@ class RealRecording:
     @property
     def name(self) -> str:
         """Name of the recording, by its map."""
-        return self.found.name
+        return self.found_map.name
 
     def model(self) -> MechanicalModel | None:
         """The given model; None where a linear one is to be fitted. Raises StudyError."""
@@ -42,12 +42,17 @@ class RealRecording:
     @property
     def parents(self) -> tuple[Path, ...]:
         """Input files of the diagnosis: recordings, map, and the model if given."""
-        before = () if self.before is None else self.before.files
+        reference_files = () if self.reference is None else self.reference.files
         try:
             model = self._model_path()
         except StudyError:
             model = None
-        return (*self.found.files, *before, self.found.source.path, *(() if model is None else (model,)))
+        return (
+            *self.found_map.files,
+            *reference_files,
+            self.found_map.source.path,
+            *(() if model is None else (model,)),
+        )
 
     @property
     def tested_on(self) -> tuple[Path, ...]:
@@ -55,8 +60,8 @@ class RealRecording:
         return tuple(path for test in self.tests for path in (*test.files, test.source.path))
 
     def _model_path(self) -> Path | None:
-        wanted = self.found.source.map.diagnosis.model
-        return model_for(wanted, self.folder) if wanted else None
+        model_name = self.found_map.source.map.diagnosis.model
+        return model_for(model_name, self.folder) if model_name else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,59 +83,63 @@ def read_real_folder(folder: Path) -> RealFolder:
             "Give a folder whose sub-folders hold recordings, as docs/real.md says.",
             saved="Nothing was written.",
         )
-    inner = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
+    subfolders = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
     recordings: list[RealRecording] = []
     troubles: list[Trouble] = []
-    for each in inner or [folder]:
+    for subfolder in subfolders or [folder]:
         try:
-            found = _recordings(each, find_map(each) or (map_by_header(each),))
+            new_recordings = _select_recordings(subfolder, find_map(subfolder) or (map_by_header(subfolder),))
         except (StudyError, OSError) as problem:
-            troubles.append(Trouble(each.name, _problem_text(problem)))
+            troubles.append(Trouble(subfolder.name, _describe_problem(problem)))
             continue
-        recordings += found
+        recordings += new_recordings
     return RealFolder(tuple(recordings), tuple(troubles))
 
 
-def _problem_text(problem: StudyError | OSError) -> str:
+def _describe_problem(problem: StudyError | OSError) -> str:
     return problem.happened if isinstance(problem, StudyError) else f"{problem.strerror or problem}."
 
 
-def _recordings(folder: Path, found: Sequence[FoundMap]) -> list[RealRecording]:
-    """The recordings of a sub-folder that are to be diagnosed. found: all of its recordings with their maps."""
-    made = []
-    for each in found:
-        if each.source.map.diagnosis.tests and any(_is_test_of(each, other) for other in found):
+def _select_recordings(folder: Path, found_maps: Sequence[FoundMap]) -> list[RealRecording]:
+    """The recordings of a sub-folder that are to be diagnosed. found_maps: all of its recordings with their maps."""
+    recordings = []
+    for found_map in found_maps:
+        if found_map.source.map.diagnosis.tests and any(_is_test_of(found_map, candidate) for candidate in found_maps):
             continue
-        tests = tuple(other for other in found if _is_test_of(other, each))
-        before, changed = _find_pair(each, found)
-        made.append(RealRecording(folder, each, tests, before, changed))
-    return made
+        tests = tuple(candidate for candidate in found_maps if _is_test_of(candidate, found_map))
+        reference, changed = _find_pair(found_map, found_maps)
+        recordings.append(RealRecording(folder, found_map, tests, reference, changed))
+    return recordings
 
 
 def _is_test_of(test: FoundMap, base: FoundMap) -> bool:
     """Whether `test` only tests what was found in `base`. With one recording per file, the file names must agree up
     to the first underscore."""
-    wanted = test.source.map.diagnosis.tests
-    if not wanted or base.source.map.diagnosis.tests:
+    tested_name = test.source.map.diagnosis.tests
+    if not tested_name or base.source.map.diagnosis.tests:
         return False
-    if wanted == base.name:
+    if tested_name == base.name:
         return True
-    alike = test.files[0].stem.split("_")[0] == base.files[0].stem.split("_")[0]
-    return wanted == base.source.name and (not base.source.map.separate or alike)
+    same_stem = test.files[0].stem.split("_")[0] == base.files[0].stem.split("_")[0]
+    return tested_name == base.source.name and (not base.source.map.separate or same_stem)
 
 
-def _find_pair(found_map: FoundMap, found: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
+def _find_pair(found_map: FoundMap, found_maps: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
     """The recording before a change of the device and the change in words, as the map states; None and nothing where
     the map states none, or that recording is not there."""
     for pair in found_map.source.map.diagnosis.pair:
         if found_map.files[0].match(pair.after):
-            before = next(
-                (other for other in found if other.source is found_map.source and _fits_pattern(other, pair.before)),
+            reference = next(
+                (
+                    candidate
+                    for candidate in found_maps
+                    if candidate.source is found_map.source and _fits_pattern(candidate, pair.before)
+                ),
                 None,
             )
-            return before, pair.changed if before is not None else ""
+            return reference, pair.changed if reference is not None else ""
     return None, ""
 
 
-def _fits_pattern(found: FoundMap, pattern: str) -> bool:
-    return found.files[0].match(pattern)
+def _fits_pattern(found_map: FoundMap, pattern: str) -> bool:
+    return found_map.files[0].match(pattern)

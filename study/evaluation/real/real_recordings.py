@@ -23,12 +23,12 @@ from study.devices.clock import Clock, RealClock
 from study.errors import StudyError, UserInterruptError, WrongUseError, resumable
 from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, report_crash
-from study.evaluation.real.inject_real import carriers, run_injections
+from study.evaluation.real.inject_real import load_carriers, run_injections
 from study.evaluation.real.real_folder import RealFolder, RealRecording, read_real_folder
 from study.evaluation.real.reuse_answers import (
     ANSWER_NAME,
     INJECTED_NAME,
-    answer_place,
+    answer_folder,
     origin_of_answer,
     reusable_answers,
 )
@@ -44,20 +44,20 @@ from study.store.formats.real_answer_file import read_answer_and_origin, write_r
 from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 from study.workflows.forked_map import processor_s, without_forking
-from study.workflows.run_on_executor import run_pieces
+from study.workflows.run_on_executor import run_tasks
 
 RETUNED_NAME = "retuned.toml"
 """Re-tuned model, in the folder of a recording's answer."""
-DIAGNOSED_OF_BOTH = 0.5
+DIAGNOSIS_SHARE = 0.5
 """Progress, 0 to 1, at which the diagnosis ends and the injection of faults begins."""
-EVALUATIONS = 4000
+MAX_EVALUATIONS = 4000
 """Limit of the search for one recording, counted in evaluations (a structure weighed, a law simulated or fitted). At
 the limit the search ends with its best result. Evaluations are counted instead of seconds, because answers would
 otherwise depend on the load of the machine."""
-FOLDERS_AHEAD = 16
+MAX_TASKS_IN_FLIGHT = 16
 """Most recordings in flight on an executor: each is sent with all files of its sub-folder, which are in memory until
 then."""
-BESIDE_S = 25.0
+OVERHEAD_S = 25.0
 """Processor time (s) subtracted from the time of a recording, where `RealPlan.seconds` is given: for all work other
 than the search (fit of a model, page, figures)."""
 
@@ -93,20 +93,20 @@ def diagnose_folder(
             "Leave --seconds out: searches then end by a count of evaluations, the same on every machine.",
             saved="Nothing was written.",
         )
-    found = _take_inventory(plan)
-    time = clock or RealClock()
-    kept = reusable_answers(plan.out, found.recordings, plan.seconds)
+    inventory = _take_inventory(plan)
+    used_clock = clock or RealClock()
+    reused = reusable_answers(plan.out, inventory.recordings, plan.seconds)
     _make_writable(plan.out)
     saved = f"What was answered so far is in {plan.out}."
-    with resumable("Not all recordings were diagnosed.", saved, also=(UserInterruptError,)):
+    with resumable("Not all recordings were diagnosed.", saved, further_types=(UserInterruptError,)):
         if executor is None:
-            answers = _answers(plan, found, kept, on_progress, time)
+            answers = _diagnose_here(plan, inventory, reused, on_progress, used_clock)
         else:
-            answers = _sent_answers(plan, found, kept, on_progress, executor)
-        injected = _inject_faults(plan, found, answers, on_progress, executor or 2)
+            answers = _diagnose_on_executor(plan, inventory, reused, on_progress, executor)
+        injected = _inject_faults(plan, inventory, answers, on_progress, executor or 2)
         on_progress("writing the page", 0.98)
         return write_real(
-            plan.out, RealResults(answers, found.troubles, injected), local_time(time.utc(), machine_zone)
+            plan.out, RealResults(answers, inventory.troubles, injected), local_time(used_clock.utc(), machine_zone)
         )
 
 
@@ -120,12 +120,12 @@ def _take_inventory(plan: RealPlan) -> RealFolder:
             "Give a number of 1 or more, such as 180, or leave it out.",
             saved="Nothing was written.",
         )
-    found = read_real_folder(plan.folder)
-    if found.recordings:
-        return found
+    inventory = read_real_folder(plan.folder)
+    if inventory.recordings:
+        return inventory
     raise StudyError(
         "There is no recording to diagnose",
-        " ".join(f"{trouble.where}: {trouble.why}" for trouble in found.troubles),
+        " ".join(f"{trouble.location}: {trouble.reason}" for trouble in inventory.troubles),
         "Give a folder whose sub-folders hold recordings, as docs/real.md says.",
         saved="Nothing was written.",
     )
@@ -142,125 +142,133 @@ def _make_writable(out: Path) -> None:
 
 
 def _inject_faults(
-    plan: RealPlan, found: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress, workers: Workers
+    plan: RealPlan, inventory: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress, workers: Workers
 ) -> tuple[InjectedOutcome, ...]:
     """Inject `plan.inject` faults into diagnosed recordings and diagnose them; no outcomes where it is 0."""
     if plan.inject == 0:
         return ()
-    begun = DIAGNOSED_OF_BOTH
-    on_progress("injecting faults", begun)
-    carried = carriers(plan.out, found.recordings, answers)
+    start_share = DIAGNOSIS_SHARE
+    on_progress("injecting faults", start_share)
+    carriers = load_carriers(plan.out, inventory.recordings, answers)
 
-    def show(done: int, of: int) -> None:
-        on_progress(f"injected faults, {done} of {of}", begun + (0.98 - begun) * done / max(of, 1))
+    def show(done: int, total: int) -> None:
+        on_progress(f"injected faults, {done} of {total}", start_share + (0.98 - start_share) * done / max(total, 1))
 
-    return run_injections(plan.out / INJECTED_NAME, carried, (plan.inject, plan.seed), show, workers)
+    return run_injections(plan.out / INJECTED_NAME, carriers, (plan.inject, plan.seed), show, workers)
 
 
-def _answers(
-    plan: RealPlan, found: RealFolder, kept: Mapping[Path, RealAnswer], on_progress: Progress, clock: Clock
+def _diagnose_here(
+    plan: RealPlan, inventory: RealFolder, reused: Mapping[Path, RealAnswer], on_progress: Progress, clock: Clock
 ) -> tuple[RealAnswer, ...]:
-    # The last 2 % of the progress are for writing the page.
-    """Answers of all recordings in order, diagnosed here one after another; those in `kept` are reused. With
+    """Answers of all recordings in order, diagnosed here one after another; those in `reused` are reused. With
     `plan.seconds`, the remaining time of a sub-folder is divided evenly among its remaining recordings; each gets at
     least a tenth of `plan.seconds`."""
-    answers, count, end = [], max(len(found.recordings), 1), DIAGNOSED_OF_BOTH if plan.inject else 0.98
-    whole = plan.seconds or 0.0
-    left = dict.fromkeys((each.folder.name for each in found.recordings), whole)
-    for number, recording in enumerate(found.recordings):
-        rest = sum(other.folder == recording.folder for other in found.recordings[number:])
-        begun = processor_s()
-        budget = max(left[recording.folder.name] / rest - BESIDE_S, 0.1 * whole)
+    # The last 2 % of the progress are for writing the page.
+    answers, count, end_share = [], max(len(inventory.recordings), 1), DIAGNOSIS_SHARE if plan.inject else 0.98
+    limit_s = plan.seconds or 0.0
+    remaining_s = dict.fromkeys((listed.folder.name for listed in inventory.recordings), limit_s)
+    for number, recording in enumerate(inventory.recordings):
+        remaining_count = sum(candidate.folder == recording.folder for candidate in inventory.recordings[number:])
+        start_s = processor_s()
+        budget = max(remaining_s[recording.folder.name] / remaining_count - OVERHEAD_S, 0.1 * limit_s)
 
-        def show(what: str, share: float, number: int = number, real_recording: RealRecording = recording) -> None:
+        def show(step: str, share: float, number: int = number, real_recording: RealRecording = recording) -> None:
             on_progress(
-                f"{real_recording.folder.name}, {real_recording.name}: {what}", end * (number + min(share, 1.0)) / count
+                f"{real_recording.folder.name}, {real_recording.name}: {step}",
+                end_share * (number + min(share, 1.0)) / count,
             )
 
-        there = kept.get(answer_place(plan.out, recording))
-        answers.append(there or _answer(plan, recording, budget, show, clock))
-        left[recording.folder.name] -= processor_s() - begun
+        reused_answer = reused.get(answer_folder(plan.out, recording))
+        answers.append(reused_answer or _diagnose_and_write(plan, recording, budget, show, clock))
+        remaining_s[recording.folder.name] -= processor_s() - start_s
     return tuple(answers)
 
 
-def _sent_answers(
+def _diagnose_on_executor(
     plan: RealPlan,
-    found: RealFolder,
-    kept: Mapping[Path, RealAnswer],
+    inventory: RealFolder,
+    reused: Mapping[Path, RealAnswer],
     on_progress: Progress,
     executor: Executor,
 ) -> tuple[RealAnswer, ...]:
-    """Answers of all recordings in order; those not in `kept` are diagnosed on the workers of the executor, which
+    """Answers of all recordings in order; those not in `reused` are diagnosed on the workers of the executor, which
     return the files of the results."""
-    places = [answer_place(plan.out, each) for each in found.recordings]
-    left = [(place, each) for place, each in zip(places, found.recordings, strict=True) if place not in kept]
-    sent = ((place, (each.folder.name, each.name, read_files(each.folder))) for place, each in left)
-    answers, end = dict(kept), DIAGNOSED_OF_BOTH if plan.inject else 0.98
-    for place, files in run_pieces(executor, answer_sent_recording, sent, FOLDERS_AHEAD):
-        with _new_folder_in_parents(place) as part:
+    answer_paths = [answer_folder(plan.out, real_recording) for real_recording in inventory.recordings]
+    unanswered = [
+        (answer_path, real_recording)
+        for answer_path, real_recording in zip(answer_paths, inventory.recordings, strict=True)
+        if answer_path not in reused
+    ]
+    tasks = (
+        (answer_path, (real_recording.folder.name, real_recording.name, read_files(real_recording.folder)))
+        for answer_path, real_recording in unanswered
+    )
+    answers, end_share = dict(reused), DIAGNOSIS_SHARE if plan.inject else 0.98
+    for answer_path, files in run_tasks(executor, answer_sent_recording, tasks, MAX_TASKS_IN_FLIGHT):
+        with _new_folder_in_parents(answer_path) as part:
             write_files(part, files)
-        answers[place] = read_answer_and_origin(place / ANSWER_NAME)[0]
-        on_progress(f"{len(answers)} of {len(places)} answered", end * len(answers) / len(places))
-    return tuple(answers[place] for place in places)
+        answers[answer_path] = read_answer_and_origin(answer_path / ANSWER_NAME)[0]
+        on_progress(f"{len(answers)} of {len(answer_paths)} answered", end_share * len(answers) / len(answer_paths))
+    return tuple(answers[answer_path] for answer_path in answer_paths)
 
 
 def answer_sent_recording(folder: str, name: str, files: Files) -> Files:
     """Diagnose one recording on a worker, and return the files of its results. folder, files: name and content of its
     sub-folder; name: of the recording. Raises StudyError where the recording is not in these files."""
-    with TemporaryDirectory() as place, without_forking():
-        plan = RealPlan(Path(place) / "recordings", Path(place) / "out")
+    with TemporaryDirectory() as temporary, without_forking():
+        plan = RealPlan(Path(temporary) / "recordings", Path(temporary) / "out")
         write_files(plan.folder / folder, files)
-        found = read_real_folder(plan.folder)
-        wanted = next((each for each in found.recordings if each.name == name), None)
-        if wanted is None:
-            why = " ".join(trouble.why for trouble in found.troubles)
+        inventory = read_real_folder(plan.folder)
+        real_recording = next((candidate for candidate in inventory.recordings if candidate.name == name), None)
+        if real_recording is None:
+            reasons = " ".join(trouble.reason for trouble in inventory.troubles)
             raise StudyError(
                 "A recording did not come to its worker",
-                f"{folder}, {name}: it is not among the files that were sent. {why}".strip(),
+                f"{folder}, {name}: it is not among the files that were sent. {reasons}".strip(),
                 "Look whether it is still in the folder, and run the same command again.",
                 saved="All answers so far.",
             )
-        _answer(plan, wanted, 0.0, lambda what, share: None, RealClock())
-        return read_files(answer_place(plan.out, wanted))
+        _diagnose_and_write(plan, real_recording, 0.0, lambda step, share: None, RealClock())
+        return read_files(answer_folder(plan.out, real_recording))
 
 
-def _answer(
+def _diagnose_and_write(
     plan: RealPlan, real_recording: RealRecording, budget_s: float, on_progress: Progress, clock: Clock
 ) -> RealAnswer:
     """Diagnose one recording and write its results. budget_s: processor time for the search, used where `plan.seconds`
     is given. A crash is written as an answer, unless the crash guard is off."""
-    begun_s, worked, guard = clock.now_s(), processor_s(), crash_guard()
-    timed: TimeBudget = lambda: processor_s() - worked < budget_s  # noqa: E731
-    time_left = CountedBudget(EVALUATIONS) if plan.seconds is None else timed
+    start_s, processor_start_s, guard = clock.now_s(), processor_s(), crash_guard()
+    time_budget: TimeBudget = lambda: processor_s() - processor_start_s < budget_s  # noqa: E731
+    time_left = CountedBudget(MAX_EVALUATIONS) if plan.seconds is None else time_budget
 
-    def kept(done: RealDiagnosis) -> RealAnswer:
-        answer = replace(done.answer, seconds=round(clock.now_s() - begun_s, 1))
-        _write(
-            answer_place(plan.out, real_recording),
-            replace(done, answer=answer),
+    def write_result(diagnosis: RealDiagnosis) -> RealAnswer:
+        answer = replace(diagnosis.answer, seconds=round(clock.now_s() - start_s, 1))
+        _write_diagnosis(
+            answer_folder(plan.out, real_recording),
+            replace(diagnosis, answer=answer),
             origin_of_answer(real_recording, plan.seconds),
         )
         return answer
 
     try:
-        return kept(diagnose_real(real_recording, time_left, guard, on_progress))
+        return write_result(diagnose_real(real_recording, time_left, guard, on_progress))
     except StudyError:
         raise
     except Exception as crash:
         if not guard.on:
             raise
-        return kept(report_crash(real_recording, crash))
+        return write_result(report_crash(real_recording, crash))
 
 
-def _write(folder: Path, done: RealDiagnosis, origin: Provenance) -> None:
+def _write_diagnosis(folder: Path, result: RealDiagnosis, origin: Provenance) -> None:
     """Write the results of one recording atomically: the answer, and unless it was refused, diagnosis and re-tuned
     model."""
     with _new_folder_in_parents(folder) as part:
-        if done.findings is not None:
-            write_diagnosis_into(part, done.findings, done.parents)
-            assert done.findings.retuned is not None
-            write_mechanical_model(part / RETUNED_NAME, done.findings.retuned)
-        write_real_answer(part / ANSWER_NAME, done.answer, origin)
+        if result.findings is not None:
+            write_diagnosis_into(part, result.findings, result.parents)
+            assert result.findings.retuned is not None
+            write_mechanical_model(part / RETUNED_NAME, result.findings.retuned)
+        write_real_answer(part / ANSWER_NAME, result.answer, origin)
 
 
 @contextmanager

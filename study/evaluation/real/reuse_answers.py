@@ -29,7 +29,7 @@ class _EarlierAnswer:
     """Changes of input files and settings, as clauses; empty if the answer can be reused."""
 
 
-def answer_place(out: Path, real_recording: RealRecording) -> Path:
+def answer_folder(out: Path, real_recording: RealRecording) -> Path:
     """Folder with the results of one recording."""
     return out / real_recording.folder.name / real_recording.name
 
@@ -41,62 +41,62 @@ def origin_of_answer(real_recording: RealRecording, seconds: float | None) -> Pr
     return gather_provenance(parents=files, settings={"seconds": seconds})
 
 
-def reusable_answers(out: Path, wanted: Sequence[RealRecording], seconds: float | None) -> dict[Path, RealAnswer]:
+def reusable_answers(out: Path, recordings: Sequence[RealRecording], seconds: float | None) -> dict[Path, RealAnswer]:
     """Earlier answers by the folder of their results; nothing is written. Raises StudyError where an answer is damaged
     or was given for other inputs or settings."""
-    answered = [recording for recording in wanted if (answer_place(out, recording) / ANSWER_NAME).is_file()]
-    earlier = [_read_earlier_answer(answer_place(out, recording), recording, seconds) for recording in answered]
+    answered = [recording for recording in recordings if (answer_folder(out, recording) / ANSWER_NAME).is_file()]
+    earlier = [_read_earlier_answer(answer_folder(out, recording), recording, seconds) for recording in answered]
     if outdated := [answer for answer in earlier if answer.changes]:
         raise _inputs_changed_error(out, outdated)
     return {answer.place: answer.answer for answer in earlier}
 
 
-def _read_earlier_answer(place: Path, real_recording: RealRecording, seconds: float | None) -> _EarlierAnswer:
+def _read_earlier_answer(folder: Path, real_recording: RealRecording, seconds: float | None) -> _EarlierAnswer:
     """The answer in a folder of results, with its changes. Raises StudyError where it is damaged."""
     try:
-        answer, origin = read_answer_and_origin(place / ANSWER_NAME)
+        answer, origin = read_answer_and_origin(folder / ANSWER_NAME)
     except StudyError as error:
         raise StudyError(
             f"{real_recording.folder.name}/{real_recording.name}/{error.title}",
             error.happened,
-            f"Move {place} away to diagnose it again, or choose another --out.",
+            f"Move {folder} away to diagnose it again, or choose another --out.",
             saved="Nothing was written.",
         ) from error
-    now = origin_of_answer(real_recording, seconds)
-    files = {(parent.file, parent.sha256) for parent in now.parents}
+    current_origin = origin_of_answer(real_recording, seconds)
+    files = {(parent.file, parent.sha256) for parent in current_origin.parents}
     return _EarlierAnswer(
-        place, answer, (*_file_changes(_files_in(origin), files), *_compare_settings(origin, seconds))
+        folder, answer, (*_compare_files(_read_parents(origin), files), *_compare_settings(origin, seconds))
     )
 
 
-def _files_in(origin: Mapping[str, Any]) -> set[tuple[str, str]]:
+def _read_parents(origin: Mapping[str, Any]) -> set[tuple[str, str]]:
     """(name, SHA-256) of all input files in a stored provenance."""
     stored = origin.get("parents")
     parents = stored if isinstance(stored, list) else []
     return {(str(parent.get("file")), str(parent.get("sha256"))) for parent in parents if isinstance(parent, dict)}
 
 
-def _file_changes(then: set[tuple[str, str]], now: set[tuple[str, str]]) -> Iterator[str]:
-    """Clauses about input files that were added, changed or removed. then, now: sets of (name, SHA-256)."""
-    names_then, names_now = ({name for name, _ in files} for files in (then, now))
-    for name in sorted({name for name, _ in then ^ now}):
-        if name not in names_then:
+def _compare_files(earlier: set[tuple[str, str]], current: set[tuple[str, str]]) -> Iterator[str]:
+    """Clauses about input files that were added, changed or removed. earlier, current: sets of (name, SHA-256)."""
+    earlier_names, current_names = ({name for name, _ in files} for files in (earlier, current))
+    for name in sorted({name for name, _ in earlier ^ current}):
+        if name not in earlier_names:
             yield f"{name} is not among its recorded inputs"
         else:
-            yield f"{name} has changed" if name in names_now else f"{name} is gone"
+            yield f"{name} has changed" if name in current_names else f"{name} is gone"
 
 
 def _compare_settings(origin: Mapping[str, Any], seconds: float | None) -> Iterator[str]:
     """A clause where --seconds, the only setting, has changed or was not recorded."""
     settings = origin.get("settings")
-    then = settings.get("seconds", "") if isinstance(settings, dict) else ""
-    if not isinstance(then, int | float | None):
+    earlier_s = settings.get("seconds", "") if isinstance(settings, dict) else ""
+    if not isinstance(earlier_s, int | float | None):
         yield "its --seconds is not recorded"
-    elif then != seconds:
-        yield f"--seconds was {_seconds(then)}, and is {_seconds(seconds)}"
+    elif earlier_s != seconds:
+        yield f"--seconds was {_format_seconds(earlier_s)}, and is {_format_seconds(seconds)}"
 
 
-def _seconds(limit_s: float | None) -> str:
+def _format_seconds(limit_s: float | None) -> str:
     return "left out" if limit_s is None else f"{limit_s:g}"
 
 

@@ -1,4 +1,5 @@
-"""Write the results for a folder of real recordings: an HTML page, tables (CSV) and figures."""
+"""Write the results of `hapteq real`, the diagnosis of a folder of recordings of real devices: an HTML page, tables
+(CSV) and figures."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,7 +39,7 @@ class RealRow:
     black_box: float | None
     """Error of a black-box model."""
     noise: float | None
-    """Error that repeats of the measurement allow."""
+    """Error from the difference between repeated measurements: the noise floor."""
     seconds: float
     """Duration of the diagnosis (s)."""
     candidates: str
@@ -81,55 +82,58 @@ class WrittenReal:
     table: Path
 
 
-def write_real(out: Path, results: RealResults, generated: str) -> WrittenReal:
+def write_real(folder: Path, results: RealResults, generated: str) -> WrittenReal:
     """Write page, tables and figures, replacing earlier ones. generated: time shown on the page. Raises
     CannotWriteError."""
     answers = results.answers
     pictures = {(answer.folder, answer.recording): real_picture(answer) for answer in answers}
-    write_pictures(out / FIGURES_NAME, tuple(pictures.values()))
-    write_text(out / TABLE_NAME, rows_to_csv([_row(answer) for answer in answers], RealRow), overwrite=True)
+    write_pictures(folder / FIGURES_NAME, tuple(pictures.values()))
+    write_text(folder / TABLE_NAME, rows_to_csv([_make_row(answer) for answer in answers], RealRow), overwrite=True)
     origin = gather_provenance()
-    shown = {
+    origin_texts = {
         "command": " ".join(origin.command),
         "versions": ", ".join(f"{name} {version}" for name, version in origin.versions.items()),
     }
     if results.injected:
         write_text(
-            out / INJECTED_NAME,
-            rows_to_csv([_injection_row(each) for each in results.injected], InjectedRow),
+            folder / INJECTED_NAME,
+            rows_to_csv([_make_injection_row(outcome) for outcome in results.injected], InjectedRow),
             overwrite=True,
         )
     else:
-        _remove_stale(out / INJECTED_NAME)
-    page = render_real_report(results.answers, results.troubles, results.injected, pictures, shown, generated)
-    write_text(out / PAGE_NAME, page, overwrite=True)
-    return WrittenReal(results, out / PAGE_NAME, out / TABLE_NAME)
+        _remove_stale(folder / INJECTED_NAME)
+    page = render_real_report(results.answers, results.troubles, results.injected, pictures, origin_texts, generated)
+    write_text(folder / PAGE_NAME, page, overwrite=True)
+    return WrittenReal(results, folder / PAGE_NAME, folder / TABLE_NAME)
 
 
 def _remove_stale(path: Path) -> None:
+    """Delete a table of an earlier run, if any. Raises CannotWriteError."""
     try:
         path.unlink(missing_ok=True)
     except OSError as problem:
         raise CannotWriteError(path, problem) from problem
 
 
-def _row(real_answer: RealAnswer) -> RealRow:
+def _make_row(real_answer: RealAnswer) -> RealRow:
+    """The row of a recording; its errors are empty without held-out data."""
     errors = real_answer.held_out
-    before, retuned, after, noise = (
+    given_error, retuned_error, error_with_effects, noise_error = (
         (None, None, None, None) if errors is None else (errors.before, errors.retuned, errors.after, errors.noise)
     )
     effects = " ".join(real_answer.effects)
     return RealRow(
         real_answer.folder, real_answer.recording, real_answer.verdict, effects, real_answer.error,
-        before, retuned, after, real_answer.black_box, noise, real_answer.seconds,
-        " ".join(each.effect for each in real_answer.candidates),
+        given_error, retuned_error, error_with_effects, real_answer.black_box, noise_error, real_answer.seconds,
+        " ".join(candidate.effect for candidate in real_answer.candidates),
     )  # fmt: skip
 
 
-def _injection_row(outcome: InjectedOutcome) -> InjectedRow:
+def _make_injection_row(outcome: InjectedOutcome) -> InjectedRow:
+    """The row of an injected fault; "nothing" for the intact recording."""
     values = " ".join(f"{name}={value:.6g}" for name, value in outcome.values.items())
     return InjectedRow(
         outcome.recording, outcome.injected or "nothing", outcome.strength, values, outcome.change,
-        outcome.detectable, outcome.judged, outcome.verdict, " ".join(outcome.named),
+        outcome.detectable, outcome.answer_class, outcome.verdict, " ".join(outcome.named),
         " ".join(outcome.returned), outcome.seconds,
     )  # fmt: skip

@@ -48,28 +48,31 @@ def play_baselines(
 
     estimate: frequency response at the centre, including the spring. on_share: called with the fraction done, 0 to 1.
     """
-    inverses = baseline_inverses(models.centre, estimate, _lines_hz(plan, models.centre.sample_rate_hz))
-    wanted = len(_PLACEMENTS) * len(inverses) + 2
-    found: list[PlayedResponse] = []
-    for where in _PLACEMENTS:
+    inverses = baseline_inverses(models.centre, estimate, _band_lines_hz(plan, models.centre.sample_rate_hz))
+    total = len(_PLACEMENTS) * len(inverses) + 2
+    responses: list[PlayedResponse] = []
+    for placement in _PLACEMENTS:
         for inverse in inverses:
-            playing = PlaybackRow(
-                f"{inverse.name}, {where.words}", _driver(plan, inverse), where.place_m, hand=where.hand
+            row = PlaybackRow(
+                f"{inverse.name}, {placement.words}",
+                _make_driver(plan, inverse),
+                placement.place_m,
+                hand=placement.hand,
             )
-            played = replace(play_row(plan, playing), multiply_adds=inverse.multiply_adds)
-            found.append(played)
-            on_share(len(found) / wanted)
-        found += [play_row(plan, playing) for playing in _for_the_place(where, models)]
-        on_share(len(found) / wanted)
-    return tuple(found)
+            response = replace(play_row(plan, row), multiply_adds=inverse.multiply_adds)
+            responses.append(response)
+            on_share(len(responses) / total)
+        responses += [play_row(plan, row) for row in _equalizers_for_placement(placement, models)]
+        on_share(len(responses) / total)
+    return tuple(responses)
 
 
-def _for_the_place(where: _Placement, models: PlacedModels) -> tuple[PlaybackRow, ...]:
+def _equalizers_for_placement(placement: _Placement, models: PlacedModels) -> tuple[PlaybackRow, ...]:
     """The equalizer designed for a condition: from the model identified in the hand, or at the edge from the blended
     models of other places; none at the centre."""
-    if where.hand:
+    if placement.hand:
         return (PlaybackRow("model identified in the hand", make_single_model_driver(models.hand), hand=True),)
-    if where.place_m == EDGE:
+    if placement.place_m == EDGE:
         return (
             PlaybackRow(
                 "models of other places, blended, edge", make_blending_driver(blend_at(models.workspace, EDGE)), EDGE
@@ -78,7 +81,7 @@ def _for_the_place(where: _Placement, models: PlacedModels) -> tuple[PlaybackRow
     return ()
 
 
-def _lines_hz(plan: ReproductionPlan, rate_hz: float) -> FloatArray:
+def _band_lines_hz(plan: ReproductionPlan, rate_hz: float) -> FloatArray:
     """(lines,): frequencies (Hz) of the spectral lines of one period that lie in the band."""
     period = round(plan.period_s * rate_hz)
     return np.asarray(
@@ -86,15 +89,15 @@ def _lines_hz(plan: ReproductionPlan, rate_hz: float) -> FloatArray:
     )
 
 
-def _driver(plan: ReproductionPlan, inverse: Inverse) -> Driver:
+def _make_driver(plan: ReproductionPlan, inverse: Inverse) -> Driver:
     """The driver that multiplies the spectrum of the wanted acceleration by the inverse, line by line in the band;
     other lines are zero."""
 
-    def drive(wanted: Signal) -> FloatArray:
-        used = lines_of_band(plan.band_hz, len(wanted), wanted.sample_rate_hz)
-        spectrum = np.fft.rfft(wanted.samples, axis=0)
+    def drive(target: Signal) -> FloatArray:
+        band_lines = lines_of_band(plan.band_hz, len(target), target.sample_rate_hz)
+        spectrum = np.fft.rfft(target.samples, axis=0)
         forces = np.zeros((len(spectrum), inverse.response.shape[1]), dtype=complex)
-        forces[used] = np.einsum("lmp,lp->lm", inverse.response, spectrum[used])
-        return np.asarray(np.fft.irfft(forces, len(wanted), axis=0), dtype=np.float64)
+        forces[band_lines] = np.einsum("lmp,lp->lm", inverse.response, spectrum[band_lines])
+        return np.asarray(np.fft.irfft(forces, len(target), axis=0), dtype=np.float64)
 
     return drive

@@ -1,4 +1,5 @@
-"""Rows of figure 5: which model drives the device at which place."""
+"""Reproduction of the paper's figure 5: simulated playback with and without equalization, one row per combination of
+model, place in the workspace, signal and device."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,8 +24,8 @@ class PlacedModels:
     """Identified models by place; all include the spring that acts during playback."""
 
     centre: IdentifiedModel
-    between: tuple[IdentifiedModel, ...]
-    """Identified beside the centre, not at the edge."""
+    intermediate: tuple[IdentifiedModel, ...]
+    """Models identified at `INTERMEDIATE_PLACES`, none of which is the edge."""
     frictionless: IdentifiedModel
     """Model at the centre, of the device without friction."""
     hand: IdentifiedModel
@@ -32,8 +33,8 @@ class PlacedModels:
 
     @property
     def workspace(self) -> WorkspaceModels:
-        """Models of the centre and of the places beside it, for interpolation."""
-        return WorkspaceModels((self.centre, *self.between))
+        """Models of the centre and of the intermediate places, for interpolation."""
+        return WorkspaceModels((self.centre, *self.intermediate))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +42,7 @@ class EqualizedPlayback:
     """Responses measured with and without equalization, for the figure and its table."""
 
     rows: EqualizedRows
-    others: tuple[PlayedResponse, ...]
+    table_rows: tuple[PlayedResponse, ...]
     """Rows of the table only."""
     remarks: tuple[str, ...]
 
@@ -49,31 +50,31 @@ class EqualizedPlayback:
 def play_equalized(
     plan: ReproductionPlan, models: PlacedModels, on_share: Callable[[float], None]
 ) -> EqualizedPlayback:
-    """Play all rows. on_share: progress, 0 to 1."""
+    """Play all rows on the simulated device. on_share: called with the progress, 0 to 1."""
     blended = blend_at(models.workspace, EDGE)
     interpolated, remarks = _interpolate_modes(models.workspace)
-    rows = _rows_to_play(models, blended) | interpolated
-    found: dict[str, PlayedResponse] = {}
+    rows = _list_rows(models, blended) | interpolated
+    responses: dict[str, PlayedResponse] = {}
     for number, (key, row) in enumerate(rows.items(), start=1):
-        played = play_row(plan, row)
+        response = play_row(plan, row)
         # A static gain would correct its level: only the shape of the response is compared.
         unscaled = row.driver is not_equalized
-        found[key] = replace(played, response=normalise_gain(played.response)) if unscaled else played
+        responses[key] = replace(response, response=normalise_gain(response.response)) if unscaled else response
         on_share(number / len(rows))
-    return _sort_rows(found, (*blended.remarks, *remarks, *_describe_clipping(found)))
+    return _split_rows(responses, (*blended.remarks, *remarks, *_describe_clipping(responses)))
 
 
 def make_blending_driver(models: ModelsAtPlace) -> Driver:
     """Driver with the weighted sum of the forces that each model computes (`ModelsAtPlace.forces`)."""
 
-    def drive(wanted: Signal) -> FloatArray:
-        return models.forces(lambda model: periodic_command(model, wanted).samples)
+    def drive(target: Signal) -> FloatArray:
+        return models.forces(lambda model: periodic_command(model, target).samples)
 
     return drive
 
 
-def _rows_to_play(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, PlaybackRow]:
-    """What is played for each row, by the row's key: driver, place, signal and device."""
+def _list_rows(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, PlaybackRow]:
+    """Rows to play, by key (fields of `EqualizedRows` and further rows): driver, place, signal and device."""
     centre = make_single_model_driver(models.centre)
     frictionless = make_single_model_driver(models.frictionless)
     return {
@@ -100,7 +101,7 @@ def _rows_to_play(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Pla
 
 def make_single_model_driver(model: IdentifiedModel) -> Driver:
     """Driver by the periodic inverse of a single model."""
-    return lambda wanted: periodic_command(model, wanted).samples
+    return lambda target: periodic_command(model, target).samples
 
 
 def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, PlaybackRow], tuple[str, ...]]:
@@ -113,15 +114,17 @@ def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, PlaybackRo
     return {"edge_modal": row}, at_edge.remarks
 
 
-def _describe_clipping(found: Mapping[str, PlayedResponse]) -> Sequence[str]:
+def _describe_clipping(responses: Mapping[str, PlayedResponse]) -> Sequence[str]:
+    """A remark for each row whose force was clipped."""
     return [
         f"{row.name} ({row.signal}): a cap cut the force off at {row.clipped_ticks} ticks."
-        for row in found.values()
+        for row in responses.values()
         if row.clipped_ticks
     ]
 
 
-def _sort_rows(found: Mapping[str, PlayedResponse], remarks: tuple[str, ...]) -> EqualizedPlayback:
-    named = EqualizedRows.__dataclass_fields__
-    rows = EqualizedRows(**{name: found[name] for name in named})
-    return EqualizedPlayback(rows, tuple(row for name, row in found.items() if name not in named), remarks)
+def _split_rows(responses: Mapping[str, PlayedResponse], remarks: tuple[str, ...]) -> EqualizedPlayback:
+    """The responses as rows of the figure and rows of the table only."""
+    figure_names = EqualizedRows.__dataclass_fields__
+    rows = EqualizedRows(**{name: responses[name] for name in figure_names})
+    return EqualizedPlayback(rows, tuple(row for name, row in responses.items() if name not in figure_names), remarks)

@@ -19,7 +19,7 @@ from study.errors import StudyError, UserInterruptError, resumable
 from study.evaluation.reproduction.reproduce_baselines import play_baselines
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, play_equalized
 from study.evaluation.reproduction.reproduce_recordings import CachedRecording, RecordingRequest, record_or_load
-from study.evaluation.reproduction.reproduction_plan import BETWEEN, ReproductionPlan, Steps
+from study.evaluation.reproduction.reproduction_plan import INTERMEDIATE_PLACES, ReproductionPlan, Steps
 from study.evaluation.reproduction.reproduction_results import Results
 from study.evaluation.reproduction.write_reproduction import WrittenReproduction, write_reproduction_folder
 from study.store.disk.file_errors import CannotWriteError, UnusableFileError
@@ -48,18 +48,18 @@ class ReproducedModel:
 
 
 def identify_or_load(
-    plan: ReproductionPlan, recorded: CachedRecording, on_share: Callable[[float], None]
+    plan: ReproductionPlan, cached: CachedRecording, on_share: Callable[[float], None]
 ) -> ReproducedModel:
     """Load the cached model, or identify it; a cached file of another recording, order or band, or without its
     quality, is replaced."""
-    path = plan.models / recorded.path.name
-    model = _load_cached_model(path, plan, recorded.path)
+    path = plan.models / cached.path.name
+    model = _load_cached_model(path, plan, cached.path)
     if model is None:
         path.unlink(missing_ok=True)
-        asked = IdentifyPlan((recorded.path,), path, plan.band_hz, plan.order, with_spring=True)
-        model = identify_model(asked, on_share).model
+        identify_plan = IdentifyPlan((cached.path,), path, plan.band_hz, plan.order, with_spring=True)
+        model = identify_model(identify_plan, on_share).model
     on_share(1.0)
-    return ReproducedModel(model, validate_on_test(model, (from_excitation(recorded.recording),)))
+    return ReproducedModel(model, validate_on_test(model, (from_excitation(cached.recording),)))
 
 
 def _load_cached_model(path: Path, plan: ReproductionPlan, source: Path) -> IdentifiedModel | None:
@@ -86,45 +86,53 @@ CENTRE_NAME, SLICK_NAME, HAND_NAME = "centre", "frictionless", "hand"
 
 def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]) -> WrittenReproduction:
     """Make all figures. `on_progress(share)`, 0 to 1. Resumable after UserInterruptError. Raises StudyError."""
-    wanted = _recordings_to_make(plan)
+    requests = _list_requests(plan)
     models = _model_names()
-    steps = Steps(_weights(plan, wanted, models), on_progress)
+    steps = Steps(_step_weights(plan, requests, models), on_progress)
     saved = f"Sessions, recordings and models so far are in {plan.out}."
-    with resumable("The reproduction is not finished.", saved, also=(UserInterruptError,)):
+    with resumable("The reproduction is not finished.", saved, further_types=(UserInterruptError,)):
         _make_folders(plan)
-        recordings = {name: record_or_load(plan, each, steps.of(f"recording {name}")) for name, each in wanted.items()}
+        recordings = {
+            name: record_or_load(plan, request, steps.progress_of(f"recording {name}"))
+            for name, request in requests.items()
+        }
         collected = _rehearse_study(plan, steps)
-        identified = {name: identify_or_load(plan, recordings[name], steps.of(f"model {name}")) for name in models}
-        results = _results(plan, recordings, identified, collected, steps)
-        return write_reproduction_folder(plan, results, steps.of("writing"))
+        identified = {
+            name: identify_or_load(plan, recordings[name], steps.progress_of(f"model {name}")) for name in models
+        }
+        results = _collect_results(plan, recordings, identified, collected, steps)
+        return write_reproduction_folder(plan, results, steps.progress_of("writing"))
 
 
-def _recordings_to_make(plan: ReproductionPlan) -> Mapping[str, RecordingRequest]:
-    asked = plan.protocols
-    wanted = (
-        RecordingRequest("ellipsoid", asked.ellipsoid),
-        RecordingRequest("sweep", asked.sweep),
-        RecordingRequest(CENTRE_NAME, asked.band),
-        *(RecordingRequest(name, asked.band, place) for name, place in zip(_between_names(), BETWEEN, strict=True)),
-        RecordingRequest(SLICK_NAME, asked.band, device=FRICTIONLESS),
-        RecordingRequest(HAND_NAME, asked.hand),
+def _list_requests(plan: ReproductionPlan) -> Mapping[str, RecordingRequest]:
+    protocols = plan.protocols
+    requests = (
+        RecordingRequest("ellipsoid", protocols.ellipsoid),
+        RecordingRequest("sweep", protocols.sweep),
+        RecordingRequest(CENTRE_NAME, protocols.band),
+        *(
+            RecordingRequest(name, protocols.band, place)
+            for name, place in zip(_intermediate_names(), INTERMEDIATE_PLACES, strict=True)
+        ),
+        RecordingRequest(SLICK_NAME, protocols.band, device=FRICTIONLESS),
+        RecordingRequest(HAND_NAME, protocols.hand),
     )
-    return {each.name: each for each in wanted}
+    return {request.name: request for request in requests}
 
 
-def _between_names() -> tuple[str, ...]:
-    return tuple(f"between_{number}" for number in range(1, len(BETWEEN) + 1))
+def _intermediate_names() -> tuple[str, ...]:
+    return tuple(f"between_{number}" for number in range(1, len(INTERMEDIATE_PLACES) + 1))
 
 
 def _model_names() -> tuple[str, ...]:
-    return (CENTRE_NAME, *_between_names(), SLICK_NAME, HAND_NAME)
+    return (CENTRE_NAME, *_intermediate_names(), SLICK_NAME, HAND_NAME)
 
 
-def _weights(
-    plan: ReproductionPlan, wanted: Mapping[str, RecordingRequest], models: tuple[str, ...]
+def _step_weights(
+    plan: ReproductionPlan, requests: Mapping[str, RecordingRequest], models: tuple[str, ...]
 ) -> dict[str, float]:
     return {
-        **{f"recording {name}": RECORDING_S for name in wanted},
+        **{f"recording {name}": RECORDING_S for name in requests},
         "study": SUBJECT_S * plan.subjects / plan.workers,
         **{f"model {name}": MODEL_S for name in models},
         "playing": PLAYING_S,
@@ -144,12 +152,12 @@ def _make_folders(plan: ReproductionPlan) -> None:
 def _rehearse_study(plan: ReproductionPlan, steps: Steps) -> CollectedTrials:
     source = read_study_protocol(plan.protocols.study, plan.study)
     rehearsal = Rehearsal(source.protocol, source.text, subjects=plan.subjects, seed=plan.seed, data=plan.study)
-    report = steps.of("study")
+    report = steps.progress_of("study")
     rehearse_study(rehearsal, plan.workers, lambda done: report(done / plan.subjects))
     return collect_sessions(plan.study, source.protocol.name)
 
 
-def _results(
+def _collect_results(
     plan: ReproductionPlan,
     recordings: Mapping[str, CachedRecording],
     identified: Mapping[str, ReproducedModel],
@@ -158,14 +166,14 @@ def _results(
 ) -> Results:
     models = PlacedModels(
         centre=identified[CENTRE_NAME].model,
-        between=tuple(identified[name].model for name in _between_names()),
+        intermediate=tuple(identified[name].model for name in _intermediate_names()),
         frictionless=identified[SLICK_NAME].model,
         hand=identified[HAND_NAME].model,
     )
     centre = recordings[CENTRE_NAME].recording
     try:
         device = _measure_device(recordings["sweep"].recording)
-        shapes = _ellipsoids(recordings["ellipsoid"].recording)
+        ellipsoid_results = _measure_ellipsoids(recordings["ellipsoid"].recording)
         estimate = estimate_transfer((from_excitation(centre),))
     except (TransferEstimateError, ValueError) as problem:
         raise StudyError(
@@ -176,12 +184,12 @@ def _results(
         ) from problem
     return Results(
         study=analyse_study(collected.trials, collected.protocol),
-        ellipsoids=shapes,
+        ellipsoids=ellipsoid_results,
         device=device,
         device_name=centre.device,
-        played=play_equalized(plan, models, steps.of("playing")),
-        baselines=play_baselines(plan, models, estimate, steps.of("baselines")),
-        models=tuple(each.as_used_model(name) for name, each in identified.items()),
+        played=play_equalized(plan, models, steps.progress_of("playing")),
+        baselines=play_baselines(plan, models, estimate, steps.progress_of("baselines")),
+        models=tuple(reproduced.as_used_model(name) for name, reproduced in identified.items()),
         tested=identified[CENTRE_NAME].tested,
         tested_frictionless=identified[SLICK_NAME].tested,
         remarks=tuple(f"{name}: {warning}" for name, recording in recordings.items() for warning in recording.warnings),
@@ -195,5 +203,5 @@ def _measure_device(recording: Recording) -> MeasuredDevice:
     return MeasuredDevice(response, find_resonances(response), coupling_onset(response))
 
 
-def _ellipsoids(recording: Recording) -> tuple[EllipsoidResult, ...]:
+def _measure_ellipsoids(recording: Recording) -> tuple[EllipsoidResult, ...]:
     return ellipsoids(recording, sensor_frame(recording))

@@ -15,7 +15,7 @@ from analysis.evaluation.reproduction.played_response import (
     PlayedResponse,
     SignalKind,
     estimate_response,
-    make_wanted_wave,
+    make_target_wave,
 )
 from equalizer.signals.excitation import apply_fades
 from equalizer.signals.signal import FloatArray, Signal
@@ -24,7 +24,7 @@ from study.devices.device import Device, DeviceSettings
 from study.devices.opening import SIMULATED, open_device
 from study.errors import StudyError
 from study.evaluation.reproduction.reproduction_plan import CENTRE, Place, ReproductionPlan
-from study.session.stimulus.limits import limits_of_recording
+from study.session.stimulus.limits import make_recording_limits
 from study.store.formats.protocol_files import read_recording_protocol
 
 AXES = ("ax", "ay", "az")
@@ -58,16 +58,16 @@ class PlaybackRow:
     """Kind of the wanted acceleration: sweep or multisine."""
 
 
-def not_equalized(wanted: Signal) -> FloatArray:
+def not_equalized(target: Signal) -> FloatArray:
     """(period, 3): forces proportional to the wanted acceleration, as without an equalizer."""
-    return wanted.samples
+    return target.samples
 
 
 def play_row(plan: ReproductionPlan, row: PlaybackRow) -> PlayedResponse:
     """Play one row. Raises DeviceError, or StudyError where the device does not report its true acceleration."""
     protocol = read_recording_protocol(plan.protocols.band).protocol
     settings = DeviceSettings(
-        limits=limits_of_recording(protocol),
+        limits=make_recording_limits(protocol),
         spring_frequency_hz=protocol.spring.natural_frequency_hz,
         spring_damping_n_s_per_m=protocol.spring.damping_n_s_per_m,
         keep_s=1.0,
@@ -83,18 +83,18 @@ def _play_axes(plan: ReproductionPlan, row: PlaybackRow, device: Device, peak_n:
     """Response from wanted to true acceleration, (lines, 3, 3). Each axis is played in turn; its forces are scaled to
     the peak `peak_n` (N), and the wanted acceleration by the same factor."""
     rate_hz = device.info.sample_rate_hz
-    wave = make_wanted_wave(row.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
-    wanted, delivered, clipped = [], [], 0
+    wave = make_target_wave(row.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
+    targets, delivered, total_clipped = [], [], 0
     for axis in range(3):
         samples = np.zeros((len(wave), 3))
         samples[:, axis] = wave
         loop = row.driver(Signal(samples, rate_hz, "acceleration", "m/s^2", AXES))
         scale = peak_n / float(np.linalg.norm(loop, axis=1).max())
-        played, limited = _play_to_steady_state(device, scale * loop)
-        wanted.append(scale * wave)
-        delivered.append(played)
-        clipped += limited
-    frequency_hz, response = estimate_response(np.array(wanted), delivered, plan.band_hz, rate_hz)
+        true_acceleration, clipped_ticks = _play_to_steady_state(device, scale * loop)
+        targets.append(scale * wave)
+        delivered.append(true_acceleration)
+        total_clipped += clipped_ticks
+    frequency_hz, response = estimate_response(np.array(targets), delivered, plan.band_hz, rate_hz)
     return PlayedResponse(
         name=row.name,
         device=device.info.name,
@@ -104,7 +104,7 @@ def _play_axes(plan: ReproductionPlan, row: PlaybackRow, device: Device, peak_n:
         frequency_hz=frequency_hz,
         response=response,
         peak_force_n=peak_n,
-        clipped_ticks=clipped,
+        clipped_ticks=total_clipped,
     )
 
 
@@ -113,14 +113,14 @@ def _play_to_steady_state(device: Device, loop: FloatArray) -> tuple[FloatArray,
     cut the force. loop: (period, 3), N."""
     rate_hz = device.info.sample_rate_hz
     forces = apply_fades(np.tile(loop, (PERIODS, 1)), round(FADE_S * rate_hz), 0)
-    played = device.play(Signal(forces, rate_hz, "force", "N", ("fx", "fy", "fz")))
-    if played.truth is None or played.recording is None:
+    run = device.play(Signal(forces, rate_hz, "force", "N", ("fx", "fy", "fz")))
+    if run.truth is None or run.recording is None:
         raise StudyError(
             "The device did not play the forces to their end",
-            f"{device.info.name}: {played.health.fault.value}; its true acceleration is not known.",
+            f"{device.info.name}: {run.health.fault.value}; its true acceleration is not known.",
             "Run the command again.",
             saved="Recordings and models so far are in the folder.",
         )
-    health = played.health
+    health = run.health
     clipped = health.stimulus_clipped + health.feedback_clipped + health.total_clipped
-    return played.truth.samples[-len(loop) :], clipped
+    return run.truth.samples[-len(loop) :], clipped

@@ -46,62 +46,62 @@ class CachedRecording:
 
 
 def record_or_load(
-    plan: ReproductionPlan, wanted: RecordingRequest, on_share: Callable[[float], None]
+    plan: ReproductionPlan, request: RecordingRequest, on_share: Callable[[float], None]
 ) -> CachedRecording:
     """Load the cached recording, or make it. on_share: called with the completed share, 0 to 1. Raises StudyError where
     the folder contains a recording of another run under this name."""
-    path = plan.recordings / f"{wanted.name}.h5"
-    protocol = read_recording_protocol(wanted.protocol).protocol
-    found = _load_cached_recording(path, plan, wanted, protocol)
-    if found is None:
-        recording = RecordingPlan(protocol, wanted.device, wanted.place_m, plan.seed, path)
+    path = plan.recordings / f"{request.name}.h5"
+    protocol = read_recording_protocol(request.protocol).protocol
+    cached = _load_cached_recording(path, plan, request, protocol)
+    if cached is None:
+        recording = RecordingPlan(protocol, request.device, request.place_m, plan.seed, path)
         total_s = recording.total_s
         record_device(recording, lambda seconds: on_share(seconds / total_s))
-        found = read_recording(path)
+        cached = read_recording(path)
     on_share(1.0)
-    return CachedRecording(path, found, _warn_of_reduced_amplitudes(found))
+    return CachedRecording(path, cached, _warn_of_reduced_amplitudes(cached))
 
 
 def _load_cached_recording(
-    path: Path, plan: ReproductionPlan, wanted: RecordingRequest, protocol: RecordingProtocol
+    path: Path, plan: ReproductionPlan, request: RecordingRequest, protocol: RecordingProtocol
 ) -> Recording | None:
     """The cached recording; None where there is none, or only an interrupted one, which is removed. Raises StudyError
     for a file that cannot be read or belongs to another run."""
     if not path.exists():
         return None
     try:
-        found = read_recording(path)
+        cached = read_recording(path)
     except UnusableFileError as problem:
-        raise _foreign(path, "it cannot be read") from problem
-    meta = found.meta
+        raise _foreign_file_error(path, "it cannot be read") from problem
+    meta = cached.meta
     origin: dict[str, Any] = meta.get("provenance", {})
     if origin.get("protocol_hash") != protocol_hash(protocol):
-        raise _foreign(path, "it follows another protocol")
+        raise _foreign_file_error(path, "it follows another protocol")
     if origin.get("seeds") != {"device": plan.seed}:
-        raise _foreign(path, "it was made with another seed")
-    if tuple(meta.get("place_m", ())) != wanted.place_m:
-        raise _foreign(path, "it was made at another place")
+        raise _foreign_file_error(path, "it was made with another seed")
+    if tuple(meta.get("place_m", ())) != request.place_m:
+        raise _foreign_file_error(path, "it was made at another place")
     if meta.get("interrupted"):
         path.unlink()
         return None
-    return found
+    return cached
 
 
 def _warn_of_reduced_amplitudes(recording: Recording) -> tuple[str, ...]:
     """Sentences about segments whose amplitude (N) was lower than the protocol requests; repeated on every run."""
     return tuple(
-        f"Played at {about['played_amplitude_n']:.3g} N instead of {about['requested_amplitude_n']:.3g} N along "
-        f"{about['along']}, because something was at its limit."
-        for about in recording.meta.get("segments", ())
-        if about["played_amplitude_n"] < about["requested_amplitude_n"]
+        f"Played at {segment['played_amplitude_n']:.3g} N instead of {segment['requested_amplitude_n']:.3g} N along "
+        f"{segment['along']}, because something was at its limit."
+        for segment in recording.meta.get("segments", ())
+        if segment["played_amplitude_n"] < segment["requested_amplitude_n"]
     )
 
 
-def _foreign(path: Path, why: str) -> StudyError:
-    """The error for a file that does not belong to this reproduction. why: a clause."""
+def _foreign_file_error(path: Path, reason: str) -> StudyError:
+    """The error for a file that does not belong to this reproduction. reason: a clause."""
     return StudyError(
         "This folder holds another reproduction",
-        f"{path} is in the way: {why}.",
+        f"{path} is in the way: {reason}.",
         "Choose another folder with --out, or the same --seed to continue.",
         saved="Nothing was changed.",
     )

@@ -11,7 +11,7 @@ CENTRE: Place = (0.0, 0.0, 0.0)
 """Centre of the workspace."""
 EDGE: Place = (0.0, 0.05, 0.0)
 """Near the edge of a workspace whose soft stops begin at 75 mm."""
-BETWEEN: tuple[Place, ...] = ((0.0, 0.03, 0.0), (0.0, 0.065, 0.0))
+INTERMEDIATE_PLACES: tuple[Place, ...] = ((0.0, 0.03, 0.0), (0.0, 0.065, 0.0))
 """Places at which further models are identified for interpolation, in addition to the centre. `EDGE` is not among them,
 so that playback there tests the interpolation."""
 
@@ -76,7 +76,7 @@ class Steps:
         self._on_progress = on_progress
         self._done: dict[str, float] = {}
 
-    def of(self, step: str) -> Callable[[float], None]:
+    def progress_of(self, step: str) -> Callable[[float], None]:
         """Progress callback for one step: takes its own share, 0 to 1."""
         return lambda share: self._report_share(step, share)
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from analysis.evaluation.reproduction.document import FigureFindings, Reproduction
 from analysis.evaluation.reproduction.ellipsoid_findings import ellipsoid_findings
-from analysis.evaluation.reproduction.equalized_findings import find_equalized
+from analysis.evaluation.reproduction.equalized_findings import make_equalized_findings
 from analysis.evaluation.reproduction.played_response import describe_played
-from analysis.evaluation.reproduction.response_findings import band_findings, response_findings
+from analysis.evaluation.reproduction.response_findings import make_band_findings, make_response_findings
 from analysis.evaluation.reproduction.study_findings import direction_limit_hz, study_findings
 from analysis.figures.reproduction_pictures import reproduction_pictures
 from analysis.reports.reproduction_report import overview_lines, render_reproduction_report
@@ -49,12 +49,12 @@ def write_reproduction_folder(
     # Where the thresholds give no limit of direction, the published one separates the bands.
     used_limit_hz = PUBLISHED_DIRECTION_LIMIT_HZ if limit_hz is None else limit_hz
     bands = frequency_bands(results.device.onset.frequency_hz, used_limit_hz)
-    reproduction = _document(plan, results, bands, limit_hz, used_limit_hz)
+    reproduction = _make_document(plan, results, bands, limit_hz, used_limit_hz)
     pictures = reproduction_pictures(
         results.study, results.ellipsoids, results.device, bands, used_limit_hz, results.played.rows
     )
     on_share(0.2)
-    write_pictures(plan.figures, [picture for several in pictures.values() for picture in several])
+    write_pictures(plan.figures, [picture for figure_pictures in pictures.values() for picture in figure_pictures])
     on_share(0.8)
     origin = gather_provenance(
         protocol_hash=results.protocol_hash, seeds={"reproduction": plan.seed}, parents=results.sources
@@ -67,7 +67,7 @@ def write_reproduction_folder(
     return WrittenReproduction(reproduction, overview_lines(reproduction), document, report)
 
 
-def _document(
+def _make_document(
     plan: ReproductionPlan,
     results: Results,
     bands: tuple[FrequencyBand, ...],
@@ -76,7 +76,7 @@ def _document(
 ) -> Reproduction:
     """The document: findings on each figure, playback rows, baselines and models. limit_hz: limit of direction from the
     thresholds, None without one; used_limit_hz: the limit that separates the bands (Hz)."""
-    played = results.played
+    playback = results.played
     return Reproduction(
         device=results.device_name,
         subjects=plan.subjects,
@@ -84,13 +84,13 @@ def _document(
         band_hz=plan.band_hz,
         order=plan.order,
         figures=(
-            band_findings(bands, limit_hz, used_limit_hz),
+            make_band_findings(bands, limit_hz, used_limit_hz),
             study_findings(results.study),
             ellipsoid_findings(results.ellipsoids),
-            response_findings(results.device.response, results.device.resonances, results.device.onset),
+            make_response_findings(results.device.response, results.device.resonances, results.device.onset),
             _equalization_findings(results),
         ),
-        played=tuple(describe_played(row) for row in (*played.rows.all, *played.others)),
+        played=tuple(describe_played(row) for row in (*playback.rows.all, *playback.table_rows)),
         baselines=tuple(describe_played(row) for row in results.baselines),
         models=results.models,
     )
@@ -98,9 +98,9 @@ def _document(
 
 def _equalization_findings(results: Results) -> FigureFindings:
     """Findings on figure 5, with the errors of the tested models with and without friction where both are known."""
-    with_it, without = results.tested, results.tested_frictionless
-    tested = (with_it.error, without.error) if with_it and without else None
-    return find_equalized(results.played.rows, tested, (*results.remarks, *results.played.remarks))
+    with_friction, frictionless = results.tested, results.tested_frictionless
+    errors = (with_friction.error, frictionless.error) if with_friction and frictionless else None
+    return make_equalized_findings(results.played.rows, errors, (*results.remarks, *results.played.remarks))
 
 
 def _origin_entries(origin: Provenance) -> dict[str, str]:

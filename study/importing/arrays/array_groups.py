@@ -24,31 +24,31 @@ class Groups:
     """Arrays of the first run: name without prefix, and full name. Other arrays belong to no run."""
 
 
-def groups_in(arrays: Mapping[str, npt.NDArray[Any]], least: int) -> Groups:
+def groups_in(arrays: Mapping[str, npt.NDArray[Any]], min_samples: int) -> Groups:
     """Runs in a file, by the separator that gives the largest number of arrays in runs. Each run must contain an array
-    of at least `least` samples; without two such runs there are none."""
-    long_ones = [name for name, array in arrays.items() if array.size >= least]
-    found = [_group_arrays(tuple(arrays), long_ones, separator) for separator in _SEPARATORS]
-    return max(found, key=lambda groups: len(groups.prefixes) * len(groups.names))
+    of at least `min_samples` samples; without two such runs there are none."""
+    long_names = [name for name, array in arrays.items() if array.size >= min_samples]
+    candidates = [_group_arrays(tuple(arrays), long_names, separator) for separator in _SEPARATORS]
+    return max(candidates, key=lambda groups: len(groups.prefixes) * len(groups.names))
 
 
-def _group_arrays(names: Sequence[str], long_ones: Sequence[str], separator: str) -> Groups:
+def _group_arrays(names: Sequence[str], long_names: Sequence[str], separator: str) -> Groups:
     """Runs by one separator: prefixes that are followed by the same set of names, the most common one."""
     members: dict[str, list[str]] = {}
     for name in names:
-        before, between, after = _split(name, separator)
+        run_prefix, mark, stem = _split(name, separator)
         if (
-            before.strip() == before != ""
-            and after
-            and (separator not in _LOOSE or any(letter.isdigit() for letter in before))
+            run_prefix.strip() == run_prefix != ""
+            and stem
+            and (separator not in _LOOSE or any(letter.isdigit() for letter in run_prefix))
         ):
-            members.setdefault(before + between, []).append(after)
-    alike = Counter(tuple(sorted(rest)) for rest in members.values())
-    usual, count = alike.most_common(1)[0] if alike else ((), 0)
+            members.setdefault(run_prefix + mark, []).append(stem)
+    stem_counts = Counter(tuple(sorted(stems)) for stems in members.values())
+    common_stems, count = stem_counts.most_common(1)[0] if stem_counts else ((), 0)
     prefixes = [
         prefix
-        for prefix, rest in members.items()
-        if tuple(sorted(rest)) == usual and any(prefix + name in long_ones for name in rest)
+        for prefix, stems in members.items()
+        if tuple(sorted(stems)) == common_stems and any(prefix + name in long_names for name in stems)
     ]
     if count < 2 or len(prefixes) < 2:
         return Groups((), {})
@@ -58,6 +58,6 @@ def _group_arrays(names: Sequence[str], long_ones: Sequence[str], separator: str
 def _split(name: str, separator: str) -> tuple[str, str, str]:
     """Prefix, separator and rest of a name, split at its last slash, or else at the first separator. A unit in brackets
     is not searched for separators."""
-    plain, bracket, unit = re.match(r"([^\[(]*)([\[(]?)(.*)", name, re.DOTALL).groups()  # type: ignore[union-attr]
-    before, between, after = plain.rpartition(separator) if separator == "/" else plain.partition(separator)
-    return before, between, after + bracket + unit if between else ""
+    text, bracket, unit = re.match(r"([^\[(]*)([\[(]?)(.*)", name, re.DOTALL).groups()  # type: ignore[union-attr]
+    prefix, mark, stem = text.rpartition(separator) if separator == "/" else text.partition(separator)
+    return prefix, mark, stem + bracket + unit if mark else ""

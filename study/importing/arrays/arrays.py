@@ -60,7 +60,7 @@ class Arrays:
         return self.path.name
 
 
-def left_out(array: Array) -> str:
+def unread_reason(array: Array) -> str:
     """Kind or problem of an array that is not read, as text, from its placeholder; empty for all other arrays."""
     text = array.item() if array.dtype.kind == "O" and array.size == 1 else ""
     return text if isinstance(text, str) else ""
@@ -74,19 +74,21 @@ def read_arrays(path: Path, table: CsvMap) -> Arrays:
     except OSError as problem:
         raise CannotReadError(path, problem) from problem
     try:
-        found = _read(path, table)
+        content = _read_any(path, table)
     except UnusableFileError as refused:
         raise ImportRefusedError(path.name, refused.happened, _CHECK) from refused
     except DAMAGED as problem:
-        words = str(problem) or type(problem).__name__
+        message = str(problem) or type(problem).__name__
         # Messages of this program have the form "cause; remedy"; those of a library give only the cause.
-        raise ImportRefusedError(path.name, words, MEND if "; " in words else _CHECK) from problem
-    if not found.by_name:
+        raise ImportRefusedError(path.name, message, MEND if "; " in message else _CHECK) from problem
+    if not content.by_name:
         raise ImportRefusedError(path.name, "it holds no arrays", "Check that it is the right file.")
-    return Arrays(path, {name: np.squeeze(array) for name, array in found.by_name.items()}, found.clocks, found.notes)
+    return Arrays(
+        path, {name: np.squeeze(array) for name, array in content.by_name.items()}, content.clocks, content.notes
+    )
 
 
-def _read(path: Path, table: CsvMap) -> Table:
+def _read_any(path: Path, table: CsvMap) -> Table:
     """Columns of a text table or of the sheets of a workbook, or arrays of another file."""
     if path.suffix.lower() in TABLES:
         return read_csv_arrays(path, table)

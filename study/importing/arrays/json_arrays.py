@@ -23,11 +23,11 @@ JSON_BYTES = 2**26
 """Largest JSON file in bytes: parsed, it takes about twenty times as much memory."""
 _MOST_OBJECTS, _MOST_VALUES = 2**21, 2**24
 """Most objects and lists of a file, each of which takes hundreds of bytes of memory, and most values of it."""
-_OURS = "hapteq"
+_OWN_PREFIX = "hapteq"
 """Beginning of the names of hapteq's own formats."""
 _OWN_FORMAT = re.compile(rb'"format"\s*:\s*"hapteq')
 """Bytes in which a document declares one of these formats."""
-_LOOKED_AT = 4096
+_SEARCHED_BYTES = 4096
 """Bytes at the start of a file that are searched for `_OWN_FORMAT`."""
 _UNIT_KEYS = ("unit", "units")
 """Keys that state the unit of the values in the same object."""
@@ -42,21 +42,21 @@ def read_json_arrays(path: Path) -> dict[str, Array]:
     except UnicodeDecodeError as problem:
         raise ValueError(f"it is no UTF-8 text (byte {problem.start}), as JSON is; save it as UTF-8") from problem
     document = _parse(text)
-    if isinstance(document, dict) and str(document.get("format", "")).startswith(_OURS):
+    if isinstance(document, dict) and str(document.get("format", "")).startswith(_OWN_PREFIX):
         raise ValueError(f"it is a hapteq document ({document['format']}), and holds no recording")
-    found = dict(_arrays(document, ()))
-    parents = {place[:-1] for place, array in found.items() if array.size > 1}
-    alone = parents.pop() if len(parents) == 1 else ()
+    arrays = dict(_find_arrays(document, ()))
+    parent_paths = {key_path[:-1] for key_path, array in arrays.items() if array.size > 1}
+    common_path = parent_paths.pop() if len(parent_paths) == 1 else ()
     return {
-        "/".join(place[len(alone) :] if place[: len(alone)] == alone else place): array
-        for place, array in found.items()
+        "/".join(key_path[len(common_path) :] if key_path[: len(common_path)] == common_path else key_path): array
+        for key_path, array in arrays.items()
     }
 
 
 def is_own_document(path: Path) -> bool:
     """Whether the beginning of a JSON file declares one of our own formats."""
     with open_regular(path) as file:
-        return _OWN_FORMAT.search(file.read(_LOOKED_AT)) is not None
+        return _OWN_FORMAT.search(file.read(_SEARCHED_BYTES)) is not None
 
 
 def _parse(text: str) -> Any:
@@ -66,73 +66,73 @@ def _parse(text: str) -> Any:
         raise ValueError(f"it has more than {_MOST_OBJECTS} records or {_MOST_VALUES} values; save it as .csv or .npz")
     try:
         return load_json(text, with_nan=True)
-    except ValueError as whole:
+    except ValueError as json_error:
         lines = [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip()]
         if len(lines) < 2:
-            raise ValueError(f"this is no JSON: {whole}") from whole
+            raise ValueError(f"this is no JSON: {json_error}") from json_error
         try:
-            records = [_record(number, line) for number, line in lines]
-        except ValueError as problem:
-            raise ValueError(f"this is neither JSON ({whole}) nor lines of it ({problem})") from problem
+            records = [_parse_record(number, line) for number, line in lines]
+        except ValueError as lines_error:
+            raise ValueError(f"this is neither JSON ({json_error}) nor lines of it ({lines_error})") from lines_error
         return records
 
 
-def _record(number: int, line: str) -> Any:
+def _parse_record(number: int, line: str) -> Any:
     """The record on one line. Raises ValueError unless it is a JSON object."""
     try:
-        found = load_json(line, with_nan=True)
+        record = load_json(line, with_nan=True)
     except ValueError as problem:
         raise ValueError(f"line {number}: {problem}") from problem
-    if not isinstance(found, dict):
+    if not isinstance(record, dict):
         raise ValueError(f"line {number} is no record in braces")
-    return found
+    return record
 
 
-def _arrays(value: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
+def _find_arrays(value: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
     """Arrays by the path of keys that leads to them."""
     match value:
         case dict():
-            yield from _arrays_of_object(value, place)
+            yield from _arrays_of_object(value, key_path)
         case []:
             return
         case [dict(), *_] if all(isinstance(record, dict) for record in value):
-            yield from (((*place, key), _array(column)) for key, column in _columns(value).items())
+            yield from (((*key_path, key), _make_array(column)) for key, column in _collect_columns(value).items())
         case _:
-            yield place or ("data",), _array(value)
+            yield key_path or ("data",), _make_array(value)
 
 
-def _arrays_of_object(value: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
+def _arrays_of_object(value: Mapping[str, Any], key_path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
     """Arrays of an object. `{"unit": "N", "values": [...]}` is one array, with the unit in brackets behind its name."""
     units = [value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)]
     lists = [key for key, entry in value.items() if isinstance(entry, list)]
     values = lists[0] if len(lists) == 1 else next((key for key in _VALUE_KEYS if key in lists), "")
-    if place and len(units) == 1 and values:
+    if key_path and len(units) == 1 and values:
         for key, entry in value.items():
             if key == values:
-                yield (*place[:-1], with_units([place[-1]], units)[0]), _array(entry)
+                yield (*key_path[:-1], with_units([key_path[-1]], units)[0]), _make_array(entry)
             elif key not in _UNIT_KEYS:
-                yield from _arrays_beside_values(entry, (*place, key))
+                yield from _arrays_beside_values(entry, (*key_path, key))
         return
     for key, entry in value.items():
-        yield from _arrays(entry, (*place, key))
+        yield from _find_arrays(entry, (*key_path, key))
 
 
-def _arrays_beside_values(entry: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
+def _arrays_beside_values(entry: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
     """Placeholder for an entry in the same object as values and their unit, such as a description. Raises ValueError
     unless the entry is a text or null: a number, such as a scale, may change the values."""
     if entry is not None and (not isinstance(entry, str) or is_number(entry.strip(), ".")):
-        name = "/".join(place[:-1])
+        name = "/".join(key_path[:-1])
         raise ValueError(
-            f"'{name}' has '{place[-1]}' next to its values, and whether it scales them is not stated; write the "
+            f"'{name}' has '{key_path[-1]}' next to its values, and whether it scales them is not stated; write the "
             "values in their unit, and remove it"
         )
-    yield place, np.array(None, dtype=object)
+    yield key_path, np.array(None, dtype=object)
 
 
-def _columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
+def _collect_columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
     """One column for each key of any record, None where a record lacks it; objects inside a record are read one level
     deep, as `imu.x`. Raises ValueError with too many keys or values."""
-    flat = [dict(_fields(record)) for record in records]
+    flat = [dict(_flatten_record(record)) for record in records]
     keys = dict.fromkeys(key for record in flat for key in record)
     if len(keys) > MOST_COLUMNS or len(keys) * len(flat) > _MOST_VALUES:
         raise ValueError(
@@ -141,16 +141,16 @@ def _columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
     return {key: [record.get(key) for record in flat] for key in keys}
 
 
-def _fields(record: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def _flatten_record(record: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Keys and values of a record; those of an object inside it as `key.inner`."""
     for key, value in record.items():
         if isinstance(value, dict):
-            yield from ((f"{key}.{inner}", entry) for inner, entry in value.items())
+            yield from ((f"{key}.{inner_key}", entry) for inner_key, entry in value.items())
         else:
             yield key, value
 
 
-def _array(value: Any) -> Array:
+def _make_array(value: Any) -> Array:
     """Array of an entry: numbers, NaN where a value is missing; texts, which may be dates, where any value is not a
     number; a placeholder where there is no rectangular array of numbers."""
     if isinstance(value, list) and value and all(_is_scalar(entry) for entry in value):
@@ -160,10 +160,10 @@ def _array(value: Any) -> Array:
             return np.array([np.nan if entry is None or isinstance(entry, str) else float(entry) for entry in value])
         return np.array([str(entry) for entry in value])
     try:
-        found = np.asarray(value)
+        array = np.asarray(value)
     except ValueError:  # lists of several lengths
         return np.array(None, dtype=object)
-    return found if found.dtype.kind in "fiub" else np.array(None, dtype=object)
+    return array if array.dtype.kind in "fiub" else np.array(None, dtype=object)
 
 
 def _array_of_texts(texts: list[str]) -> Array:

@@ -21,7 +21,7 @@ from study.store.disk.declared_size import SizeLimit
 Array = npt.NDArray[Any]
 MOST_MAT_BYTES = 2**32
 """Largest file that is read (4 GiB)."""
-DEEPEST = 32
+MAX_STRUCTURE_DEPTH = 32
 """Deepest nesting of structures."""
 _HEADER_BYTES = 128
 """Length of a MAT-file's header."""
@@ -37,9 +37,9 @@ _CLASSES = {
     6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8",
 }  # fmt: skip
 """NumPy type of a numeric array, by its array class in the MAT-file format."""
-_LEFT_OUT = {_TEXT: "a text", _OBJECT: "an object", 5: "a sparse matrix", 16: "a function"}
+_UNREAD_CLASSES = {_TEXT: "a text", _OBJECT: "an object", 5: "a sparse matrix", 16: "a function"}
 """Array classes that are not read, in words."""
-_SAVED_INSTEAD = {
+_CONVERSIONS = {
     "a cell": "{plain}_1 = {name}{{1}}",
     "class timeseries": "{name} = struct('time', {name}.Time, 'values', {name}.Data)",
     "class table": "{name} = table2struct({name}, 'ToScalar', true)",
@@ -47,11 +47,11 @@ _SAVED_INSTEAD = {
 """Matlab statement that makes a readable array of one that is not read, by a part of its description."""
 
 
-def instead(name: str, what: str) -> str:
-    """Matlab statement that converts an array of this kind before saving, as advice; empty where none is known. what:
+def conversion_advice(name: str, kind: str) -> str:
+    """Matlab statement that converts an array of this kind before saving, as advice; empty where none is known. kind:
     its kind."""
-    for problem, statement in _SAVED_INSTEAD.items():
-        if problem in what:
+    for problem, statement in _CONVERSIONS.items():
+        if problem in kind:
             return f"in Matlab: {statement.format(name=name, plain=name.replace('.', '_'))}"
     return ""
 
@@ -65,41 +65,41 @@ class _Cells(tuple[Array, ...]):
 
 
 class _Bytes:
-    """A data element of the file, read from `at` onwards, with the byte order of the file."""
+    """A data element of the file, read from `position` onwards, with the byte order of the file."""
 
     def __init__(self, content: memoryview, order: str) -> None:
         self.content = content
         self.order = order
-        self.at = 0
+        self.position = 0
 
     @property
-    def left(self) -> int:
+    def remaining(self) -> int:
         """Number of bytes that are not read yet."""
-        return len(self.content) - self.at
+        return len(self.content) - self.position
 
     def element(self) -> "tuple[int, _Bytes]":
-        """Data type and content of the next element; `at` moves to its end. Raises ValueError if it is longer than the
-        rest of the file."""
-        if self.left < 8:
+        """Data type and content of the next element; `position` moves to its end. Raises ValueError if it is longer
+        than the rest of the file."""
+        if self.remaining < 8:
             raise ValueError("it is cut off")
-        kind, size = struct.unpack_from(self.order + "II", self.content, self.at)
-        begin, padded = self.at + 8, True
+        kind, size = struct.unpack_from(self.order + "II", self.content, self.position)
+        start, padded = self.position + 8, True
         if kind >> 16:  # data of up to four bytes are stored in the tag itself
-            kind, size, begin = kind & 0xFFFF, kind >> 16, self.at + 4
+            kind, size, start = kind & 0xFFFF, kind >> 16, self.position + 4
             padded = False
-        if size > (4 if not padded else self.left - 8):
+        if size > (4 if not padded else self.remaining - 8):
             raise ValueError(f"an element of {size} bytes is longer than the rest of the file")
-        self.at = self.at + 8 if not padded else begin + size
+        self.position = self.position + 8 if not padded else start + size
         if padded and kind != _COMPRESSED:
-            self.at = min(begin + -(-size // 8) * 8, len(self.content))
-        return kind, _Bytes(self.content[begin : begin + size], self.order)
+            self.position = min(start + -(-size // 8) * 8, len(self.content))
+        return kind, _Bytes(self.content[start : start + size], self.order)
 
     def numbers(self) -> Array:
         """Numbers of the next element. Raises ValueError if it is of another data type."""
-        kind, found = self.element()
+        kind, element = self.element()
         if kind not in _TYPES:
             raise ValueError(f"an element of the type {kind} is found where numbers are needed")
-        return np.frombuffer(found.content, np.dtype(self.order + _TYPES[kind]))
+        return np.frombuffer(element.content, np.dtype(self.order + _TYPES[kind]))
 
 
 def read_mat5_arrays(path: Path) -> dict[str, Array]:
@@ -109,57 +109,57 @@ def read_mat5_arrays(path: Path) -> dict[str, Array]:
         raise ValueError("it is no MAT file of version 5 to 7.3; save it in Matlab with -v7")
     limit = SizeLimit(len(content))
     file = _Bytes(memoryview(content)[_HEADER_BYTES:], "<" if content[126:128] == b"IM" else ">")
-    found: dict[str, Array] = {}
-    while file.left >= 8:
+    arrays: dict[str, Array] = {}
+    while file.remaining >= 8:
         kind, element = file.element()
         if kind == _COMPRESSED:
-            kind, element = _unpack(element, limit).element()
+            kind, element = _decompress(element, limit).element()
         if kind == _MATRIX:
-            name, value = _matrix(element, 0)
+            name, value = _read_matrix(element, 0)
             if name and not name.startswith("__"):  # the contents of objects have no name
-                _add(found, name, value)
-    return found
+                _add_arrays(arrays, name, value)
+    return arrays
 
 
-def _unpack(packed: _Bytes, limit: SizeLimit) -> _Bytes:
+def _decompress(compressed: _Bytes, limit: SizeLimit) -> _Bytes:
     """Decompress a variable. Raises DeclaredSizeError where it is larger than the limit."""
     unpacker = zlib.decompressobj()
-    content = unpacker.decompress(packed.content, limit.most_bytes)
+    content = unpacker.decompress(compressed.content, limit.most_bytes)
     if unpacker.unconsumed_tail:
-        limit.take("a compressed variable", limit.most_bytes + 1)
-    limit.take("a compressed variable", len(content))
-    return _Bytes(memoryview(content), packed.order)
+        limit.add_size("a compressed variable", limit.most_bytes + 1)
+    limit.add_size("a compressed variable", len(content))
+    return _Bytes(memoryview(content), compressed.order)
 
 
-def _matrix(element: _Bytes, depth: int) -> tuple[str, Any]:
+def _read_matrix(element: _Bytes, depth: int) -> tuple[str, Any]:
     """Name and value of a miMATRIX element: an array, a dict of arrays for a structure, or the arrays of a cell. depth:
     its level of nesting. Raises ValueError where it is damaged or too deep."""
-    if depth > DEEPEST:
-        raise ValueError(f"its structures are nested more than {DEEPEST} levels deep")
-    if not element.left:
+    if depth > MAX_STRUCTURE_DEPTH:
+        raise ValueError(f"its structures are nested more than {MAX_STRUCTURE_DEPTH} levels deep")
+    if not element.remaining:
         return "", np.empty(0)
     flags = int(element.numbers()[0])
     code = flags & 0xFF
     if code == _OPAQUE:
         name, _, kind = (bytes(element.element()[1].content).decode("utf-8", "replace") for _ in range(3))
-        return name, _no_numbers(f"an object of the class {kind}")
+        return name, _make_placeholder(f"an object of the class {kind}")
     shape = tuple(int(length) for length in element.numbers())
     name = bytes(element.element()[1].content).decode("utf-8", "replace")
     if _FIRST_NUMBER <= code <= _LAST_NUMBER:
-        return name, np.array(0j) if flags & _COMPLEX else _numeric(element, shape, _CLASSES[code])
+        return name, np.array(0j) if flags & _COMPLEX else _read_numeric(element, shape, _CLASSES[code])
     if code == _STRUCT:
-        return name, _structures(element, math.prod(shape), depth)
+        return name, _read_structures(element, math.prod(shape), depth)
     if code == _CELL:
-        return name, _cells(element, math.prod(shape), depth)
-    return name, _no_numbers(_LEFT_OUT.get(code, "no array"))
+        return name, _read_cells(element, math.prod(shape), depth)
+    return name, _make_placeholder(_UNREAD_CLASSES.get(code, "no array"))
 
 
-def _no_numbers(what: str) -> Array:
+def _make_placeholder(kind: str) -> Array:
     """Placeholder for an array that is left out, with its kind as text."""
-    return np.array(what, dtype=object)
+    return np.array(kind, dtype=object)
 
 
-def _numeric(element: _Bytes, shape: tuple[int, ...], number: str) -> Array:
+def _read_numeric(element: _Bytes, shape: tuple[int, ...], number: str) -> Array:
     """A numeric array; Matlab stores columns first. Raises ValueError where its shape and its numbers do not agree."""
     values = element.numbers()
     if math.prod(shape) != len(values) or min(shape, default=0) < 0:
@@ -167,52 +167,57 @@ def _numeric(element: _Bytes, shape: tuple[int, ...], number: str) -> Array:
     return values.astype(number).reshape(shape, order="F")
 
 
-def _structures(element: _Bytes, count: int, depth: int) -> dict[str, Any]:
+def _read_structures(element: _Bytes, count: int, depth: int) -> dict[str, Any]:
     """Fields of a structure by name; for an array of structures, those of each under its number, as in `signals.2`.
     Raises ValueError where it is damaged."""
     length = int(element.numbers()[0])
     names = bytes(element.element()[1].content)
     if length < 1 or len(names) % length:
         raise ValueError("the names of a structure's fields are damaged")
-    words = [names[at : at + length].split(b"\0")[0].decode("utf-8", "replace") for at in range(0, len(names), length)]
-    if count * len(words) * 8 > element.left:
+    words = [
+        names[offset : offset + length].split(b"\0")[0].decode("utf-8", "replace")
+        for offset in range(0, len(names), length)
+    ]
+    if count * len(words) * 8 > element.remaining:
         raise ValueError(f"{count} structures of {len(words)} fields are longer than the rest of the file")
-    every = [{word: _field(element, word, depth) for word in words} for _ in range(count)]
-    return every[0] if count == 1 else {str(number): fields for number, fields in enumerate(every, start=1)}
+    structures = [{word: _read_field(element, word, depth) for word in words} for _ in range(count)]
+    return structures[0] if count == 1 else {str(number): fields for number, fields in enumerate(structures, start=1)}
 
 
-def _cells(element: _Bytes, count: int, depth: int) -> Any:
+def _read_cells(element: _Bytes, count: int, depth: int) -> Any:
     """Arrays of a cell, if all hold numbers and have the same number of dimensions and the same shorter side; otherwise
     a placeholder. Raises ValueError where it is damaged."""
-    if count * 8 > element.left:
+    if count * 8 > element.remaining:
         raise ValueError(f"a cell of {count} arrays is longer than the rest of the file")
-    every = [_field(element, f"{number}", depth) for number in range(1, count + 1)]
-    if not every or not all(isinstance(each, np.ndarray) and each.dtype.kind in "fiu" and each.size for each in every):
-        return _no_numbers("a cell that contains more than arrays of numbers")
+    arrays = [_read_field(element, f"{number}", depth) for number in range(1, count + 1)]
+    if not arrays or not all(
+        isinstance(array, np.ndarray) and array.dtype.kind in "fiu" and array.size for array in arrays
+    ):
+        return _make_placeholder("a cell that contains more than arrays of numbers")
     if (
-        len({(squeezed.ndim, min(squeezed.shape) if squeezed.ndim > 1 else 0) for squeezed in map(np.squeeze, every)})
+        len({(squeezed.ndim, min(squeezed.shape) if squeezed.ndim > 1 else 0) for squeezed in map(np.squeeze, arrays)})
         > 1
     ):
-        return _no_numbers("a cell of arrays that are not alike")
-    return _Cells(every)
+        return _make_placeholder("a cell of arrays that are not alike")
+    return _Cells(arrays)
 
 
-def _field(element: _Bytes, word: str, depth: int) -> Any:
+def _read_field(element: _Bytes, word: str, depth: int) -> Any:
     """Value of the next field or entry. word: its name, for messages."""
-    kind, inner = element.element()
+    kind, nested = element.element()
     if kind != _MATRIX:
         raise ValueError(f"the field '{word}' of a structure or cell is damaged")
-    return _matrix(inner, depth + 1)[1]
+    return _read_matrix(nested, depth + 1)[1]
 
 
-def _add(found: dict[str, Array], name: str, value: Any) -> None:
+def _add_arrays(arrays: dict[str, Array], name: str, value: Any) -> None:
     """Add a value to the arrays found, under names as `read_mat5_arrays` describes."""
     if isinstance(value, dict):
-        for field, inner in value.items():
-            _add(found, f"{name}.{field}", inner)
+        for field, nested in value.items():
+            _add_arrays(arrays, f"{name}.{field}", nested)
     elif isinstance(value, _Cells) and len(value) > 1:
-        found.update({f"{number}-of-{len(value)}/{name}": array for number, array in enumerate(value, start=1)})
+        arrays.update({f"{number}-of-{len(value)}/{name}": array for number, array in enumerate(value, start=1)})
     elif isinstance(value, _Cells):
-        found[name] = value[0]
+        arrays[name] = value[0]
     else:
-        found[name] = value
+        arrays[name] = value

@@ -19,7 +19,7 @@ from study.store.disk.hdf5_contents import datasets_in
 from study.store.disk.hdf5_file import open_any_hdf5
 
 Array = npt.NDArray[Any]
-_PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Compressions that numpy.savez and numpy.savez_compressed use."""
 _CELL = "a cell, which is read where the file was saved with -v7"
 """Description of a Matlab cell, which an HDF5 file stores as references."""
@@ -33,46 +33,46 @@ def read_npz_arrays(path: Path) -> dict[str, Array]:
     with open_regular(path) as file:
         limit = SizeLimit(path.stat().st_size)
         if file.peek(6)[:6] == b"\x93NUMPY":
-            found = _npy(file, path.stat().st_size, limit, "data")
-            return {} if found is None else {"data": found}
+            array = _read_npy(file, path.stat().st_size, limit, "data")
+            return {} if array is None else {"data": array}
         with zipfile.ZipFile(file) as archive:
-            return _members(archive, limit)
+            return _read_members(archive, limit)
 
 
-def _members(archive: zipfile.ZipFile, limit: SizeLimit) -> dict[str, Array]:
+def _read_members(archive: zipfile.ZipFile, limit: SizeLimit) -> dict[str, Array]:
     """Arrays of the members of an archive, except Python objects. Raises ValueError for a compression that numpy does
     not use."""
-    found: dict[str, Array] = {}
+    arrays: dict[str, Array] = {}
     for member in archive.infolist():
         if not member.filename.endswith(".npy"):
             continue
         name = member.filename.removesuffix(".npy")
-        if member.compress_type not in _PLAIN:
+        if member.compress_type not in _COMPRESSIONS:
             raise ValueError(f"{name} is packed in a way that numpy does not use; save it with numpy.savez")
         with archive.open(member) as content:
-            array = _npy(content, member.file_size, limit, name)
+            array = _read_npy(content, member.file_size, limit, name)
         if array is not None:
-            found[name] = array
-    return found
+            arrays[name] = array
+    return arrays
 
 
-def _npy(file: Any, size: int, limit: SizeLimit, name: str) -> Array | None:
+def _read_npy(file: Any, size: int, limit: SizeLimit, name: str) -> Array | None:
     """One array; None for Python objects. size: unpacked size of its container (bytes). Raises ValueError where the
     declared shape does not fit."""
-    shape, fortran_order, dtype = _header(file)
+    shape, fortran_order, dtype = _read_header(file)
     if dtype.hasobject:
         return None
-    wanted = math.prod(shape) * dtype.itemsize
-    if not 0 <= wanted <= size:
-        raise ValueError(f"{name} is said to have the shape {shape}, {wanted} bytes, but holds {size}")
-    limit.take(name, wanted)
-    content = file.read(wanted)
-    if len(content) != wanted:
-        raise ValueError(f"{name} is cut off after {len(content)} of {wanted} bytes")
+    declared_bytes = math.prod(shape) * dtype.itemsize
+    if not 0 <= declared_bytes <= size:
+        raise ValueError(f"{name} is said to have the shape {shape}, {declared_bytes} bytes, but holds {size}")
+    limit.add_size(name, declared_bytes)
+    content = file.read(declared_bytes)
+    if len(content) != declared_bytes:
+        raise ValueError(f"{name} is cut off after {len(content)} of {declared_bytes} bytes")
     return np.frombuffer(content, dtype).reshape(shape, order="F" if fortran_order else "C")
 
 
-def _header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+def _read_header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     """Shape, whether the order is Fortran, and type of an array. Raises ValueError for an unknown version of the
     format."""
     version = np.lib.format.read_magic(file)
@@ -86,15 +86,15 @@ def _header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
 def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
     """Datasets by their path, as in `run1/force`. transposed: the file is of Matlab: dimensions are reversed, and names
     have dots for slashes. Raises UnusableFileError."""
-    found: dict[str, Array] = {}
+    arrays: dict[str, Array] = {}
     with open_any_hdf5(path, "HDF5 file") as file:
         for name, entry in datasets_in(file):
             if name.startswith("#") or entry.shape is None:
                 continue
             kind = entry.attrs.get("MATLAB_class", b"")
             if kind == b"cell" or "MATLAB_object_decode" in entry.attrs:
-                what = f"an object of the class {kind.decode('utf-8', 'replace')}" if kind != b"cell" else _CELL
-                values = np.array(what, dtype=object)
+                kind_text = f"an object of the class {kind.decode('utf-8', 'replace')}" if kind != b"cell" else _CELL
+                values = np.array(kind_text, dtype=object)
             elif entry.dtype.kind in "fiub":
                 values = np.asarray(entry[()])
             elif h5py.check_string_dtype(entry.dtype) is not None and entry.ndim == 1 and len(entry):
@@ -103,5 +103,5 @@ def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
                 values = _NO_NUMBERS
             else:
                 continue
-            found[name.replace("/", ".") if transposed else name] = values.T if transposed else values
-    return found
+            arrays[name.replace("/", ".") if transposed else name] = values.T if transposed else values
+    return arrays

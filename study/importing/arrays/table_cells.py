@@ -23,7 +23,7 @@ _ERRORS = (NOT_AVAILABLE, "#div/0!", "#ref!", "#value!", "#name?", "#num!", "#nu
 """Cells of a spreadsheet that look like the beginning of a comment but are not."""
 _LONGEST_ERROR = 8
 """Characters of a spreadsheet's longest error value, such as `#DIV/0!`."""
-_LIKE_A_NUMBER = re.compile(r"[-+]?[.,]?\d[\d.,:/' \u00a0\u202f-]*(?:[dDeE][-+]?\d+)?(?P<rest>.*)")
+_NUMBER_LIKE = re.compile(r"[-+]?[.,]?\d[\d.,:/' \u00a0\u202f-]*(?:[dDeE][-+]?\d+)?(?P<rest>.*)")
 """A field that begins like a number, date or clock time; `rest` is the text behind that."""
 _BRACKETED = re.compile(r"[\[(].*[\])]")
 """A unit in brackets."""
@@ -31,8 +31,8 @@ _BRACKETED = re.compile(r"[\[(].*[\])]")
 
 def is_comment(line: str) -> bool:
     """Whether a line begins with # or %, and not with an error value of a spreadsheet, such as `#N/A`."""
-    begin = line.lstrip()
-    return begin.startswith(COMMENTS) and not begin[:_LONGEST_ERROR].lower().startswith(_ERRORS)
+    text = line.lstrip()
+    return text.startswith(COMMENTS) and not text[:_LONGEST_ERROR].lower().startswith(_ERRORS)
 
 
 def split_row(line: str, delimiter: str) -> list[str]:
@@ -71,15 +71,15 @@ def is_empty(field: str) -> bool:
 
 def count_filled_fields(fields: Sequence[str]) -> int:
     """Number of fields, without empty ones at the end."""
-    return max((place for place, field in enumerate(fields, start=1) if field), default=0)
+    return max((count for count, field in enumerate(fields, start=1) if field), default=0)
 
 
 def is_text(field: str) -> bool:
     """Whether a field is words, or a digit with letters (`3a`). A number in an unknown notation (`1.234,5`, `12:30`, `3
     mm`), and several numbers in one field, are not words."""
-    like = _LIKE_A_NUMBER.fullmatch(field)
-    number = like is not None and (not re.fullmatch(r"\w+", like["rest"]) or is_unit(like["rest"]))
-    return not number and not is_stamp(field) and not is_number(field, ".")
+    match = _NUMBER_LIKE.fullmatch(field)
+    is_numeric = match is not None and (not re.fullmatch(r"\w+", match["rest"]) or is_unit(match["rest"]))
+    return not is_numeric and not is_stamp(field) and not is_number(field, ".")
 
 
 def is_unit(text: str) -> bool:
@@ -98,15 +98,15 @@ def holds_data(fields: Sequence[str], decimal: str) -> bool:
 
 def _is_spelled_number(field: str) -> bool:
     """Whether a field is a number, date or clock time in any notation, without text behind it."""
-    like = _LIKE_A_NUMBER.fullmatch(field)
-    return like is not None and not like["rest"]
+    match = _NUMBER_LIKE.fullmatch(field)
+    return match is not None and not match["rest"]
 
 
 def are_numbers(fields: Sequence[str], decimal: str, texts: Collection[int] = ()) -> bool:
     """Whether a row consists of numbers, or of dates and clock times with at least one number. texts: indices of
     columns of words, which are ignored."""
-    plain = [field for place, field in enumerate(fields) if place not in texts and not is_stamp(field)]
-    return all(is_number(field, decimal) for field in plain) and not all(map(is_empty, plain))
+    values = [field for column, field in enumerate(fields) if column not in texts and not is_stamp(field)]
+    return all(is_number(field, decimal) for field in values) and not all(map(is_empty, values))
 
 
 def holds_number(fields: Sequence[str], decimal: str) -> bool:
@@ -118,11 +118,11 @@ def first_numbers(rows: Sequence[Line], delimiter: str, decimal: str, texts: Col
     """Index of the first row of numbers, or of the first of the rows directly above it in which every number is
     missing; None without a row of numbers."""
     split = (split_row(text, delimiter) for _, text in rows)
-    found = next(((k, len(row)) for k, row in enumerate(split) if are_numbers(row, decimal, texts)), None)
-    begin, width = found or (None, 0)
-    while begin:
-        above = split_row(rows[begin - 1][1], delimiter)
+    first_row = next(((k, len(row)) for k, row in enumerate(split) if are_numbers(row, decimal, texts)), None)
+    index, width = first_row or (None, 0)
+    while index:
+        above = split_row(rows[index - 1][1], delimiter)
         if len(above) != width or not all(is_empty(field) or is_stamp(field) for field in above):
             break
-        begin -= 1
-    return begin
+        index -= 1
+    return index

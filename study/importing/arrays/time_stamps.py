@@ -53,68 +53,68 @@ def is_stamp(field: str) -> bool:
 def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
     """Time stamps of a column; None unless each field is a stamp or missing, and all are of one kind. Raises ValueError
     for dates of ambiguous order, for stamps that do not exist, and where only some have a time zone."""
-    given = fields.notna()
-    text = fields[given].str.strip()
+    is_filled = fields.notna()
+    text = fields[is_filled].str.strip()
     if text.empty or not text.map(is_stamp).all():
         return None
     parts = text.str.extract(_STAMP)
     has_date, has_clock = parts["date"].notna(), parts["hour"].notna()
     if has_date.any() != has_date.all() or has_clock.any() != has_clock.all():
         return None
-    values = np.zeros(len(text))
+    filled_seconds = np.zeros(len(text))
     if has_clock.all():
-        values += _clock_seconds(text, parts)
+        filled_seconds += _compute_clock_s(text, parts)
     if has_date.all():
-        values += _date_seconds(parts["date"])
-    every = np.full(len(fields), np.nan)
-    every[given.to_numpy()] = values
-    return StampColumn(every, bool(has_date.all()), bool(has_clock.all()), str(text.iloc[0]))
+        filled_seconds += _compute_date_s(parts["date"])
+    seconds = np.full(len(fields), np.nan)
+    seconds[is_filled.to_numpy()] = filled_seconds
+    return StampColumn(seconds, bool(has_date.all()), bool(has_clock.all()), str(text.iloc[0]))
 
 
-def _clock_seconds(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
+def _compute_clock_s(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
     """Seconds since midnight, in UTC where a zone is stated. Raises ValueError for minutes or seconds above 59, and
     where only some have a zone."""
-    for place in np.flatnonzero((parts["minute"].astype(int) > 59) | (parts["second"].str[:2].astype(int) > 59)):
-        raise ValueError(f"'{text.iloc[place]}' is no clock time, with more than 59 minutes or seconds")
+    for index in np.flatnonzero((parts["minute"].astype(int) > 59) | (parts["second"].str[:2].astype(int) > 59)):
+        raise ValueError(f"'{text.iloc[index]}' is no clock time, with more than 59 minutes or seconds")
     if parts["zone"].isna().any() != parts["zone"].isna().all():
         raise ValueError("some of its clock times have a zone, others none; write all with it, or all without")
-    second = parts["second"].str.replace(r"[,:]", ".", regex=True).astype(float)
+    seconds = parts["second"].str.replace(r"[,:]", ".", regex=True).astype(float)
     hour = parts["hour"].astype(float)
-    half = parts["half"].fillna("").str.lower().str[:1]
+    half_day = parts["half"].fillna("").str.lower().str[:1]
     # Alone, a clock time may be the time since a start, which has more hours.
-    highest = np.select([half == "a", half == "p", parts["date"].notna()], [12.0, 23.0, 24.0], math.inf)
+    highest_hour = np.select([half_day == "a", half_day == "p", parts["date"].notna()], [12.0, 23.0, 24.0], math.inf)
     # 24:00:00 is the end of a day (ISO 8601); no time comes after it.
-    after_midnight = parts["date"].notna() & (hour == 24) & ((parts["minute"].astype(int) > 0) | (second > 0))
-    for place in np.flatnonzero((hour > highest) | after_midnight):
-        raise ValueError(f"'{text.iloc[place]}' is no clock time: it has hour {hour.iloc[place]:g}; correct it")
-    hour = hour.where(half == "", hour % 12) + 12.0 * (half == "p")
-    ahead = parts["zone"].fillna("").map({zone: _zone_s(zone) for zone in parts["zone"].fillna("").unique()})
-    return np.asarray(hour * HOUR_S + parts["minute"].astype(float) * 60 + second - ahead, dtype=np.float64)
+    after_midnight = parts["date"].notna() & (hour == 24) & ((parts["minute"].astype(int) > 0) | (seconds > 0))
+    for index in np.flatnonzero((hour > highest_hour) | after_midnight):
+        raise ValueError(f"'{text.iloc[index]}' is no clock time: it has hour {hour.iloc[index]:g}; correct it")
+    hour = hour.where(half_day == "", hour % 12) + 12.0 * (half_day == "p")
+    zone_s = parts["zone"].fillna("").map({zone: _parse_zone_s(zone) for zone in parts["zone"].fillna("").unique()})
+    return np.asarray(hour * HOUR_S + parts["minute"].astype(float) * 60 + seconds - zone_s, dtype=np.float64)
 
 
-def _zone_s(zone: str) -> float:
+def _parse_zone_s(zone: str) -> float:
     """Offset of a zone from UTC (s), positive to the east; 0 without a zone."""
     digits = re.sub(r"\D", "", zone)
-    ahead_s = (int(digits[:2]) * 60 + int(digits[2:] or 0)) * 60.0 if digits else 0.0
-    return -ahead_s if zone.startswith("-") else ahead_s
+    offset_s = (int(digits[:2]) * 60 + int(digits[2:] or 0)) * 60.0 if digits else 0.0
+    return -offset_s if zone.startswith("-") else offset_s
 
 
-def _date_seconds(dates: "pd.Series[str]") -> Seconds:
+def _compute_date_s(dates: "pd.Series[str]") -> Seconds:
     """Seconds since the first date; seconds since 1970 would be resolved to 0.24 µs only (float64). Raises ValueError
     for several dates of ambiguous order."""
-    days: dict[str, float] = {}  # no value for a single date of ambiguous order
-    several = dates.nunique() > 1
+    date_s_by_text: dict[str, float] = {}  # no value for a single date of ambiguous order
+    has_several_dates = dates.nunique() > 1
     for date in dates.unique():
         numbers = [int(part) for part in re.split(r"\D", date)]
-        if numbers[0] < 1000 and several:
+        if numbers[0] < 1000 and has_several_dates:
             raise ValueError(f"'{date}' may be day and month or month and day; write dates as 2024-03-01")
         if numbers[0] >= 1000:
-            days[date] = _day(numbers, date)
-    first = days.get(str(dates.iloc[0]), 0.0)
-    return np.asarray(dates.map(lambda date: days.get(date, first) - first), dtype=np.float64)
+            date_s_by_text[date] = _parse_day_s(numbers, date)
+    first_date_s = date_s_by_text.get(str(dates.iloc[0]), 0.0)
+    return np.asarray(dates.map(lambda date: date_s_by_text.get(date, first_date_s) - first_date_s), dtype=np.float64)
 
 
-def _day(numbers: list[int], date: str) -> float:
+def _parse_day_s(numbers: list[int], date: str) -> float:
     """Seconds from 1970-01-01 to a date (year, month, day). Raises ValueError for a date that does not exist."""
     year, month, day = numbers
     try:
@@ -128,15 +128,17 @@ def join_stamps(columns: Mapping[str, StampColumn]) -> dict[str, StampColumn]:
     date continue into the next day where they fall by more than half a day."""
     dates = {name: column for name, column in columns.items() if not column.has_clock}
     clocks = {name: column for name, column in columns.items() if not column.has_date}
-    joined = dict(columns)
+    merged_columns = dict(columns)
     if len(dates) == 1 and len(clocks) == 1:
-        (day_name, day), (clock_name, clock) = *dates.items(), *clocks.items()
-        del joined[day_name]
-        both = StampColumn(day.seconds + clock.seconds, True, True, f"{day.first} {clock.first}")
-        return joined | {clock_name: both}
-    for name, clock in clocks.items():
-        known = np.flatnonzero(np.isfinite(clock.seconds))
-        over = np.zeros(len(clock.seconds))
-        over[known[1:]] = np.cumsum(np.diff(clock.seconds[known]) < -DAY_S / 2)
-        joined[name] = StampColumn(clock.seconds + over * DAY_S, False, True, clock.first)
-    return joined
+        (day_name, date_column), (clock_name, clock_column) = *dates.items(), *clocks.items()
+        del merged_columns[day_name]
+        combined = StampColumn(
+            date_column.seconds + clock_column.seconds, True, True, f"{date_column.first} {clock_column.first}"
+        )
+        return merged_columns | {clock_name: combined}
+    for name, clock_column in clocks.items():
+        finite_indices = np.flatnonzero(np.isfinite(clock_column.seconds))
+        days_passed = np.zeros(len(clock_column.seconds))
+        days_passed[finite_indices[1:]] = np.cumsum(np.diff(clock_column.seconds[finite_indices]) < -DAY_S / 2)
+        merged_columns[name] = StampColumn(clock_column.seconds + days_passed * DAY_S, False, True, clock_column.first)
+    return merged_columns

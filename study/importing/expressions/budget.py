@@ -9,13 +9,13 @@ from contextlib import contextmanager
 
 from study.importing.map_format.map_errors import ImportProblemError
 
-DEEPEST = 200
+MAX_EXPRESSION_DEPTH = 200
 """Nesting of one expression and of the definitions that it uses; below Python's own recursion limit."""
-HELD, HELD_PER_NUMBER = 20_000_000, 20
+HELD_NUMBERS, HELD_PER_NUMBER = 20_000_000, 20
 """Numbers that may be held at once (64-bit: 160 MB), and how many more for each number that the files hold. By hand."""
-MOST_HELD = 400_000_000
+MAX_HELD = 400_000_000
 """Most numbers held at once, for any file (3.2 GB). By hand."""
-COMPUTED, COMPUTED_PER_NUMBER = 500_000_000, 500
+COMPUTED_NUMBERS, COMPUTED_PER_NUMBER = 500_000_000, 500
 """Numbers that may be computed in total, and how many more for each number that the files hold. By hand."""
 _STEP = 10_000
 """Fixed cost of a single operation, in additions. By hand."""
@@ -25,14 +25,14 @@ class Budget:
     """Budget of one import. Methods raise ImportProblemError; text: the expression, for messages."""
 
     def __init__(self) -> None:
-        self._most_held = HELD
-        self._left_to_compute = COMPUTED
+        self._most_held = HELD_NUMBERS
+        self._left_to_compute = COMPUTED_NUMBERS
         self._held = 0
         self._depth = 0
 
     def allow_for(self, numbers: int) -> None:
         """Add the allowance for a file of this many numbers."""
-        self._most_held = min(MOST_HELD, self._most_held + HELD_PER_NUMBER * numbers)
+        self._most_held = min(MAX_HELD, self._most_held + HELD_PER_NUMBER * numbers)
         self._left_to_compute += COMPUTED_PER_NUMBER * numbers
 
     def spend(self, numbers: float, text: str, times: int = 1) -> None:
@@ -55,11 +55,11 @@ class Budget:
             self._held -= numbers
 
     @contextmanager
-    def deeper(self, text: str, levels: int = 1) -> Iterator[None]:
-        """Count levels of nesting while the block runs. Raises ImportProblemError beyond `DEEPEST`."""
+    def nested(self, text: str, levels: int = 1) -> Iterator[None]:
+        """Count levels of nesting while the block runs. Raises ImportProblemError beyond `MAX_EXPRESSION_DEPTH`."""
         self._depth += levels
         try:
-            if self._depth > DEEPEST:
+            if self._depth > MAX_EXPRESSION_DEPTH:
                 raise ImportProblemError(f"'{text}' is nested too deeply")
             yield
         finally:

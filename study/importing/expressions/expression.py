@@ -1,4 +1,4 @@
-"""Evaluate expressions of a map: arithmetic over arrays.
+"""Evaluate the expressions of an import map: arithmetic over arrays.
 
 The text is parsed by Python's parser and evaluated here on the syntax tree, never by Python itself. What is not in the
 lists below is refused by name: attributes, other function calls, comprehensions.
@@ -21,7 +21,7 @@ from study.importing.map_format.map_errors import ImportProblemError, suggestion
 Lookup = Callable[[str], Value]
 """Returns the value of a name. Raises ImportProblemError for an unknown name."""
 
-LONGEST = 2000
+LONGEST_EXPRESSION = 2000
 """Longest expression of a map, in characters: parsing takes time and stack depth."""
 _CALL_COSTS = 20
 """Cost of a function call per element, in additions: the slowest functions sort, or compute a sine."""
@@ -55,7 +55,7 @@ def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, which is reported later
-            value: Value | str = _Evaluation(text, lookup, clock, budget).of(tree)
+            value: Value | str = _Evaluation(text, lookup, clock, budget).evaluate_node(tree)
     except (MemoryError, RecursionError) as error:
         raise ImportProblemError(f"'{text}' needs more memory than there is") from error
     if isinstance(value, str):
@@ -63,13 +63,13 @@ def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
     return value
 
 
-def names_in(text: str) -> set[str]:
+def find_names(text: str) -> set[str]:
     """Names of arrays, channels and definitions that an expression uses. Raises ImportProblemError."""
     tree = parse_expression(text)
     functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    plain = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in functions}
+    identifiers = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in functions}
     quoted = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
-    return (plain | quoted) - {"pi", "clock_s", "rate_hz"}
+    return (identifiers | quoted) - {"pi", "clock_s", "rate_hz"}
 
 
 @lru_cache(maxsize=1024)
@@ -77,12 +77,12 @@ def parse_expression(text: str) -> ast.expr:
     """Syntax tree of an expression. Raises ImportProblemError."""
     if not text.strip():
         raise ImportProblemError("the expression is empty")
-    if len(text) > LONGEST:
-        raise ImportProblemError(f"the expression has {len(text)} characters; up to {LONGEST} are read")
+    if len(text) > LONGEST_EXPRESSION:
+        raise ImportProblemError(f"the expression has {len(text)} characters; up to {LONGEST_EXPRESSION} are read")
     try:
         return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-        raise ImportProblemError(f"'{text}' is not an expression ({_reason(error)}); {ALLOWED}") from error
+        raise ImportProblemError(f"'{text}' is not an expression ({_describe_error(error)}); {ALLOWED}") from error
 
 
 class _Evaluation:
@@ -94,27 +94,29 @@ class _Evaluation:
         self.clock = clock
         self.budget = budget
 
-    def of(self, node: ast.expr) -> Any:
+    def evaluate_node(self, node: ast.expr) -> Any:
         """Value of a node of the syntax tree: numbers, or a text."""
-        with self.budget.deeper(self.text):
+        with self.budget.nested(self.text):
             match node:
                 case ast.Constant() | ast.Name():
-                    return self._leaf(node)
-                case ast.UnaryOp(op=ast.USub(), operand=inner):
-                    return self._negative(inner)
-                case ast.UnaryOp(op=ast.UAdd(), operand=inner):
-                    return self._numbers(inner)
-                case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _OPERATIONS:
-                    return self._combine(_OPERATIONS[type(operator)], left, right)
-                case ast.Compare(left=left, ops=[order], comparators=[right]) if type(order) in _COMPARISONS:
-                    return self._combine(_COMPARISONS[type(order)], left, right)
+                    return self._evaluate_leaf(node)
+                case ast.UnaryOp(op=ast.USub(), operand=operand):
+                    return self._negate_operand(operand)
+                case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                    return self._evaluate_numbers(operand)
+                case ast.BinOp(left=left_operand, op=operator, right=right_operand) if type(operator) in _OPERATIONS:
+                    return self._combine_operands(_OPERATIONS[type(operator)], left_operand, right_operand)
+                case ast.Compare(left=left_operand, ops=[order], comparators=[right_operand]) if (
+                    type(order) in _COMPARISONS
+                ):
+                    return self._combine_operands(_COMPARISONS[type(order)], left_operand, right_operand)
                 case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
-                    return self._call(name, arguments)
-                case ast.Subscript(value=inner, slice=index):
-                    return self._index_array(inner, index)
-            raise self._refusal(node)
+                    return self._call_function(name, arguments)
+                case ast.Subscript(value=operand, slice=index):
+                    return self._index_array(operand, index)
+            raise self._make_not_allowed_error(node)
 
-    def _leaf(self, node: ast.Constant | ast.Name) -> Any:
+    def _evaluate_leaf(self, node: ast.Constant | ast.Name) -> Any:
         """Value of a name, a number or a text."""
         self.budget.spend(0, self.text)
         match node:
@@ -122,30 +124,33 @@ class _Evaluation:
                 return np.float64(np.pi)
             case ast.Name(id=name):
                 return self.lookup(name)
-            case ast.Constant(value=str() as word):
-                return word
+            case ast.Constant(value=str() as quoted_text):
+                return quoted_text
             case ast.Constant(value=int() | float() as number) if not isinstance(number, bool) and abs(number) < 1e300:
                 return np.float64(number)
-        raise self._refusal(node)
+        raise self._make_not_allowed_error(node)
 
-    def _numbers(self, node: ast.expr) -> Value:
+    def _evaluate_numbers(self, node: ast.expr) -> Value:
         """Value of a node that must be numbers."""
-        value = self.of(node)
+        value = self.evaluate_node(node)
         if isinstance(value, str):
             raise ImportProblemError(f"in '{self.text}' the text '{value}' is found where numbers are needed")
         numbers: Value = value
         return numbers
 
-    def _negative(self, node: ast.expr) -> Value:
-        value = self._numbers(node)
+    def _negate_operand(self, node: ast.expr) -> Value:
+        """Value of a node with a minus sign."""
+        value = self._evaluate_numbers(node)
         self.budget.spend(np.size(value), self.text)
         return np.negative(value)
 
-    def _combine(self, operation: Callable[[Any, Any], Any], left: ast.expr, right: ast.expr) -> Value:
+    def _combine_operands(
+        self, operation: Callable[[Any, Any], Any], left_operand: ast.expr, right_operand: ast.expr
+    ) -> Value:
         """Value of an operator or comparison between two nodes."""
-        first = self._numbers(left)
+        first = self._evaluate_numbers(left_operand)
         with self.budget.hold_numbers(np.size(first)):
-            second = self._numbers(right)
+            second = self._evaluate_numbers(right_operand)
         try:
             self._count_cost((first, second), 1)
             return np.asarray(operation(first, second), dtype=np.float64)
@@ -162,10 +167,10 @@ class _Evaluation:
         with self.budget.hold_numbers(sum(np.size(value) for value in values)):
             self.budget.spend(size, self.text, times)
 
-    def _call(self, name: str, arguments: list[ast.expr]) -> Value:
+    def _call_function(self, name: str, arguments: list[ast.expr]) -> Value:
         """Value of a function call; its cost is counted before it is computed."""
         if name == "array":
-            return self._array_by_name(arguments)
+            return self._look_up_array(arguments)
         if name not in FUNCTIONS:
             raise ImportProblemError(
                 f"in '{self.text}' there is no function '{name}'{suggestion(name, FUNCTIONS)}; {ALLOWED}"
@@ -176,7 +181,7 @@ class _Evaluation:
         values: list[Value] = []
         for argument in arguments:
             with self.budget.hold_numbers(sum(np.size(value) for value in values)):
-                values.append(self._numbers(argument))
+                values.append(self._evaluate_numbers(argument))
         try:
             if name == "repeat":
                 self.budget.spend(np.size(values[0]) * float(values[1]), self.text)
@@ -188,48 +193,52 @@ class _Evaluation:
         except (ValueError, IndexError, TypeError, ArithmeticError) as error:
             raise ImportProblemError(f"in '{self.text}' {function.usage} fails: {error}") from error
 
-    def _array_by_name(self, arguments: list[ast.expr]) -> Value:
+    def _look_up_array(self, arguments: list[ast.expr]) -> Value:
         """Value of `array("NAME")`, for names that are not identifiers."""
         match arguments:
             case [ast.Constant(value=str() as name)]:
                 return self.lookup(name)
         raise ImportProblemError(f"in '{self.text}' array(\"NAME\") takes one name in quotes")
 
-    def _index_array(self, inner: ast.expr, index: ast.expr) -> Value:
+    def _index_array(self, operand: ast.expr, index: ast.expr) -> Value:
         """Value of an indexed array."""
-        whole = self._numbers(inner)
+        array = self._evaluate_numbers(operand)
         entries = index.elts if isinstance(index, ast.Tuple) else [index]
-        places: list[int | slice] = []
-        with self.budget.hold_numbers(np.size(whole)), self.budget.deeper(self.text):
+        indices: list[int | slice] = []
+        with self.budget.hold_numbers(np.size(array)), self.budget.nested(self.text):
             for entry in entries:
-                places.append(self._index(entry))
+                indices.append(self._evaluate_index(entry))
         try:
-            part: npt.NDArray[np.float64] = np.asarray(whole)[tuple(places)]
+            part: npt.NDArray[np.float64] = np.asarray(array)[tuple(indices)]
         except IndexError as error:
-            raise ImportProblemError(f"in '{self.text}' the index is outside the shape {np.shape(whole)}") from error
+            raise ImportProblemError(f"in '{self.text}' the index is outside the shape {np.shape(array)}") from error
         return part
 
-    def _index(self, node: ast.expr) -> int | slice:
-        """An index or a slice of whole numbers."""
+    def _evaluate_index(self, node: ast.expr) -> int | slice:
+        """An index or a slice of integers."""
         if not isinstance(node, ast.Slice):
-            return self._whole_number(node)
-        bounds = [None if bound is None else self._whole_number(bound) for bound in (node.lower, node.upper, node.step)]
+            return self._evaluate_integer(node)
+        bounds = [
+            None if bound is None else self._evaluate_integer(bound) for bound in (node.lower, node.upper, node.step)
+        ]
         if bounds[2] == 0:
             raise ImportProblemError(f"in '{self.text}' a step of 0 is not allowed")
         return slice(*bounds)
 
-    def _whole_number(self, node: ast.expr) -> int:
-        number = self._numbers(node)
+    def _evaluate_integer(self, node: ast.expr) -> int:
+        """Value of a node that must be an integer."""
+        number = self._evaluate_numbers(node)
         if np.ndim(number) or not float(number).is_integer():
             raise ImportProblemError(f"in '{self.text}' an index is not a whole number")
         return int(number)
 
-    def _refusal(self, node: ast.expr) -> ImportProblemError:
-        # As written in the source: unparsing would need memory in proportion to its depth.
+    def _make_not_allowed_error(self, node: ast.expr) -> ImportProblemError:
         """The error for a node that is not allowed."""
+        # As written in the source: unparsing would need memory in proportion to its depth.
         part = ast.get_source_segment(self.text.strip(), node) or self.text
         return ImportProblemError(f"in '{self.text}' this is not understood: {part}; {ALLOWED}")
 
 
-def _reason(error: BaseException) -> str:
+def _describe_error(error: BaseException) -> str:
+    """Message of a syntax error; name of any other exception."""
     return error.msg if isinstance(error, SyntaxError) else type(error).__name__

@@ -23,7 +23,7 @@ class Clock(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A function of expressions, with the fewest and the most arguments that it takes."""
+    """A function of expressions, with the least and the largest number of its arguments."""
 
     usage: str
     meaning: str
@@ -33,13 +33,13 @@ class Function:
     """Arguments: the clock, then the values."""
 
 
-def _plain(usage: str, meaning: str, function: Callable[..., Any], count: int = 1) -> Function:
-    """A function with a fixed number of arguments that does not depend on time."""
+def _make_time_independent(usage: str, meaning: str, function: Callable[..., Any], count: int = 1) -> Function:
+    """Make a function that does not depend on time and has a fixed number (`count`) of arguments."""
     return Function(usage, meaning, count, count, lambda clock, *values: function(*values))
 
 
-def _line(values: Value) -> Value:
-    """The array, if it has one dimension. Raises ValueError otherwise."""
+def _require_vector(values: Value) -> Value:
+    """Return the array. Raises ValueError unless it has one dimension."""
     if np.ndim(values) != 1:
         raise ValueError(f"it needs an array of one dimension, not of shape {np.shape(values)}")
     return values
@@ -47,60 +47,64 @@ def _line(values: Value) -> Value:
 
 def _difference(values: Value) -> Value:
     """Differences of neighbouring samples (n,); the first is 0."""
-    return np.diff(_line(values), prepend=values[:1])
+    return np.diff(_require_vector(values), prepend=values[:1])
 
 
 def _derivative(clock: Clock, values: Value) -> Value:
     """Derivative (n,) per second, by central differences; one-sided at the ends."""
-    found: Value = np.gradient(_line(values), clock.times_s(len(values)))
-    return found
+    derivative: Value = np.gradient(_require_vector(values), clock.times_s(len(values)))
+    return derivative
 
 
 def _integral(clock: Clock, values: Value) -> Value:
     """Integral (n,) over seconds from the first sample, by the trapezoidal rule."""
-    steps = np.diff(clock.times_s(len(_line(values))))
+    steps = np.diff(clock.times_s(len(_require_vector(values))))
     return np.concatenate([[0.0], np.cumsum(steps * (values[1:] + values[:-1]) / 2)])
 
 
 def _onset(clock: Clock, values: Value, threshold: Value) -> int:
     """Index of the first sample that differs from the mean of the first ten by more than the threshold. Raises
     ValueError without such a sample."""
-    away = np.abs(_line(values) - np.mean(values[:10])) > float(threshold)
-    if not away.any():
+    is_beyond = np.abs(_require_vector(values) - np.mean(values[:10])) > float(threshold)
+    if not is_beyond.any():
         raise ValueError(f"nothing leaves the mean of the first ten samples by more than {float(threshold):g}")
-    return int(np.argmax(away))
+    return int(np.argmax(is_beyond))
 
 
 def _repeat(values: Value, times: Value) -> Value:
     """The array, repeated `times` times."""
-    return np.tile(_line(values), int(times))
+    return np.tile(_require_vector(values), int(times))
 
 
 FUNCTIONS: dict[str, Function] = {
-    "abs": _plain("abs(x)", "magnitude", np.abs),
-    "sqrt": _plain("sqrt(x)", "square root", np.sqrt),
-    "exp": _plain("exp(x)", "exponential", np.exp),
-    "log": _plain("log(x)", "natural logarithm", np.log),
-    "sin": _plain("sin(x)", "x in radians", np.sin),
-    "cos": _plain("cos(x)", "x in radians", np.cos),
-    "tan": _plain("tan(x)", "x in radians", np.tan),
-    "sign": _plain("sign(x)", "-1, 0 or 1", np.sign),
-    "clip": _plain("clip(x, lowest, highest)", "held within two numbers", np.clip, 3),
-    "unwrap": _plain("unwrap(x)", "an angle in radians without its jumps by a turn", np.unwrap),
-    "mean": _plain("mean(x)", "one number; missing samples are left out", np.nanmean),
-    "median": _plain("median(x)", "likewise", np.nanmedian),
-    "std": _plain("std(x)", "likewise", np.nanstd),
-    "min": _plain("min(x)", "likewise", np.nanmin),
-    "max": _plain("max(x)", "likewise", np.nanmax),
-    "sum": _plain("sum(x)", "likewise", np.nansum),
-    "length": _plain("length(x)", "number of samples", len),
-    "diff": _plain("diff(x)", "each sample less the one before; the first is 0", _difference),
-    "cumsum": _plain("cumsum(x)", "running sum", lambda x: np.cumsum(_line(x))),
-    "derivative": Function("derivative(x)", "per second, by central differences", 1, 1, _derivative),
-    "integral": Function("integral(x)", "over seconds, from 0, by trapezoids", 1, 1, _integral),
-    "onset": Function("onset(x, by)", "first sample that leaves the mean of the first ten by more", 2, 2, _onset),
-    "repeat": _plain("repeat(x, times)", "one after another", _repeat, 2),
-    "flatten": _plain("flatten(x)", "the rows of a table one after another", np.ravel),
-    "transpose": _plain("transpose(x)", "rows as columns", np.transpose),
+    "abs": _make_time_independent("abs(x)", "magnitude", np.abs),
+    "sqrt": _make_time_independent("sqrt(x)", "square root", np.sqrt),
+    "exp": _make_time_independent("exp(x)", "exponential", np.exp),
+    "log": _make_time_independent("log(x)", "natural logarithm", np.log),
+    "sin": _make_time_independent("sin(x)", "sine, x in radians", np.sin),
+    "cos": _make_time_independent("cos(x)", "cosine, x in radians", np.cos),
+    "tan": _make_time_independent("tan(x)", "tangent, x in radians", np.tan),
+    "sign": _make_time_independent("sign(x)", "sign: -1, 0 or 1", np.sign),
+    "clip": _make_time_independent(
+        "clip(x, lowest, highest)", "x limited to the range from lowest to highest", np.clip, 3
+    ),
+    "unwrap": _make_time_independent("unwrap(x)", "angle in radians without jumps by a full turn", np.unwrap),
+    "mean": _make_time_independent("mean(x)", "a single number; missing samples are left out", np.nanmean),
+    "median": _make_time_independent("median(x)", "likewise", np.nanmedian),
+    "std": _make_time_independent("std(x)", "likewise", np.nanstd),
+    "min": _make_time_independent("min(x)", "likewise", np.nanmin),
+    "max": _make_time_independent("max(x)", "likewise", np.nanmax),
+    "sum": _make_time_independent("sum(x)", "likewise", np.nansum),
+    "length": _make_time_independent("length(x)", "number of samples", len),
+    "diff": _make_time_independent("diff(x)", "each sample minus the previous one; the first is 0", _difference),
+    "cumsum": _make_time_independent("cumsum(x)", "running sum", lambda x: np.cumsum(_require_vector(x))),
+    "derivative": Function("derivative(x)", "derivative per second, by central differences", 1, 1, _derivative),
+    "integral": Function("integral(x)", "integral over seconds from 0, by the trapezoidal rule", 1, 1, _integral),
+    "onset": Function(
+        "onset(x, by)", "index of the first sample that differs from the mean of the first ten by more", 2, 2, _onset
+    ),
+    "repeat": _make_time_independent("repeat(x, times)", "x repeated in sequence", _repeat, 2),
+    "flatten": _make_time_independent("flatten(x)", "the rows of a table in sequence", np.ravel),
+    "transpose": _make_time_independent("transpose(x)", "rows as columns", np.transpose),
 }
 """Functions by name. `array("NAME")`, for names that are not identifiers, is evaluated in `expression`."""

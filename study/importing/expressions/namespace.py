@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.arrays.arrays import Arrays, left_out
+from study.importing.arrays.arrays import Arrays, unread_reason
 from study.importing.arrays.csv_arrays import FaultyColumn
-from study.importing.arrays.mat_arrays import instead
+from study.importing.arrays.mat_arrays import conversion_advice
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.expression import evaluate
 from study.importing.expressions.functions import Clock, Value
 from study.importing.map_format.map_errors import ImportProblemError, suggestion
-from study.importing.map_format.signal_words import unit_in
+from study.importing.map_format.signal_words import split_bracketed_unit
 
-_SHOWN = 24
+_MAX_SHOWN = 24
 """Most arrays that a message names."""
 
 
@@ -35,7 +35,7 @@ class Namespace:
 
     arrays: Mapping[str, npt.NDArray[Any]]
     definitions: Mapping[str, str]
-    where: str
+    file_name: str
     """The file, for messages."""
     budget: Budget
     """Limit of the cost of all expressions of an import together."""
@@ -46,7 +46,7 @@ class Namespace:
         """Value of an array by its name, which may contain any characters, or of an expression. Raises
         ImportProblemError."""
         if text in self.arrays:
-            return self._numbers(text)
+            return self._to_float(text)
         return evaluate(text, lambda name: self.lookup(name, clock), clock, self.budget)
 
     def number(self, text: str) -> float:
@@ -60,25 +60,25 @@ class Namespace:
         """Value of an array or a definition. clock: gives the times for the expression of a definition. Raises
         ImportProblemError for an unknown name."""
         if name in self.arrays:
-            return self._numbers(name)
+            return self._to_float(name)
         if name in self.definitions:
             return self._value_of_definition(name, clock)
         if name == "clock_s":
             raise ImportProblemError("clock_s is known in [[computed]] channels only, on the recording's grid")
         names = [*self.arrays, *self.definitions]
         raise ImportProblemError(
-            f"there is no array '{name}' in {self.where}{suggestion(name, names)}; there are {self.list_names()}"
+            f"there is no array '{name}' in {self.file_name}{suggestion(name, names)}; there are {self.list_names()}"
         )
 
-    def has(self, name: str) -> bool:
+    def has_name(self, name: str) -> bool:
         """Whether there is an array or a definition of this name."""
         return name in self.arrays or name in self.definitions
 
     def list_names(self) -> str:
         """Names with their shapes, for messages."""
-        shown = [f"{name} {_shape(array)}" for name, array in list(self.arrays.items())[:_SHOWN]]
-        more = len(self.arrays) - _SHOWN
-        return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
+        texts = [f"{name} {_shape(array)}" for name, array in list(self.arrays.items())[:_MAX_SHOWN]]
+        remaining = len(self.arrays) - _MAX_SHOWN
+        return ", ".join(texts) + (f" and {remaining} more" if remaining > 0 else "")
 
     def _value_of_definition(self, name: str, clock: Clock) -> Value:
         """Value of a definition. Raises ImportProblemError where it needs itself."""
@@ -86,37 +86,39 @@ class Namespace:
             raise ImportProblemError(f"the definition of '{name}' refers to itself")
         self._open.add(name)
         try:
-            with self.budget.deeper(name, 2):
+            with self.budget.nested(name, 2):
                 return self.value_of(self.definitions[name], clock)
         finally:
             self._open.discard(name)
 
-    def _numbers(self, name: str) -> Value:
+    def _to_float(self, name: str) -> Value:
         """An array as float64. Raises ImportProblemError where it holds no real numbers."""
         array = self.arrays[name]
-        problem = left_out(array)
+        problem = unread_reason(array)
         if isinstance(problem, FaultyColumn):
             raise ImportProblemError(problem)
         if array.dtype.kind not in "fiub":
-            what = "complex numbers" if array.dtype.kind == "c" else "text or objects"
-            known = f": it is {problem}" if problem else ""
-            mend = f"; {statement}" if (statement := instead(name, problem)) else ""
-            raise ImportProblemError(f"the array '{name}' in {self.where} holds {what}, not real numbers{known}{mend}")
+            content = "complex numbers" if array.dtype.kind == "c" else "text or objects"
+            kind_text = f": it is {problem}" if problem else ""
+            advice = f"; {statement}" if (statement := conversion_advice(name, problem)) else ""
+            raise ImportProblemError(
+                f"the array '{name}' in {self.file_name} holds {content}, not real numbers{kind_text}{advice}"
+            )
         self.budget.spend(array.size, name)
         with np.errstate(all="ignore"):
             return np.asarray(array, dtype=np.float64)
 
 
-def of_file(arrays: Arrays, definitions: Mapping[str, str], prefix: str, budget: Budget) -> Namespace:
+def namespace_of(arrays: Arrays, definitions: Mapping[str, str], prefix: str, budget: Budget) -> Namespace:
     """Namespace of a file. Names that begin with the prefix are also known without it, and `fx [N]` as `fx`. Raises
     ImportProblemError if a prefix is given and no name begins with it."""
-    short = {name.removeprefix(prefix): array for name, array in arrays.by_name.items() if name.startswith(prefix)}
-    plain = {unit_in(name)[0]: array for name, array in arrays.by_name.items()}
-    if prefix and not short:
+    unprefixed = {name.removeprefix(prefix): array for name, array in arrays.by_name.items() if name.startswith(prefix)}
+    unitless = {split_bracketed_unit(name)[0]: array for name, array in arrays.by_name.items()}
+    if prefix and not unprefixed:
         listed = Namespace(arrays.by_name, {}, arrays.name, budget).list_names()
         raise ImportProblemError(f"no array of {arrays.name} begins with '{prefix}'; there are {listed}")
     budget.allow_for(sum(array.size for array in arrays.by_name.values()))
-    return Namespace({**plain, **arrays.by_name, **short}, definitions, arrays.name, budget)
+    return Namespace({**unitless, **arrays.by_name, **unprefixed}, definitions, arrays.name, budget)
 
 
 def _shape(array: npt.NDArray[Any]) -> str:

@@ -32,57 +32,59 @@ class PartFiles:
         return self.file.name + (f" {self.part.prefix}*" if self.part.prefix else "")
 
 
-def part_files(wanted: ImportMap, files: Sequence[Path]) -> tuple[PartFiles, ...]:
+def part_files(import_map: ImportMap, files: Sequence[Path]) -> tuple[PartFiles, ...]:
     """Parts in the order of the recording, with their files. Raises ImportProblemError for a superfluous or missing
     file, and for several files where the map makes a recording of each."""
-    ordered = _order_files(wanted, files)
-    if wanted.separate and len(ordered) > 1:
+    ordered = _order_files(import_map, files)
+    if import_map.separate and len(ordered) > 1:
         names = ", ".join(path.name for path in ordered)
         raise ImportProblemError(f"the map makes one recording of each file; import {names} one by one")
-    beside = any(clock.file for clock in wanted.clock)
-    parts = (_side_by_side(wanted, ordered),) if beside else tuple(_in_sequence(wanted, ordered))
+    is_parallel = any(clock.file for clock in import_map.clock)
+    parts = (_assign_parallel(import_map, ordered),) if is_parallel else tuple(_assign_sequential(import_map, ordered))
     used = {path for part in parts for path in part.by_clock.values()}
-    if left := [path.name for path in ordered if path not in used]:
-        raise ImportProblemError(f"no part of the map takes the file {left[0]}; leave it out, or add a [[part]] for it")
+    if unused := [path.name for path in ordered if path not in used]:
+        raise ImportProblemError(
+            f"no part of the map takes the file {unused[0]}; leave it out, or add a [[part]] for it"
+        )
     return parts
 
 
-def _order_files(wanted: ImportMap, files: Sequence[Path]) -> list[Path]:
+def _order_files(import_map: ImportMap, files: Sequence[Path]) -> list[Path]:
     """Files in the order of the map's patterns; those of one pattern in the given order. Raises ImportProblemError for
     a file that fits no pattern."""
-    found = []
+    ranked = []
     for path in files:
-        fits = [number for number, pattern in enumerate(wanted.files) if fnmatchcase(path.name, pattern)]
-        if not fits:
-            raise ImportProblemError(f"{path.name} is none of the files of this map ({', '.join(wanted.files)})")
-        found.append((fits[0], path))
-    return [path for _, path in sorted(found, key=lambda entry: entry[0])]
+        fitting = [number for number, pattern in enumerate(import_map.files) if fnmatchcase(path.name, pattern)]
+        if not fitting:
+            raise ImportProblemError(f"{path.name} is none of the files of this map ({', '.join(import_map.files)})")
+        ranked.append((fitting[0], path))
+    return [path for _, path in sorted(ranked, key=lambda entry: entry[0])]
 
 
-def _side_by_side(wanted: ImportMap, files: Sequence[Path]) -> PartFiles:
+def _assign_parallel(import_map: ImportMap, files: Sequence[Path]) -> PartFiles:
     """A single part with a file for each clock, recorded in parallel."""
     by_clock = {}
-    for clock in wanted.clock:
+    for clock in import_map.clock:
         (path,) = _exactly_one(clock.file or "*", files, f"clock '{clock.name}'")
         by_clock[clock.name] = path
     return PartFiles(PartMap(file=" + ".join(path.name for path in by_clock.values())), by_clock)
 
 
-def _in_sequence(wanted: ImportMap, files: Sequence[Path]) -> Iterator[PartFiles]:
+def _assign_sequential(import_map: ImportMap, files: Sequence[Path]) -> Iterator[PartFiles]:
     """A part for each file, in the order of the map's parts; all clocks are in the same file."""
-    for part in wanted.part or (PartMap(),):
+    for part in import_map.part or (PartMap(),):
         fitting = [path for path in files if fnmatchcase(path.name, part.file)]
         if not fitting:
             raise ImportProblemError(f"no file given fits the part '{part.file}'; given are {_names(files)}")
         for path in fitting:
-            yield PartFiles(part, {clock.name: path for clock in wanted.clock})
+            yield PartFiles(part, {clock.name: path for clock in import_map.clock})
 
 
-def _exactly_one(pattern: str, files: Sequence[Path], what: str) -> list[Path]:
+def _exactly_one(pattern: str, files: Sequence[Path], subject: str) -> list[Path]:
     """List with the single file that fits a pattern. Raises ImportProblemError where none or several fit."""
     fitting = [path for path in files if fnmatchcase(path.name, pattern)]
     if len(fitting) != 1:
-        raise ImportProblemError(f"{what} is in the file '{pattern}', which fits {len(fitting)} of {_names(files)}")
+        raise ImportProblemError(f"{subject} is in the file '{pattern}', which fits {len(fitting)} of {_names(files)}")
     return fitting
 
 

@@ -1,4 +1,7 @@
-"""Segments of a part: the map's segments on its sample grid."""
+"""Segments of an imported recording: converts the segments of an import map, in seconds or samples, to sample ranges.
+
+Called by `study.importing.build_recording` for each part: the arrays of a file that share a prefix.
+"""
 
 from collections.abc import Iterator
 from fnmatch import fnmatchcase
@@ -12,67 +15,79 @@ from study.importing.map_format.import_map import SegmentMap
 from study.importing.map_format.map_errors import ImportProblemError
 
 
-def segments_of(
-    wanted: tuple[SegmentMap, ...], part: tuple[str, str], command: FloatArray, rate_hz: float
+def place_segments(
+    segment_maps: tuple[SegmentMap, ...], part: tuple[str, str], command: FloatArray, rate_hz: float
 ) -> Iterator[Segment]:
-    """The map's segments that fit this part, on its sample grid. part: name of its file, and its prefix. command: (n,
+    """The map's segments that apply to a part, as sample ranges. part: name of its file, and its prefix. command: (n,
     m) in the map's unit, which amplitudes also have. Raises ImportProblemError."""
     file, prefix = part
-    for number, entry in enumerate(wanted, start=1):
-        if fnmatchcase(file, entry.file) and (entry.prefix == "*" or fnmatchcase(prefix, entry.prefix)):
+    for number, segment_map in enumerate(segment_maps, start=1):
+        if fnmatchcase(file, segment_map.file) and (
+            segment_map.prefix == "*" or fnmatchcase(prefix, segment_map.prefix)
+        ):
             try:
-                yield from _pieces(entry, command, rate_hz)
+                yield from _place_segment(segment_map, command, rate_hz)
             except ImportProblemError as error:
                 raise ImportProblemError(f"segment[{number}] in {file}: {error}") from error
 
 
-def _pieces(entry: SegmentMap, command: FloatArray, rate_hz: float) -> Iterator[Segment]:
-    start, stop = _bounds(entry, len(command), rate_hz)
-    spans = list(_spans(entry, start, stop))
+def _place_segment(segment_map: SegmentMap, command: FloatArray, rate_hz: float) -> Iterator[Segment]:
+    """The segments of one entry of the map; a negative amplitude stands for the peak of the command. Raises
+    ImportProblemError."""
+    start, stop = _find_bounds(segment_map, len(command), rate_hz)
+    spans = list(_divide_span(segment_map, start, stop))
     if not spans:
-        raise ImportProblemError(f"no piece of {entry.every} samples fits between {start} and {stop}")
-    for (begin, end), role in zip(*_with_roles(entry, spans), strict=True):
-        amplitude = entry.amplitude if entry.amplitude >= 0 else _peak(command[begin:end])
-        yield Segment(begin, end, entry.kind, amplitude, entry.period, role)
+        raise ImportProblemError(f"no piece of {segment_map.every} samples fits between {start} and {stop}")
+    for (first, last), role in zip(*_assign_roles(segment_map, spans), strict=True):
+        amplitude = segment_map.amplitude if segment_map.amplitude >= 0 else _find_peak(command[first:last])
+        yield Segment(first, last, segment_map.kind, amplitude, segment_map.period, role)
 
 
-def _bounds(entry: SegmentMap, samples: int, rate_hz: float) -> tuple[int, int]:
-    start = round(entry.start_s * rate_hz) if entry.start_s else entry.start
-    stop = round(entry.stop_s * rate_hz) if entry.stop_s else entry.stop
+def _find_bounds(segment_map: SegmentMap, samples: int, rate_hz: float) -> tuple[int, int]:
+    """First sample, and sample after the last. Times in seconds take precedence unless 0; negative values count from
+    the end of the part, as does a stop of 0. Raises ImportProblemError for bounds outside the part."""
+    start = round(segment_map.start_s * rate_hz) if segment_map.start_s else segment_map.start
+    stop = round(segment_map.stop_s * rate_hz) if segment_map.stop_s else segment_map.stop
     start, stop = (start + samples if start < 0 else start), (stop + samples if stop <= 0 else stop)
     if not 0 <= start < stop <= samples:
         raise ImportProblemError(f"it goes from sample {start} to {stop}, but the part has {samples} samples")
     return start, stop
 
 
-def _spans(entry: SegmentMap, start: int, stop: int) -> Iterator[tuple[int, int]]:
-    if not entry.every:
+def _divide_span(segment_map: SegmentMap, start: int, stop: int) -> Iterator[tuple[int, int]]:
+    """The range from start to stop; with `every`, pieces of `length` samples (0: of `every`) that begin every `every`
+    samples, without an incomplete last one. Raises ImportProblemError for pieces that would overlap."""
+    if not segment_map.every:
         yield start, stop
         return
-    length = entry.length or entry.every
-    if length > entry.every:
-        raise ImportProblemError(f"its length, {length}, is more than one every {entry.every} samples leaves room for")
-    for begin in range(start, stop - length + 1, entry.every):
-        yield begin, begin + length
+    length = segment_map.length or segment_map.every
+    if length > segment_map.every:
+        raise ImportProblemError(
+            f"its length, {length}, is more than one every {segment_map.every} samples leaves room for"
+        )
+    for first in range(start, stop - length + 1, segment_map.every):
+        yield first, first + length
 
 
-def _with_roles(entry: SegmentMap, spans: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], list[str]]:
-    """Assign roles: one span is cut into its shares; of several, each gets the share in which its middle lies."""
-    if not entry.split:
-        return spans, [entry.role] * len(spans)
-    ends = np.cumsum(list(entry.split.values()))
-    roles = list(entry.split)
+def _assign_roles(segment_map: SegmentMap, spans: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], list[str]]:
+    """Ranges and their roles by the shares of `split`: a single range is cut in proportion to the shares; of several,
+    each gets the role of the share in which its middle lies. Raises ImportProblemError for a share without samples."""
+    if not segment_map.split:
+        return spans, [segment_map.role] * len(spans)
+    ends = np.cumsum(list(segment_map.split.values()))
+    roles = list(segment_map.split)
     if len(spans) > 1:
         middles = (np.arange(len(spans)) + 0.5) / len(spans)
         return spans, [roles[min(int(np.searchsorted(ends, middle)), len(roles) - 1)] for middle in middles]
     ((start, stop),) = spans
-    cuts = [start, *(start + round(float(end) * (stop - start)) for end in ends[:-1]), stop]
-    pieces = list(pairwise(cuts))
-    if any(begin >= end for begin, end in pieces):
+    cuts = [start, *(start + round(float(last) * (stop - start)) for last in ends[:-1]), stop]
+    shares = list(pairwise(cuts))
+    if any(first >= last for first, last in shares):
         raise ImportProblemError(f"{stop - start} samples cannot be split into shares as small as these")
-    return pieces, roles
+    return shares, roles
 
 
-def _peak(command: FloatArray) -> float:
+def _find_peak(command: FloatArray) -> float:
+    """Largest magnitude of the samples that are not missing; 0 without any."""
     finite = command[np.isfinite(command)]
     return float(np.max(np.abs(finite))) if finite.size else 0.0

@@ -1,4 +1,4 @@
-"""Parse the text of a map into an ImportMap, or into a list of all its problems."""
+"""Parse the TOML text of an import map into an ImportMap, or report all its problems."""
 
 import json
 import tomllib
@@ -8,16 +8,16 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from protocols.document.schema import Node, Place, describe_allowed, keys_of, node_at, resolve_reference
-from protocols.document.validation_messages import key_path, nearest_key, shown
+from protocols.document.schema import Node, Place, describe_allowed, find_node, list_keys, resolve_reference
+from protocols.document.validation_messages import describe_value, find_nearest_key, format_key_path
 from study.importing.map_format.import_map import ImportMap
 from study.store.disk.file_errors import UnusableFileError
 
 KIND = "import map"
-"""What messages call a map."""
+"""Kind of the document, for messages."""
 
 _ADAPTER: TypeAdapter[ImportMap] = TypeAdapter(ImportMap)
-"""Checks a map, and makes its schema."""
+"""Validates a map, and makes its JSON Schema."""
 MAP_SCHEMA: Node = _ADAPTER.json_schema()
 """JSON Schema of a map: docs/importing.md is made from it."""
 
@@ -29,14 +29,18 @@ def parse_map(text: str, source: Path) -> ImportMap:
     except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
         raise UnusableFileError(source, KIND, (f"it is not TOML: {error}",)) from error
     try:
-        found = _ADAPTER.validate_json(json.dumps(values, default=str), strict=True)
+        import_map = _ADAPTER.validate_json(json.dumps(values, default=str), strict=True)
     except ValidationError as error:
-        raise UnusableFileError(source, KIND, tuple(_problems(error.errors()))) from error
+        raise UnusableFileError(source, KIND, tuple(_describe_errors(error.errors()))) from error
     except (ValueError, RecursionError) as error:  # a number of more digits than Python writes
         raise UnusableFileError(source, KIND, (f"it cannot be read: {error}",)) from error
-    if problems := (*_contradictions(found), *_segment_contradictions(found), *_meta(found)):
+    if problems := (
+        *_find_contradictions(import_map),
+        *_find_segment_contradictions(import_map),
+        *_find_meta_problems(import_map),
+    ):
         raise UnusableFileError(source, KIND, problems)
-    return found
+    return import_map
 
 
 def is_map(values: dict[str, Any]) -> bool:
@@ -44,68 +48,73 @@ def is_map(values: dict[str, Any]) -> bool:
     return isinstance(values.get("channel"), list)
 
 
-def _problems(errors: Sequence[Any]) -> Iterator[str]:
+def _describe_errors(errors: Sequence[Any]) -> Iterator[str]:
+    """A clause for each validation error of pydantic."""
     for error in errors:
         place: Place = error["loc"]
         if error["type"] == "json_invalid":  # nested too deeply
             yield f"it cannot be read: {error['msg']}"
             continue
-        key = key_path(MAP_SCHEMA, place)
+        key = format_key_path(MAP_SCHEMA, place)
         if error["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
-            yield _report_unknown_key(key, place)
+            yield _describe_unknown_key(key, place)
         elif error["type"] == "missing":
             yield f"{key} is missing; it is {_describe_allowed(place)}"
         else:
-            yield f"{key} is {_show_value(error['input'])}; it must be {_describe_allowed(place)}"
+            yield f"{key} is {_quote_value(error['input'])}; it must be {_describe_allowed(place)}"
 
 
-def _report_unknown_key(key: str, place: Place) -> str:
-    table = node_at(MAP_SCHEMA, place[:-1])
-    known = keys_of(MAP_SCHEMA, table) if table else ()
-    meant = nearest_key(str(place[-1]), known)
-    return f"{key} is no key of a map" + (f"; did you mean {meant}" if meant else f"; keys here are {', '.join(known)}")
+def _describe_unknown_key(key: str, place: Place) -> str:
+    table = find_node(MAP_SCHEMA, place[:-1])
+    known_keys = list_keys(MAP_SCHEMA, table) if table else ()
+    nearest = find_nearest_key(str(place[-1]), known_keys)
+    return f"{key} is no key of a map" + (
+        f"; did you mean {nearest}" if nearest else f"; keys here are {', '.join(known_keys)}"
+    )
 
 
-def _show_value(value: Any) -> str:
-    return f'"{value}"' if isinstance(value, str) else shown(value)
+def _quote_value(value: Any) -> str:
+    return f'"{value}"' if isinstance(value, str) else describe_value(value)
 
 
 def _describe_allowed(place: Place) -> str:
-    node = node_at(MAP_SCHEMA, place)
+    node = find_node(MAP_SCHEMA, place)
     if node is None:
-        parent = resolve_reference(MAP_SCHEMA, node_at(MAP_SCHEMA, place[:-1]) or {})
+        parent = resolve_reference(MAP_SCHEMA, find_node(MAP_SCHEMA, place[:-1]) or {})
         return "a number" if parent.get("additionalProperties", {}).get("type") == "number" else "text in quotes"
     return describe_allowed_in_map(node, str(place[-1]))
 
 
 def describe_allowed_in_map(node: Node, key: str) -> str:
     """Allowed values of a key, in words."""
-    whole = resolve_reference(MAP_SCHEMA, node)
-    if whole.get("type") == "object" and "properties" not in whole:
+    resolved = resolve_reference(MAP_SCHEMA, node)
+    if resolved.get("type") == "object" and "properties" not in resolved:
         return "a table"
     return describe_allowed(MAP_SCHEMA, node, key)
 
 
-def _contradictions(found: ImportMap) -> Iterator[str]:
-    clocks = [clock.name for clock in found.clock]
-    keys = [(entry.role, entry.name) for entry in found.channel]
-    keys += [(entry.role, entry.name) for entry in found.computed]
+def _find_contradictions(import_map: ImportMap) -> Iterator[str]:
+    """Contradictions among channels, clocks and parts, as clauses."""
+    clocks = [clock.name for clock in import_map.clock]
+    keys = [(entry.role, entry.name) for entry in import_map.channel]
+    keys += [(entry.role, entry.name) for entry in import_map.computed]
     for role, name in sorted({key for key in keys if keys.count(key) > 1}):
         yield f"{role} '{name}' is defined twice"
     for name in sorted({name for name in clocks if clocks.count(name) > 1}):
         yield f"clock '{name}' is defined twice"
-    for channel in found.channel:
+    for channel in import_map.channel:
         if channel.clock and channel.clock not in clocks:
             yield f"channel '{channel.name}' is on the clock '{channel.clock}', but there are {', '.join(clocks)}"
-    yield from _roles(found)
-    yield from _check_hold(found)
-    yield from _clock_contradictions(found)
-    if found.part and any(clock.file for clock in found.clock):
+    yield from _find_missing_roles(import_map)
+    yield from _find_hold_contradictions(import_map)
+    yield from _find_clock_contradictions(import_map)
+    if import_map.part and any(clock.file for clock in import_map.clock):
         yield "clocks with `file` put files side by side, [[part]] one after another; a map does one or the other"
 
 
-def _segment_contradictions(found: ImportMap) -> Iterator[str]:
-    for number, segment in enumerate(found.segment, start=1):
+def _find_segment_contradictions(import_map: ImportMap) -> Iterator[str]:
+    """Invalid splits of segments, and limits that are stated twice, as clauses."""
+    for number, segment in enumerate(import_map.segment, start=1):
         if set(segment.split) - {"fit", "test", ""}:
             yield f"segment[{number}].split names {', '.join(segment.split)}; roles are fit, test, or empty"
         elif segment.split and (segment.role or not 0.999 <= sum(segment.split.values()) <= 1.001):
@@ -114,50 +123,54 @@ def _segment_contradictions(found: ImportMap) -> Iterator[str]:
             yield f"segment[{number}] is stated in samples and in seconds; state one of them"
 
 
-def _meta(found: ImportMap) -> Iterator[str]:
+def _find_meta_problems(import_map: ImportMap) -> Iterator[str]:
+    """Metadata that JSON cannot hold, as a clause."""
     try:
-        json.dumps(found.meta, allow_nan=False)
+        json.dumps(import_map.meta, allow_nan=False)
     except ValueError:
         yield "meta holds a number that is not finite; leave it out, or write it as text"
 
 
-_FREE = (
+_FREE_MOTION_ADVICE = (
     '; for a device that moves freely, write a force of zero for each axis: [[computed]] with role = "command", '
     'name = "none", value = "0 * clock_s", unit = "N" ("N m" for angles)'
 )
 """Advice where commands are missing."""
 
 
-def _roles(found: ImportMap) -> Iterator[str]:
-    roles = {channel.role for channel in found.channel} | {channel.role for channel in found.computed}
-    for needed in ("command", "response"):
-        if needed not in roles:
-            free = _FREE if needed == "command" else ""
-            yield f"there is no channel with the role '{needed}'; a recording needs both command and response{free}"
+def _find_missing_roles(import_map: ImportMap) -> Iterator[str]:
+    """A clause for each of the roles command and response that no channel has."""
+    roles = {channel.role for channel in import_map.channel} | {channel.role for channel in import_map.computed}
+    for role in ("command", "response"):
+        if role not in roles:
+            advice = _FREE_MOTION_ADVICE if role == "command" else ""
+            yield f"there is no channel with the role '{role}'; a recording needs both command and response{advice}"
 
 
-_RESAMPLED = {"zero-order": "held", "linear": "linear", "band-limited": "band-limited"}
+_RESAMPLE_OF_HOLD = {"zero-order": "held", "linear": "linear", "band-limited": "band-limited"}
 """How commands are resampled, by the `hold` of the map."""
 
 
-def _check_hold(found: ImportMap) -> Iterator[str]:
-    """The interpolation of a command between samples is stated in two places, which must agree."""
-    for channel in found.channel:
+def _find_hold_contradictions(import_map: ImportMap) -> Iterator[str]:
+    """Commands whose `resample` contradicts the `hold` of the recording, as clauses."""
+    for channel in import_map.channel:
         hold = {"held": "zero-order"}.get(channel.resample, channel.resample)
-        if channel.role == "command" and hold and (hold == "zero-order") != (found.hold == "zero-order"):
+        if channel.role == "command" and hold and (hold == "zero-order") != (import_map.hold == "zero-order"):
             yield (
-                f"command '{channel.name}' is resampled {channel.resample}, but the recording's hold is {found.hold}; "
-                "a command either stays between its samples (held, zero-order) or it does not: "
-                f'write hold = "{hold}" at the top of the map, or resample = "{_RESAMPLED[found.hold]}" here'
+                f"command '{channel.name}' is resampled {channel.resample}, but the recording's hold is "
+                f"{import_map.hold}; a command either stays between its samples (held, zero-order) or it does not: "
+                f'write hold = "{hold}" at the top of the map, or '
+                f'resample = "{_RESAMPLE_OF_HOLD[import_map.hold]}" here'
             )
 
 
-def _clock_contradictions(found: ImportMap) -> Iterator[str]:
-    for clock in found.clock:
-        ways = [bool(clock.time), bool(clock.rate_hz), bool(clock.rate), clock.unknown]
-        if sum(ways) > 1:
+def _find_clock_contradictions(import_map: ImportMap) -> Iterator[str]:
+    """Clocks with no time, or with several or incomplete statements of time or alignment, as clauses."""
+    for clock in import_map.clock:
+        statements = [bool(clock.time), bool(clock.rate_hz), bool(clock.rate), clock.unknown]
+        if sum(statements) > 1:
             yield f"clock '{clock.name}' states its time more than once; state one of time, rate_hz, rate, unknown"
-        if sum(ways) == 0:
+        if sum(statements) == 0:
             yield (
                 f"clock '{clock.name}' has no rate: give its rate_hz, its rate as an expression, or its time stamps; "
                 "where no time is known, unknown = true"
@@ -170,5 +183,5 @@ def _clock_contradictions(found: ImportMap) -> Iterator[str]:
             yield f"clock '{clock.name}' needs both trigger and reference_trigger, or neither"
         if clock.align and clock.trigger:
             yield f"clock '{clock.name}' is aligned twice, by a trigger and by correlation; choose one of them"
-        if clock is found.clock[0] and (clock.align or clock.trigger or clock.offset_s):
+        if clock is import_map.clock[0] and (clock.align or clock.trigger or clock.offset_s):
             yield f"clock '{clock.name}' is the first, to which the others are aligned; it must have no offset"

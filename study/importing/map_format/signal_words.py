@@ -1,7 +1,7 @@
 """Interpret channel names: quantity and unit, as in `fx [N]`, `displacement_mm`, `motor speed (rpm)`; and derive the
 roles of channels (command, response, ...) from them.
 
-`name_signal` interprets one name; `roles_of`, `open_roles` and `propose_roles` take all names of a file.
+`parse_signal_name` interprets one name; `assign_roles`, `list_open_roles` and `propose_roles` take all names of a file.
 """
 
 import re
@@ -26,7 +26,7 @@ from study.importing.map_format.import_map import SignalRole
 
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+(?:\([^\[\]()]*\))?)[\])]\s*")
 """A name followed by its unit in brackets."""
-_SAID_BEHIND = re.compile(r"(?<=\w)(?:\s*/\s*|\s*,\s+|\s+in\s+)(?=\S)")
+_UNIT_SEPARATOR = re.compile(r"(?<=\w)(?:\s*/\s*|\s*,\s+|\s+in\s+)(?=\S)")
 """Separator between a name and its unit without brackets (`force / N`, `force, N`, `Kraft in N`), as in standards and
 in files of testing machines."""
 _NO_UNITS = ("n/a", "na", "none", "-", "--")
@@ -35,9 +35,9 @@ _PEAK = re.compile(r"(?<![a-z])(peak|pk|rms)\b|(?<=[av])(peak|pk|rms)\b", re.IGN
 """Mark of a unit whose numbers are peak or rms values."""
 LONGEST_NAME = 300
 """Longest name in characters; the search for a unit takes quadratic time."""
-_REMEMBERED = 2**14
+_CACHE_SIZE = 2**14
 """Size of the cache of names: the headers of one file are interpreted repeatedly."""
-_FOREIGN = {
+_FOREIGN_WORDS = {
     "time": ("时间", "時間", "時刻", "시간", "время", "χρόνος"),
     "force": ("载荷", "荷重", "하중", "сила", "усилие", "δύναμη"),
     "torque": ("扭矩", "转矩", "トルク", "토크", "момент", "ροπή"),
@@ -51,31 +51,31 @@ _FOREIGN = {
     "pressure": ("压力", "圧力", "압력", "давление", "πίεση"),
 }
 """Words for a quantity in other scripts."""
-FOREIGN_WORDS = {word: quantity for quantity, words in _FOREIGN.items() for word in words}
+FOREIGN_WORDS = {word: quantity for quantity, words in _FOREIGN_WORDS.items() for word in words}
 """Quantity of each word in another script; the words are also used to detect an encoding."""
-_SURE = ("rad", "mrad", "rpm", "kN", "N m", "mN m")
+_CERTAIN_UNITS = ("rad", "mrad", "rpm", "kN", "N m", "mN m")
 """Units that are unambiguous at the end of a name, unlike `A` in `phase_A`; units with a slash are unambiguous, too."""
-_WRITTEN_TOGETHER = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
+_JOINED_UNITS = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
 """Units as written in names, without blanks or slashes, and their usual notation."""
-_SAID: dict[str, SignalRole] = {
+_ROLE_OF_WORD: dict[str, SignalRole] = {
     **dict.fromkeys(("command", "cmd", "commanded", "comando", "mando", "befehl", "commande"), "command"),
     **dict.fromkeys(("ref", "reference", "target", "setpoint", "desired"), "helper"),
     **dict.fromkeys(("referencia", "sollwert", "consigne"), "helper"),
     **dict.fromkeys(("supply", "battery", "bus", "ambient", "setting"), "condition"),
 }  # fmt: skip
 """Role that a word in a name states."""
-_SHORT: dict[str, SignalRole] = {"u": "command", "y": "response"}
+_TEXTBOOK_ROLES: dict[str, SignalRole] = {"u": "command", "y": "response"}
 """Role of the textbook names of input and output. They count only if both occur and no name is `x`: `y` would then be
 an axis."""
-_ALONE: dict[str, SignalRole] = {
+_ROLE_OF_NAME: dict[str, SignalRole] = {
     **dict.fromkeys(("input", "entrada", "eingang", "entrée", "entree"), "command"),
     **dict.fromkeys(("output", "salida", "ausgang", "sortie"), "response"),
 }
 """Role of names of input and output, valid only as the whole name: an "output speed" is a speed."""
 _Role = SignalRole | Literal[""]
 """Role of a channel; empty: not known."""
-_DRIVES, _FEEDS = ("force", "torque"), ("current", "voltage")
-_MOTIONS, _PLACES = ("acceleration", "velocity"), ("position", "angle")
+_FORCES, _ELECTRICAL = ("force", "torque"), ("current", "voltage")
+_RATES, _POSITIONS = ("acceleration", "velocity"), ("position", "angle")
 """Quantities of channels: forces, electrical quantities, rates of motion, and positions."""
 
 
@@ -96,26 +96,26 @@ class ParsedName:
     a contradiction. Otherwise empty."""
 
     @property
-    def sure(self) -> bool:
+    def is_certain(self) -> bool:
         """Whether the interpretation is certain: there is no `doubt`."""
         return not self.doubt
 
 
-def plain_names(columns: Sequence[ParsedName]) -> list[str]:
+def strip_units(columns: Sequence[ParsedName]) -> list[str]:
     """Names without the unit at their end (`displacement_in` becomes `displacement`, because samples are converted to
     SI), where the unit is certain and the names stay distinct."""
-    plain = [_without_unit(column) for column in columns]
-    return [name if plain.count(name) == 1 else column.name for name, column in zip(plain, columns, strict=True)]
+    stems = [_strip_unit(column) for column in columns]
+    return [name if stems.count(name) == 1 else column.name for name, column in zip(stems, columns, strict=True)]
 
 
-def _without_unit(column: ParsedName) -> str:
+def _strip_unit(column: ParsedName) -> str:
     """Name without the unit at its end, where that is certain."""
-    before, unit = unit_at_end(column.name)
-    return before if unit and unit == column.unit and not column.doubt else column.name
+    stem, unit = split_unit_at_end(column.name)
+    return stem if unit and unit == column.unit and not column.doubt else column.name
 
 
-@lru_cache(_REMEMBERED)
-def unit_in(header: str) -> tuple[str, str]:
+@lru_cache(_CACHE_SIZE)
+def split_bracketed_unit(header: str) -> tuple[str, str]:
     """Name and bracketed unit; the unit is empty if there is none."""
     match = _BRACKETED.fullmatch(header) if len(header) <= LONGEST_NAME else None
     if not match or not match["name"].strip():
@@ -129,145 +129,165 @@ def is_peak_value(unit: str) -> bool:
     return plain_unit(unit) != unit and _PEAK.search(unit) is not None
 
 
-@lru_cache(_REMEMBERED)
-def name_signal(header: str) -> ParsedName:
+@lru_cache(_CACHE_SIZE)
+def parse_signal_name(header: str) -> ParsedName:
     """Interpret one header. The quantity follows from a word of the name if there is one, otherwise from the unit; a
     contradiction between both is a doubt."""
-    name, unit = unit_in(header)
-    foreign = max((word for word in FOREIGN_WORDS if word in name.lower()), key=len, default="")
-    word = quantity_in(name) if FOREIGN_WORDS.get(foreign, "time") == "time" else FOREIGN_WORDS[foreign]
-    stated = unit or unit_at_end(name)[1]
+    name, unit = split_bracketed_unit(header)
+    foreign_word = max((stated for stated in FOREIGN_WORDS if stated in name.lower()), key=len, default="")
+    stated = quantity_in(name) if FOREIGN_WORDS.get(foreign_word, "time") == "time" else FOREIGN_WORDS[foreign_word]
+    unit_text = unit or split_unit_at_end(name)[1]
     try:
-        known = parse_unit(stated)
+        parsed_unit = parse_unit(unit_text)
     except UnknownUnitError:
-        return ParsedName(header, name, "", word, _unknown(unit) if unit else "")
-    by_unit = "time" if known.si == "s" else quantity_of(known.si)
-    if by_unit == known.si != UNSTATED and word not in ("setting", *QUANTITY_UNITS):
-        return ParsedName(header, name, stated, by_unit, f"what is measured in {stated} is not known")
-    if not word:
+        return ParsedName(header, name, "", stated, _describe_unknown_unit(unit) if unit else "")
+    by_unit = "time" if parsed_unit.si == "s" else quantity_of(parsed_unit.si)
+    if by_unit == parsed_unit.si != UNSTATED and stated not in ("setting", *QUANTITY_UNITS):
+        return ParsedName(header, name, unit_text, by_unit, f"what is measured in {unit_text} is not known")
+    if not stated:
         doubt = (
             ""
-            if unit or stated in _SURE or "/" in stated
-            else f"whether {stated} is its unit is not sure, for no word says what it is"
+            if unit or unit_text in _CERTAIN_UNITS or "/" in unit_text
+            else f"whether {unit_text} is its unit is not sure, for no word says what it is"
         )
-        return ParsedName(header, name, stated, by_unit, doubt)
+        return ParsedName(header, name, unit_text, by_unit, doubt)
     try:
-        check_quantity(word, known)
+        check_quantity(stated, parsed_unit)
     except UnknownUnitError:
         if SEVERAL_MEANINGS & set(words_in(name)):
-            return ParsedName(header, name, stated, by_unit, "")
-        doubt = f"its name says {word}, its unit, {stated}, says {by_unit}{force_hint(word, known)}"
-        return ParsedName(header, name, stated, by_unit, doubt)
-    return ParsedName(header, name, stated, word, "")
+            return ParsedName(header, name, unit_text, by_unit, "")
+        doubt = f"its name says {stated}, its unit, {unit_text}, says {by_unit}{force_hint(stated, parsed_unit)}"
+        return ParsedName(header, name, unit_text, by_unit, doubt)
+    return ParsedName(header, name, unit_text, stated, "")
 
 
-def _unknown(unit: str) -> str:
+def _describe_unknown_unit(unit: str) -> str:
     """Clause about an unknown unit."""
-    near = suggest_unit(unit)
-    return f"'{unit}' is not a unit known here" + (f" (did you mean '{near}'?)" if near else "")
+    nearest = suggest_unit(unit)
+    return f"'{unit}' is not a unit known here" + (f" (did you mean '{nearest}'?)" if nearest else "")
 
 
-def roles_of(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
+def assign_roles(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
     """Roles by quantity: forces are commands, or voltages or currents if there are none, or else channels named as
     commands; accelerations and velocities are responses, or positions if there are no others; other known quantities
-    are conditions. None if something is open or contradicted by a name (`open_roles` says what)."""
-    return None if open_roles(columns) else [role for role in _roles(columns, _find_stated_roles(columns)) if role]
+    are conditions. None if something is open or contradicted by a name (`list_open_roles` says what)."""
+    return (
+        None
+        if list_open_roles(columns)
+        else [role for role in _compute_roles(columns, _find_stated_roles(columns)) if role]
+    )
 
 
-def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
+def list_open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
     """What names and quantities leave open, one clause each; empty if they determine all roles."""
-    every_said = _find_stated_roles(columns)
-    roles = _roles(columns, every_said)
-    found = []
-    for column, role, stated in zip(columns, roles, every_said, strict=True):
-        if role == "helper" or (role and stated not in ("", role)):
-            found.append(f"whether '{column.header}' is to be compared, or is only a help to others")
-        elif not role and column.quantity in _FEEDS:
-            found.append(f"whether '{column.header}' is the command")
+    stated_roles = _find_stated_roles(columns)
+    roles = _compute_roles(columns, stated_roles)
+    questions = []
+    for column, role, stated_role in zip(columns, roles, stated_roles, strict=True):
+        if role == "helper" or (role and stated_role not in ("", role)):
+            questions.append(f"whether '{column.header}' is to be compared, or is only a help to others")
+        elif not role and column.quantity in _ELECTRICAL:
+            questions.append(f"whether '{column.header}' is the command")
         elif not role:
-            found.append(f"what '{column.header}' is")
-    if found:
-        return tuple(found)
+            questions.append(f"what '{column.header}' is")
+    if questions:
+        return tuple(questions)
     if "command" not in roles:
-        found.append("what the command is (no column is a force, torque, current or voltage, or called command)")
+        questions.append("what the command is (no column is a force, torque, current or voltage, or called command)")
     if "response" not in roles:
-        found.append("what the response is (no column is a position, angle, speed or acceleration)")
-    return tuple(found)
+        questions.append("what the response is (no column is a position, angle, speed or acceleration)")
+    return tuple(questions)
 
 
 def propose_roles(columns: Sequence[ParsedName]) -> list[_Role]:
     """Roles by words of the names, otherwise by quantity; empty where open. A reference is a helper; so are currents
     and voltages where there is a force."""
     all_stated = _find_stated_roles(columns)
-    return [stated or role for stated, role in zip(all_stated, _roles(columns, all_stated), strict=True)]
+    return [
+        stated_role or role for stated_role, role in zip(all_stated, _compute_roles(columns, all_stated), strict=True)
+    ]
 
 
-def may_be_imposed(columns: Sequence[ParsedName]) -> bool:
+def may_be_imposed_motion(columns: Sequence[ParsedName]) -> bool:
     """Whether there are forces (or torques) and positions (or angles), no velocities or accelerations, and no name that
     states a command, a response or a helper."""
     quantities = {column.quantity for column in columns}
-    plain = not {"command", "helper", "response"} & set(_find_stated_roles(columns))
-    return plain and bool(quantities & set(_DRIVES) and quantities & set(_PLACES)) and not quantities & set(_MOTIONS)
+    is_unstated = not {"command", "helper", "response"} & set(_find_stated_roles(columns))
+    return (
+        is_unstated
+        and bool(quantities & set(_FORCES) and quantities & set(_POSITIONS))
+        and not quantities & set(_RATES)
+    )
 
 
-def _roles(columns: Sequence[ParsedName], stated: Sequence[_Role]) -> list[_Role]:
+def _compute_roles(columns: Sequence[ParsedName], stated_roles: Sequence[_Role]) -> list[_Role]:
     """Role of each channel by quantity, with conditions and commands that names state; empty where open."""
-    by_quantity = _by_quantity(columns, stated)
-    return [_role(column, role, by_quantity) for column, role in zip(columns, stated, strict=True)]
+    roles_by_quantity = _map_roles(columns, stated_roles)
+    return [_choose_role(column, role, roles_by_quantity) for column, role in zip(columns, stated_roles, strict=True)]
 
 
-def _role(column: ParsedName, stated: _Role, by_quantity: Mapping[str, SignalRole]) -> _Role:
-    if stated == "condition":
+def _choose_role(column: ParsedName, stated_role: _Role, roles_by_quantity: Mapping[str, SignalRole]) -> _Role:
+    if stated_role == "condition":
         return "condition"
-    if stated == "command" and column.quantity in ("", "1") and "command" not in by_quantity.values():
+    if stated_role == "command" and column.quantity in ("", "1") and "command" not in roles_by_quantity.values():
         return "command"
-    known = column.quantity not in ("", "1", "time", *_DRIVES, *_FEEDS, *_MOTIONS, *_PLACES)
-    return by_quantity.get(column.quantity, "condition" if known else "")
+    has_other_quantity = column.quantity not in (
+        "",
+        "1",
+        "time",
+        *_FORCES,
+        *_ELECTRICAL,
+        *_RATES,
+        *_POSITIONS,
+    )
+    return roles_by_quantity.get(column.quantity, "condition" if has_other_quantity else "")
 
 
 def _find_stated_roles(columns: Sequence[ParsedName]) -> list[_Role]:
     """Role that each name states; empty where it states none."""
-    firsts = {column.name.split("_")[0].lower() for column in columns}
-    short = _SHORT if {"u", "y"} <= firsts and "x" not in firsts else {}
-    found: list[_Role] = []
+    first_words = {column.name.split("_")[0].lower() for column in columns}
+    textbook_roles = _TEXTBOOK_ROLES if {"u", "y"} <= first_words and "x" not in first_words else {}
+    roles: list[_Role] = []
     for column in columns:
         words = words_in(column.name)
-        alone: _Role = _ALONE.get(words[0], "") if len(words) == 1 else ""
-        brief = alone or (short.get(words[0], "") if words else "")
-        found.append(next((_SAID[word] for word in words if word in _SAID), brief))
-    return found
+        role_of_name: _Role = _ROLE_OF_NAME.get(words[0], "") if len(words) == 1 else ""
+        default_role = role_of_name or (textbook_roles.get(words[0], "") if words else "")
+        roles.append(next((_ROLE_OF_WORD[word] for word in words if word in _ROLE_OF_WORD), default_role))
+    return roles
 
 
-def _by_quantity(columns: Sequence[ParsedName], stated: Sequence[_Role]) -> dict[str, SignalRole]:
-    """Role of each quantity, given which quantities occur in the file (see `roles_of`)."""
-    quantities = {column.quantity for column, role in zip(columns, stated, strict=True) if role != "condition"}
-    answers = _MOTIONS if quantities & set(_MOTIONS) else _PLACES
-    by_quantity: dict[str, SignalRole] = {}
-    if quantities & set(_DRIVES):
-        by_quantity.update({**dict.fromkeys(_FEEDS, "helper"), **dict.fromkeys(_DRIVES, "command")})
-    elif len(quantities & set(_FEEDS)) == 1:  # with both currents and voltages, the command cannot be identified
-        by_quantity.update(dict.fromkeys(_FEEDS, "command"))
-    by_quantity.update(dict.fromkeys(_PLACES, "position"))
-    by_quantity.update(dict.fromkeys(answers, "response"))
-    return by_quantity
+def _map_roles(columns: Sequence[ParsedName], stated_roles: Sequence[_Role]) -> dict[str, SignalRole]:
+    """Role of each quantity, given which quantities occur in the file (see `assign_roles`)."""
+    quantities = {column.quantity for column, role in zip(columns, stated_roles, strict=True) if role != "condition"}
+    response_quantities = _RATES if quantities & set(_RATES) else _POSITIONS
+    roles_by_quantity: dict[str, SignalRole] = {}
+    if quantities & set(_FORCES):
+        roles_by_quantity.update({**dict.fromkeys(_ELECTRICAL, "helper"), **dict.fromkeys(_FORCES, "command")})
+    elif len(quantities & set(_ELECTRICAL)) == 1:  # with both currents and voltages, the command cannot be identified
+        roles_by_quantity.update(dict.fromkeys(_ELECTRICAL, "command"))
+    roles_by_quantity.update(dict.fromkeys(_POSITIONS, "position"))
+    roles_by_quantity.update(dict.fromkeys(response_quantities, "response"))
+    return roles_by_quantity
 
 
-@lru_cache(_REMEMBERED)
-def unit_at_end(name: str) -> tuple[str, str]:
+@lru_cache(_CACHE_SIZE)
+def split_unit_at_end(name: str) -> tuple[str, str]:
     """Name, and the unit at its end as in `displacement_mm`, `omega_rad_s`, `a_mps2`, `force / N` (the longest ending
     that is a unit). Without such a unit: the whole name, and an empty unit."""
     if len(name) > LONGEST_NAME:
         return name, ""
     parts = name.split("_")
-    ends = [("_".join(parts[:first]), _join_unit(parts[first:])) for first in range(1, len(parts))]
-    ends += [(name[: mark.start()], name[mark.end() :]) for mark in _SAID_BEHIND.finditer(name)]
-    for before, text in ends:
+    candidates = [
+        ("_".join(parts[:split_index]), _join_unit(parts[split_index:])) for split_index in range(1, len(parts))
+    ]
+    candidates += [(name[: separator.start()], name[separator.end() :]) for separator in _UNIT_SEPARATOR.finditer(name)]
+    for stem, text in candidates:
         unit = plain_unit(text)
         try:
             parse_unit(unit)
         except UnknownUnitError:
             continue
-        return (before, unit) if unit != "1" else (name, "")
+        return (stem, unit) if unit != "1" else (name, "")
     return name, ""
 
 
@@ -275,5 +295,5 @@ def _join_unit(parts: Sequence[str]) -> str:
     """A unit in usual notation, from the parts of a name between underscores."""
     text = "_".join(parts)
     text = re.sub(r"mps2$", "m/s^2", text)
-    text = _WRITTEN_TOGETHER.get(text, text.replace("_per_", "/").replace("_", "/"))
+    text = _JOINED_UNITS.get(text, text.replace("_per_", "/").replace("_", "/"))
     return re.sub(r"(?<=[a-z])2$", "^2", text)

@@ -32,19 +32,19 @@ from study.session.facts.events import (
     TrialPresented,
     TrialSpoiled,
 )
-from study.session.views.archive_views import TURNED_AWAY
+from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.views.local_time import Zone, in_utc, local_parts
 
 _Key = tuple[int, int, int]
 """Run, trial and attempt of a presentation."""
 
 
-def log_in_words(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...]:
+def describe_log(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...]:
     """One line per event, oldest first: local time and a sentence. A line with the date precedes each change of date or
     UTC offset."""
     events = tuple(events)
-    counted = {_key(event) for event in events if isinstance(event, TrialMeasured)}
-    presented = {_key(e): e for e in events if isinstance(e, TrialPresented) and _key(e) in counted}
+    measured_keys = {_key(event) for event in events if isinstance(event, TrialMeasured)}
+    presented = {_key(e): e for e in events if isinstance(e, TrialPresented) and _key(e) in measured_keys}
     lines: list[str] = []
     text = ""
     for event in events:
@@ -57,7 +57,7 @@ def log_in_words(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...
     return tuple(lines)
 
 
-def in_words(event: Event) -> str:
+def describe_event(event: Event) -> str:
     """One event alone. Direction and correctness of a trial, which depend on other events, are left out."""
     return _describe(event, {})
 
@@ -72,9 +72,9 @@ def _describe(event: Event, presented: dict[_Key, TrialPresented]) -> str:
         case TrialMeasured():
             return _describe_measured(event)
         case TrialSpoiled():
-            return f"{_place_text(event)} is void and is presented again: {event.reason}."
+            return f"{_describe_trial_place(event)} is void and is presented again: {event.reason}."
         case RestTaken():
-            return f"Rested {_seconds(event.rested_s)} before trial {event.trial + 1} of run {event.run + 1}."
+            return f"Rested {_format_seconds(event.rested_s)} before trial {event.trial + 1} of run {event.run + 1}."
         case _:
             return _describe_other(event)
 
@@ -89,38 +89,38 @@ def _describe_other(event: Event) -> str:
         case PlaceTaken():
             return f"Takes part, as number {event.participant_number + 1} of this protocol."
         case DeviceChecked():
-            found = " ".join(_as_sentence(finding) for finding in event.findings)
-            return f"The device was checked: {'fine' if event.passed else 'not fine'}. {found}".rstrip()
+            findings = " ".join(_make_sentence(finding) for finding in event.findings)
+            return f"The device was checked: {'fine' if event.passed else 'not fine'}. {findings}".rstrip()
         case DemoPlayed():
             return (
                 f"Demonstration: direction {event.direction} at {event.frequency_hz:g} Hz, {event.level_n:.3g} N, "
-                f"for {_seconds(event.seconds)}."
+                f"for {_format_seconds(event.seconds)}."
             )
         case DemoFinished():
             return "The demonstration is over."
         case PauseTaken():
-            return f"A pause of {_seconds(event.paused_s)}, asked for by the {event.who}."
+            return f"A pause of {_format_seconds(event.paused_s)}, asked for by the {event.who}."
         case OnsetPulsed() | MaskingPlayed() | ProbePlayed() | ProbeMeasured():
-            return _describe_beside(event)
+            return _describe_accompanying(event)
         case NoteTaken():
-            return f"{'Adverse event' if event.adverse else 'Note'} by the {event.who}: {_one_line(event.text)}"
+            return f"{'Adverse event' if event.adverse else 'Note'} by the {event.who}: {_join_lines(event.text)}"
         case _:
             return f"{event.event.replace('_', ' ').capitalize()}."
 
 
-def _describe_beside(event: OnsetPulsed | MaskingPlayed | ProbePlayed | ProbeMeasured) -> str:
+def _describe_accompanying(event: OnsetPulsed | MaskingPlayed | ProbePlayed | ProbeMeasured) -> str:
     """The sentence for an event that accompanies the trials: onset pulse, masking noise, or probe."""
     if isinstance(event, ProbePlayed | ProbeMeasured):
         return _describe_probe(event)
     if isinstance(event, OnsetPulsed):
-        sent = "was sent" if event.pulsed_s is not None else f"was lost: {_one_line(event.trouble)}"
-        return f"Onset pulse, {_one_line(event.line)}: {sent}."
+        outcome = "was sent" if event.pulsed_s is not None else f"was lost: {_join_lines(event.trouble)}"
+        return f"Onset pulse, {_join_lines(event.line)}: {outcome}."
     if event.trouble:
-        return f"The masking noise fell silent: {_as_sentence(event.trouble)}"
+        return f"The masking noise fell silent: {_make_sentence(event.trouble)}"
     if not event.playing:
         return "The masking noise was stopped."
     band = f"{event.low_hz:g} to {event.high_hz:g} Hz"
-    return f"Masking noise on {_one_line(event.output)}: {event.level_db:g} dB, {band}, seed {event.seed}."
+    return f"Masking noise on {_join_lines(event.output)}: {event.level_db:g} dB, {band}, seed {event.seed}."
 
 
 PROBES = {
@@ -134,34 +134,36 @@ PROBES = {
 def _describe_probe(event: ProbePlayed | ProbeMeasured) -> str:
     if isinstance(event, ProbePlayed):
         return f"{PROBES[event.kind]}, number {event.number + 1}: {event.level_n:.3g} N."
-    kept = "kept" if event.recording else "not kept"
-    why = f": {_one_line(event.trouble)}" if event.trouble else ""
-    return f"The probe, number {event.number + 1}, was {kept}{why}."
+    recording_text = "kept" if event.recording else "not kept"
+    reason = f": {_join_lines(event.trouble)}" if event.trouble else ""
+    return f"The probe, number {event.number + 1}, was {recording_text}{reason}."
 
 
 def _describe_sitting(event: SessionOpened | SessionResumed | SessionInterrupted | SessionClosed) -> str:
     match event:
         case SessionOpened():
-            who = f"simulated participant {event.observer}" if event.observer else "a person"
-            return f"Session {event.session} began: {event.subject}, {who}, on {_device(event.device)}."
+            participant = f"simulated participant {event.observer}" if event.observer else "a person"
+            return (
+                f"Session {event.session} began: {event.subject}, {participant}, on {_describe_device(event.device)}."
+            )
         case SessionResumed():
             mended = " An incomplete last line, left by a crash, was removed." if event.mended else ""
-            return f"The session was continued, on {_device(event.device)}.{mended}"
+            return f"The session was continued, on {_describe_device(event.device)}.{mended}"
         case SessionInterrupted():
             return f"The sitting ended: {event.reason}. The session can be resumed."
         case SessionClosed():
             if event.outcome != "completed":
-                return f"The session is over: {TURNED_AWAY[event.outcome]}. The person does not take part."
+                return f"The session is over: {INELIGIBILITY_REASONS[event.outcome]}. The person does not take part."
             return "The session is finished."
 
 
 def _describe_presented(event: TrialPresented, with_direction: bool) -> str:
-    again = f", attempt {event.attempt + 1}" if event.attempt else ""
-    what = f"{event.level_n:.3f} N at {event.frequency_hz:g} Hz"
+    attempt_text = f", attempt {event.attempt + 1}" if event.attempt else ""
+    stimulus_text = f"{event.level_n:.3f} N at {event.frequency_hz:g} Hz"
     if with_direction:
-        shown = f"interval {event.direction}" if event.phase is Phase.DETECTION else f"direction {event.direction}"
-        what = f"{shown}, {what}"
-    return f"{_place_text(event)} ({event.phase.value}{again}): {what}."
+        target = f"interval {event.direction}" if event.phase is Phase.DETECTION else f"direction {event.direction}"
+        stimulus_text = f"{target}, {stimulus_text}"
+    return f"{_describe_trial_place(event)} ({event.phase.value}{attempt_text}): {stimulus_text}."
 
 
 def _describe_answer(event: AnswerGiven, presented: TrialPresented | None) -> str:
@@ -175,14 +177,14 @@ def _describe_answer(event: AnswerGiven, presented: TrialPresented | None) -> st
 def _describe_measured(event: TrialMeasured) -> str:
     """The delivered acceleration of a trial that counts, and its flags."""
     if event.status == "unmeasured":
-        return " ".join(("Counts, without a measurement.", *map(_as_sentence, event.flags)))
+        return " ".join(("Counts, without a measurement.", *map(_make_sentence, event.flags)))
     parts = []
     if event.delivered_mps2 is not None:
         parts.append(f"{event.delivered_mps2:.2f} m/s² along the direction")
     if event.off_axis_mps2 is not None:
         parts.append(f"{event.off_axis_mps2:.2f} m/s² across")
     measured = f"Delivered {', '.join(parts)}." if parts else "Counts."
-    return " ".join((measured, *map(_as_sentence, event.flags)))
+    return " ".join((measured, *map(_make_sentence, event.flags)))
 
 
 def _describe_form(event: FormFilled) -> str:
@@ -196,20 +198,28 @@ def _describe_form(event: FormFilled) -> str:
             outcome = "nothing speaks against taking part" if event.passed else "the sitting cannot go on"
             return f"The exclusion questions were answered{version}: {outcome}."
         case "setup":
-            how = "; ".join(f"{key.replace('_', ' ')}: {_one_line(answer)}" for key, answer in event.answers.items())
-            return f"Set-up. {how[:1].upper()}{how[1:]}." if how else "The questions on the set-up were asked."
+            answers_text = "; ".join(
+                f"{key.replace('_', ' ')}: {_join_lines(answer)}" for key, answer in event.answers.items()
+            )
+            return (
+                f"Set-up. {answers_text[:1].upper()}{answers_text[1:]}."
+                if answers_text
+                else "The questions on the set-up were asked."
+            )
         case "questionnaire":
-            asked = _count(len(event.answers), "question")
-            return f"Before the trials: {asked} answered; the answers stay in the log file."
+            question_count = _format_count(len(event.answers), "question")
+            return f"Before the trials: {question_count} answered; the answers stay in the log file."
         case "debrief":
-            return f"Debrief: {_count(len(event.answers), 'question')} answered; the answers stay in the log file."
+            return (
+                f"Debrief: {_format_count(len(event.answers), 'question')} answered; the answers stay in the log file."
+            )
 
 
-def _device(device: DeviceFacts) -> str:
+def _describe_device(device: DeviceFacts) -> str:
     return f"{device.name}{' (simulated, nothing moves)' if device.simulated else ''}"
 
 
-def _place_text(event: TrialPresented | TrialSpoiled) -> str:
+def _describe_trial_place(event: TrialPresented | TrialSpoiled) -> str:
     return f"Run {event.run + 1}, trial {event.trial + 1}"
 
 
@@ -217,21 +227,21 @@ def _key(event: TrialPresented | AnswerGiven | TrialMeasured) -> _Key:
     return event.run, event.trial, event.attempt
 
 
-def _seconds(seconds: float) -> str:
+def _format_seconds(seconds: float) -> str:
     if seconds < 120:
         return f"{seconds:.3g} s"
     return f"{seconds / 60:.0f} min"
 
 
-def _count(number: int, thing: str) -> str:
-    return f"{number} {thing}{'' if number == 1 else 's'}"
+def _format_count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def _one_line(text: str) -> str:
+def _join_lines(text: str) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
-def _as_sentence(text: str) -> str:
+def _make_sentence(text: str) -> str:
     """A flag or finding as a sentence with capital and full stop."""
-    line = _one_line(text)
+    line = _join_lines(text)
     return f"{line[:1].upper()}{line[1:]}{'' if line.endswith(('.', '!', '?')) else '.'}" if line else ""

@@ -49,5 +49,5 @@ def acceleration_of_level(equalized: EqualizedFacts | None, level_n: float, freq
 def equalizer_amplitude(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float:
     """Amplitude of a level in the unit of the input: N without an equalizer, m/s^2 with one. Raises ValueError for a
     frequency without a scale."""
-    wanted = acceleration_of_level(equalized, level_n, frequency_hz)
-    return level_n if wanted is None else wanted
+    acceleration_mps2 = acceleration_of_level(equalized, level_n, frequency_hz)
+    return level_n if acceleration_mps2 is None else acceleration_mps2

@@ -44,29 +44,29 @@ class ChainBrokenError(ValueError):
 
 def write_chained(chain: Chain, event: bytes) -> tuple[Chain, bytes]:
     """Append an event (a JSON object without a line end). Returns the line with its checksum, line end included."""
-    after = _extend_chain(chain, event, carried=True)
-    return after, event[:-1] + _FIELD + after.head.encode() + _END + b"\n"
+    extended = _extend_chain(chain, event, has_checksum=True)
+    return extended, event[:-1] + _FIELD + extended.head.encode() + _END + b"\n"
 
 
 def read_chained(chain: Chain, line: bytes) -> tuple[Chain, bytes]:
     """Check a line without its end. Returns the chain and the event's own bytes. Raises ChainBrokenError."""
-    event, head = _split(line)
-    after = _extend_chain(chain, event, carried=head is not None)
+    event, head = _split_checksum(line)
+    extended = _extend_chain(chain, event, has_checksum=head is not None)
     if head is None and chain.since:
         raise ChainBrokenError("has no checksum, although lines before it have")
-    if head is not None and head != after.head:
+    if head is not None and head != extended.head:
         raise ChainBrokenError("does not match its checksum")
-    return after, event
+    return extended, event
 
 
-def _extend_chain(chain: Chain, event: bytes, carried: bool) -> Chain:
-    """The chain after one more event. carried: whether its line has a checksum."""
+def _extend_chain(chain: Chain, event: bytes, has_checksum: bool) -> Chain:
+    """The chain after one more event. has_checksum: whether its line has a checksum."""
     lines = chain.lines + 1
     head = hashlib.sha256(chain.head.encode() + b"\n" + event).hexdigest()[:DIGITS]
-    return Chain(head, lines, chain.since or (lines if carried else 0))
+    return Chain(head, lines, chain.since or (lines if has_checksum else 0))
 
 
-def _split(line: bytes) -> tuple[bytes, str | None]:
+def _split_checksum(line: bytes) -> tuple[bytes, str | None]:
     """Bytes of the event, and its checksum or None. The raw bytes are split, so that nothing is parsed and written
     again."""
     digits = line[-len(_END) - DIGITS : -len(_END)]

@@ -49,21 +49,21 @@ class ClockStep:
         return f"The computer's clock was set back by {step}. {limits}"
 
 
-def elapsed_s(before: Moment, now: Moment) -> float:
+def elapsed_s(start: Moment, end: Moment) -> float:
     """Time between two moments (s), never negative. By the monotonic clock where both carry it, otherwise by the
     wall clock."""
-    if before.monotonic_s is not None and now.monotonic_s is not None:
-        return max(0.0, now.monotonic_s - before.monotonic_s)
-    return max(0.0, seconds_between(before.utc, now.utc))
+    if start.monotonic_s is not None and end.monotonic_s is not None:
+        return max(0.0, end.monotonic_s - start.monotonic_s)
+    return max(0.0, seconds_between(start.utc, end.utc))
 
 
-def clock_step(before: Moment, now: Moment, between_sittings: bool = False) -> ClockStep | None:
+def clock_step(start: Moment, end: Moment, between_sittings: bool = False) -> ClockStep | None:
     """Time by which the wall clock was set between two entries, or None; without monotonic times only a step back can
     be detected."""
-    wall_s = seconds_between(before.utc, now.utc)
-    monotonic = before.monotonic_s is not None and now.monotonic_s is not None
-    by_s = wall_s - elapsed_s(before, now) if monotonic else min(0.0, wall_s)
-    return ClockStep(now.utc, by_s, between_sittings) if abs(by_s) >= STEP_S else None
+    wall_s = seconds_between(start.utc, end.utc)
+    monotonic = start.monotonic_s is not None and end.monotonic_s is not None
+    by_s = wall_s - elapsed_s(start, end) if monotonic else min(0.0, wall_s)
+    return ClockStep(end.utc, by_s, between_sittings) if abs(by_s) >= STEP_S else None
 
 
 def seconds_between(first_utc: str, second_utc: str) -> float:

@@ -1,7 +1,7 @@
 """Reasons for void trials that the computer caused, as they are logged and shown, and the sentences made of them.
 
 A computer that is too busy delays the 1 kHz control loop or the screen; such trials are void and repeated. That the
-computer was the cause is recognised by the text of the logged reason (`computer_too_busy`).
+computer was the cause is recognised by the text of the logged reason (`is_computer_busy`).
 """
 
 SCREEN_SILENT = "the screen gave no sign of life"
@@ -29,14 +29,14 @@ ENGINE_LATE_S = 0.1
 """A delay of the engine's own wake-up (s) that shows a busy computer: more than twice the polling interval."""
 
 
-def why_screen_silent(engine_late_s: float, load_per_processor: float | None) -> str:
+def explain_silent_screen(engine_late_s: float, load_per_processor: float | None) -> str:
     """The reason to log for a silent screen. engine_late_s: delay of the engine's own wake-up (s); load_per_processor:
     load average per processor, None if unknown."""
     loaded = load_per_processor is not None and load_per_processor > LOAD_PER_PROCESSOR
     return SCREEN_LATE if loaded or engine_late_s >= ENGINE_LATE_S else SCREEN_SILENT
 
 
-def computer_too_busy(reason: str) -> bool:
+def is_computer_busy(reason: str) -> bool:
     """Whether this reason states that the computer was too busy; False also where the cause is unknown."""
     return reason in (SCREEN_LATE, PROGRAM_STALLED) or reason.endswith((TICKS_MISSED, TICKS_LATE, TICK_HELD))
 
@@ -45,17 +45,17 @@ TOO_BUSY = "the computer is too busy"
 """Beginning of the reason for ending a sitting whose void trials the computer caused."""
 
 
-def why_too_many(reasons: tuple[str, ...]) -> str:
+def explain_many_voids(reasons: tuple[str, ...]) -> str:
     """Reason why a sitting ends after several void trials in a row. reasons: of these trials, at least one."""
-    many = f"{len(reasons)} trials in a row were void"
-    if all(map(computer_too_busy, reasons)):
-        return f"{TOO_BUSY}: {many} because of it, not because of the participant (the last because {reasons[-1]})"
-    if all(computer_too_busy(reason) or reason == SCREEN_SILENT for reason in reasons):
-        return f"{many}, the last because {reasons[-1]}: the computer may be too busy"
-    return f"{many}, the last because {reasons[-1]}"
+    void_text = f"{len(reasons)} trials in a row were void"
+    if all(map(is_computer_busy, reasons)):
+        return f"{TOO_BUSY}: {void_text} because of it, not because of the participant (the last because {reasons[-1]})"
+    if all(is_computer_busy(reason) or reason == SCREEN_SILENT for reason in reasons):
+        return f"{void_text}, the last because {reasons[-1]}: the computer may be too busy"
+    return f"{void_text}, the last because {reasons[-1]}"
 
 
-def busy_sentence(voids: int) -> str:
+def describe_busy_voids(voids: int) -> str:
     """Summary for the experimenter at the end of a sitting. voids: number of trials void because of a busy computer."""
     trials = "1 trial was" if voids == 1 else f"{voids} trials were"
     return (

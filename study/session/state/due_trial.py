@@ -6,11 +6,11 @@ from protocols.definition.staircase_rule import StaircaseRule
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.procedure.schedule import (
     Run,
+    are_labels_swapped,
     detection_direction,
     draw_trial,
     is_catch_trial,
-    label_of,
-    labels_swapped,
+    label_direction,
     practice_level_n,
     rove_level_n,
 )
@@ -18,7 +18,7 @@ from protocols.procedure.staircase import StaircaseState, level_n, to_db
 from protocols.trial import Phase
 from study.session.facts.events import SessionOpened
 from study.session.facts.level_scale import acceleration_of_level
-from study.session.state.rules import same_stimulus_again
+from study.session.state.rules import repeats_same_stimulus
 from study.session.stimulus.stimulus import direction_angle_deg
 
 _ROVED = (Phase.TRAINING, Phase.TEST)
@@ -27,7 +27,7 @@ direction."""
 
 
 @dataclass(frozen=True, slots=True)
-class Present:
+class PresentTrial:
     """Play this stimulus and ask for the answer."""
 
     run: int
@@ -59,45 +59,45 @@ class Place:
     staircase: StaircaseState
 
 
-def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRule, place: Place) -> Present:
+def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRule, place: Place) -> PresentTrial:
     """The presentation at this place."""
     run, polarity = place.run, protocol.stimulus.onset_polarity
-    draws = 0 if same_stimulus_again(opened) else place.attempt
+    draws = 0 if repeats_same_stimulus(opened) else place.attempt
     draw = draw_trial(protocol.schedule, polarity, opened.seed, run.index, place.trial, draws)
-    label, direction = label_of(draw.direction, labels_are_swapped(protocol, opened)), draw.direction
+    label, direction = label_direction(draw.direction, has_swapped_labels(protocol, opened)), draw.direction
     if run.phase is Phase.DETECTION:  # the answer is an interval; the direction does not matter
         label = draw.direction
         direction = detection_direction(opened.seed, run.index, place.trial, draws)
     phase, level_db = run.phase, place.staircase.level_db
-    newton = level_n(rule, place.staircase)
+    force_n = level_n(rule, place.staircase)
     if run.practice:
-        newton = practice_level_n(protocol.practice, opened.seed, run.index, place.trial, draws)
-        level_db = to_db(newton)
+        force_n = practice_level_n(protocol.practice, opened.seed, run.index, place.trial, draws)
+        level_db = to_db(force_n)
     elif run.phase is Phase.TEST and is_catch_trial(protocol.catch, opened.seed, run.index, place.trial):
-        phase, newton, level_db = Phase.CATCH, rule.cap_n, to_db(rule.cap_n)
+        phase, force_n, level_db = Phase.CATCH, rule.cap_n, to_db(rule.cap_n)
     nominal_n = None
     if protocol.stimulus.rove_db and phase in _ROVED and not run.practice:
-        nominal_n = newton
-        drawn_n = rove_level_n(newton, protocol.stimulus.rove_db, opened.seed, run.index, place.trial, draws)
-        newton = min(drawn_n, protocol.safety.stimulus_cap_n)
-        level_db = to_db(newton)
-    return Present(
+        nominal_n = force_n
+        drawn_n = rove_level_n(force_n, protocol.stimulus.rove_db, opened.seed, run.index, place.trial, draws)
+        force_n = min(drawn_n, protocol.safety.stimulus_cap_n)
+        level_db = to_db(force_n)
+    return PresentTrial(
         run=run.index,
         trial=place.trial,
         attempt=place.attempt,
         phase=phase,
         frequency_hz=run.frequency_hz,
         level_db=level_db,
-        level_n=newton,
+        level_n=force_n,
         label=label,
         direction=direction,
         angle_deg=direction_angle_deg(protocol.directions, direction),
         polarity=draw.polarity,
-        wanted_mps2=acceleration_of_level(opened.equalized, newton, run.frequency_hz),
+        wanted_mps2=acceleration_of_level(opened.equalized, force_n, run.frequency_hz),
         nominal_n=nominal_n,
     )
 
 
-def labels_are_swapped(protocol: StudyProtocol, opened: SessionOpened) -> bool:
+def has_swapped_labels(protocol: StudyProtocol, opened: SessionOpened) -> bool:
     """Whether the numbers 1 and 2 are exchanged for this participant."""
-    return labels_swapped(protocol.schedule, len(protocol.stimulus.frequencies_hz), opened.participant_number)
+    return are_labels_swapped(protocol.schedule, len(protocol.stimulus.frequencies_hz), opened.participant_number)

@@ -1,4 +1,5 @@
-"""A session's state as the fold of its logged events: `state.begin_session` takes the first event, `apply` each other.
+"""A session's state as the fold of its logged events: `state.begin_session` takes the first event, `apply_event` each
+other.
 
 Event sourcing: the state holds only what follows from the log, so that a session can be resumed after a crash. An event
 that cannot follow the previous ones raises LogContradiction. Events within a trial are in `fold_trial`.
@@ -29,30 +30,30 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.facts.log_time import Moment
-from study.session.state.daily_dose import with_dose_elsewhere
+from study.session.state.daily_dose import set_dose_elsewhere
 from study.session.state.draw_check import LogContradiction
 from study.session.state.fold_trial import answer_trial, measure_trial, present_trial, spoil_trial
-from study.session.state.probe_state import LARGEST_WEIGHT_HZ, ProbeState, after_break, begin_probe, end_probe
-from study.session.state.rules import place_comes_later
+from study.session.state.probe_state import LARGEST_WEIGHT_HZ, ProbeState, apply_break, begin_probe, end_probe
+from study.session.state.rules import is_place_assigned_later
 from study.session.state.sitting_state import (
     SittingState,
     add_exposure,
-    check,
-    fill_in,
+    apply_device_check,
+    apply_form,
+    estimate_amplitude_mps2,
     finish_demo,
-    likely_amplitude_mps2,
     pass_time,
-    sit_down_again,
+    resume_sitting,
     start_motion,
 )
-from study.session.state.state import SessionState, take_place
+from study.session.state.state import SessionState, assign_place
 
 
-def apply(state: SessionState, event: Event) -> SessionState:
+def apply_event(state: SessionState, event: Event) -> SessionState:
     """The state after one more event. Raises LogContradiction where the event cannot follow the state."""
     if state.closed and not isinstance(event, NoteTaken | SessionInterrupted):
         raise LogContradiction(f"{event.event} after the session was closed")
-    if state.turned_away_for_good and not isinstance(event, NoteTaken | SessionInterrupted | SessionClosed):
+    if state.is_finally_ineligible and not isinstance(event, NoteTaken | SessionInterrupted | SessionClosed):
         raise LogContradiction(f"{event.event} of a person who does not take part")
     state = replace(state, sitting=_advance_time(state.sitting, event))
     match event:
@@ -79,14 +80,14 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
         case RestTaken():
             return _apply_rest(state, event)
         case PauseTaken():
-            return _with_probing(state, after_break(state.sitting.probing, event, state.protocol.probes))
+            return _set_probing(state, apply_break(state.sitting.probing, event, state.protocol.probes))
         case ProbePlayed() | ProbeMeasured():
             return _apply_probe(state, event)
         case FormFilled() | DeviceChecked() | DemoPlayed() | DemoFinished():
             return _apply_preparation(state, event)
         case SessionResumed():
-            again = sit_down_again(state.sitting, state.answers)
-            return replace(state, sitting=with_dose_elsewhere(again, event.dose_elsewhere))
+            resumed = resume_sitting(state.sitting, state.answers)
+            return replace(state, sitting=set_dose_elsewhere(resumed, event.dose_elsewhere))
         case PlaceTaken():
             return _take_place(state, event)
         case SessionClosed():
@@ -101,11 +102,11 @@ def _apply_rest(state: SessionState, event: RestTaken) -> SessionState:
     """Apply a rest: none is due any more. Raises LogContradiction where none was due."""
     if state.rest_due_s <= 0:
         raise LogContradiction(f"a rest before trial {event.trial} of run {event.run}, where none was due")
-    rested = _with_probing(state, after_break(state.sitting.probing, event, state.protocol.probes))
+    rested = _set_probing(state, apply_break(state.sitting.probing, event, state.protocol.probes))
     return replace(rested, rest_due_s=0.0)
 
 
-def _with_probing(state: SessionState, probing: ProbeState) -> SessionState:
+def _set_probing(state: SessionState, probing: ProbeState) -> SessionState:
     return replace(state, sitting=replace(state.sitting, probing=probing))
 
 
@@ -116,29 +117,31 @@ def _apply_probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> Ses
         raise LogContradiction(f"{event.event} while a trial is open")
     probing = state.sitting.probing
     if isinstance(event, ProbePlayed):
-        moved = start_motion(state.sitting) if event.kind == "hand" else state.sitting
-        return replace(state, sitting=replace(moved, probing=begin_probe(probing, event, state.protocol.probes)))
-    after = _with_probing(state, end_probe(probing, event))
+        moved_sitting = start_motion(state.sitting) if event.kind == "hand" else state.sitting
+        return replace(
+            state, sitting=replace(moved_sitting, probing=begin_probe(probing, event, state.protocol.probes))
+        )
+    updated = _set_probing(state, end_probe(probing, event))
     if probing.open is None or probing.open.kind != "hand":
-        return after
+        return updated
     # The dose takes an amplitude: that of a sine with the measured root mean square.
     amplitude_mps2 = None if event.rms_mps2 is None else math.sqrt(2) * event.rms_mps2
-    sitting = add_exposure(after.sitting, LARGEST_WEIGHT_HZ, amplitude_mps2, event.vibrated_s)
-    return replace(after, sitting=sitting)
+    sitting = add_exposure(updated.sitting, LARGEST_WEIGHT_HZ, amplitude_mps2, event.vibrated_s)
+    return replace(updated, sitting=sitting)
 
 
 def _take_place(state: SessionState, event: PlaceTaken) -> SessionState:
     """Apply the participant's place in the balanced order. Raises LogContradiction where none was due."""
-    if state.trials or state.sitting.placed or not place_comes_later(state.opened):
+    if state.trials or state.sitting.place_assigned or not is_place_assigned_later(state.opened):
         raise LogContradiction("a place in the order was taken where none was due")
-    return take_place(state, event.participant_number)
+    return assign_place(state, event.participant_number)
 
 
 def _apply_close(state: SessionState, event: SessionClosed) -> SessionState:
     """Close the session: completed, or because the person does not take part. Raises LogContradiction where the state
     does not allow this outcome."""
     if event.outcome != "completed":
-        if not state.turned_away_for_good or event.outcome != state.sitting.turned_away:
+        if not state.is_finally_ineligible or event.outcome != state.sitting.ineligibility:
             raise LogContradiction(f"the session was closed as {event.outcome}, which no form says")
         return replace(state, closed=True)
     if not state.finished or state.presented is not None:
@@ -154,12 +157,12 @@ def _apply_preparation(
         raise LogContradiction(f"{event.event} while a trial is open")
     match event:
         case FormFilled():
-            return replace(state, sitting=fill_in(state.sitting, event))
+            return replace(state, sitting=apply_form(state.sitting, event))
         case DeviceChecked():
-            return replace(state, sitting=check(state.sitting, event))
+            return replace(state, sitting=apply_device_check(state.sitting, event))
         case DemoFinished():
             return replace(state, sitting=finish_demo(state.sitting, event))
         case DemoPlayed():
-            amplitude = likely_amplitude_mps2(state.trials, event.frequency_hz, event.level_n)
+            amplitude = estimate_amplitude_mps2(state.trials, event.frequency_hz, event.level_n)
             sitting = add_exposure(start_motion(state.sitting), event.frequency_hz, amplitude, event.seconds)
             return replace(state, sitting=replace(sitting, demos=sitting.demos + 1))

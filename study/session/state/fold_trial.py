@@ -9,8 +9,8 @@ import math
 from dataclasses import replace
 
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.procedure.practice import PracticeState, add_answer, practice_over
-from protocols.procedure.staircase import begin, is_finished, step
+from protocols.procedure.practice import PracticeState, add_answer, is_practice_over
+from protocols.procedure.staircase import begin_staircase, is_finished, step
 from protocols.trial import Phase, Trial, TrialStatus, VoidCause
 from study.session.facts.events import (
     AnswerGiven,
@@ -21,31 +21,37 @@ from study.session.facts.events import (
 )
 from study.session.facts.log_time import seconds_between
 from study.session.facts.sensor_facts import SensorFacts
-from study.session.facts.void_reasons import computer_too_busy
-from study.session.state.draw_check import LogContradiction, check_draw, place_of
+from study.session.facts.void_reasons import is_computer_busy
+from study.session.state.draw_check import LogContradiction, check_draw, describe_place
 from study.session.state.sitting_state import (
     add_exposure,
-    likely_amplitude_mps2,
+    estimate_amplitude_mps2,
     start_motion,
 )
-from study.session.state.state import SessionState, current_rule, due, felt, repeats_left
+from study.session.state.state import (
+    SessionState,
+    count_repeats_left,
+    find_due_presentation,
+    is_felt_by_person,
+    make_current_rule,
+)
 
 
 def present_trial(state: SessionState, event: TrialPresented) -> SessionState:
     """The state with this trial open. Raises LogContradiction where another trial is open, no run is left, or the
     trial differs from the draw that is due."""
     if state.presented is not None:
-        raise LogContradiction(f"{place_of(event)} presented while another trial is open")
+        raise LogContradiction(f"{describe_place(event)} presented while another trial is open")
     if state.finished:
-        raise LogContradiction(f"{place_of(event)} presented after the last run")
-    check_draw(event, due(state))
+        raise LogContradiction(f"{describe_place(event)} presented after the last run")
+    check_draw(event, find_due_presentation(state))
     repeat_cause = state.trials[-1].void_cause if state.attempt else None
-    row = _trial_row(state.opened, event, felt(state.opened), repeat_cause)
+    row = _trial_row(state.opened, event, is_felt_by_person(state.opened), repeat_cause)
     return replace(state, presented=event, trials=(*state.trials, row), sitting=start_motion(state.sitting))
 
 
 def _trial_row(
-    opened: SessionOpened, event: TrialPresented, felt: bool | None, repeat_cause: VoidCause | None
+    opened: SessionOpened, event: TrialPresented, was_felt: bool | None, repeat_cause: VoidCause | None
 ) -> Trial:
     """Row of `trials.csv` at the presentation; answer and measurement are added later."""
     return Trial(
@@ -66,7 +72,7 @@ def _trial_row(
         off_axis_mps2=None,
         displacement_mm=None,
         missed_ticks=None,
-        felt=felt,
+        felt=was_felt,
         status=TrialStatus.OPEN,
         angle_deg=event.angle_deg,
         wanted_mps2=event.wanted_mps2,
@@ -79,9 +85,9 @@ def _trial_row(
 def answer_trial(state: SessionState, event: AnswerGiven) -> SessionState:
     """The open trial with its answer; the staircase moves when the trial is measured. Raises LogContradiction where
     the trial is not open or has an answer."""
-    presented = _open_trial(state, event)
+    presented = _require_open_trial(state, event)
     if state.answered is not None:
-        raise LogContradiction(f"{place_of(event)} answered twice")
+        raise LogContradiction(f"{describe_place(event)} answered twice")
     row = replace(
         state.trials[-1],
         answer=event.answer,
@@ -94,12 +100,12 @@ def answer_trial(state: SessionState, event: AnswerGiven) -> SessionState:
 
 def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
     """Close the answered trial: staircase, dose, and the next trial, rest or run. Raises LogContradiction."""
-    presented = _open_trial(state, event)
+    presented = _require_open_trial(state, event)
     if state.answered is None:
-        raise LogContradiction(f"{place_of(event)} measured before it was answered")
-    stepped = _step(state, presented, correct=state.answered.answer == presented.direction)
+        raise LogContradiction(f"{describe_place(event)} measured before it was answered")
+    stepped = _step_staircase(state, presented, correct=state.answered.answer == presented.direction)
     row = replace(
-        _with_sensor(state.trials[-1], event.sensor),
+        _set_sensor_facts(state.trials[-1], event.sensor),
         reversal=stepped.staircase.reversals > state.staircase.reversals,
         delivered_mps2=event.delivered_mps2,
         off_axis_mps2=event.off_axis_mps2,
@@ -114,36 +120,36 @@ def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
     amplitude_mps2 = None
     if event.delivered_mps2 is not None:
         amplitude_mps2 = math.hypot(event.delivered_mps2, event.off_axis_mps2 or 0.0)
-    after = replace(
+    updated = replace(
         _add_vibration(stepped, presented, amplitude_mps2, event.vibrated_s),
         presented=None,
         answered=None,
         trial=state.trial + 1,
         attempt=0,
         trials=(*state.trials[:-1], row),
-        rest_due_s=_rest_within_run(state.protocol, state.trial + 1),
+        rest_due_s=_find_rest_within_run(state.protocol, state.trial + 1),
     )
-    return _next_run(after) if _run_over(after) else after
+    return _start_next_run(updated) if _is_run_over(updated) else updated
 
 
 def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
     """Close the open trial as void, so that it is due again. Raises LogContradiction where it is not open, or where the
     participant asked for a repeat and none is left in this run."""
-    presented = _open_trial(state, event)
-    if event.cause is VoidCause.ASKED and repeats_left(state) == 0:
-        raise LogContradiction(f"{place_of(event)} was asked for again, although no repeat of this run remained")
+    presented = _require_open_trial(state, event)
+    if event.cause is VoidCause.ASKED and count_repeats_left(state) == 0:
+        raise LogContradiction(f"{describe_place(event)} was asked for again, although no repeat of this run remained")
     row = replace(
-        _with_sensor(state.trials[-1], event.sensor),
+        _set_sensor_facts(state.trials[-1], event.sensor),
         missed_ticks=event.missed_ticks,
         late_ticks=event.late_ticks,
         latest_s=event.latest_s,
         status=TrialStatus.SPOILED,
         void_cause=event.cause,
     )
-    busy_voids = state.sitting.busy_voids + computer_too_busy(event.reason)
-    counted = replace(state, sitting=replace(state.sitting, busy_voids=busy_voids))
+    busy_voids = state.sitting.busy_voids + is_computer_busy(event.reason)
+    counted_state = replace(state, sitting=replace(state.sitting, busy_voids=busy_voids))
     return replace(
-        _add_vibration(counted, presented, None, event.vibrated_s),
+        _add_vibration(counted_state, presented, None, event.vibrated_s),
         presented=None,
         answered=None,
         attempt=state.attempt + 1,
@@ -151,7 +157,7 @@ def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
     )
 
 
-def _with_sensor(row: Trial, sensor: SensorFacts | None) -> Trial:
+def _set_sensor_facts(row: Trial, sensor: SensorFacts | None) -> Trial:
     """The row with what the accelerometer lost during the trial; unchanged without a sensor."""
     if sensor is None:
         return row
@@ -159,7 +165,7 @@ def _with_sensor(row: Trial, sensor: SensorFacts | None) -> Trial:
     return replace(row, lost_packets=sensor.lost, garbled_bytes=garbled_bytes, acceleration_missing=missing)
 
 
-def _open_trial(state: SessionState, event: AnswerGiven | TrialMeasured | TrialSpoiled) -> TrialPresented:
+def _require_open_trial(state: SessionState, event: AnswerGiven | TrialMeasured | TrialSpoiled) -> TrialPresented:
     """The presentation to which the event belongs. Raises LogContradiction where that trial is not open."""
     presented = state.presented
     if presented is None or (presented.run, presented.trial, presented.attempt) != (
@@ -167,39 +173,39 @@ def _open_trial(state: SessionState, event: AnswerGiven | TrialMeasured | TrialS
         event.trial,
         event.attempt,
     ):
-        raise LogContradiction(f"{event.event} for {place_of(event)}, which is not open")
+        raise LogContradiction(f"{event.event} for {describe_place(event)}, which is not open")
     return presented
 
 
-def _step(state: SessionState, presented: TrialPresented, correct: bool) -> SessionState:
+def _step_staircase(state: SessionState, presented: TrialPresented, correct: bool) -> SessionState:
     """Apply an answer: to the count of a practice run, else to the staircase; no effect in a catch trial."""
     if state.runs[state.run].practice:
         return replace(state, practice=add_answer(state.practice, correct))
     if presented.phase is Phase.CATCH:
         return state
-    return replace(state, staircase=step(current_rule(state), state.staircase, correct))
+    return replace(state, staircase=step(make_current_rule(state), state.staircase, correct))
 
 
-def _run_over(state: SessionState) -> bool:
+def _is_run_over(state: SessionState) -> bool:
     """Whether the current run is finished, by the rule of practice or of the staircase."""
     if state.runs[state.run].practice:
-        return practice_over(state.protocol.practice, state.practice)
-    return is_finished(current_rule(state), state.staircase)
+        return is_practice_over(state.protocol.practice, state.practice)
+    return is_finished(make_current_rule(state), state.staircase)
 
 
-def _next_run(state: SessionState) -> SessionState:
+def _start_next_run(state: SessionState) -> SessionState:
     """The state at the beginning of the next run, with the rest that is due before it (s); no rest after the last."""
     last = state.run + 1 == len(state.runs)
     # Practice runs are short: their rest is the time it takes to read how they went.
     rest_s = 0.0 if last or state.runs[state.run].practice else state.protocol.rests.after_run_s
-    after = replace(state, run=state.run + 1, trial=0, attempt=0, practice=PracticeState(), rest_due_s=rest_s)
-    return after if last else replace(after, staircase=begin(current_rule(after)))
+    updated = replace(state, run=state.run + 1, trial=0, attempt=0, practice=PracticeState(), rest_due_s=rest_s)
+    return updated if last else replace(updated, staircase=begin_staircase(make_current_rule(updated)))
 
 
-def _rest_within_run(protocol: StudyProtocol, trials_done: int) -> float:
+def _find_rest_within_run(protocol: StudyProtocol, trials_done: int) -> float:
     """Rest (s) that is due after so many trials of a run, 0 for none."""
-    every = protocol.rests.after_trials
-    return protocol.rests.within_run_s if every and trials_done % every == 0 else 0.0
+    trials_between_rests = protocol.rests.after_trials
+    return protocol.rests.within_run_s if trials_between_rests and trials_done % trials_between_rests == 0 else 0.0
 
 
 def _add_vibration(
@@ -208,6 +214,6 @@ def _add_vibration(
     """Add the vibration of a presentation to the dose, whether or not the trial counts. amplitude_mps2: None where it
     was not measured, and is estimated; seconds: duration of the vibration."""
     if amplitude_mps2 is None:
-        amplitude_mps2 = likely_amplitude_mps2(state.trials, presented.frequency_hz, presented.level_n)
+        amplitude_mps2 = estimate_amplitude_mps2(state.trials, presented.frequency_hz, presented.level_n)
     sitting = add_exposure(state.sitting, presented.frequency_hz, amplitude_mps2, seconds)
     return replace(state, sitting=sitting)

@@ -8,14 +8,14 @@ trial.
 from dataclasses import dataclass
 
 from study.session.facts.log_time import Moment
-from study.session.state.due_trial import Present
-from study.session.state.probe_state import Probe, Reference, due_probe, due_reference
-from study.session.state.sitting_state import dose_now, pass_time
-from study.session.state.state import SessionState, due
+from study.session.state.due_trial import PresentTrial
+from study.session.state.probe_state import Probe, Reference, find_due_probe, find_due_reference
+from study.session.state.sitting_state import compute_daily_dose, pass_time
+from study.session.state.state import SessionState, find_due_presentation
 from study.session.state.vibration_dose import a8_mps2
-from study.session.views.archive_views import TURNED_AWAY
+from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.views.form_views import Form, FormKind
-from study.session.views.forms import form_of
+from study.session.views.forms import make_form
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +37,14 @@ class Demonstrate:
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
+class TakeRest:
     """A rest of this length (s) is enforced before the next trial."""
 
     seconds: float
 
 
 @dataclass(frozen=True, slots=True)
-class Leave:
+class EndSitting:
     """The sitting must end here."""
 
     reason: str
@@ -56,9 +56,9 @@ class Finish:
     """The session is finished."""
 
 
-Preparation = FillIn | CheckDevice | Leave
+Preparation = FillIn | CheckDevice | EndSitting
 """The possible steps before the instructions of a sitting."""
-Action = Demonstrate | Present | Probe | Reference | Rest | FillIn | Leave | Finish
+Action = Demonstrate | PresentTrial | Probe | Reference | TakeRest | FillIn | EndSitting | Finish
 """The possible next actions of a session."""
 
 
@@ -67,8 +67,8 @@ def next_preparation(state: SessionState) -> Preparation | None:
     sitting = state.sitting
     if state.opened.observer is not None or state.finished:
         return None
-    if sitting.turned_away:
-        return Leave(TURNED_AWAY[sitting.turned_away])
+    if sitting.ineligibility:
+        return EndSitting(INELIGIBILITY_REASONS[sitting.ineligibility])
     forms = (
         (FormKind.CONSENT, sitting.consented),
         (FormKind.EXCLUSION, sitting.included),
@@ -76,7 +76,7 @@ def next_preparation(state: SessionState) -> Preparation | None:
         (FormKind.SETUP, sitting.setup_done),
     )
     for kind, done in forms:
-        form = None if done else form_of(state.protocol, kind)
+        form = None if done else make_form(state.protocol, kind)
         if form is not None:
             return FillIn(form)
     return None if sitting.device_checked else CheckDevice()
@@ -89,28 +89,28 @@ def next_action(state: SessionState, utc: str = "", monotonic_s: float | None = 
     """
     if state.presented is not None:
         raise ValueError("a trial is open; it must be closed before the next action")
-    person = state.opened.observer is None
+    is_person = state.opened.observer is None
     if state.finished:
-        form = form_of(state.protocol, FormKind.DEBRIEF) if person and not state.sitting.debriefed else None
+        form = make_form(state.protocol, FormKind.DEBRIEF) if is_person and not state.sitting.debriefed else None
         return FillIn(form) if form is not None and not state.closed else Finish()
-    if person and utc and (reason := limit_reached(state, utc, monotonic_s)):
-        return Leave(reason)
+    if is_person and utc and (reason := find_reached_limit(state, utc, monotonic_s)):
+        return EndSitting(reason)
     probing, probes = state.sitting.probing, state.protocol.probes
-    if person and state.protocol.demo.level_n > 0 and not state.sitting.demo_done and not state.trials:
+    if is_person and state.protocol.demo.level_n > 0 and not state.sitting.demo_done and not state.trials:
         return Demonstrate()
     if state.rest_due_s > 0:
-        return Rest(seconds=state.rest_due_s)
-    return due_reference(probing, probes) or due_probe(probing, probes) or due(state)
+        return TakeRest(seconds=state.rest_due_s)
+    return find_due_reference(probing, probes) or find_due_probe(probing, probes) or find_due_presentation(state)
 
 
-def limit_reached(state: SessionState, utc: str, monotonic_s: float | None = None) -> str:
+def find_reached_limit(state: SessionState, utc: str, monotonic_s: float | None = None) -> str:
     """Why this sitting must end, in words; empty if it may continue. The limits are the duration of the sitting
     (minutes) and the daily exposure A(8) of the hand (m/s²)."""
     limits = state.protocol.limits
     sitting = pass_time(state.sitting, Moment(utc, monotonic_s))
     if (sitting.sat_s or 0.0) / 60.0 >= limits.longest_min:
         return f"the longest sitting of {limits.longest_min:g} minutes is reached; go on another day"
-    dose = a8_mps2(dose_now(sitting))
+    dose = a8_mps2(compute_daily_dose(sitting))
     if dose >= limits.dose_a8_mps2:
         return (
             f"the hand has got its vibration dose for today (A(8) {dose:.2f} of {limits.dose_a8_mps2:g} m/s²); "

@@ -27,9 +27,9 @@ never underestimated."""
 class ProbeState:
     """State of the probes and references of a session, as far as they decide what is due next."""
 
-    played: int = 0
+    probe_count: int = 0
     """Number of probes in the session: with a hand, tests of a free handle, and references."""
-    with_hand: int = 0
+    hand_probe_count: int = 0
     """Number of probes with the hand on the handle, which determines the level of the next."""
     open: ProbePlayed | None = None
     """The probe whose measurement is not in the log: it is playing, or the program ended while it played."""
@@ -56,18 +56,18 @@ class Reference:
     """A reference is due, with no hand on the handle."""
 
 
-def due_probe(probing: ProbeState, settings: ProbeSettings) -> Probe | None:
+def find_due_probe(probing: ProbeState, settings: ProbeSettings) -> Probe | None:
     """The next probe with a hand; None where none is due yet, or the protocol has none. The levels are used in turn."""
     if not settings.levels_n or (probing.since_s is not None and probing.since_s < settings.interval_s):
         return None
-    return Probe(settings.levels_n[probing.with_hand % len(settings.levels_n)])
+    return Probe(settings.levels_n[probing.hand_probe_count % len(settings.levels_n)])
 
 
-def due_reference(probing: ProbeState, settings: ProbeSettings) -> Reference | None:
+def find_due_reference(probing: ProbeState, settings: ProbeSettings) -> Reference | None:
     """The reference, due once in a sitting; only after the first probe with a hand, because a comparison with that
     probe shows whether the handle is free. None where it was played, declined, or the protocol has none."""
-    due = settings.reference_s > 0 and not probing.referenced and probing.since_s is not None
-    return Reference() if due else None
+    is_due = settings.reference_s > 0 and not probing.referenced and probing.since_s is not None
+    return Reference() if is_due else None
 
 
 def begin_probe(probing: ProbeState, event: ProbePlayed, settings: ProbeSettings) -> ProbeState:
@@ -75,45 +75,45 @@ def begin_probe(probing: ProbeState, event: ProbePlayed, settings: ProbeSettings
 
     Raises LogContradiction where the protocol has no probes, the force is above its cap, or the number is not the next.
     """
-    hand = event.kind == "hand"
+    is_hand_probe = event.kind == "hand"
     highest_n = settings.reference_n if event.kind == "reference" else settings.probe_cap_n
     if not settings.played:
         raise LogContradiction(f"a probe of {event.level_n:g} N, but the protocol has no probes")
     if event.level_n > highest_n:
         raise LogContradiction(f"a probe of {event.level_n:g} N, but the protocol allows {highest_n:g} N at most")
-    if event.number != probing.played:
-        raise LogContradiction(f"probe {event.number}, but probe {probing.played} is the next")
+    if event.number != probing.probe_count:
+        raise LogContradiction(f"probe {event.number}, but probe {probing.probe_count} is the next")
     return replace(
         probing,
-        played=probing.played + 1,
-        with_hand=probing.with_hand + hand,
+        probe_count=probing.probe_count + 1,
+        hand_probe_count=probing.hand_probe_count + is_hand_probe,
         open=event,
-        since_s=0.0 if hand else probing.since_s,
-        referenced=probing.referenced or not hand,
+        since_s=0.0 if is_hand_probe else probing.since_s,
+        referenced=probing.referenced or not is_hand_probe,
     )
 
 
 def end_probe(probing: ProbeState, event: ProbeMeasured) -> ProbeState:
     """The state after the measurement of a probe, or after a reference that the experimenter declined (it has the next
     number and no recording). Raises LogContradiction where this probe is not playing."""
-    declined = event.number == probing.played and event.recording is None
-    if not declined and (probing.open is None or probing.open.number != event.number):
+    is_declined = event.number == probing.probe_count and event.recording is None
+    if not is_declined and (probing.open is None or probing.open.number != event.number):
         raise LogContradiction(f"a measurement of probe {event.number}, which is not playing")
-    ended = replace(probing, open=None, referenced=probing.referenced or declined)
+    updated = replace(probing, open=None, referenced=probing.referenced or is_declined)
     if probing.open is None or probing.open.kind != "hand":
-        return ended
-    return replace(ended, hand_mass_kg=event.apparent_mass_kg, hand_level_n=probing.open.level_n)
+        return updated
+    return replace(updated, hand_mass_kg=event.apparent_mass_kg, hand_level_n=probing.open.level_n)
 
 
-def after_break(probing: ProbeState, event: PauseTaken | RestTaken, settings: ProbeSettings) -> ProbeState:
+def apply_break(probing: ProbeState, event: PauseTaken | RestTaken, settings: ProbeSettings) -> ProbeState:
     """The state after a pause or a rest.
 
     After `reference_after_pause_s` or longer the grip may have changed: a probe and a reference are due again. After a
     shorter pause the interval to the next probe starts anew, because the participant has just taken the handle again. A
     shorter rest changes nothing.
     """
-    seconds = event.paused_s if isinstance(event, PauseTaken) else event.rested_s
-    if seconds >= settings.reference_after_pause_s:
+    break_s = event.paused_s if isinstance(event, PauseTaken) else event.rested_s
+    if break_s >= settings.reference_after_pause_s:
         return replace(probing, referenced=False, since_s=None, hand_mass_kg=None)
     if isinstance(event, RestTaken) or probing.since_s is None:
         return probing

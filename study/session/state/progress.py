@@ -13,7 +13,7 @@ from study.session.views.views import Progress
 
 USUAL_TRIALS = 65
 """Typical number of trials of a staircase with 13 reversals; about 60 with few errors, 110 for pure guessing."""
-USUAL_PER_REVERSAL = USUAL_TRIALS / 13
+TRIALS_PER_REVERSAL = USUAL_TRIALS / 13
 """Typical number of trials per reversal."""
 
 
@@ -23,10 +23,10 @@ FIRST = 8
 """Number of answers in this sitting before which no time is estimated, because the first answers are slow."""
 
 
-def progress(state: SessionState) -> Progress:
+def estimate_progress(state: SessionState) -> Progress:
     """Fraction of the session done, 0 to 1, and minutes left, estimated from the latest answers; later rests are
     included."""
-    expected = [_usual_trials(state, run) for run in state.runs]
+    expected = [_typical_trials(state, run) for run in state.runs]
     done = sum(expected[: state.run])
     if not state.finished:
         # A run that takes more trials than is typical must not be shown as completed.
@@ -35,25 +35,27 @@ def progress(state: SessionState) -> Progress:
     return Progress(share_done=share, minutes_left=_minutes_left(state, sum(expected) - done))
 
 
-def _usual_trials(state: SessionState, run: Run) -> float:
+def _typical_trials(state: SessionState, run: Run) -> float:
     """Typical number of trials of a run, from the settings of its rule."""
     protocol = state.protocol
     if run.practice:
         return protocol.practice.of_last
     rule = protocol.staircase
-    usual = rule.bayesian.trials if rule.is_bayesian else rule.reversals * USUAL_PER_REVERSAL
+    typical = rule.bayesian.trials if rule.is_bayesian else rule.reversals * TRIALS_PER_REVERSAL
     limit = protocol.training.trial_limit if run.phase is Phase.TRAINING else 0
-    return min(usual, limit) if limit else usual
+    return min(typical, limit) if limit else typical
 
 
 def _minutes_left(state: SessionState, trials_left: float) -> int | None:
     """Minutes left, rounded up; None before `FIRST` answers in this sitting. Estimated from the median response time,
     not from the clock, because forms, instructions and pauses do not predict the time of further trials."""
     answered = state.answers - state.sitting.answers_before
-    taken_s = [trial.response_time_s for trial in state.trials if trial.counts and trial.response_time_s is not None]
-    if answered < FIRST or not taken_s:
+    response_times_s = [
+        trial.response_time_s for trial in state.trials if trial.counts and trial.response_time_s is not None
+    ]
+    if answered < FIRST or not response_times_s:
         return None
     protocol = state.protocol
-    each_s = median(taken_s[-LATEST:]) + protocol.stimulus.fade_out_s + protocol.trial.pause_between_s
-    rests = sum(not run.practice for run in state.runs[state.run : -1]) * state.protocol.rests.after_run_s / 60
-    return math.ceil(each_s / 60 * trials_left + rests)
+    trial_s = median(response_times_s[-LATEST:]) + protocol.stimulus.fade_out_s + protocol.trial.pause_between_s
+    rests_min = sum(not run.practice for run in state.runs[state.run : -1]) * state.protocol.rests.after_run_s / 60
+    return math.ceil(trial_s / 60 * trials_left + rests_min)

@@ -29,17 +29,17 @@ LATEST: Literal[2] = 2
 """Version of new sessions."""
 
 
-def same_stimulus_again(opened: SessionOpened) -> bool:
+def repeats_same_stimulus(opened: SessionOpened) -> bool:
     """Whether a void trial is repeated with the same stimulus."""
     return opened.rules >= 2
 
 
-def refusal_is_final(opened: SessionOpened) -> bool:
+def is_refusal_final(opened: SessionOpened) -> bool:
     """Whether a refusal or an exclusion closes the session."""
     return opened.rules >= 2
 
 
-def place_comes_later(opened: SessionOpened) -> bool:
+def is_place_assigned_later(opened: SessionOpened) -> bool:
     """Whether the participant number is assigned after the preparation of the sitting; never for simulated
     participants, who always take part."""
     return opened.rules >= 2 and opened.observer is None

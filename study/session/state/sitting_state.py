@@ -13,7 +13,7 @@ from protocols.trial import Trial
 from study.session.facts.log_time import ClockStep, Moment, clock_step, elapsed_s
 from study.session.facts.sitting_events import DemoFinished, DeviceChecked, FormFilled
 from study.session.state.probe_state import ProbeState
-from study.session.state.vibration_dose import NO_DOSE, Dose, add, total
+from study.session.state.vibration_dose import NO_DOSE, Dose, add_sinusoid, sum_doses
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +33,10 @@ class SittingState:
 
     consented: bool = False
     included: bool = False
-    turned_away: Literal["", "refused", "excluded"] = ""
+    ineligibility: Literal["", "refused", "excluded"] = ""
     """Reason why no stimulus may be played: consent refused, or excluded by a question; empty if allowed."""
-    placed: bool = False
-    """Whether the participant's place in the balanced order of conditions is taken."""
+    place_assigned: bool = False
+    """Whether the participant's place in the counterbalanced order of conditions is assigned."""
     questioned: bool = False
     setup_done: bool = False
     device_checked: bool = False
@@ -56,9 +56,9 @@ class SittingState:
     """Seconds since the handle last moved, in any sitting; None before."""
     dose: Dose = NO_DOSE
     """Dose of this session since the last rest of `NIGHT_H` or more."""
-    elsewhere: Dose = NO_DOSE
+    other_sessions_dose: Dose = NO_DOSE
     """Dose of the participant's other sessions on the same day, as known at the beginning of this sitting."""
-    not_counted: tuple[str, ...] = ()
+    unread_sessions: tuple[str, ...] = ()
     """Sessions of the participant that could not be read at the beginning of this sitting."""
     night: Night | None = None
     """The last rest of `NIGHT_H` or more; None before the first."""
@@ -75,13 +75,13 @@ NIGHT_S = 3600 * NIGHT_H
 """`NIGHT_H` in seconds."""
 
 
-def fill_in(sitting: SittingState, event: FormFilled) -> SittingState:
+def apply_form(sitting: SittingState, event: FormFilled) -> SittingState:
     """The state after a form; `event.passed` decides on consent and on inclusion."""
     match event.form:
         case "consent":
-            return replace(sitting, consented=event.passed, turned_away="" if event.passed else "refused")
+            return replace(sitting, consented=event.passed, ineligibility="" if event.passed else "refused")
         case "exclusion":
-            return replace(sitting, included=event.passed, turned_away="" if event.passed else "excluded")
+            return replace(sitting, included=event.passed, ineligibility="" if event.passed else "excluded")
         case "questionnaire":
             return replace(sitting, questioned=True)
         case "setup":
@@ -90,7 +90,7 @@ def fill_in(sitting: SittingState, event: FormFilled) -> SittingState:
             return replace(sitting, debriefed=True)
 
 
-def check(sitting: SittingState, event: DeviceChecked) -> SittingState:
+def apply_device_check(sitting: SittingState, event: DeviceChecked) -> SittingState:
     """The state after a device check."""
     return replace(sitting, device_checked=event.passed)
 
@@ -100,7 +100,7 @@ def finish_demo(sitting: SittingState, event: DemoFinished) -> SittingState:
     return replace(sitting, demo_done=True)
 
 
-def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
+def resume_sitting(sitting: SittingState, answers: int) -> SittingState:
     """The state at the beginning of a further sitting. answers: number of answers so far. Under version 1 of the rules
     (`rules`) a person who was turned away is asked again, in case an answer was mistyped."""
     return replace(
@@ -109,26 +109,26 @@ def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
         device_checked=False,
         sat_s=None,
         busy_voids=0,
-        turned_away="",
+        ineligibility="",
         answers_before=answers,
         probing=replace(sitting.probing, since_s=None, referenced=False, open=None, hand_mass_kg=None),
     )
 
 
-def pass_time(sitting: SittingState, now: Moment, resumed: bool = False) -> SittingState:
+def pass_time(sitting: SittingState, moment: Moment, resumed: bool = False) -> SittingState:
     """Advance all durations to this moment. resumed: the moment begins a new sitting, whose monotonic clock cannot be
     compared with earlier values."""
     last = Moment(sitting.last.utc) if resumed else sitting.last
-    passed, step = elapsed_s(last, now), clock_step(last, now, between_sittings=resumed)
+    passed_s, step = elapsed_s(last, moment), clock_step(last, moment, between_sittings=resumed)
     since_s = sitting.probing.since_s
-    later = replace(
+    advanced = replace(
         sitting,
-        last=now,
-        probing=replace(sitting.probing, since_s=None if since_s is None else since_s + passed),
-        sat_s=None if sitting.sat_s is None else sitting.sat_s + passed,
-        still_s=None if sitting.still_s is None else sitting.still_s + passed,
+        last=moment,
+        probing=replace(sitting.probing, since_s=None if since_s is None else since_s + passed_s),
+        sat_s=None if sitting.sat_s is None else sitting.sat_s + passed_s,
+        still_s=None if sitting.still_s is None else sitting.still_s + passed_s,
     )
-    return later if step is None else _apply_clock_step(later, step)
+    return advanced if step is None else _apply_clock_step(advanced, step)
 
 
 def _apply_clock_step(sitting: SittingState, step: ClockStep) -> SittingState:
@@ -136,19 +136,19 @@ def _apply_clock_step(sitting: SittingState, step: ClockStep) -> SittingState:
     between two sittings, so that the rest was shorter than counted: the rest is shortened, and a dose that it reset is
     restored."""
     steps = (*sitting.clock_steps, step)
-    known = replace(sitting, clock_steps=steps)
+    corrected = replace(sitting, clock_steps=steps)
     # Known steps forward were not counted as rest: setting the clock back by the same amount changes nothing.
     doubt_s = max(0.0, -_sum_s(steps)) - max(0.0, -_sum_s(sitting.clock_steps))
     if doubt_s <= 0:
-        return known
-    if known.still_s is not None:
-        known = replace(known, still_s=max(0.0, known.still_s - doubt_s))
-    if known.night is None:
-        return known
-    night = replace(known.night, still_s=known.night.still_s - doubt_s)
+        return corrected
+    if corrected.still_s is not None:
+        corrected = replace(corrected, still_s=max(0.0, corrected.still_s - doubt_s))
+    if corrected.night is None:
+        return corrected
+    night = replace(corrected.night, still_s=corrected.night.still_s - doubt_s)
     if night.still_s >= NIGHT_S:
-        return replace(known, night=night)
-    return replace(known, night=None, dose=total(night.dose, known.dose))
+        return replace(corrected, night=night)
+    return replace(corrected, night=None, dose=sum_doses(night.dose, corrected.dose))
 
 
 def _sum_s(steps: tuple[ClockStep, ...]) -> float:
@@ -159,14 +159,16 @@ def _sum_s(steps: tuple[ClockStep, ...]) -> float:
 def start_motion(sitting: SittingState) -> SittingState:
     """The state when the handle begins to move: after a rest of `NIGHT_H` or more the dose starts again from zero."""
     if sitting.still_s is not None and sitting.still_s >= NIGHT_S:
-        sitting = replace(sitting, night=Night(sitting.still_s, sitting.dose), dose=NO_DOSE, elsewhere=NO_DOSE)
+        sitting = replace(
+            sitting, night=Night(sitting.still_s, sitting.dose), dose=NO_DOSE, other_sessions_dose=NO_DOSE
+        )
     return replace(sitting, sat_s=sitting.sat_s or 0.0, still_s=0.0)
 
 
-def dose_now(sitting: SittingState) -> Dose:
+def compute_daily_dose(sitting: SittingState) -> Dose:
     """Dose of today, of this and the participant's other sessions; none after a rest of `NIGHT_H` or more."""
-    rested = sitting.still_s is not None and sitting.still_s >= NIGHT_S
-    return NO_DOSE if rested else total(sitting.dose, sitting.elsewhere)
+    is_rested = sitting.still_s is not None and sitting.still_s >= NIGHT_S
+    return NO_DOSE if is_rested else sum_doses(sitting.dose, sitting.other_sessions_dose)
 
 
 def add_exposure(
@@ -176,10 +178,10 @@ def add_exposure(
     logs, which did not record it, and nothing is added."""
     if not seconds:
         return sitting
-    return replace(sitting, dose=add(sitting.dose, frequency_hz, amplitude_mps2, seconds))
+    return replace(sitting, dose=add_sinusoid(sitting.dose, frequency_hz, amplitude_mps2, seconds))
 
 
-def likely_amplitude_mps2(trials: tuple[Trial, ...], frequency_hz: float, level_n: float) -> float | None:
+def estimate_amplitude_mps2(trials: tuple[Trial, ...], frequency_hz: float, level_n: float) -> float | None:
     """Estimated acceleration amplitude (m/s^2) of a stimulus that was not measured: its level (N) times the largest
     ratio of amplitude to level measured at this frequency; None without such a measurement."""
     ratios = [

@@ -9,16 +9,16 @@ from dataclasses import dataclass, field, replace
 from protocols.definition.staircase_rule import StaircaseRule
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.procedure.practice import PracticeState
-from protocols.procedure.run_rules import staircase_rule
-from protocols.procedure.schedule import Run, runs
-from protocols.procedure.staircase import StaircaseState, begin
+from protocols.procedure.run_rules import make_staircase_rule
+from protocols.procedure.schedule import Run, schedule_runs
+from protocols.procedure.staircase import StaircaseState, begin_staircase
 from protocols.trial import Trial, VoidCause
 from study.session.facts.events import AnswerGiven, SessionOpened, TrialPresented
 from study.session.facts.log_time import Moment
-from study.session.state.daily_dose import with_dose_elsewhere
+from study.session.state.daily_dose import set_dose_elsewhere
 from study.session.state.draw_check import LogContradiction
-from study.session.state.due_trial import Place, Present, due_trial
-from study.session.state.rules import place_comes_later, refusal_is_final, same_stimulus_again
+from study.session.state.due_trial import Place, PresentTrial, due_trial
+from study.session.state.rules import is_place_assigned_later, is_refusal_final, repeats_same_stimulus
 from study.session.state.sitting_state import SittingState
 
 
@@ -59,14 +59,14 @@ class SessionState:
         return self.run >= len(self.runs)
 
     @property
-    def turned_away_for_good(self) -> bool:
+    def is_finally_ineligible(self) -> bool:
         """Whether the participant refused or was excluded, where the rules make that final."""
-        return bool(self.sitting.turned_away) and refusal_is_final(self.opened)
+        return bool(self.sitting.ineligibility) and is_refusal_final(self.opened)
 
     @property
-    def takes_part(self) -> bool:
+    def has_final_place(self) -> bool:
         """Whether the participant number in `opened` is the participant's final place in the counterbalanced order."""
-        return self.sitting.placed or bool(self.trials) or not place_comes_later(self.opened)
+        return self.sitting.place_assigned or bool(self.trials) or not is_place_assigned_later(self.opened)
 
     @property
     def answers(self) -> int:
@@ -81,9 +81,9 @@ def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionStat
     state = SessionState(
         opened=opened,
         protocol=protocol,
-        runs=runs(protocol, opened.seed, opened.participant_number),
+        runs=schedule_runs(protocol, opened.seed, opened.participant_number),
         run=0,
-        staircase=begin(protocol.staircase),
+        staircase=begin_staircase(protocol.staircase),
         trial=0,
         attempt=0,
         presented=None,
@@ -91,49 +91,49 @@ def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionStat
         trials=(),
         rest_due_s=0.0,
         closed=False,
-        sitting=with_dose_elsewhere(SittingState(last=Moment(opened.utc, opened.monotonic_s)), opened.dose_elsewhere),
+        sitting=set_dose_elsewhere(SittingState(last=Moment(opened.utc, opened.monotonic_s)), opened.dose_elsewhere),
     )
-    return replace(state, staircase=begin(current_rule(state)))
+    return replace(state, staircase=begin_staircase(make_current_rule(state)))
 
 
 def _check_scales(opened: SessionOpened, protocol: StudyProtocol) -> None:
     """Raise LogContradiction unless an equalized session has a scale of levels for every frequency."""
     if opened.equalized is None:
         return
-    known = {scale.frequency_hz for scale in opened.equalized.levels}
-    missing = [f"{frequency:g} Hz" for frequency in protocol.all_frequencies_hz if frequency not in known]
+    scaled_hz = {scale.frequency_hz for scale in opened.equalized.levels}
+    missing = [f"{frequency:g} Hz" for frequency in protocol.all_frequencies_hz if frequency not in scaled_hz]
     if missing:
         raise LogContradiction(f"the session has no scale of levels for {', '.join(missing)}")
 
 
-def take_place(state: SessionState, participant_number: int) -> SessionState:
+def assign_place(state: SessionState, participant_number: int) -> SessionState:
     """Assign the place in the counterbalanced order, before the first trial. participant_number replaces the number of
     the opening line and determines the order of the runs."""
     opened = replace(state.opened, participant_number=participant_number)
-    order = runs(state.protocol, opened.seed, participant_number)
-    after = replace(state, opened=opened, runs=order, sitting=replace(state.sitting, placed=True))
-    return replace(after, staircase=begin(current_rule(after)))
+    order = schedule_runs(state.protocol, opened.seed, participant_number)
+    updated = replace(state, opened=opened, runs=order, sitting=replace(state.sitting, place_assigned=True))
+    return replace(updated, staircase=begin_staircase(make_current_rule(updated)))
 
 
-def current_rule(state: SessionState) -> StaircaseRule:
+def make_current_rule(state: SessionState) -> StaircaseRule:
     """Staircase rule of the current run; unused in a practice run."""
-    return staircase_rule(state.protocol, state.runs[state.run].phase)
+    return make_staircase_rule(state.protocol, state.runs[state.run].phase)
 
 
-def due(state: SessionState) -> Present:
+def find_due_presentation(state: SessionState) -> PresentTrial:
     """The next presentation, determined by the staircase and the schedule of the current run."""
     place = Place(state.runs[state.run], state.trial, state.attempt, state.staircase)
-    return due_trial(state.protocol, state.opened, current_rule(state), place)
+    return due_trial(state.protocol, state.opened, make_current_rule(state), place)
 
 
-def repeats_left(state: SessionState) -> int | None:
+def count_repeats_left(state: SessionState) -> int | None:
     """Number of further repeats of a stimulus that the participant may request in this run; None if unlimited."""
-    if not same_stimulus_again(state.opened):
+    if not repeats_same_stimulus(state.opened):
         return None
-    asked = sum(trial.run == state.run and trial.void_cause is VoidCause.ASKED for trial in state.trials)
-    return max(0, state.protocol.trial.repeats_per_run - asked)
+    requested = sum(trial.run == state.run and trial.void_cause is VoidCause.ASKED for trial in state.trials)
+    return max(0, state.protocol.trial.repeats_per_run - requested)
 
 
-def felt(opened: SessionOpened) -> bool | None:
+def is_felt_by_person(opened: SessionOpened) -> bool | None:
     """Whether a person felt the stimuli: False on a simulated device, None for a simulated participant."""
     return None if opened.observer is not None else not opened.device.simulated

@@ -57,7 +57,7 @@ def hand_arm_weight(frequency_hz: float) -> float:
     return abs(band * transition)
 
 
-def add(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, seconds: float) -> Dose:
+def add_sinusoid(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, seconds: float) -> Dose:
     """The dose after one more sinusoid of this duration (s). amplitude_mps2: peak; None if it was not measured.
 
     Fades count at full amplitude, so the dose is overestimated, never underestimated. Raises ValueError for a negative
@@ -65,15 +65,15 @@ def add(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, seconds: 
     """
     if seconds < 0:
         raise ValueError(f"seconds is {seconds:g}; a vibration lasts 0 s or longer")
-    longer = replace(dose, vibrated_s=dose.vibrated_s + seconds)
+    extended = replace(dose, vibrated_s=dose.vibrated_s + seconds)
     if amplitude_mps2 is None:
-        return replace(longer, unmeasured_s=dose.unmeasured_s + seconds)
+        return replace(extended, unmeasured_s=dose.unmeasured_s + seconds)
     return replace(
-        longer, squared_s=dose.squared_s + _frequency_weighted_rms(frequency_hz, amplitude_mps2) ** 2 * seconds
+        extended, squared_s=dose.squared_s + _frequency_weighted_rms(frequency_hz, amplitude_mps2) ** 2 * seconds
     )
 
 
-def total(*doses: Dose) -> Dose:
+def sum_doses(*doses: Dose) -> Dose:
     """Sum of doses of one hand on one day."""
     return Dose(
         squared_s=sum(dose.squared_s for dose in doses),

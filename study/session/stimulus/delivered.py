@@ -22,8 +22,8 @@ STIFFEST_N_PER_M, STRONGEST_DAMPING_N_S_PER_M, HEAVIEST_KG = 2000.0, 30.0, 3.0
 whole arm (135 N/m, 6.5 N s/m, 0.55 kg by Sci. Rep. srep18004). The device's own mass is added."""
 
 LEAST_MPS2 = 0.1
-"""Least expected acceleration (m/s²) for which `hardly_arrived` decides; a smaller one could be hidden by the sensor's
-noise."""
+"""Least expected acceleration (m/s²) for which `has_hardly_moved` decides; a smaller one could be hidden by the
+sensor's noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,18 +48,18 @@ def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_h
     if not covers_a_period(measured, recording.sample_rate_hz, frequency_hz):
         return None
     acceleration = phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz)[0]
-    along = acceleration @ unit_vector
-    off_axis = acceleration - along * unit_vector
+    along_direction = acceleration @ unit_vector
+    off_axis = acceleration - along_direction * unit_vector
     return Delivered(
-        along_mps2=float(np.abs(along)),
+        along_mps2=float(np.abs(along_direction)),
         off_axis_mps2=float(np.linalg.norm(off_axis)),
         # From the accelerometer at the handle, because the encoders measure behind elastic cables.
-        displacement_mm=1000.0 * float(np.abs(along)) / (2 * np.pi * frequency_hz) ** 2,
+        displacement_mm=1000.0 * float(np.abs(along_direction)) / (2 * np.pi * frequency_hz) ** 2,
         harmonics_mps2=_harmonics(recording, frequency_hz),
     )
 
 
-def hardly_arrived(
+def has_hardly_moved(
     recording: Recording, unit_vector: FloatArray, frequency_hz: float, friction_n: float, device_kg: float
 ) -> bool:
     """Whether less acceleration arrived than with the stiffest, heaviest assumed hand:
@@ -78,10 +78,10 @@ def hardly_arrived(
 
 def _harmonics(recording: Recording, frequency_hz: float) -> float | None:
     """As `Delivered.harmonics_mps2`."""
-    below = math.ceil(recording.sample_rate_hz / 2 / frequency_hz) - 1
-    highest = min(HIGHEST_HARMONIC, below)
+    highest_below_nyquist = math.ceil(recording.sample_rate_hz / 2 / frequency_hz) - 1
+    highest = min(HIGHEST_HARMONIC, highest_below_nyquist)
     if highest < 2:
         return None
     # A separate fit, so that the fundamental is the same as in earlier sessions, which were fitted without harmonics.
-    found = phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz, highest)
-    return float(np.linalg.norm(found[1:]))
+    harmonic_phasors = phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz, highest)
+    return float(np.linalg.norm(harmonic_phasors[1:]))

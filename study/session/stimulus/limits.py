@@ -46,13 +46,13 @@ class Limits:
     plausibility: PlausibilitySettings = field(default_factory=PlausibilitySettings)
 
 
-def limits_of_study(protocol: StudyProtocol) -> Limits:
+def make_study_limits(protocol: StudyProtocol) -> Limits:
     """Limits with a slew rate just above that of the steepest stimulus: the highest frequency at the highest level,
     while it is faded."""
     stimulus = protocol.stimulus
     fastest_hz = max(protocol.all_frequencies_hz)
     fade_s = min(stimulus.fade_in_s, stimulus.fade_out_s)
-    return _limits(protocol.safety, _slew(fastest_hz, highest_level_n(protocol), fade_s))
+    return _make_limits(protocol.safety, _slew(fastest_hz, highest_level_n(protocol), fade_s))
 
 
 def highest_level_n(protocol: StudyProtocol) -> float:
@@ -60,17 +60,17 @@ def highest_level_n(protocol: StudyProtocol) -> float:
     return min(highest_roved_n(protocol.staircase.cap_n, protocol.stimulus.rove_db), protocol.safety.stimulus_cap_n)
 
 
-def limits_of_recording(protocol: RecordingProtocol) -> Limits:
+def make_recording_limits(protocol: RecordingProtocol) -> Limits:
     """Limits with a slew rate just above that of the steepest excitation of this recording."""
     slews = [
         (BETWEEN_SAMPLES if isinstance(segment, MultisineSegment) else 1.0)
         * _slew(highest_hz(segment), segment.amplitude_n, protocol.fade_s)
         for segment in protocol.segments
     ]
-    return _limits(protocol.safety, max(slews))
+    return _make_limits(protocol.safety, max(slews))
 
 
-def forces_in_words(safety: SafetySettings) -> str:
+def describe_forces(safety: SafetySettings) -> str:
     """Largest forces (N) on the hand, in words, for messages on which a person decides."""
     feedback_n = min(safety.feedback_cap_n, safety.total_cap_n)
     return (
@@ -86,7 +86,7 @@ def _slew(frequency_hz: float, amplitude_n: float, fade_s: float) -> float:
     return SLEW_MARGIN * steepest + SPRING_SLEW_N_PER_S
 
 
-def _limits(safety: SafetySettings, slew_n_per_s: float) -> Limits:
+def _make_limits(safety: SafetySettings, slew_n_per_s: float) -> Limits:
     return Limits(
         stimulus_cap_n=safety.stimulus_cap_n,
         total_cap_n=safety.total_cap_n,

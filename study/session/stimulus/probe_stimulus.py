@@ -23,27 +23,27 @@ PHASES_SEED = 16
 """Seed of the phases, the same for every probe, so that probes can be compared line by line."""
 
 
-def probe_wave(settings: ProbeSettings, sample_rate_hz: float) -> FloatArray:
+def make_probe_wave(settings: ProbeSettings, sample_rate_hz: float) -> FloatArray:
     """One period, (n, 3), whose norm over the axes peaks at 1. Each axis has every third odd line from `FROM_HZ` on."""
     n = round(PERIOD_S * sample_rate_hz)
     lines = lines_between(FROM_HZ, settings.to_hz, n, sample_rate_hz, odd_only=True)
     return make_interleaved_multisine(lines, n, 3, PHASES_SEED)
 
 
-def probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz: float) -> HeldStimulus:
+def make_probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz: float) -> HeldStimulus:
     """A probe whose norm peaks at `level_n` (N). Raises ValueError for a level above the cap of probes, or not above
     0."""
     if not 0 < level_n <= settings.probe_cap_n:
         raise ValueError(f"a probe of {level_n:g} N is not within its cap of {settings.probe_cap_n:g} N")
-    loop = _forces(level_n * probe_wave(settings, sample_rate_hz), sample_rate_hz)
+    loop = _make_force_signal(level_n * make_probe_wave(settings, sample_rate_hz), sample_rate_hz)
     return HeldStimulus(loop, fade_in_s=FADE_S, fade_out_s=FADE_S, fade_shape="raised_cosine")
 
 
-def reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> tuple[Signal, tuple[Segment, ...]]:
+def make_reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> tuple[Signal, tuple[Segment, ...]]:
     """The reference as commands (n, 3) in N, and its whole periods as segments: first at full level, then at half of
     it, because a response that depends on the level shows friction. The last third of each part is held out, to test a
     model."""
-    wave = probe_wave(settings, sample_rate_hz)
+    wave = make_probe_wave(settings, sample_rate_hz)
     n, fade = len(wave), round(FADE_S * sample_rate_hz)
     part = max(4, round(settings.reference_s / PERIOD_S / 2))
     # Between the parts the level falls linearly over one period.
@@ -59,9 +59,9 @@ def reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> tuple[
             Segment(start, middle, "multisine", peak_n, n, "fit"),
             Segment(middle, stop, "multisine", peak_n, n, "test"),
         ]
-    return _forces(forces, sample_rate_hz), tuple(segments)
+    return _make_force_signal(forces, sample_rate_hz), tuple(segments)
 
 
-def _forces(samples: FloatArray, sample_rate_hz: float) -> Signal:
+def _make_force_signal(samples: FloatArray, sample_rate_hz: float) -> Signal:
     """Samples (n, 3) in N as a signal of forces along x, y and z."""
     return Signal(samples, sample_rate_hz, "force", "N", ("fx", "fy", "fz"))

@@ -5,7 +5,7 @@ realisation.
 
 An analysis uses only the evaluated part: whole periods at constant amplitude (the first period of a sweep contains its
 transient). Each piece is played by itself (`workflows/recording/play_pieces`), and again with less force where the
-accelerometer clipped (`Piece.at`).
+accelerometer clipped (`RecordingPiece.at`).
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ from study.session.stimulus.stimulus import direction_vector, loop_length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Piece:
+class RecordingPiece:
     """One excitation with a rest before and after it."""
 
     commands: Signal
@@ -32,7 +32,7 @@ class Piece:
     """The evaluated part, in samples of `commands`."""
     number: int
     """Number of its segment in the protocol, from 1."""
-    along: str
+    direction_name: str
     """Axis or test direction of the force: x, y, z, direction_1, direction_2, or all (three axes at once)."""
     unit_vector: tuple[float, float, float] | None
     """Unit vector of the force; None for all axes at once."""
@@ -43,7 +43,7 @@ class Piece:
     realisation: int = 1
     """Number of the realisation of a multisine's phases, from 1."""
 
-    def at(self, amplitude_n: float) -> "Piece":
+    def scale_to(self, amplitude_n: float) -> "RecordingPiece":
         """The same excitation, scaled to another peak (N)."""
         samples = self.commands.samples * (amplitude_n / self.segment.amplitude)
         return replace(
@@ -53,107 +53,112 @@ class Piece:
         )
 
 
-def pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[Piece, ...]:
+def make_pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[RecordingPiece, ...]:
     """All pieces in the order of the protocol's segments, the whole sequence as often as the protocol repeats it.
     sample_rate_hz: sample rate of the device."""
-    once: list[Piece] = []
+    sequence: list[RecordingPiece] = []
     for number, segment in enumerate(protocol.segments, start=1):
         match segment:
             case SineSegment():
-                once += [_sine_piece(protocol, number, segment, f, sample_rate_hz) for f in segment.frequencies_hz]
+                sequence += [
+                    _make_sine_piece(protocol, number, segment, f, sample_rate_hz) for f in segment.frequencies_hz
+                ]
             case SweepSegment():
-                once.append(_sweep_piece(protocol, number, segment, sample_rate_hz))
+                sequence.append(_make_sweep_piece(protocol, number, segment, sample_rate_hz))
             case MultisineSegment():
-                once += _multisine_pieces(protocol, number, segment, sample_rate_hz)
-    return tuple(once) * protocol.repeats
+                sequence += _make_multisine_pieces(protocol, number, segment, sample_rate_hz)
+    return tuple(sequence) * protocol.repeats
 
 
-def unit_vector(directions: TestDirections, along: str) -> FloatArray:
+def make_unit_vector(directions: TestDirections, axis_name: str) -> FloatArray:
     """Unit vector (3,) of a device axis or of a test direction."""
-    if along in ("x", "y", "z"):
-        axis: FloatArray = np.eye(3)["xyz".index(along)]
+    if axis_name in ("x", "y", "z"):
+        axis: FloatArray = np.eye(3)["xyz".index(axis_name)]
         return axis
-    return direction_vector(directions, int(along.removeprefix("direction_")))
+    return direction_vector(directions, int(axis_name.removeprefix("direction_")))
 
 
-def _sine_piece(
+def _make_sine_piece(
     protocol: RecordingProtocol, number: int, segment: SineSegment, frequency_hz: float, rate_hz: float
-) -> Piece:
+) -> RecordingPiece:
     """A sinusoid. The evaluated part is a whole number of loops of whole periods; settling and fades lie outside."""
     period = loop_length(frequency_hz, rate_hz)
-    fade = round(protocol.fade_s * rate_hz)
-    settle = max(fade, round(segment.settle_s * rate_hz))
-    counted = max(1, round(segment.duration_s * rate_hz) // period) * period
-    wave = sine(frequency_hz, segment.amplitude_n, settle + counted + fade, rate_hz)
-    vector = unit_vector(protocol.directions, segment.along)
-    commands, shift = _with_rests(protocol, apply_fades(wave, fade, fade)[:, None] * vector, rate_hz)
-    start = shift + settle
-    return Piece(
+    fade_samples = round(protocol.fade_s * rate_hz)
+    settle_samples = max(fade_samples, round(segment.settle_s * rate_hz))
+    evaluated_samples = max(1, round(segment.duration_s * rate_hz) // period) * period
+    wave = sine(frequency_hz, segment.amplitude_n, settle_samples + evaluated_samples + fade_samples, rate_hz)
+    vector = make_unit_vector(protocol.directions, segment.along)
+    commands, shift = _add_rests(protocol, apply_fades(wave, fade_samples, fade_samples)[:, None] * vector, rate_hz)
+    start = shift + settle_samples
+    return RecordingPiece(
         commands=commands,
-        segment=Segment(start, start + counted, "sine", segment.amplitude_n, period, segment.role),
+        segment=Segment(start, start + evaluated_samples, "sine", segment.amplitude_n, period, segment.role),
         number=number,
-        along=segment.along,
-        unit_vector=_triple(vector),
+        direction_name=segment.along,
+        unit_vector=_to_tuple(vector),
         frequency_hz=frequency_hz,
     )
 
 
-def _sweep_piece(protocol: RecordingProtocol, number: int, segment: SweepSegment, rate_hz: float) -> Piece:
+def _make_sweep_piece(
+    protocol: RecordingProtocol, number: int, segment: SweepSegment, rate_hz: float
+) -> RecordingPiece:
     """A sweep. With several periods it is faded in during the first, which contains the transient; every period ends at
     zero, so that no fade-out is needed."""
     period = round(segment.duration_s * rate_hz)
     wave = np.tile(log_sweep(segment.from_hz, segment.to_hz, segment.amplitude_n, period, rate_hz), segment.periods)
-    vector = unit_vector(protocol.directions, segment.along)
+    vector = make_unit_vector(protocol.directions, segment.along)
     fade_in = round(protocol.fade_s * rate_hz) if segment.periods > 1 else 0
-    commands, start = _with_rests(protocol, apply_fades(wave, min(fade_in, period), 0)[:, None] * vector, rate_hz)
-    return Piece(
+    commands, start = _add_rests(protocol, apply_fades(wave, min(fade_in, period), 0)[:, None] * vector, rate_hz)
+    return RecordingPiece(
         commands=commands,
         segment=Segment(start, start + len(wave), "sweep", segment.amplitude_n, period, segment.role),
         number=number,
-        along=segment.along,
-        unit_vector=_triple(vector),
+        direction_name=segment.along,
+        unit_vector=_to_tuple(vector),
         band_hz=(segment.from_hz, segment.to_hz),
     )
 
 
-def _multisine_pieces(
+def _make_multisine_pieces(
     protocol: RecordingProtocol, number: int, segment: MultisineSegment, rate_hz: float
-) -> list[Piece]:
+) -> list[RecordingPiece]:
     """A piece for each realisation of a multisine. A multisine does not start at zero, so its fades lie outside the
     evaluated periods."""
     period, fade = round(segment.duration_s * rate_hz), round(protocol.fade_s * rate_hz)
     lines = lines_between(segment.from_hz, segment.to_hz, period, rate_hz, odd_only=segment.odd_only)
-    vector = None if segment.along == "all" else unit_vector(protocol.directions, segment.along)
+    vector = None if segment.along == "all" else make_unit_vector(protocol.directions, segment.along)
     tiles = multisines(
         lines, period, segment.amplitude_n, 3 if vector is None else 1, segment.realisations, segment.seed
     )
-    found = []
+    pieces = []
     for realisation, tile in enumerate(tiles, start=1):
         wave = tile[np.arange(-fade, segment.periods * period + fade) % period]
         forces = apply_fades(wave if vector is None else wave * vector, fade, fade)
-        commands, shift = _with_rests(protocol, forces, rate_hz)
+        commands, shift = _add_rests(protocol, forces, rate_hz)
         start, stop = shift + fade, shift + fade + segment.periods * period
-        found.append(
-            Piece(
+        pieces.append(
+            RecordingPiece(
                 commands=commands,
                 segment=Segment(start, stop, "multisine", segment.amplitude_n, period, segment.role),
                 number=number,
-                along=segment.along,
-                unit_vector=None if vector is None else _triple(vector),
+                direction_name=segment.along,
+                unit_vector=None if vector is None else _to_tuple(vector),
                 band_hz=(segment.from_hz, segment.to_hz),
                 realisation=realisation,
             )
         )
-    return found
+    return pieces
 
 
-def _with_rests(protocol: RecordingProtocol, forces: FloatArray, rate_hz: float) -> tuple[Signal, int]:
+def _add_rests(protocol: RecordingProtocol, forces: FloatArray, rate_hz: float) -> tuple[Signal, int]:
     """Commands of a piece, and the index at which `forces`, (n, 3), begin."""
-    rest = round(protocol.rest_s * rate_hz)
-    samples = np.zeros((len(forces) + 2 * rest, 3))
-    samples[rest : rest + len(forces)] = forces
-    return Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), rest
+    rest_samples = round(protocol.rest_s * rate_hz)
+    samples = np.zeros((len(forces) + 2 * rest_samples, 3))
+    samples[rest_samples : rest_samples + len(forces)] = forces
+    return Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), rest_samples
 
 
-def _triple(vector: FloatArray) -> tuple[float, float, float]:
+def _to_tuple(vector: FloatArray) -> tuple[float, float, float]:
+    """A vector, (3,), as a tuple."""
     return float(vector[0]), float(vector[1]), float(vector[2])

@@ -61,7 +61,7 @@ def fade_in(settings: StimulusSettings, sample_rate_hz: float) -> FloatArray:
     return share if settings.fade_shape == "linear" else 0.5 - 0.5 * np.cos(np.pi * share)
 
 
-def held_stimulus(
+def make_held_stimulus(
     settings: StimulusSettings,
     unit_vector: FloatArray,
     frequency_hz: float,
@@ -74,7 +74,7 @@ def held_stimulus(
     n = loop_length(frequency_hz, sample_rate_hz)
     phase = 2 * math.pi * frequency_hz / sample_rate_hz * np.arange(n)
     force = equalizer.takes == "force"
-    wanted = Signal(
+    target = Signal(
         samples=amplitude * np.sin(phase)[:, None] * unit_vector,
         sample_rate_hz=sample_rate_hz,
         quantity=equalizer.takes,
@@ -82,7 +82,7 @@ def held_stimulus(
         channels=("fx", "fy", "fz") if force else ("ax", "ay", "az"),
     )
     envelope = fade_in(settings, sample_rate_hz)
-    loop, onset = equalizer.periodic(wanted), equalizer.onset(wanted, envelope)
+    loop, onset = equalizer.periodic(target), equalizer.onset(target, envelope)
     if onset is not None:
         # The loop is rotated so that its first sample is the one that follows the last sample of the onset.
         loop = replace(loop, samples=np.roll(loop.samples, -len(envelope), axis=0))

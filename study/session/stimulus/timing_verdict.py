@@ -53,7 +53,7 @@ class Lateness:
         return not self.p99_ms < LATE_TICKS * self.tick_ms
 
 
-def lateness_of(late_s: FloatArray, rate_hz: float) -> Lateness:
+def measure_lateness(late_s: FloatArray, rate_hz: float) -> Lateness:
     """Lateness statistics. late_s (n,): how late each wake-up was (s), not negative. Raises ValueError if empty."""
     if len(late_s) == 0:
         raise ValueError("no wake-up was measured")
@@ -115,11 +115,11 @@ def judge_late(late_ticks: int, latest_ms: float, ticks: int, load_per_processor
     value = f"{late_ticks} of {ticks} ({share:.2%}) ended after the next was due, missed ones among them"
     value += f"; the latest {latest_ms:.1f} ms after its time"
     if share > LATE_SHARE:
-        quiet = f"{LATE_SHARE:.1%}"
+        normal_limit = f"{LATE_SHARE:.1%}"
         value += (
-            f"; at most {limit:.1%} are fine with all cores busy ({quiet} else)"
+            f"; at most {limit:.1%} are fine with all cores busy ({normal_limit} else)"
             if busy
-            else f"; at most {quiet} are fine"
+            else f"; at most {normal_limit} are fine"
         )
     return DeviceFinding("Late ticks", value, fine, "" if fine else ADVICE)
 

@@ -7,12 +7,12 @@ the files.
 from dataclasses import dataclass
 from typing import Literal
 
-Standing = Literal["finished", "unfinished", "running", "refused", "excluded", "withdrawn", "unreadable"]
+SessionStatus = Literal["finished", "unfinished", "running", "refused", "excluded", "withdrawn", "unreadable"]
 """Status of a session. `running`: a program is writing its log; `refused`, `excluded`: the participant did not take
-part, see `TURNED_AWAY`; `withdrawn`: the data were erased, and only a note of the withdrawal is kept; `unreadable`: the
-log is missing or damaged."""
+part, see `INELIGIBILITY_REASONS`; `withdrawn`: the data were erased, and only a note of the withdrawal is kept;
+`unreadable`: the log is missing or damaged."""
 
-TURNED_AWAY = {
+INELIGIBILITY_REASONS = {
     "refused": "consent was not given",
     "excluded": "a question of the exclusion list was answered with yes",
 }
@@ -36,7 +36,7 @@ class SessionLine:
     runs_done: int
     runs: int
     """Number of runs in the plan."""
-    standing: Standing
+    standing: SessionStatus
     remark: str = ""
     """Note for the list, such as the reason why the session cannot be read."""
 

@@ -2,7 +2,7 @@
 set-up, state of the handle. Plain values without any drawing, for every kind of screen.
 
 Texts are shown in the participant's language; answers are logged as codes that are the same in every language, so that
-studies in several languages can be analysed together (`coded`).
+studies in several languages can be analysed together (`code_answers`).
 """
 
 import re
@@ -69,7 +69,7 @@ class Form:
 
 @dataclass(frozen=True, slots=True)
 class FormReply:
-    """Answers to a form as they were given, in the language shown; `coded` converts them for the log."""
+    """Answers to a form as they were given, in the language shown; `code_answers` converts them for the log."""
 
     answers: dict[str, str]
     """Answers by the keys of their fields."""
@@ -89,24 +89,26 @@ def has_answer(field: FormField, answer: str) -> bool:
         return answer in field.choices
     if field.limits is None:
         return True
-    number = number_in(answer)
+    number = parse_number(answer)
     return number is not None and field.limits.lowest <= number <= field.limits.highest
 
 
-def number_in(answer: str) -> float | None:
+def parse_number(answer: str) -> float | None:
     """Parse a decimal number with point or comma, at most 15 digits on either side; None for other text."""
-    plain = answer.replace(",", ".")
-    return float(plain) if re.fullmatch(r"[+-]?([0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15})", plain) else None
+    decimal_text = answer.replace(",", ".")
+    return (
+        float(decimal_text) if re.fullmatch(r"[+-]?([0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15})", decimal_text) else None
+    )
 
 
-def coded(form: Form, reply: FormReply) -> dict[str, str]:
+def code_answers(form: Form, reply: FormReply) -> dict[str, str]:
     """The answers as they are logged, the same in every language: choices as their codes, numbers with a decimal point,
     missing answers as empty text."""
-    kept = {}
+    coded_answers = {}
     for field in form.fields:
         answer = reply.answers.get(field.key, "").strip()
-        number = number_in(answer) if field.limits is not None else None
+        number = parse_number(answer) if field.limits is not None else None
         if field.codes and answer in field.choices:
             answer = field.codes[field.choices.index(answer)]
-        kept[field.key] = answer if number is None else f"{number:.10g}"
-    return kept
+        coded_answers[field.key] = answer if number is None else f"{number:.10g}"
+    return coded_answers

@@ -1,4 +1,4 @@
-"""Forms of a sitting, made from its protocol, and the evaluation of a filled form.
+"""Forms of a session, made from its protocol, and the evaluation of a filled form.
 
 Consent, exclusion criteria, questionnaires before and after the trials, set-up, and state of the handle. The data
 classes are those of `form_views`.
@@ -11,7 +11,7 @@ from protocols.definition.preparation import ConsentSettings, SetupSettings
 from protocols.definition.probes import ProbeSettings
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.form_views import Form, FormField, FormKind, FormReply, Limits, coded
+from study.session.views.form_views import Form, FormField, FormKind, FormReply, Limits, code_answers
 
 YES_NO = ("yes", "no")
 """Codes of the two answers as they are logged; the text that is shown depends on the language."""
@@ -40,62 +40,64 @@ class FormOutcome:
     """Differences between set-up and protocol, as an English sentence for the log; empty if they agree."""
 
 
-def words_of(protocol: StudyProtocol) -> Words:
-    """All texts of this protocol that participants read, in its language."""
+def make_words(protocol: StudyProtocol) -> Words:
+    """The texts of this protocol that participants read, in its language."""
     return Words(protocol.text.words)
 
 
-def form_of(protocol: StudyProtocol, kind: FormKind) -> Form | None:
+def make_form(protocol: StudyProtocol, kind: FormKind) -> Form | None:
     """The form of this kind; None if the protocol has no questions of this kind."""
-    words = words_of(protocol)
+    words = make_words(protocol)
     match kind:
         case FormKind.CONSENT:
-            return _consent(protocol, words) if protocol.consent.statements or protocol.probes.played else None
+            return (
+                _make_consent_form(protocol, words) if protocol.consent.statements or protocol.probes.played else None
+            )
         case FormKind.EXCLUSION:
-            return _exclusion(protocol.consent, words) if protocol.consent.exclusions else None
+            return _make_exclusion_form(protocol.consent, words) if protocol.consent.exclusions else None
         case FormKind.QUESTIONNAIRE:
-            return _questions(kind, "questions", protocol.before, words) if protocol.before else None
+            return _make_question_form(kind, "questions", protocol.before, words) if protocol.before else None
         case FormKind.SETUP:
-            return _setup(protocol.setup, words) if protocol.setup.ask else None
+            return _make_setup_form(protocol.setup, words) if protocol.setup.ask else None
         case FormKind.DEBRIEF:
-            return _questions(kind, "debrief", protocol.debrief, words) if protocol.debrief else None
+            return _make_question_form(kind, "debrief", protocol.debrief, words) if protocol.debrief else None
         case FormKind.HANDLE:
-            return _let_go(protocol, words) if protocol.probes.reference_s > 0 else None
+            return _make_release_form(protocol, words) if protocol.probes.reference_s > 0 else None
 
 
 def judge_form(protocol: StudyProtocol, form: Form, reply: FormReply) -> FormOutcome:
     """Whether the form is passed, and which of its answers are logged."""
-    answers = coded(form, reply)
+    answers = code_answers(form, reply)
     match form.kind:
         case FormKind.CONSENT:
-            agreed = all(answer == "yes" for answer in answers.values())
+            has_consented = all(answer == "yes" for answer in answers.values())
             # Of a person who refuses, only the refusal is logged.
-            return FormOutcome(agreed, answers if agreed else {})
+            return FormOutcome(has_consented, answers if has_consented else {})
         case FormKind.EXCLUSION:
             # Which question excludes the person concerns the person's health and is not needed by the study.
             return FormOutcome(all(answer == "no" for answer in answers.values()), {})
         case FormKind.SETUP:
-            return FormOutcome(True, answers, _reminder(protocol.setup, answers))
+            return FormOutcome(True, answers, _describe_deviations(protocol.setup, answers))
         case FormKind.QUESTIONNAIRE | FormKind.DEBRIEF:
             return FormOutcome(True, {key: answer for key, answer in answers.items() if answer})
         case FormKind.HANDLE:
             return FormOutcome(answers.get("free") == "yes", {})
 
 
-def confirmation_of(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS) -> Form:
+def make_confirmation(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS) -> Form:
     """Form that asks to confirm a refused consent or an exclusion before it becomes final, with the questions
     concerned."""
-    consent, answers = form.kind is FormKind.CONSENT, coded(form, reply)
+    is_consent, answers = form.kind is FormKind.CONSENT, code_answers(form, reply)
     texts = [
         words.fill("quoted", {"text": field.label})
         for field in form.fields
-        if answers[field.key] != ("yes" if consent else "no")
+        if answers[field.key] != ("yes" if is_consent else "no")
     ]
     return Form(
         form.kind,
         words["confirm_title"],
-        words.fill("confirm_no" if consent else "confirm_yes", {"questions": " ".join(texts)}),
-        (_yes_no("right", words["confirm_refused" if consent else "confirm_excluded"], words),),
+        words.fill("confirm_no" if is_consent else "confirm_yes", {"questions": " ".join(texts)}),
+        (_make_yes_no_field("right", words["confirm_refused" if is_consent else "confirm_excluded"], words),),
         form.version,
         form.ethics_id,
     )
@@ -103,104 +105,107 @@ def confirmation_of(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS) 
 
 def is_confirmed(confirmation: Form, reply: FormReply) -> bool:
     """Whether the answers were confirmed; otherwise the form is filled in again."""
-    return coded(confirmation, reply)["right"] == "yes"
+    return code_answers(confirmation, reply)["right"] == "yes"
 
 
-def _yes_no(key: str, label: str, words: Words) -> FormField:
+def _make_yes_no_field(key: str, label: str, words: Words) -> FormField:
     """A question to be answered by yes or no."""
-    return FormField(key, label, tuple(words[each] for each in YES_NO), codes=YES_NO)
+    return FormField(key, label, tuple(words[word_key] for word_key in YES_NO), codes=YES_NO)
 
 
-def _one_of(key: str, label: str, choices: dict[str, str], words: Words) -> FormField:
+def _make_choice_field(key: str, label: str, choices: dict[str, str], words: Words) -> FormField:
     """A question with choices. choices: logged code, and key of the text."""
-    return FormField(key, label, tuple(words[each] for each in choices.values()), codes=tuple(choices))
+    return FormField(key, label, tuple(words[word_key] for word_key in choices.values()), codes=tuple(choices))
 
 
-def _consent(protocol: StudyProtocol, words: Words) -> Form:
+def _make_consent_form(protocol: StudyProtocol, words: Words) -> Form:
     """Consent form: the statements of the protocol, and a statement on probes, which no protocol can leave out."""
     settings = protocol.consent
-    statements = (*settings.statements, *probe_statements(protocol.probes, words))
+    statements = (*settings.statements, *list_probe_statements(protocol.probes, words))
     fields = tuple(
-        _yes_no(f"statement_{number}", statement, words) for number, statement in enumerate(statements, start=1)
+        _make_yes_no_field(f"statement_{number}", statement, words)
+        for number, statement in enumerate(statements, start=1)
     )
     origin = settings.version, settings.ethics_id
     return Form(FormKind.CONSENT, words["consent_title"], words["consent_intro"], fields, *origin)
 
 
-def probe_statements(probes: ProbeSettings, words: Words = ENGLISH_WORDS) -> tuple[str, ...]:
+def list_probe_statements(probes: ProbeSettings, words: Words = ENGLISH_WORDS) -> tuple[str, ...]:
     """Statements of consent to the probes between trials; empty where the protocol has none."""
     if not probes.levels_n:
         return ()
-    strongest = {"seconds": f"{probes.interval_s:g}", "newtons": f"{max(probes.levels_n):g}"}
-    return (words.fill("consent_probes", strongest),)
+    probe_texts = {"seconds": f"{probes.interval_s:g}", "newtons": f"{max(probes.levels_n):g}"}
+    return (words.fill("consent_probes", probe_texts),)
 
 
-def _let_go(protocol: StudyProtocol, words: Words) -> Form:
-    """Form that asks the participant to release the handle for the reference. The duration shown is
-    `reference_s` plus 5 s."""
+def _make_release_form(protocol: StudyProtocol, words: Words) -> Form:
+    """Form that asks the participant to release the handle for the reference probe. The duration shown is
+    `reference_s` plus an allowance of 5 s."""
     probes = protocol.probes
-    shaken = {"seconds": f"{probes.reference_s + 5:.0f}", "newtons": f"{probes.reference_n:g}"}
-    free = {"yes": "yes", "not now": "let_go_not_now"}
+    reference_texts = {"seconds": f"{probes.reference_s + 5:.0f}", "newtons": f"{probes.reference_n:g}"}
+    answers = {"yes": "yes", "not now": "let_go_not_now"}
     return Form(
         FormKind.HANDLE,
         words["let_go_title"],
-        words.fill("let_go_intro", shaken),
-        (_one_of("free", words["let_go_free"], free, words),),
+        words.fill("let_go_intro", reference_texts),
+        (_make_choice_field("free", words["let_go_free"], answers, words),),
     )
 
 
-def take_the_handle(words: Words = ENGLISH_WORDS) -> Form:
+def make_take_handle_form(words: Words = ENGLISH_WORDS) -> Form:
     """The form that asks the participant to take the handle again, after a reference probe."""
-    held = _one_of("held", words["take_held"], {"yes": "yes"}, words)
-    return Form(FormKind.HANDLE, words["take_title"], words["take_intro"], (held,))
+    held_field = _make_choice_field("held", words["take_held"], {"yes": "yes"}, words)
+    return Form(FormKind.HANDLE, words["take_title"], words["take_intro"], (held_field,))
 
 
-def _exclusion(settings: ConsentSettings, words: Words) -> Form:
+def _make_exclusion_form(settings: ConsentSettings, words: Words) -> Form:
+    """Form of the exclusion criteria: yes to any question excludes the participant."""
     fields = tuple(
-        _yes_no(f"question_{number}", question, words) for number, question in enumerate(settings.exclusions, start=1)
+        _make_yes_no_field(f"question_{number}", question, words)
+        for number, question in enumerate(settings.exclusions, start=1)
     )
     origin = settings.version, settings.ethics_id
     return Form(FormKind.EXCLUSION, words["exclusion_title"], words["exclusion_intro"], fields, *origin)
 
 
-def _setup(settings: SetupSettings, words: Words) -> Form:
+def _make_setup_form(settings: SetupSettings, words: Words) -> Form:
     """Set-up form. Where the protocol has a requirement, the question states it."""
 
-    def asked(key: str, wished: bool) -> str:
-        return f"{words[key]} {words[f'{key}_wanted']}" if wished else words[key]
+    def question_text(key: str, is_required: bool) -> str:
+        return f"{words[key]} {words[f'{key}_wanted']}" if is_required else words[key]
 
     return Form(
         FormKind.SETUP,
         words["setup_title"],
         words["setup_intro"],
         (
-            _one_of("hearing", asked("setup_hearing", settings.hearing_masked), HEARING, words),
-            _yes_no("hand_hidden", asked("setup_hidden", settings.hand_hidden), words),
-            _yes_no("arm_supported", asked("setup_arm", settings.arm_supported), words),
-            _one_of("grip", words.fill("setup_grip", {"grip": settings.grip}), GRIPS, words),
-            _one_of("hand", words["setup_hand"], HANDS, words),
+            _make_choice_field("hearing", question_text("setup_hearing", settings.hearing_masked), HEARING, words),
+            _make_yes_no_field("hand_hidden", question_text("setup_hidden", settings.hand_hidden), words),
+            _make_yes_no_field("arm_supported", question_text("setup_arm", settings.arm_supported), words),
+            _make_choice_field("grip", words.fill("setup_grip", {"grip": settings.grip}), GRIPS, words),
+            _make_choice_field("hand", words["setup_hand"], HANDS, words),
         ),
     )
 
 
-def _reminder(setup: SetupSettings, answers: dict[str, str]) -> str:
-    """As `FormOutcome.reminder`."""
-    differing = (
+def _describe_deviations(setup: SetupSettings, answers: dict[str, str]) -> str:
+    """Differences between set-up and protocol, as an English sentence for the log; empty if they agree."""
+    requirements = (
         (setup.hearing_masked and answers.get("hearing") == "nothing", "the device can be heard"),
         (setup.hand_hidden and answers.get("hand_hidden") == "no", "the hand can be seen"),
         (setup.arm_supported and answers.get("arm_supported") == "no", "the arm is not supported"),
     )
-    text = ", ".join(what for differs, what in differing if differs)
+    text = ", ".join(deviation for is_violated, deviation in requirements if is_violated)
     return f"The set-up is not the protocol's: {text}." if text else ""
 
 
-def _questions(kind: FormKind, name: str, questions: tuple[Question, ...], words: Words) -> Form:
+def _make_question_form(kind: FormKind, name: str, questions: tuple[Question, ...], words: Words) -> Form:
     """Form of voluntary questions: participation does not depend on their answers."""
-    fields = tuple(_question(question, words) for question in questions)
+    fields = tuple(_make_question_field(question, words) for question in questions)
     return Form(kind, words[f"{name}_title"], words[f"{name}_intro"], fields)
 
 
-def _question(question: Question, words: Words) -> FormField:
+def _make_question_field(question: Question, words: Words) -> FormField:
     """A question of the protocol as a field; the meaning of a scale's ends is added to the question."""
     label = question.question
     if question.ends:

@@ -26,7 +26,7 @@ def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> s
     if protocol.hand == "held":
         return (
             f"'{protocol.name}' is played into a hand: hold the handle of '{device}' now, as lightly and as evenly as "
-            f"in the study, {_duration_words(total_s)}. It will push with up to {peak_n:g} N. Letting go is always "
+            f"in the study, {_describe_duration(total_s)}. It will push with up to {peak_n:g} N. Letting go is always "
             "safe; Ctrl-C stops."
         )
     return free_handle_notice(device, peak_n, total_s)
@@ -35,9 +35,9 @@ def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> s
 def free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
     """Notice before a device moves a handle that no hand holds. peak_n: largest force (N); total_s: duration (s)."""
     return (
-        f"No person may hold the handle: '{device}' is going to move by itself {_duration_words(total_s)}, pushed with "
-        f"up to {peak_n:g} N and held at its place by a weak spring. Keep hands away and the workspace free; Ctrl-C "
-        "stops."
+        f"No person may hold the handle: '{device}' is going to move by itself {_describe_duration(total_s)}, "
+        f"pushed with up to {peak_n:g} N and held at its place by a weak spring. Keep hands away and the "
+        "workspace free; Ctrl-C stops."
     )
 
 
@@ -51,6 +51,6 @@ def limit_test_notice(device: str, force_n: float) -> str:
     )
 
 
-def _duration_words(total_s: float) -> str:
+def _describe_duration(total_s: float) -> str:
     """A duration (s) in words, in minutes from one minute on."""
     return f"for about {round(total_s / 60)} min" if total_s >= 60 else f"for about {max(1, round(total_s))} s"

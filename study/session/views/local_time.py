@@ -46,7 +46,7 @@ def local_column(utcs: Sequence[str], zone: Zone) -> tuple[str, tuple[str, ...]]
     that differs, such as in daylight saving time."""
     parts = [local_parts(utc, zone, "minutes") for utc in utcs]
     offsets = Counter(offset for _, _, offset in parts if offset)
-    usual = offsets.most_common(1)[0][0] if offsets else ""
-    return usual, tuple(
-        " ".join((date, time, offset if offset != usual else "")).strip() for date, time, offset in parts
+    common_offset = offsets.most_common(1)[0][0] if offsets else ""
+    return common_offset, tuple(
+        " ".join((date, time, offset if offset != common_offset else "")).strip() for date, time, offset in parts
     )

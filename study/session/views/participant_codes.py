@@ -11,7 +11,7 @@ ALLOWED = "a code has 1 to 16 letters and digits, at least one digit, such as P0
 
 _CODE = re.compile(r"(?=.*\d)[A-Za-z0-9]{1,16}")
 """The rule as a pattern."""
-_NUMBERED = re.compile(r"(?P<letters>[A-Za-z]*)(?P<digits>\d{1,9})")
+_NUMBERED_CODE = re.compile(r"(?P<letters>[A-Za-z]*)(?P<digits>\d{1,9})")
 """Codes that can be continued by the next number: letters, then up to nine digits."""
 
 
@@ -29,15 +29,15 @@ def code_problem(text: str) -> str:
     return f"'{text}' is no participant code; {ALLOWED}."
 
 
-def next_code(taken: tuple[str, ...]) -> str:
-    """A free code: the latest numbered code with the next number of its letters; P01 without such a code. taken: codes
-    in use, latest first."""
-    for code in taken:
-        match = _NUMBERED.fullmatch(code)
+def suggest_code(used_codes: tuple[str, ...]) -> str:
+    """A free code: the latest numbered code with the next number of its letters; P01 without such a code. used_codes:
+    the latest first."""
+    for code in used_codes:
+        match = _NUMBERED_CODE.fullmatch(code)
         if match is None:
             continue
         letters, width = match["letters"], len(match["digits"])
-        numbers = [int(m["digits"]) for m in map(_NUMBERED.fullmatch, taken) if m and m["letters"] == letters]
+        numbers = [int(m["digits"]) for m in map(_NUMBERED_CODE.fullmatch, used_codes) if m and m["letters"] == letters]
         proposed = f"{letters}{max(numbers) + 1:0{width}d}"
         return proposed if is_code(proposed) else "P01"
     return "P01"

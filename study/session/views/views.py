@@ -46,7 +46,7 @@ class Welcome:
     training_runs: int
     device: str
     """Name of the device."""
-    felt: bool
+    device_moves: bool
     """False where no device moves: the answers are practice."""
     resumed_after: int
     """Number of answers from earlier sittings."""
@@ -109,7 +109,7 @@ class DemoMenu:
     """Number of vibrations; vibration 1 has the lowest frequency."""
     vibration: int
     """Number of the present vibration, from 1."""
-    felt: tuple[tuple[int, int], ...]
+    played_pairs: tuple[tuple[int, int], ...]
     """Pairs (vibration, direction number) that were played."""
     handle_moves: bool
     """Whether a real handle moves; False with a simulated device."""
@@ -193,9 +193,9 @@ class PracticeResult:
     """Result of a short practice."""
 
     passed: bool
-    right: int
-    of: int
-    """Number of latest answers among which `right` answers were correct."""
+    correct_count: int
+    answer_count: int
+    """Number of latest answers among which `correct_count` were correct."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,9 +211,9 @@ class PauseNotice:
 class AfterPause(Enum):
     """The participant's decision that ends a pause."""
 
-    GO_ON = "go_on"
+    CONTINUE_SITTING = "go_on"
     """Continue with the sitting."""
-    LEAVE = "leave"
+    END_SITTING = "leave"
     """End the sitting; the session can be resumed."""
     WITHDRAW = "withdraw"
     """Withdraw consent: end the sitting, and erase the data after the device is closed."""
@@ -245,7 +245,7 @@ class Answered:
     """The participant's answer, 1 or 2: number of the direction or interval. Raises ValueError for other numbers."""
 
     answer: int
-    at_s: float
+    key_time_s: float
     """Time at which the key arrived, by the session's monotonic clock (s)."""
 
     def __post_init__(self) -> None:
@@ -259,22 +259,22 @@ class Unanswered:
 
     reason: str
     """Why, in words, as it is logged."""
-    leave: bool
+    ends_sitting: bool
     """Whether the participant or the experimenter ends the sitting; the session can be resumed."""
-    asked: bool = False
+    repeat_requested: bool = False
     """Whether the participant asked for a repetition of the trial; this shows that the participant is present."""
     pause: bool = False
     """Whether a pause was asked for: the force ends at once, and nothing is played until the session continues."""
     cause: VoidCause = VoidCause.FAULT
-    """Cause of the void trial where `leave`, `asked` and `pause` are all false."""
+    """Cause of the void trial where `ends_sitting`, `repeat_requested` and `pause` are all false."""
 
 
 Reply = Answered | Unanswered
 """Reply of a participant to a trial."""
 
 
-def picture_of(directions: TestDirections, swapped: bool) -> DirectionPicture:
-    """Picture of the two directions, 45 degrees to either side of the line of symmetry. swapped: whether numbers 1 and
-    2 are exchanged for this participant."""
+def make_direction_picture(directions: TestDirections, labels_swapped: bool) -> DirectionPicture:
+    """Picture of the two directions, 45 degrees to either side of the line of symmetry. labels_swapped: whether numbers
+    1 and 2 are exchanged for this participant."""
     first, second = directions.symmetry_deg + 45.0, directions.symmetry_deg - 45.0
-    return DirectionPicture(directions.plane, (second, first) if swapped else (first, second))
+    return DirectionPicture(directions.plane, (second, first) if labels_swapped else (first, second))

@@ -20,11 +20,11 @@ from study.session.facts.events import (
 )
 from study.session.facts.log_time import seconds_between
 from study.session.facts.sitting_events import FormFilled, NoteTaken
-from study.session.state.fold import apply
+from study.session.state.fold import apply_event
 from study.session.state.state import SessionState, begin_session
 from study.session.watching.watch_view import FormLine, NoteLine
 
-NO_STEADY_PART = "no steady part to measure, or too little of it"
+UNMEASURED_FLAG = "no steady part to measure, or too little of it"
 """A flag in logs before version 1.1 that is not shown, because nearly every trial has it and it is no fault. Later logs
 have the status `unmeasured` instead."""
 
@@ -38,9 +38,9 @@ class PlayedProbe:
     kind: str
     """hand, free or reference, as in `ProbePlayed`."""
     level_n: float
-    """Peak of the norm of the force."""
-    at_s: float
-    """Time since the session was opened."""
+    """Peak of the norm of the force (N)."""
+    started_s: float
+    """Time from the opening of the session to the start of the probe (s)."""
     sitting: int
     """Number of the sitting, from 0."""
     recording: str = ""
@@ -59,7 +59,7 @@ class FollowedSession:
     forms: tuple[FormLine, ...]
     notes: tuple[NoteLine, ...]
     """Oldest first."""
-    left: str
+    end_reason: str
     """Why the sitting was ended; empty while it has not ended."""
     sitting_utc: str
     """When the present sitting was opened."""
@@ -83,51 +83,57 @@ def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> FollowedSe
         remarks=(),
         forms=(),
         notes=(),
-        left="",
+        end_reason="",
         sitting_utc=opened.utc,
         notes_before=0,
         last_utc=opened.utc,
     )
 
 
-def follow(watched: FollowedSession, event: Event) -> FollowedSession:
+def apply_followed_event(watched: FollowedSession, event: Event) -> FollowedSession:
     """The followed session after one more event. Raises LogContradiction where the event cannot follow the previous
     ones."""
-    after = replace(watched, state=apply(watched.state, event), last_utc=event.utc)
+    updated = replace(watched, state=apply_event(watched.state, event), last_utc=event.utc)
     match event:
         case TrialPresented():
-            return replace(after, remarks=(*watched.remarks, ""))
+            return replace(updated, remarks=(*watched.remarks, ""))
         case TrialMeasured():
-            return _set_remark(after, ", ".join(flag for flag in event.flags if flag != NO_STEADY_PART))
+            return _set_remark(updated, ", ".join(flag for flag in event.flags if flag != UNMEASURED_FLAG))
         case TrialSpoiled():
-            return _set_remark(after, event.reason)
+            return _set_remark(updated, event.reason)
         case ProbePlayed() | ProbeMeasured():
-            return _probe(after, event)
+            return _record_probe(updated, event)
         case FormFilled():
-            return replace(after, forms=(*watched.forms, FormLine(event.utc, event.form, event.passed)))
+            return replace(updated, forms=(*watched.forms, FormLine(event.utc, event.form, event.passed)))
         case NoteTaken():
             note = NoteLine(event.utc, event.who, event.text, event.adverse)
-            return replace(after, notes=(*watched.notes, note))
+            return replace(updated, notes=(*watched.notes, note))
         case SessionInterrupted():
-            return replace(after, left=event.reason)
+            return replace(updated, end_reason=event.reason)
         case SessionResumed():
             return replace(
-                after, left="", sitting_utc=event.utc, notes_before=len(watched.notes), sitting=watched.sitting + 1
+                updated,
+                end_reason="",
+                sitting_utc=event.utc,
+                notes_before=len(watched.notes),
+                sitting=watched.sitting + 1,
             )
         case _:
-            return after
+            return updated
 
 
-def _probe(watched: FollowedSession, event: ProbePlayed | ProbeMeasured) -> FollowedSession:
+def _record_probe(watched: FollowedSession, event: ProbePlayed | ProbeMeasured) -> FollowedSession:
     """Note the beginning or the measurement of a probe; a declined reference, which was not played, is left out."""
     if isinstance(event, ProbePlayed):
-        at_s = max(0.0, seconds_between(watched.state.opened.utc, event.utc))
-        return replace(watched, playing=PlayedProbe(event.number, event.kind, event.level_n, at_s, watched.sitting))
-    played = watched.playing
-    if played is None or played.number != event.number:
+        started_s = max(0.0, seconds_between(watched.state.opened.utc, event.utc))
+        return replace(
+            watched, playing=PlayedProbe(event.number, event.kind, event.level_n, started_s, watched.sitting)
+        )
+    probe = watched.playing
+    if probe is None or probe.number != event.number:
         return watched
-    kept = replace(played, recording=event.recording or "", trouble=event.trouble)
-    return replace(watched, playing=None, probes=(*watched.probes, kept))
+    finished_probe = replace(probe, recording=event.recording or "", trouble=event.trouble)
+    return replace(watched, playing=None, probes=(*watched.probes, finished_probe))
 
 
 def _set_remark(watched: FollowedSession, remark: str) -> FollowedSession:

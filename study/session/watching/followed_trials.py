@@ -4,11 +4,11 @@ The direction of a trial is withheld until its answer counts, because an experim
 reveal it to the participant.
 """
 
-from protocols.procedure.practice import PracticeState, practice_passed, right_of_last
+from protocols.procedure.practice import PracticeState, count_right_of_last, is_practice_passed
 from protocols.procedure.schedule import Run
 from protocols.procedure.staircase import level_n
 from protocols.trial import Phase, Trial, TrialStatus
-from study.session.state.state import SessionState, current_rule, due
+from study.session.state.state import SessionState, find_due_presentation, make_current_rule
 from study.session.watching.followed_session import FollowedSession
 from study.session.watching.watch_view import ClosedTrial, OpenTrial, PracticeLine, StaircasePoint, WatchedRun
 
@@ -16,7 +16,7 @@ LAST_TRIALS = 40
 """Number of latest trials that the experimenter's view lists."""
 
 
-def shown_run(state: SessionState) -> int | None:
+def find_shown_run(state: SessionState) -> int | None:
     """Index of the run to plot: the current run while a trial is open or before the first answer of the session,
     otherwise the run of the latest counted answer. None for a finished session without answers."""
     answered = [trial.run for trial in state.trials if trial.counts]
@@ -30,13 +30,13 @@ def _select_counted(state: SessionState, run: int) -> list[Trial]:
     return [trial for trial in state.trials if trial.run == run and trial.counts]
 
 
-def points(state: SessionState, run: int | None) -> tuple[StaircasePoint, ...]:
+def collect_points(state: SessionState, run: int | None) -> tuple[StaircasePoint, ...]:
     """Counted trials of a run without catch trials, as points of its staircase. The open trial is left out even after
     its answer, because it may still become void."""
     if run is None:
         return ()
-    closed = [t for t in _select_counted(state, run) if t.phase is not Phase.CATCH and not _is_open(state, t)]
-    return tuple(StaircasePoint(t.trial, t.staircase_n, bool(t.correct), t.reversal) for t in closed)
+    closed_trials = [t for t in _select_counted(state, run) if t.phase is not Phase.CATCH and not _is_open(state, t)]
+    return tuple(StaircasePoint(t.trial, t.staircase_n, bool(t.correct), t.reversal) for t in closed_trials)
 
 
 def _is_open(state: SessionState, trial: Trial) -> bool:
@@ -44,57 +44,59 @@ def _is_open(state: SessionState, trial: Trial) -> bool:
     return state.presented is not None and trial is state.trials[-1]
 
 
-def next_level_n(state: SessionState, shown: int | None) -> float | None:
+def next_level_n(state: SessionState, shown_run: int | None) -> float | None:
     """Level of the next trial of the shown run (N); None if the run is over or is not the current one."""
-    if state.finished or shown != state.run:
+    if state.finished or shown_run != state.run:
         return None
     run = state.runs[state.run]
-    return due(state).level_n if run.practice else level_n(current_rule(state), state.staircase)
+    return find_due_presentation(state).level_n if run.practice else level_n(make_current_rule(state), state.staircase)
 
 
-def run_line(state: SessionState, run: Run) -> WatchedRun:
+def make_run_line(state: SessionState, run: Run) -> WatchedRun:
     """A run of the schedule with its status; trials and reversals are counted over its trials that count."""
-    counted, rule = _select_counted(state, run.index), state.protocol.staircase
+    counted_trials, rule = _select_counted(state, run.index), state.protocol.staircase
     return WatchedRun(
         run=run.index,
         phase="practice" if run.practice else run.phase.value,
         frequency_hz=run.frequency_hz,
         status="present" if run.index == state.run else "done" if run.index < state.run else "to come",
-        reversals=sum(trial.reversal for trial in counted),
+        reversals=sum(trial.reversal for trial in counted_trials),
         reversals_needed=0 if run.practice or rule.is_bayesian else rule.reversals,
-        trials=len(counted),
+        trials=len(counted_trials),
     )
 
 
-def open_trial(state: SessionState, presented_s: float) -> OpenTrial | None:
+def make_open_trial(state: SessionState, presented_s: float) -> OpenTrial | None:
     """The presented trial without an answer; None if there is none. presented_s: seconds since its presentation."""
-    shown = state.presented
-    if shown is None or state.answered is not None or state.closed:
+    presented = state.presented
+    if presented is None or state.answered is not None or state.closed:
         return None
     return OpenTrial(
-        run=shown.run,
-        trial=shown.trial,
-        attempt=shown.attempt,
-        frequency_hz=shown.frequency_hz,
-        level_n=shown.level_n,
-        catch=shown.phase is Phase.CATCH,
+        run=presented.run,
+        trial=presented.trial,
+        attempt=presented.attempt,
+        frequency_hz=presented.frequency_hz,
+        level_n=presented.level_n,
+        catch=presented.phase is Phase.CATCH,
         presented_s=presented_s,
     )
 
 
-def last_trials(watched: FollowedSession) -> tuple[ClosedTrial, ...]:
+def list_last_trials(watched: FollowedSession) -> tuple[ClosedTrial, ...]:
     """Latest answered or void trials, at most `LAST_TRIALS`, newest first."""
     rows = list(zip(watched.state.trials, watched.remarks, strict=True))[-LAST_TRIALS - 1 :]
-    closed = [
-        _close_trial(watched.state, trial, remark) for trial, remark in rows if trial.status is not TrialStatus.OPEN
+    closed_trials = [
+        _make_closed_trial(watched.state, trial, remark)
+        for trial, remark in rows
+        if trial.status is not TrialStatus.OPEN
     ]
-    return tuple(closed[::-1][:LAST_TRIALS])
+    return tuple(closed_trials[::-1][:LAST_TRIALS])
 
 
-def _close_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
+def _make_closed_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
     # The direction and correctness of a void trial stay hidden, because the same stimulus is presented again. They stay
     # hidden, too, until the health of the device is judged, because the trial may still become void.
-    known = trial.counts and not _is_open(state, trial)
+    is_revealed = trial.counts and not _is_open(state, trial)
     phase = "practice" if state.runs[trial.run].practice else trial.phase.value
     return ClosedTrial(
         run=trial.run,
@@ -103,9 +105,9 @@ def _close_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
         phase=phase,
         frequency_hz=trial.frequency_hz,
         level_n=trial.level_n,
-        shown=trial.direction_shown if known else None,
+        shown=trial.direction_shown if is_revealed else None,
         answer=trial.answer,
-        correct=trial.correct if known else None,
+        correct=trial.correct if is_revealed else None,
         reversal=trial.reversal,
         response_time_s=trial.response_time_s,
         delivered_mps2=trial.delivered_mps2,
@@ -115,14 +117,19 @@ def _close_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
     )
 
 
-def practice(state: SessionState) -> tuple[PracticeLine, ...]:
+def collect_practice_lines(state: SessionState) -> tuple[PracticeLine, ...]:
     """Results of the practice runs before the current run."""
     settings, lines = state.protocol.practice, []
     for run in state.runs[: state.run]:
         if run.practice:
             done = PracticeState(tuple(bool(trial.correct) for trial in _select_counted(state, run.index)))
-            of = min(settings.of_last, len(done.correct))
+            answer_count = min(settings.of_last, len(done.correct))
             lines.append(
-                PracticeLine(run.frequency_hz, right_of_last(settings, done), of, practice_passed(settings, done))
+                PracticeLine(
+                    run.frequency_hz,
+                    count_right_of_last(settings, done),
+                    answer_count,
+                    is_practice_passed(settings, done),
+                )
             )
     return tuple(lines)

@@ -6,7 +6,7 @@ Plain values: the request inbox (`study.store.sessions.request_inbox`) carries t
 from dataclasses import dataclass
 from typing import Literal
 
-Who = Literal["participant", "experimenter", "program"]
+RequestSource = Literal["participant", "experimenter", "program"]
 """Origin of a request; `program`: a finding of the session itself."""
 
 
@@ -14,21 +14,21 @@ Who = Literal["participant", "experimenter", "program"]
 class StopAsked:
     """Request to stop: the force is switched off at once and the sitting ends; the session can be resumed."""
 
-    who: Who
+    who: RequestSource
 
 
 @dataclass(frozen=True, slots=True)
 class PauseAsked:
     """Request to pause: the force ends at once; the present trial is void and is presented again."""
 
-    who: Who
+    who: RequestSource
 
 
 @dataclass(frozen=True, slots=True)
 class NoteAsked:
     """Request to write a note into the log."""
 
-    who: Who
+    who: RequestSource
     text: str
     adverse: bool = False
     """Whether the note reports an adverse event of the participant, such as pain, numbness or fright."""

@@ -1,4 +1,4 @@
-"""Data classes of the view that an experimenter has of a running session. Plain values, quick to import.
+"""Data classes of the view that an experimenter has of a running session. They hold plain values and import quickly.
 
 The view contains no seed, and the direction of a trial only after the answer, because an experimenter who knows the
 direction could reveal it to the participant. Runs, trials and attempts are numbered from 0, as in the files; a screen
@@ -10,11 +10,11 @@ from typing import Literal
 
 from study.session.watching.live import Live
 
-Standing = Literal["running", "paused", "resting", "not running", "finished", "stopped", "refused", "excluded"]
+SittingStatus = Literal["running", "paused", "resting", "not running", "finished", "stopped", "refused", "excluded"]
 """Status of a session. `stopped`: the sitting was ended; `not running`: the program ended without logging the end. Both
 can be resumed."""
 
-ON: tuple[Standing, ...] = ("running", "paused", "resting")
+RUNNING_STATUSES: tuple[SittingStatus, ...] = ("running", "paused", "resting")
 """The statuses in which the program of the session runs."""
 
 RunStatus = Literal["done", "present", "to come"]
@@ -58,7 +58,7 @@ class OpenTrial:
     level_n: float
     catch: bool
     presented_s: float
-    """Time since its presentation."""
+    """Time since its presentation (s)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +79,9 @@ class ClosedTrial:
     reversal: bool
     response_time_s: float | None
     delivered_mps2: float | None
-    """Measured acceleration along the direction (peak)."""
+    """Measured acceleration along the direction (m/s^2, peak)."""
     off_axis_mps2: float | None
-    """Measured acceleration across the direction (peak)."""
+    """Measured acceleration across the direction (m/s^2, peak)."""
     status: str
     """ok, flagged, unmeasured or spoiled (`TrialStatus`); measuring while the measurement is not in the log."""
     remark: str
@@ -90,7 +90,7 @@ class ClosedTrial:
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """Duration of the sitting and vibration dose of the hand, with their limits."""
+    """Duration of the sitting (min) and vibration dose of the hand (m/s^2), with their limits."""
 
     elapsed_min: float
     limit_min: float
@@ -146,7 +146,7 @@ class DriftLine:
     """A change of device or grip that the probes of the session show."""
 
     since_s: float
-    """Time from the opening of the session to the first probe with this change."""
+    """Time from the opening of the session to the first probe with this change (s)."""
     sentence: str
     """The change in words."""
     beyond: bool
@@ -186,22 +186,22 @@ class WatchView:
     """Whether the device is simulated, so that no real handle moves."""
     observer: str | None
     """Name of the simulated participant; None for a person."""
-    standing: Standing
+    standing: SittingStatus
     reason: str
     """Why the session does not run, in words; empty while it runs."""
     activity: str
     """Present activity in words."""
     activity_s: float
-    """Duration of this activity so far."""
+    """Duration of this activity so far (s)."""
     runs: tuple[WatchedRun, ...]
     shown_run: int | None
     """Index of the run that `points` belong to: the present run, or the run of the latest answer (`shown_run`)."""
     points: tuple[StaircasePoint, ...]
     """Counted trials of that run."""
     next_level_n: float | None
-    """Next level of the staircase in `shown_run`, after the last point; None where the run is over."""
+    """Next level (N) of the staircase in `shown_run`, after the last point; None where the run is over."""
     cap_n: float
-    """Highest level of the staircase."""
+    """Highest level of the staircase (N)."""
     open_trial: OpenTrial | None
     last: tuple[ClosedTrial, ...]
     """Latest closed trials, newest first."""
@@ -217,7 +217,7 @@ class WatchView:
     notes: tuple[NoteLine, ...]
     """Notes of the log, newest first."""
     gate_radius_mm: float
-    """Radius within which the handle must be for a trial to start; 0 without a gate."""
+    """Radius (mm) within which the handle must be for a trial to start; 0 without a gate."""
     live: Live | None
     """Live state; None where it is out of date or the program does not run."""
     alarms: tuple[Alarm, ...]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Row = TypeVar("Row", bound="DataclassInstance")
 
-_SHOWN = 8
+_LISTED_PROBLEMS = 8
 """Number of problems that are listed individually; the others are counted."""
 
 
@@ -27,15 +27,18 @@ class CsvError(ListedProblemsError):
     """A table that cannot be used. `problems`: one sentence for each, with line and column where they apply."""
 
 
-def columns(row_type: type[Any]) -> tuple[str, ...]:
+def column_names(row_type: type[Any]) -> tuple[str, ...]:
     """Column names of a row type: the names of its fields."""
     return tuple(field.name for field in fields(row_type))
 
 
 def rows_to_csv(rows: Iterable[Row], row_type: type[Row]) -> str:
     """CSV text with a header."""
-    names = columns(row_type)
-    lines = [csv_line(names), *(csv_line([_field_text(getattr(row, name)) for name in names]) for row in rows)]
+    names = column_names(row_type)
+    lines = [
+        format_csv_line(names),
+        *(format_csv_line([_format_field(getattr(row, name)) for name in names]) for row in rows),
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -47,67 +50,69 @@ def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
     except csv.Error as error:
         raise CsvError((f"this is not CSV: {error}",)) from error
     names = _present_columns(tuple(lines[0]), row_type)
-    if problem := header_problem(tuple(lines[0]), names) or _find_doubled_column(lines[0]):
+    if problem := find_header_problem(tuple(lines[0]), names) or _find_duplicate_column(lines[0]):
         raise CsvError((problem,))
     hints = get_type_hints(row_type)
-    found: list[Row] = []
+    rows: list[Row] = []
     problems: list[str] = []
-    for number, line in enumerate(lines[1:], start=2):
-        if len(line) != len(lines[0]):
-            problems.append(f"line {number} has {len(line)} fields, but the header names {len(lines[0])}")
+    for line_number, row_fields in enumerate(lines[1:], start=2):
+        if len(row_fields) != len(lines[0]):
+            problems.append(f"line {line_number} has {len(row_fields)} fields, but the header names {len(lines[0])}")
             continue
         values: dict[str, Any] = {}
-        for name, field in zip(names, line, strict=False):
+        for name, field in zip(names, row_fields, strict=False):
             try:
-                values[name] = _read(field, hints[name])
+                values[name] = _parse_field(field, hints[name])
             except ValueError as error:
-                problems.append(f"line {number}, column {name}: {error}")
+                problems.append(f"line {line_number}, column {name}: {error}")
         if len(values) == len(names):
-            found.append(row_type(**values))
+            rows.append(row_type(**values))
     if problems:
-        rest = len(problems) - _SHOWN
-        raise CsvError((*problems[:_SHOWN], *([f"and {rest} more problems of this kind"] if rest > 0 else [])))
-    return tuple(found)
+        unlisted = len(problems) - _LISTED_PROBLEMS
+        raise CsvError(
+            (*problems[:_LISTED_PROBLEMS], *([f"and {unlisted} more problems of this kind"] if unlisted > 0 else []))
+        )
+    return tuple(rows)
 
 
-def as_written_in(text: str, rows: Iterable[Row], row_type: type[Row]) -> tuple[Row, ...]:
+def drop_absent_columns(text: str, rows: Iterable[Row], row_type: type[Row]) -> tuple[Row, ...]:
     """Rows as a table of an earlier version would hold them. text: that table; in columns that it lacks, the rows get
     their defaults."""
     header = next(csv.reader(io.StringIO(text.partition("\n")[0])), [])
-    absent = columns(row_type)[len(_present_columns(tuple(header), row_type)) :]
+    absent = column_names(row_type)[len(_present_columns(tuple(header), row_type)) :]
     defaults = {field.name: field.default for field in fields(row_type) if field.name in absent}
     return tuple(replace(row, **defaults) for row in rows)
 
 
 def _present_columns(header: tuple[str, ...], row_type: type[Any]) -> tuple[str, ...]:
     """The columns to read; trailing columns with a default may be missing, as in tables of earlier versions."""
-    names = columns(row_type)
-    needed = sum(field.default is MISSING for field in fields(row_type))
-    while len(names) > needed and header[: len(names)] != names:
+    names = column_names(row_type)
+    required_count = sum(field.default is MISSING for field in fields(row_type))
+    while len(names) > required_count and header[: len(names)] != names:
         names = names[:-1]
     return names
 
 
-def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
+def find_header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
     """Problem with the header, in words; empty if the header begins with the expected columns."""
     if header[: len(expected)] == expected:
         return ""
     for position, name in enumerate(expected, start=1):
         if header[position - 1 : position] != (name,):
-            found = f"is '{header[position - 1]}'" if position <= len(header) else "is missing"
-            return f"column {position} of the header {found}; it must be '{name}' (of {', '.join(expected)})"
+            actual = f"is '{header[position - 1]}'" if position <= len(header) else "is missing"
+            return f"column {position} of the header {actual}; it must be '{name}' (of {', '.join(expected)})"
     return ""
 
 
-def _find_doubled_column(header: Sequence[str]) -> str:
+def _find_duplicate_column(header: Sequence[str]) -> str:
     """Problem with a header that names a column twice, in words; empty if there is none. Empty names, which
     spreadsheets leave at the end of a header, are ignored."""
     names = [name.strip() for name in header]
-    doubled = next((name for place, name in enumerate(names) if name and name in names[:place]), None)
-    return f"the header names the column '{doubled}' twice; only one of both can be meant" if doubled else ""
+    duplicate = next((name for index, name in enumerate(names) if name and name in names[:index]), None)
+    return f"the header names the column '{duplicate}' twice; only one of both can be meant" if duplicate else ""
 
 
-def csv_line(fields_of_row: Sequence[str]) -> str:
+def format_csv_line(fields_of_row: Sequence[str]) -> str:
     """A row of CSV without the line end; fields are quoted where needed."""
     text = io.StringIO()
     # The writer quotes fields that contain a character of its line terminator: with both, a carriage return is quoted.
@@ -115,17 +120,17 @@ def csv_line(fields_of_row: Sequence[str]) -> str:
     return text.getvalue().removesuffix("\r\n")
 
 
-def in_words(hint: Any) -> str:
+def describe_type(hint: Any) -> str:
     """Content of a column of this type in words, for the documentation of a table."""
     if get_origin(hint) in (Union, UnionType):
-        (inner,) = (option for option in get_args(hint) if option is not NoneType)
-        return f"{in_words(inner)}, or empty"
+        (option_type,) = (option for option in get_args(hint) if option is not NoneType)
+        return f"{describe_type(option_type)}, or empty"
     if isinstance(hint, type) and issubclass(hint, Enum):
         return ", ".join(f"`{option.value}`" for option in hint)
     return {bool: "`true` or `false`", int: "whole number", float: "number", str: "text"}[hint]
 
 
-def _field_text(value: Any) -> str:
+def _format_field(value: Any) -> str:
     """A value as the text of a field."""
     match value:
         case None:
@@ -139,7 +144,7 @@ def _field_text(value: Any) -> str:
     return str(value)
 
 
-def _read(field: str, hint: Any) -> Any:
+def _parse_field(field: str, hint: Any) -> Any:
     """The value of a field, by the type of its column. Raises ValueError with a sentence fragment."""
     if get_origin(hint) in (Union, UnionType):
         if field == "" and NoneType in get_args(hint):
@@ -148,23 +153,25 @@ def _read(field: str, hint: Any) -> Any:
     if field == "" and hint is not str:
         raise ValueError("it is empty, but a value is needed")
     if hint is bool:
-        return _truth(field)
+        return _parse_bool(field)
     if isinstance(hint, type) and issubclass(hint, Enum):
-        return _choice(field, hint)
+        return _parse_enum(field, hint)
     try:
         return hint(field)
     except ValueError:
-        wanted = {int: "a whole number", float: "a number"}[hint]
-        raise ValueError(f"'{field}' is not {wanted}") from None
+        expected = {int: "a whole number", float: "a number"}[hint]
+        raise ValueError(f"'{field}' is not {expected}") from None
 
 
-def _truth(field: str) -> bool:
+def _parse_bool(field: str) -> bool:
+    """The Boolean of a field. Raises ValueError with a sentence fragment."""
     if field not in ("true", "false"):
         raise ValueError(f"'{field}' is neither true nor false")
     return field == "true"
 
 
-def _choice(field: str, options: type[Enum]) -> Enum:
+def _parse_enum(field: str, options: type[Enum]) -> Enum:
+    """The member of `options` whose value a field contains. Raises ValueError with a sentence fragment."""
     for option in options:
         if str(option.value) == field:
             return option

@@ -24,12 +24,12 @@ class SizeLimit:
         self.most_bytes = min(MOST_BYTES, max(PLAIN_BYTES, FACTOR * file_bytes))
         self._declared = 0
 
-    def take(self, what: str, size: int) -> None:
-        """Add a declared size (bytes); what: its name in messages. Raises DeclaredSizeError where the sum exceeds the
+    def add_size(self, array_name: str, size: int) -> None:
+        """Add a declared size (bytes); array_name: for messages. Raises DeclaredSizeError where the sum exceeds the
         limit."""
         self._declared += size
         if self._declared > self.most_bytes:
             raise DeclaredSizeError(
-                f"{what} declares {size} bytes, and with all before it more than the {self.most_bytes} that are "
+                f"{array_name} declares {size} bytes, and with all before it more than the {self.most_bytes} that are "
                 "read of a file of this size; save it without compression, or in parts"
             )

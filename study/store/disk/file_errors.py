@@ -56,7 +56,7 @@ class CannotReadError(StudyError):
     def __init__(self, path: Path, problem: OSError | UnicodeDecodeError) -> None:
         super().__init__(
             title=f"{path.name} cannot be read",
-            happened=_why_not_read(path, problem) + ".",
+            happened=_explain_read_failure(path, problem) + ".",
             do_now="Check the name and the folder.",
         )
 
@@ -65,12 +65,12 @@ class CannotWriteError(StudyError):
     """A file could not be written. An existing file is untouched."""
 
     def __init__(self, path: Path, problem: OSError) -> None:
-        why, do_now = _why_not_written(path, problem)
+        reason, remedy = _explain_write_failure(path, problem)
         super().__init__(
             title=f"{path.name} was not written",
-            happened=why + ".",
+            happened=reason + ".",
             saved="Nothing was changed: no half-written file remains, and existing files are unchanged.",
-            do_now=do_now,
+            do_now=remedy,
         )
 
 
@@ -93,10 +93,10 @@ _PROSE = {"it", "its", "this", "the", "there", "line", "segment", "segments", "e
 def _shorten_problems(problems: tuple[str, ...]) -> tuple[str, ...]:
     """The problems, limited in number and length: a damaged file may have a million problems or a name of a million
     letters."""
-    rest = len(problems) - _MOST_PROBLEMS
-    more = (f"and {rest} more problems",) if rest > 0 else ()
-    cut = (text if len(text) <= _LONGEST_PROBLEM else f"{text[:_LONGEST_PROBLEM]}…" for text in problems)
-    return (*islice(cut, _MOST_PROBLEMS), *more)
+    unlisted = len(problems) - _MOST_PROBLEMS
+    remainder = (f"and {unlisted} more problems",) if unlisted > 0 else ()
+    shortened = (text if len(text) <= _LONGEST_PROBLEM else f"{text[:_LONGEST_PROBLEM]}…" for text in problems)
+    return (*islice(shortened, _MOST_PROBLEMS), *remainder)
 
 
 def _sentence(problem: str) -> str:
@@ -105,7 +105,7 @@ def _sentence(problem: str) -> str:
     return capital + problem[1:].rstrip(".") + "."
 
 
-def _why_not_read(path: Path, problem: OSError | UnicodeDecodeError) -> str:
+def _explain_read_failure(path: Path, problem: OSError | UnicodeDecodeError) -> str:
     """Reason in words, without a full stop."""
     match problem:
         case FileNotFoundError():
@@ -121,7 +121,7 @@ def _why_not_read(path: Path, problem: OSError | UnicodeDecodeError) -> str:
     return f"The system says: {problem.strerror or problem}"
 
 
-def _why_not_written(path: Path, problem: OSError) -> tuple[str, str]:
+def _explain_write_failure(path: Path, problem: OSError) -> tuple[str, str]:
     """Reason in words, without a full stop, and advice."""
     match problem.errno:
         case errno.ENOSPC | errno.EDQUOT:

@@ -20,24 +20,24 @@ class AttributeProblemError(ValueError):
     `UnusableFileError`."""
 
 
-def text_attribute(owner: Any, name: str, default: str | None = None) -> str:
+def read_text_attribute(owner: Any, name: str, default: str | None = None) -> str:
     """A single text. Raises AttributeProblemError if it is missing and has no default, or is not exactly one text."""
-    texts = texts_attribute(owner, name, None if default is None else (default,))
+    texts = read_texts_attribute(owner, name, None if default is None else (default,))
     if len(texts) != 1:
         raise AttributeProblemError(f"{_describe_attribute(owner, name)} holds {len(texts)} texts; it must be one")
     return texts[0]
 
 
-def texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
+def read_texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
     """One text or a list of texts, as a tuple; UTF-8 is required. Raises AttributeProblemError."""
     if name not in owner.attrs:
         if default is None:
             raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
         return default
-    found = _value(owner, name)
-    values = np.atleast_1d(found).ravel().tolist()
+    stored = _value(owner, name)
+    values = np.atleast_1d(stored).ravel().tolist()
     if not all(isinstance(value, str | bytes) for value in values):
-        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is {_shorten(found)}; it must be text")
+        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is {_shorten_value(stored)}; it must be text")
     try:
         # h5py returns bytes that are not UTF-8 as surrogates, which cannot be encoded again.
         texts = tuple(value if isinstance(value, bytes) else value.encode() for value in (*values, name))
@@ -46,18 +46,22 @@ def texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = Non
         raise AttributeProblemError(f"{_describe_attribute(owner, name)} is not text in UTF-8") from None
 
 
-def numbers_attribute(owner: Any, name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
+def read_numbers_attribute(
+    owner: Any, name: str, count: int, default: tuple[float, ...] | None = None
+) -> tuple[float, ...]:
     """`count` numbers as floats; a single number may be a scalar or a list of length 1. Raises
     AttributeProblemError."""
     if name not in owner.attrs:
         if default is None:
             raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
         return default
-    found = _value(owner, name)
-    values = np.atleast_1d(found).ravel()
+    stored = _value(owner, name)
+    values = np.atleast_1d(stored).ravel()
     if values.dtype.kind not in "iuf" or len(values) != count:
-        wanted = "a number" if count == 1 else f"{count} numbers"
-        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is {_shorten(found)}; it must be {wanted}")
+        expected = "a number" if count == 1 else f"{count} numbers"
+        raise AttributeProblemError(
+            f"{_describe_attribute(owner, name)} is {_shorten_value(stored)}; it must be {expected}"
+        )
     return tuple(float(value) for value in values)
 
 
@@ -84,12 +88,12 @@ def _value(owner: Any, name: str) -> Any:
     return owner.attrs[name]
 
 
-def _shorten(value: Any) -> str:
+def _shorten_value(value: Any) -> str:
     text = repr(np.asarray(value).tolist())
     return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
 
 
 def _describe_attribute(owner: Any, name: str) -> str:
     """Name of the attribute and of its object, for messages."""
-    where = owner.name.strip("/")
-    return f"the attribute '{name}' of {where}" if where else f"the attribute '{name}'"
+    owner_name = owner.name.strip("/")
+    return f"the attribute '{name}' of {owner_name}" if owner_name else f"the attribute '{name}'"

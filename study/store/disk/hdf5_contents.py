@@ -71,7 +71,7 @@ def _check_dataset(name: str, dataset: Any, limit: SizeLimit) -> None:
         raise ValueError(f"{name} is compressed more than once; save it compressed once, or not at all")
     in_python = dataset.dtype.hasobject or dataset.dtype.names is not None
     entry_bytes = _OBJECT_BYTES if in_python else max(8, dataset.dtype.itemsize)  # read as float64
-    limit.take(name, math.prod(dataset.shape) * entry_bytes)
+    limit.add_size(name, math.prod(dataset.shape) * entry_bytes)
     if dataset.chunks is not None:
         chunk_bytes = math.prod(dataset.chunks) * entry_bytes
         if chunk_bytes > limit.most_bytes:

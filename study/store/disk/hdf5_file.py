@@ -19,7 +19,7 @@ from equalizer.signals.signal import FloatArray
 from study.regular_file import open_regular
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.file_errors import DAMAGED, CannotReadError, UnusableFileError
-from study.store.disk.hdf5_attributes import AttributeProblemError, numbers_attribute, text_attribute
+from study.store.disk.hdf5_attributes import AttributeProblemError, read_numbers_attribute, read_text_attribute
 from study.store.disk.hdf5_contents import check_contents
 
 Value = TypeVar("Value")
@@ -41,16 +41,16 @@ class Problems:
     """Collects all problems of a file, so that they can be reported and corrected together."""
 
     def __init__(self) -> None:
-        self.found: list[str] = []
+        self.messages: list[str] = []
         """Messages, in the order of reading."""
 
-    def attempt(self, read: Callable[[], Value], otherwise: Value) -> Value:
-        """The result of `read`; a ValueError is recorded as a problem and gives `otherwise`."""
+    def attempt(self, read: Callable[[], Value], default: Value) -> Value:
+        """The result of `read`; a ValueError is recorded as a problem and gives `default`."""
         try:
             return read()
         except ValueError as error:
-            self.found.append(str(error))
-            return otherwise
+            self.messages.append(str(error))
+            return default
 
 
 def is_hdf5(path: Path) -> bool:
@@ -58,11 +58,11 @@ def is_hdf5(path: Path) -> bool:
     return path.is_file() and bool(h5py.is_hdf5(path))
 
 
-def format_of(path: Path) -> str:
+def read_format(path: Path) -> str:
     """The format attribute of an HDF5 file; empty if there is none. Raises CannotReadError, UnusableFileError."""
     with open_any_hdf5(path, "HDF5 file") as file:
         try:
-            return text_attribute(file, "format", "")
+            return read_text_attribute(file, "format", "")
         except AttributeProblemError:
             return ""
 
@@ -74,19 +74,19 @@ def open_hdf5(path: Path, kind: str, format_name: str, version: int, *, sealed: 
     CannotReadError, UnusableFileError."""
     with open_any_hdf5(path, kind, sealed=sealed) as file:
         try:
-            found = text_attribute(file, "format")
-            (number,) = numbers_attribute(file, "version", 1)
+            stored_format = read_text_attribute(file, "format")
+            (stored_version,) = read_numbers_attribute(file, "version", 1)
         except AttributeProblemError as error:
             raise UnusableFileError(path, kind, (str(error),)) from error
-        if found != format_name:
-            raise UnusableFileError(path, kind, (f"its format is '{found}', not '{format_name}'",))
-        if number != version:
-            wrong = f"its version is {number:g}; this program reads version {version}"
-            raise UnusableFileError(path, kind, (wrong,))
+        if stored_format != format_name:
+            raise UnusableFileError(path, kind, (f"its format is '{stored_format}', not '{format_name}'",))
+        if stored_version != version:
+            version_problem = f"its version is {stored_version:g}; this program reads version {version}"
+            raise UnusableFileError(path, kind, (version_problem,))
         yield file
 
 
-def float_dataset(file: Any, name: str, shape: str) -> FloatArray:
+def read_float_dataset(file: Any, name: str, shape: str) -> FloatArray:
     """Read a dataset of floating-point numbers. shape: in words, as in "(samples, channels)"; the number of dimensions
     is checked. Raises ValueError with a sentence fragment."""
     dataset = file.get(name)
@@ -106,17 +106,17 @@ def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool, seal
     with h5py.File(buffer, "w", userblock_size=SEAL_BYTES if sealed else 0) as file:
         fill(file)
     content = buffer.getvalue()
-    write_atomically(path, with_seal(content) if sealed else content, overwrite=overwrite)
+    write_atomically(path, add_seal(content) if sealed else content, overwrite=overwrite)
 
 
-def with_seal(content: bytes) -> bytes:
+def add_seal(content: bytes) -> bytes:
     """The bytes of an HDF5 file with a user block of `SEAL_BYTES`, with the seal (SHA-256 of all bytes after the block)
     written into the block."""
     body = content[SEAL_BYTES:]
-    return _seal(hashlib.sha256(body).hexdigest(), len(body)) + body
+    return _make_seal(hashlib.sha256(body).hexdigest(), len(body)) + body
 
 
-def _seal(digest: str, size: int) -> bytes:
+def _make_seal(digest: str, size: int) -> bytes:
     """The user block of a sealed file: digest and size as text, filled with zeros to `SEAL_BYTES`."""
     return (SEAL + f"{digest} {size} bytes follow\n".encode("ascii")).ljust(SEAL_BYTES, b"\0")
 
@@ -127,10 +127,10 @@ def _check_seal(path: Path, kind: str, sealed: bool) -> None:
     with open_regular(path) as file:
         start = file.read(SEAL_BYTES)
         if start.startswith(SEAL):
-            broken = _seal(hashlib.file_digest(file, "sha256").hexdigest(), file.tell() - SEAL_BYTES) != start
+            is_damaged = _make_seal(hashlib.file_digest(file, "sha256").hexdigest(), file.tell() - SEAL_BYTES) != start
         else:  # HDF5 that begins later in the file has a user block: its seal is damaged
-            broken = sealed and not start.startswith(SIGNATURE) and is_hdf5(path)
-    if broken:
+            is_damaged = sealed and not start.startswith(SIGNATURE) and is_hdf5(path)
+    if is_damaged:
         raise UnusableFileError(path, kind, (BROKEN_SEAL,))
 
 

@@ -43,11 +43,13 @@ def read_json(path: Path, format_name: str, version: int) -> dict[str, Any]:
     Raises CannotReadError, and UnusableFileError for another format or version.
     """
     document = parse_json(path, read_text(path, DOCUMENT_BYTES), format_name)
-    found, number = document.pop("format", None), document.pop("version", None)
-    if found != format_name:
-        raise UnusableFileError(path, format_name, (f"its format is {_value_text(found)}, not '{format_name}'",))
-    if number != version or isinstance(number, bool):
-        wrong = f"its version is {_value_text(number)}; this program reads version {version}"
+    stored_format, stored_version = document.pop("format", None), document.pop("version", None)
+    if stored_format != format_name:
+        raise UnusableFileError(
+            path, format_name, (f"its format is {_value_text(stored_format)}, not '{format_name}'",)
+        )
+    if stored_version != version or isinstance(stored_version, bool):
+        wrong = f"its version is {_value_text(stored_version)}; this program reads version {version}"
         raise UnusableFileError(path, format_name, (wrong,))
     return document
 

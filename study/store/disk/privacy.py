@@ -14,21 +14,21 @@ from study.store.disk.real_folder import RealFolder, is_real_folder, open_folder
 
 PRIVATE_FOLDER, PRIVATE_FILE = 0o700, 0o600
 """Modes of folders and files with participants' data."""
-OTHERS = 0o077
+GROUP_AND_OTHERS = 0o077
 """All permission bits of group and others."""
 
 
-def open_to_others(folder: Path) -> bool:
+def is_open_to_others(folder: Path) -> bool:
     """Whether group or others have any right to the folder. Never raises; False on systems without such rights."""
     try:
-        return os.name == "posix" and bool(folder.stat().st_mode & OTHERS)
+        return os.name == "posix" and bool(folder.stat().st_mode & GROUP_AND_OTHERS)
     except OSError:
         return False
 
 
 def file_mode(folder: Path) -> int:
     """Mode of a new file in `folder`, before the umask: private where the folder is."""
-    return 0o666 if open_to_others(folder) else PRIVATE_FILE
+    return 0o666 if is_open_to_others(folder) else PRIVATE_FILE
 
 
 def write_private(path: Path, content: bytes) -> None:
@@ -47,76 +47,76 @@ def make_folder(folder: Path, *, private: bool = False) -> None:
     parent = folder.absolute().parent
     make_folder(parent, private=private)
     with contextlib.suppress(FileExistsError):
-        folder.mkdir(mode=PRIVATE_FOLDER if private or not open_to_others(parent) else 0o777)
+        folder.mkdir(mode=PRIVATE_FOLDER if private or not is_open_to_others(parent) else 0o777)
     if not folder.is_dir():
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(folder))
 
 
-def close_to_others(folder: Path, *, inside: bool = False) -> None:
-    """Remove the rights of group and others from a folder; inside: also from all its contents. Links are not followed,
-    and files of another account are unchanged. Never raises OSError."""
+def close_to_others(folder: Path, *, recursive: bool = False) -> None:
+    """Remove the rights of group and others from a folder; recursive: also from all its contents. Links are not
+    followed, and files of another account are unchanged. Never raises OSError."""
     with contextlib.suppress(OSError), open_folder(folder.absolute()) as place:
-        _close(place, inside)
+        _restrict_folder(place, recursive)
 
 
 def close_data_folder(data: Path) -> None:
-    """Remove the rights of group and others from the data folder and its folders, unless `why_open` gives a reason
-    against it. Raises OSError where the folder cannot be listed."""
-    if not open_to_others(data) or why_open(data):
+    """Remove the rights of group and others from the data folder and its folders, unless `explain_open_folder` gives a
+    reason against it. Raises OSError where the folder cannot be listed."""
+    if not is_open_to_others(data) or explain_open_folder(data):
         return
     close_to_others(data.resolve())
-    for folder in (path for path in data.iterdir() if is_real_folder(path) and open_to_others(path)):
+    for folder in (path for path in data.iterdir() if is_real_folder(path) and is_open_to_others(path)):
         close_to_others(folder)
 
 
-def why_open(data: Path) -> str:
+def explain_open_folder(data: Path) -> str:
     """Why a data folder that is open to others is not closed automatically, in words; empty if there is no reason: it
     belongs to another account, is meant to be shared (sticky or set-group bit), or holds the working or home folder."""
-    if not open_to_others(data):
+    if not is_open_to_others(data):
         return ""
-    found, place = data.stat(), data.resolve()
-    if found.st_uid != os.geteuid():
+    folder_stat, place = data.stat(), data.resolve()
+    if folder_stat.st_uid != os.geteuid():
         return "it belongs to another account"
-    if found.st_mode & (stat.S_ISVTX | stat.S_ISGID):
+    if folder_stat.st_mode & (stat.S_ISVTX | stat.S_ISGID):
         return "it was made to be shared"
-    if any(inner.is_relative_to(place) for inner in (Path.cwd(), Path.home().resolve())):
+    if any(protected.is_relative_to(place) for protected in (Path.cwd(), Path.home().resolve())):
         return "it holds more than the study"
     return ""
 
 
-def privacy_warning(folder: Path, why: str = "") -> str:
-    """Warning if others have rights to the folder, otherwise empty. why: reason why a session does not remove them."""
-    if not open_to_others(folder):
+def privacy_warning(folder: Path, reason: str = "") -> str:
+    """Warning if others have rights to the folder, otherwise empty. reason: why a session does not remove them."""
+    if not is_open_to_others(folder):
         return ""
     mode = stat.S_IMODE(folder.stat().st_mode)
     text = f"Other accounts of this computer have rights to {folder} (mode {mode:03o})."
-    return f"{text}{why and f' A session leaves them: {why}.'} Remove these rights: chmod 700 {folder}"
+    return f"{text}{reason and f' A session leaves them: {reason}.'} Remove these rights: chmod 700 {folder}"
 
 
 def data_folder_warning(data: Path) -> str:
     """Warning if others have rights to a data folder that a session will not remove; otherwise empty."""
-    why = why_open(data)
-    return privacy_warning(data, why) if why else ""
+    reason = explain_open_folder(data)
+    return privacy_warning(data, reason) if reason else ""
 
 
-def _close(place: RealFolder, inside: bool) -> None:
+def _restrict_folder(place: RealFolder, recursive: bool) -> None:
     """As `close_to_others`, for an open folder. Non-blocking opening, because an entry may be a pipe."""
     if place.descriptor is None:
         return
     _restrict_access(place.descriptor)
-    for name in place.names() if inside else ():
+    for name in place.names() if recursive else ():
         with contextlib.suppress(OSError):
             descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=place.descriptor)
             try:
                 _restrict_access(descriptor)
                 if stat.S_ISDIR(os.fstat(descriptor).st_mode):
-                    _close(RealFolder(place.path / name, descriptor), inside)
+                    _restrict_folder(RealFolder(place.path / name, descriptor), recursive)
             finally:
                 os.close(descriptor)
 
 
 def _restrict_access(descriptor: int) -> None:
     """Remove the rights of group and others from an open folder or regular file. Raises OSError."""
-    found = os.fstat(descriptor)
-    if found.st_mode & OTHERS and (stat.S_ISDIR(found.st_mode) or stat.S_ISREG(found.st_mode)):
-        os.fchmod(descriptor, stat.S_IMODE(found.st_mode) & ~OTHERS)
+    entry_stat = os.fstat(descriptor)
+    if entry_stat.st_mode & GROUP_AND_OTHERS and (stat.S_ISDIR(entry_stat.st_mode) or stat.S_ISREG(entry_stat.st_mode)):
+        os.fchmod(descriptor, stat.S_IMODE(entry_stat.st_mode) & ~GROUP_AND_OTHERS)

@@ -49,10 +49,10 @@ class Provenance:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON, TOML and HDF5; fields that are None are left out."""
-        plain = asdict(self)
-        plain["command"] = list(self.command)
-        plain["parents"] = list(plain["parents"])
-        return {key: value for key, value in plain.items() if value is not None}
+        values = asdict(self)
+        values["command"] = list(self.command)
+        values["parents"] = list(values["parents"])
+        return {key: value for key, value in values.items() if value is not None}
 
 
 def gather_provenance(
@@ -65,27 +65,27 @@ def gather_provenance(
     """Provenance of a result of the running program. parents: paths of the input files. Raises CannotReadError where
     one cannot be read."""
     return Provenance(
-        versions=versions(),
-        command=command_line(sys.argv),
+        versions=list_versions(),
+        command=anonymise_arguments(sys.argv),
         protocol_hash=protocol_hash,
         seeds=seeds,
         settings=settings,
-        parents=tuple(Parent(as_text(path.name), sha256_of(path)) for path in parents),
+        parents=tuple(Parent(replace_invalid_bytes(path.name), sha256_of(path)) for path in parents),
     )
 
 
-def versions() -> dict[str, str]:
+def list_versions() -> dict[str, str]:
     """Versions of Python and of `PACKAGES`; "not installed" where a package is missing."""
-    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
+    return {"python": platform.python_version(), **{name: _find_version(name) for name in PACKAGES}}
 
 
-def command_line(arguments: Sequence[str]) -> tuple[str, ...]:
-    """Arguments in which paths are reduced to file names, because paths reveal a computer and its owner."""
-    return tuple(_without_folders(argument) for argument in arguments)
+def anonymise_arguments(arguments: Sequence[str]) -> tuple[str, ...]:
+    """Reduce paths in arguments to file names, because paths may identify the computer and its owner."""
+    return tuple(_remove_folders(argument) for argument in arguments)
 
 
-def as_text(name: str) -> str:
-    """A file name as valid text: bytes that are not UTF-8 (surrogates in Python) are replaced."""
+def replace_invalid_bytes(name: str) -> str:
+    """Make a file name valid text: bytes that are not UTF-8 (surrogates in Python) are replaced."""
     return name.encode(errors="replace").decode()
 
 
@@ -99,14 +99,14 @@ def sha256_of(path: Path) -> str:
 
 
 @cache
-def _version(package: str) -> str:
+def _find_version(package: str) -> str:
     try:
         return version(package)
     except PackageNotFoundError:
         return "not installed"
 
 
-def _without_folders(argument: str) -> str:
+def _remove_folders(argument: str) -> str:
     option, equals, value = argument.partition("=") if argument.startswith("--") else ("", "", argument)
     name = PurePath(value).name if "/" in value or "\\" in value else value
-    return as_text(option + equals + name)
+    return replace_invalid_bytes(option + equals + name)

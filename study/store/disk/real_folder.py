@@ -49,8 +49,8 @@ class RealFolder:
         """Erase a folder inside this folder if it is empty; nothing happens if it does not exist or is no folder.
         Raises OSError."""
         with suppress(FileNotFoundError, NotADirectoryError):
-            with open_folder(self, name) as inner:
-                empty = not inner.names()
+            with open_folder(self, name) as subfolder:
+                empty = not subfolder.names()
             if empty:
                 os.rmdir(self._path_text(name), dir_fd=self.descriptor)
 
@@ -64,23 +64,23 @@ class RealFolder:
 
 
 @contextmanager
-def open_folder(where: Path | RealFolder, *names: str) -> Iterator[RealFolder]:
-    """The folder `where`, or the one reached from it by `names`, level by level.
+def open_folder(start: Path | RealFolder, *names: str) -> Iterator[RealFolder]:
+    """The folder `start`, or the one reached from it by `names`, level by level.
 
     Folders opened here are closed at the end. Raises OSError: NotADirectoryError where a level is a link or no folder,
     FileNotFoundError where it is missing.
     """
-    folder = _open_real(where, None) if isinstance(where, Path) else where
-    opened = [] if folder is where else [folder]
+    folder = _open_real(start, None) if isinstance(start, Path) else start
+    opened_folders = [] if folder is start else [folder]
     try:
         for name in names:
             folder = _open_real(folder.path / name, folder.descriptor)
-            opened.append(folder)
+            opened_folders.append(folder)
         yield folder
     finally:
-        for each in opened:
-            if each.descriptor is not None:
-                os.close(each.descriptor)
+        for opened_folder in opened_folders:
+            if opened_folder.descriptor is not None:
+                os.close(opened_folder.descriptor)
 
 
 def _open_real(path: Path, parent: int | None) -> RealFolder:

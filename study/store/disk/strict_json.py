@@ -7,7 +7,7 @@ import json
 import math
 from typing import Any
 
-DEEPEST = 64
+MAX_DEPTH = 64
 """Largest depth of nesting of a document, well below the recursion limit of Python."""
 _LONGEST_NUMBER = 40
 """Largest number of digits of a whole number; a seed of 128 bits has up to 39."""
@@ -16,30 +16,30 @@ _LONGEST_NUMBER = 40
 def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
     """Parse JSON. with_nan: NaN and infinity are accepted. Raises only ValueError, with a sentence fragment."""
     try:
-        found = json.loads(
+        document = json.loads(
             text,
             parse_constant=None if with_nan else _refuse,
-            parse_float=_finite,
+            parse_float=_parse_finite,
             parse_int=_parse_whole,
-            object_pairs_hook=_without_doubles,
+            object_pairs_hook=_refuse_duplicate_keys,
         )
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
-    _check(found)
-    return found
+    _check_document(document)
+    return document
 
 
-def _check(found: Any) -> None:
-    """Raise ValueError for nesting deeper than `DEEPEST` and for texts with lone surrogates. Without recursion."""
-    waiting = [(found, 0)]
+def _check_document(document: Any) -> None:
+    """Raise ValueError for nesting deeper than `MAX_DEPTH` and for texts with lone surrogates. Without recursion."""
+    waiting = [(document, 0)]
     while waiting:
         value, depth = waiting.pop()
-        if depth > DEEPEST:
-            raise ValueError(f"it is nested more than {DEEPEST} levels deep")
+        if depth > MAX_DEPTH:
+            raise ValueError(f"it is nested more than {MAX_DEPTH} levels deep")
         if isinstance(value, dict):
-            waiting += ((inner, depth + 1) for entry in value.items() for inner in entry)
+            waiting += ((member, depth + 1) for entry in value.items() for member in entry)
         elif isinstance(value, list):
-            waiting += ((inner, depth + 1) for inner in value)
+            waiting += ((member, depth + 1) for member in value)
         elif isinstance(value, str):
             try:
                 value.encode()
@@ -47,13 +47,13 @@ def _check(found: Any) -> None:
                 raise ValueError("a text in it has half of a character (a lone surrogate)") from None
 
 
-def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object as a dictionary. Raises ValueError for a duplicate key, of which Python would keep the last value."""
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    record = dict(pairs)
+    if len(record) < len(pairs):
         names = [name for name, _ in pairs]
         raise ValueError(f"a record in it has '{max(names, key=names.count)}' twice")
-    return found
+    return record
 
 
 def _refuse(constant: str) -> None:
@@ -61,7 +61,7 @@ def _refuse(constant: str) -> None:
     raise ValueError(f"JSON has no {constant}; write null")
 
 
-def _finite(digits: str) -> float:
+def _parse_finite(digits: str) -> float:
     """A finite number. Raises ValueError for one beyond the range of floats, which Python reads as infinity."""
     number = float(digits)
     if not math.isfinite(number):

@@ -35,7 +35,7 @@ DEEPEST_KEY = 32
 _PART = r"(?:[\w-]++|\"(?:[^\"\\\n]|\\.)*+\"?|'[^'\n]*+'?)"
 """Regular expression of a part of a dotted key: bare, or in quotes, which may lack their end. `++` and `*+` are
 possessive, so that the search never backtracks."""
-_PIECE = re.compile(
+_TOML_TOKEN = re.compile(
     r"#[^\n]*+"
     r'|"""(?:[^\\"]|\\.|"(?!""))*+(?:""")?'
     r"|'''(?:[^']|'(?!''))*+(?:''')?"
@@ -57,9 +57,9 @@ def read_toml_text(path: Path, kind: str) -> str:
 
 def too_long_key(text: str) -> str:
     """A phrase that names the line of the first dotted key with more than `DEEPEST_KEY` parts; "" if there is none."""
-    for piece in _PIECE.finditer(text):
-        key = piece["key"]
+    for token in _TOML_TOKEN.finditer(text):
+        key = token["key"]
         if key and len(key) > 2 * DEEPEST_KEY and len(re.findall(_PART, key)) > DEEPEST_KEY:
-            line = text.count("\n", 0, piece.start()) + 1
+            line = text.count("\n", 0, token.start()) + 1
             return f"line {line} has a key of more than {DEEPEST_KEY} parts"
     return ""

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from protocols.definition.participant_text import Question
 from protocols.definition.study_protocol import StudyProtocol
-from study.store.disk.csv_rows import csv_line
+from study.store.disk.csv_rows import format_csv_line
 
-ASKED = {"before": "questionnaire", "debrief": "debrief"}
+FORM_NAMES = {"before": "questionnaire", "debrief": "debrief"}
 """Name of the form in the log for each table of questions in a protocol ([[before]], [[debrief]])."""
 
 
@@ -24,7 +24,7 @@ class FilledForm:
     session: str
     """Name of the session."""
     form: str
-    """Name of the form, as in `ASKED`."""
+    """Name of the form, as in `FORM_NAMES`."""
     answers: Mapping[str, str]
     """Logged answers by the keys of the questions."""
 
@@ -75,28 +75,28 @@ class AnswerTable:
     def as_csv(self) -> str:
         """The table as CSV text, header included."""
         lines = [self.header, *((subject, session, *answers) for subject, session, answers in self.rows)]
-        return "".join(csv_line(line) + "\n" for line in lines)
+        return "".join(format_csv_line(line) + "\n" for line in lines)
 
 
-def answer_table(protocol: StudyProtocol, filled: Sequence[FilledForm], free_text: bool) -> AnswerTable:
+def answer_table(protocol: StudyProtocol, forms: Sequence[FilledForm], free_text: bool) -> AnswerTable:
     """The table of all sessions with a filled form; empty where the protocol asks nothing.
 
     free_text: include answers in the participants' own words, which may be about their health or name a person. Where a
     form was filled in twice, the later answer counts.
     """
-    asked = {"before": protocol.before, "debrief": protocol.debrief}
+    question_tables = {"before": protocol.before, "debrief": protocol.debrief}
     columns = tuple(
         AnswerColumn(table, question)
-        for table, questions in asked.items()
+        for table, questions in question_tables.items()
         for question in questions
         if free_text or not question.is_free_text
     )
     by_question = {(form.subject, form.session, form.form, key): answer
-            for form in filled for key, answer in form.answers.items()}  # fmt: skip
-    sessions = dict.fromkeys((form.subject, form.session) for form in filled if form.form in ASKED.values())
+            for form in forms for key, answer in form.answers.items()}  # fmt: skip
+    sessions = dict.fromkeys((form.subject, form.session) for form in forms if form.form in FORM_NAMES.values())
     rows = tuple(
         (subject, session, tuple(
-            by_question.get((subject, session, ASKED[column.table], column.question.key), "") for column in columns
+            by_question.get((subject, session, FORM_NAMES[column.table], column.question.key), "") for column in columns
         ))
         for subject, session in sessions
     )  # fmt: skip

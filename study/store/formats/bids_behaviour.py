@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from protocols.trial import Trial
-from study.session.views.form_views import number_in
-from study.store.disk.csv_rows import columns, rows_to_csv
+from study.session.views.form_views import parse_number
+from study.store.disk.csv_rows import column_names, rows_to_csv
 from study.store.disk.text_file import write_text
 from study.store.formats.answer_table import AnswerColumn, AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
@@ -60,37 +60,39 @@ def write_bids(
 ) -> tuple[Path, ...]:
     """Write the dataset. folder: existing and empty. facts: JSON values on where the data come from. Raises
     CannotWriteError."""
-    task, readme = _label(name), README.format(name=name, title=_title(protocol_text), facts_name=FACTS_NAME)
-    written = [
-        _json(folder / "dataset_description.json", {
+    task, readme = _make_label(name), README.format(name=name, title=_read_title(protocol_text), facts_name=FACTS_NAME)
+    paths = [
+        _write_json(folder / "dataset_description.json", {
             "Name": name, "BIDSVersion": VERSION, "DatasetType": "raw",
             "GeneratedBy": [{"Name": "hapteq", "Version": str(facts.get("versions", {}).get("hapteq", ""))}],
         }),
-        _text(folder / "README.md", readme),
-        _text(folder / "CHANGES", "1.0.0\n  - As exported by hapteq.\n"),
-        _text(folder / "code" / "protocol.toml", protocol_text),
-        _json(folder / "code" / FACTS_NAME, facts),
-        _json(folder / f"task-{task}_beh.json", {
+        _write_text(folder / "README.md", readme),
+        _write_text(folder / "CHANGES", "1.0.0\n  - As exported by hapteq.\n"),
+        _write_text(folder / "code" / "protocol.toml", protocol_text),
+        _write_json(folder / "code" / FACTS_NAME, facts),
+        _write_json(folder / f"task-{task}_beh.json", {
             "TaskName": task,
-            "TaskDescription": " ".join(part for part in (TASK, _target(protocol_text), _title(protocol_text)) if part),
+            "TaskDescription": " ".join(
+                part for part in (TASK, _describe_target(protocol_text), _read_title(protocol_text)) if part
+            ),
             "Instructions": QUESTION,
-            **{column: _describe_column(column) for column in columns(Trial) if column not in IN_FILE_NAME},
+            **{column: _describe_column(column) for column in column_names(Trial) if column not in IN_FILE_NAME},
         }),
     ]  # fmt: skip
     subjects = list(dict.fromkeys(trial.subject for trial in trials))
-    written += _participants(folder, subjects, answers)
+    paths += _write_participants(folder, subjects, answers)
     for table in dict.fromkeys(column.table for column in answers.columns):
-        written += _phenotype(folder, table, answers)
+        paths += _write_phenotype(folder, table, answers)
     for session in dict.fromkeys(trial.session for trial in trials):
         rows = [trial for trial in trials if trial.session == session]
-        sub, ses = f"sub-{_label(rows[0].subject)}", f"ses-{_label(session)}"
-        written.append(_text(folder / sub / ses / "beh" / f"{sub}_{ses}_task-{task}_beh.tsv", _tsv(rows)))
-    return tuple(written)
+        sub, ses = f"sub-{_make_label(rows[0].subject)}", f"ses-{_make_label(session)}"
+        paths.append(_write_text(folder / sub / ses / "beh" / f"{sub}_{ses}_task-{task}_beh.tsv", _format_tsv(rows)))
+    return tuple(paths)
 
 
-def _participants(folder: Path, subjects: Sequence[str], answers: AnswerTable) -> list[Path]:
+def _write_participants(folder: Path, subjects: Sequence[str], answers: AnswerTable) -> list[Path]:
     """participants.tsv and its JSON: the code, and those questions before the trials that BIDS defines a column for."""
-    known = [
+    participant_columns = [
         (place, column)
         for place, column in enumerate(answers.columns)
         if column.table == "before" and column.question.key in PARTICIPANT_COLUMNS
@@ -100,40 +102,45 @@ def _participants(folder: Path, subjects: Sequence[str], answers: AnswerTable) -
             next((row[2][place] for row in answers.rows if row[0] == subject and row[2][place]), "n/a")
             for subject in subjects
         ]
-        for place, column in known
+        for place, column in participant_columns
     }
-    by_question = {key: values for key, values in by_question.items() if all(_fits(key, value) for value in values)}
+    by_question = {
+        key: values for key, values in by_question.items() if all(_is_valid_value(key, value) for value in values)
+    }
     lines = [["participant_id", "code", *by_question]]
-    lines += [[f"sub-{_label(subject)}", subject, *(values[number] for values in by_question.values())]
+    lines += [[f"sub-{_make_label(subject)}", subject, *(values[number] for values in by_question.values())]
               for number, subject in enumerate(subjects)]  # fmt: skip
     text = "".join("\t".join(line) + "\n" for line in lines)
-    described = {
-        column.question.key: _describe_answers(column) for _, column in known if column.question.key in by_question
+    descriptions = {
+        column.question.key: _describe_answers(column)
+        for _, column in participant_columns
+        if column.question.key in by_question
     }
     return [
-        _text(folder / "participants.tsv", text),
-        _json(folder / "participants.json", {"code": {"Description": "Code as recorded"}, **described}),
+        _write_text(folder / "participants.tsv", text),
+        _write_json(folder / "participants.json", {"code": {"Description": "Code as recorded"}, **descriptions}),
     ]
 
 
-def _fits(key: str, value: str) -> bool:
+def _is_valid_value(key: str, value: str) -> bool:
     """Whether BIDS allows the value in the column `key`: n/a, one of its listed values, or a number."""
     if value == "n/a":
         return True
-    return value in PARTICIPANT_COLUMNS[key] if PARTICIPANT_COLUMNS[key] else number_in(value) is not None
+    return value in PARTICIPANT_COLUMNS[key] if PARTICIPANT_COLUMNS[key] else parse_number(value) is not None
 
 
-def _phenotype(folder: Path, table: str, answers: AnswerTable) -> list[Path]:
+def _write_phenotype(folder: Path, table: str, answers: AnswerTable) -> list[Path]:
     """Answers to the questions of one table of the protocol, a row per session."""
     columns_of = [(place, column) for place, column in enumerate(answers.columns) if column.table == table]
     lines = [["participant_id", "session_id", *(column.question.key for _, column in columns_of)]]
-    lines += [[f"sub-{_label(subject)}", f"ses-{_label(session)}", *(_cell(row[place]) for place, _ in columns_of)]
+    lines += [[f"sub-{_make_label(subject)}", f"ses-{_make_label(session)}",
+               *(_format_cell(row[place]) for place, _ in columns_of)]
               for subject, session, row in answers.rows]  # fmt: skip
-    described = {"session_id": {"Description": "Session in which this was answered"}}
-    described |= {column.question.key: _describe_answers(column) for _, column in columns_of}
+    descriptions = {"session_id": {"Description": "Session in which this was answered"}}
+    descriptions |= {column.question.key: _describe_answers(column) for _, column in columns_of}
     text = "".join("\t".join(line) + "\n" for line in lines)
     place = folder / "phenotype"
-    return [_text(place / f"{table}.tsv", text), _json(place / f"{table}.json", described)]
+    return [_write_text(place / f"{table}.tsv", text), _write_json(place / f"{table}.json", descriptions)]
 
 
 def _describe_answers(column: AnswerColumn) -> dict[str, Any]:
@@ -142,24 +149,24 @@ def _describe_answers(column: AnswerColumn) -> dict[str, Any]:
     return {"Description": question.question, **unit, **({"Levels": column.levels} if column.levels else {})}
 
 
-def _cell(answer: str) -> str:
+def _format_cell(answer: str) -> str:
     """Free text without the tabs that separate columns."""
     return " ".join(answer.split()) or "n/a"
 
 
-def _tsv(trials: Sequence[Trial]) -> str:
+def _format_tsv(trials: Sequence[Trial]) -> str:
     """The trials as TSV. No value of a trial contains a comma or a quote, so that CSV can be split at its commas."""
     lines = [line.split(",") for line in rows_to_csv(trials, Trial).splitlines()]
-    kept = [number for number, column in enumerate(columns(Trial)) if column not in IN_FILE_NAME]
-    return "".join("\t".join(line[number] or "n/a" for number in kept) + "\n" for line in lines)
+    kept_columns = [number for number, column in enumerate(column_names(Trial)) if column not in IN_FILE_NAME]
+    return "".join("\t".join(line[number] or "n/a" for number in kept_columns) + "\n" for line in lines)
 
 
-def _title(protocol_text: str) -> str:
+def _read_title(protocol_text: str) -> str:
     """Title of the protocol; empty where it has none."""
     return str(tomllib.loads(protocol_text).get("title", ""))
 
 
-def _target(protocol_text: str) -> str:
+def _describe_target(protocol_text: str) -> str:
     """Convergence level of the staircase (Levitt 1971); empty for rules with several wrong answers, and without a
     rule."""
     rule = tomllib.loads(protocol_text).get("staircase", {})
@@ -174,16 +181,16 @@ def _describe_column(column: str) -> dict[str, str]:
     return {"Description": words, **({"Units": unit} if unit else {})}
 
 
-def _label(text: str) -> str:
+def _make_label(text: str) -> str:
     """The text as a BIDS label, which takes letters and digits only."""
     return re.sub(r"[^A-Za-z0-9]", "", text)
 
 
-def _json(path: Path, value: Mapping[str, Any]) -> Path:
-    return _text(path, json.dumps(value, indent=2, ensure_ascii=False) + "\n")
+def _write_json(path: Path, value: Mapping[str, Any]) -> Path:
+    return _write_text(path, json.dumps(value, indent=2, ensure_ascii=False) + "\n")
 
 
-def _text(path: Path, text: str) -> Path:
+def _write_text(path: Path, text: str) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, text, overwrite=False)
     return path

@@ -13,8 +13,8 @@ import numpy as np
 from equalizer.linkage.calibration import CalibrationError, LinkageCalibration
 from equalizer.signals.signal import FloatArray
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.hdf5_attributes import numbers_attribute, text_attribute
-from study.store.disk.hdf5_file import Problems, float_dataset, open_hdf5, write_hdf5
+from study.store.disk.hdf5_attributes import read_numbers_attribute, read_text_attribute
+from study.store.disk.hdf5_file import Problems, open_hdf5, read_float_dataset, write_hdf5
 from study.store.disk.layout import Entry
 from study.store.disk.strict_json import load_json
 
@@ -23,27 +23,28 @@ KIND = "calibration of a linkage"
 """Name of such a file in messages."""
 
 ABOUT = (
-    "What a device says of its linkage over a grid of positions (`hapteq calibrate`); arrays have checksums. The file "
-    "begins with a block of 512 bytes that HDF5 leaves to its user and that readers skip: SHA-256 and size of all that "
-    "follows. By them a damaged file is refused before the HDF5 library sees it, which may hang on such a file. Files "
-    "of other programs may be without."
+    "Joint angles, Jacobian, inertia and gravity force of a device's linkage over a grid of "
+    "positions, as the device reports them (`hapteq calibrate`). Arrays have checksums. The file begins with "
+    "a block of 512 bytes, the user block of HDF5, which readers skip. It contains SHA-256 and size of "
+    "everything after it. A damaged file is therefore refused before the HDF5 library reads it; the library "
+    "may hang on such a file. Files of other programs may lack this block."
 )
 """Introduction of the format in docs/formats.md, which is generated."""
 
 LAYOUT = (
     Entry("format", "attribute, text", f"`{FORMAT}`"),
     Entry("version", "attribute, whole number", f"{VERSION}"),
-    Entry("device", "attribute, text", "its name"),
-    Entry("details", "attribute, text", "serial number, firmware and SDK of a real one"),
-    Entry("read_on", "attribute, text", "date, ISO 8601"),
-    Entry("position_m", "(n, 3) float64", "of the handle: x towards the operator, y right, z up"),
-    Entry("joint_angle_rad", "(n, 3) float64", "the device's own zero and order"),
+    Entry("device", "attribute, text", "name of the device"),
+    Entry("details", "attribute, text", "serial number, firmware and SDK of a real device"),
+    Entry("read_on", "attribute, text", "date of the calibration, ISO 8601"),
+    Entry("position_m", "(n, 3) float64", "position of the handle: x towards the operator, y right, z up"),
+    Entry("joint_angle_rad", "(n, 3) float64", "joint angles, with the device's own zero and order"),
     Entry("jacobian", "(n, 3, 3) float64", "m/rad: handle velocity = J joint speeds, joint torques = J^T handle force"),
-    Entry("inertia_kg", "(n, 3, 3) float64", "at the handle, in the axes of position_m"),
-    Entry("gravity_n", "(n, 3) float64", "force at the handle that holds it against gravity; NaN = not known"),
-    Entry("filled", "(n,) float64", "1 = by a mirror line, from another position; 0 = read"),
+    Entry("inertia_kg", "(n, 3, 3) float64", "inertia at the handle, in the axes of position_m"),
+    Entry("gravity_n", "(n, 3) float64", "force at the handle that balances gravity; NaN = not known"),
+    Entry("filled", "(n,) float64", "1 = mirrored at a mirror line from another position; 0 = read from the device"),
     Entry("line_deg", "attribute, 3 numbers", "azimuth of the mirror lines, from y towards z, in the joints' order"),
-    Entry("asymmetry", "attribute, 3 numbers", "by line: largest relative difference from the mirrored inertia"),
+    Entry("asymmetry", "attribute, 3 numbers", "largest relative difference from the mirrored inertia, for each line"),
     Entry("difference", "attribute, number", "largest relative difference of J from finite differences"),
     Entry("provenance", "attribute, JSON text", "versions, command", False),
 )
@@ -59,9 +60,9 @@ def read_calibration(path: Path) -> LinkageCalibration:
     """Read a calibration of a linkage. Raises CannotReadError, or UnusableFileError with all problems of the file."""
     problems = Problems()
     with open_hdf5(path, KIND, FORMAT, VERSION, sealed=True) as file:
-        parts = _parts(file, problems)
-    if problems.found:
-        raise UnusableFileError(path, KIND, tuple(problems.found))
+        parts = _read_parts(file, problems)
+    if problems.messages:
+        raise UnusableFileError(path, KIND, tuple(problems.messages))
     try:
         return LinkageCalibration(**parts)
     except CalibrationError as error:
@@ -83,21 +84,21 @@ def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
     write_hdf5(path, fill, overwrite=False, sealed=True)
 
 
-def _parts(file: Any, problems: Problems) -> dict[str, Any]:
+def _read_parts(file: Any, problems: Problems) -> dict[str, Any]:
     """Fields of `LinkageCalibration`; where a part is missing or wrong, the problem is recorded and a placeholder
     returned."""
 
     def array(name: str) -> FloatArray:
         shape = DIMENSIONS.get(name, "(positions, 3)")
-        return problems.attempt(lambda: float_dataset(file, name, shape), np.empty(0))
+        return problems.attempt(lambda: read_float_dataset(file, name, shape), np.empty(0))
 
     def text(name: str) -> str:
-        return problems.attempt(lambda: text_attribute(file, name), "")
+        return problems.attempt(lambda: read_text_attribute(file, name), "")
 
     def numbers(name: str, count: int) -> FloatArray:
-        return np.array(problems.attempt(lambda: numbers_attribute(file, name, count), (0.0,) * count))
+        return np.array(problems.attempt(lambda: read_numbers_attribute(file, name, count), (0.0,) * count))
 
-    provenance: dict[str, Any] = problems.attempt(lambda: _provenance(file), {})
+    provenance: dict[str, Any] = problems.attempt(lambda: _read_provenance(file), {})
     return {
         **{name: text(name) for name in ("device", "details", "read_on")},
         **{name: array(name) for name in ARRAYS},
@@ -107,9 +108,9 @@ def _parts(file: Any, problems: Problems) -> dict[str, Any]:
     }
 
 
-def _provenance(file: Any) -> dict[str, Any]:
+def _read_provenance(file: Any) -> dict[str, Any]:
     """The attribute `provenance`, empty if missing. Raises ValueError where it is not a JSON object."""
-    found = load_json(text_attribute(file, "provenance", "{}"))
-    if not isinstance(found, dict):
+    provenance = load_json(read_text_attribute(file, "provenance", "{}"))
+    if not isinstance(provenance, dict):
         raise ValueError("the attribute 'provenance' must be a JSON object")
-    return found
+    return provenance

@@ -49,9 +49,11 @@ def read_daily_check(path: Path) -> DailyCheck:
     """Read the result of a daily check. Raises CannotReadError, UnusableFileError."""
     document = read_json(path, FORMAT, VERSION)
     try:
-        found = {field.name: document[field.name] for field in fields(DailyCheck)}
-        if not isinstance(found["passed"], bool) or not all(isinstance(found[name], str) for name in ("device", "utc")):
+        values = {field.name: document[field.name] for field in fields(DailyCheck)}
+        if not isinstance(values["passed"], bool) or not all(
+            isinstance(values[name], str) for name in ("device", "utc")
+        ):
             raise TypeError("device and utc must be texts, passed true or false")
-        return DailyCheck(**{**found, "sentences": tuple(found["sentences"]), "changes": tuple(found["changes"])})
+        return DailyCheck(**{**values, "sentences": tuple(values["sentences"]), "changes": tuple(values["changes"])})
     except (KeyError, TypeError) as error:
         raise UnusableFileError(path, "daily check", (f"it has no proper {error}",)) from error

@@ -16,13 +16,13 @@ from equalizer.plant.model_quality import ModelQuality
 from equalizer.signals.signal import FloatArray
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.hdf5_attributes import (
-    numbers_attribute,
-    text_attribute,
+    read_numbers_attribute,
+    read_text_attribute,
+    read_texts_attribute,
     text_or_list,
-    texts_attribute,
     write_texts,
 )
-from study.store.disk.hdf5_file import Problems, float_dataset, open_hdf5, write_hdf5
+from study.store.disk.hdf5_file import Problems, open_hdf5, read_float_dataset, write_hdf5
 from study.store.disk.layout import Entry
 from study.store.disk.strict_json import load_json
 
@@ -37,23 +37,35 @@ LAYOUT = (
     Entry("B", "(n, m) float32 or float64", "likewise"),
     Entry("C", "(p, n) float32 or float64", "y[k] = C x[k] + D u[k]"),
     Entry("D", "(p, m) float32 or float64", "likewise"),
-    Entry("sample_rate_hz", "attribute, number", "the only rate at which the model can run"),
-    Entry("band_hz", "attribute, 2 numbers", "where the fit was made"),
+    Entry("sample_rate_hz", "attribute, number", "the only sample rate at which the model can run"),
+    Entry("band_hz", "attribute, 2 numbers", "frequency band of the fit"),
     Entry("input_unit", "attribute, text or list", "SI; one for all channels, or one per channel"),
     Entry("output_unit", "attribute, text or list", "likewise"),
     Entry("input_channels", "attribute, list of text", "one name per input"),
     Entry("output_channels", "attribute, list of text", "one name per output"),
-    Entry("delay_samples", "attribute, number", "for information: A, B, C, D include the delay", False),
-    Entry("place_m", "attribute, 3 numbers", "where in the workspace; left out = not known", False),
-    Entry("covariance", "(k, k) float32 or float64", "of the k entries of A, B, C, D, each row by row", False),
-    Entry("samples", "(draws, k) float32 or float64", "draws of the same entries from their uncertainty", False),
-    Entry("expected_error", "attribute, number", "of model against device, relative; not below any other", False),
-    Entry("misfit_error", "attribute, number", "against the lines it was fitted to, beyond their noise", False),
-    Entry("scatter_error", "attribute, number", "left by the noise of those lines", False),
-    Entry("held_out_error", "attribute, number", "on a record kept for a test, its noise included", False),
-    Entry("held_out_noise", "attribute, number", "of that record", False),
+    Entry("delay_samples", "attribute, number", "for information; A, B, C, D include the delay", False),
+    Entry("place_m", "attribute, 3 numbers", "place in the workspace; missing = not known", False),
+    Entry(
+        "covariance",
+        "(k, k) float32 or float64",
+        "covariance of the k entries of A, B, C, D, each matrix row by row",
+        False,
+    ),
+    Entry("samples", "(draws, k) float32 or float64", "random draws of the same entries from their uncertainty", False),
+    Entry(
+        "expected_error",
+        "attribute, number",
+        "relative error of the model against the device; at least the misfit, scatter and held-out error",
+        False,
+    ),
+    Entry("misfit_error", "attribute, number", "relative error against the fitted lines, beyond their noise", False),
+    Entry(
+        "scatter_error", "attribute, number", "relative error that remains because of the noise of those lines", False
+    ),
+    Entry("held_out_error", "attribute, number", "relative error on a held-out record, its noise included", False),
+    Entry("held_out_noise", "attribute, number", "relative noise of that record", False),
     Entry("held_out_s", "attribute, number", "length of that record", False),
-    Entry("quality_remarks", "attribute, list of text", "what the errors come from", False),
+    Entry("quality_remarks", "attribute, list of text", "sources of the errors", False),
     Entry("provenance", "attribute, JSON text", "versions, command, seeds, parents", False),
 )
 """Contents of the file, as docs/formats.md lists them."""
@@ -63,9 +75,9 @@ def read_identified_model(path: Path | str) -> IdentifiedModel:
     """Read a model. Raises CannotReadError, or UnusableFileError with all problems."""
     path, problems = Path(path), Problems()
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
-        parts = _parts(file, problems)
-    if problems.found:
-        raise UnusableFileError(path, KIND, tuple(problems.found))
+        parts = _read_parts(file, problems)
+    if problems.messages:
+        raise UnusableFileError(path, KIND, tuple(problems.messages))
     try:
         return IdentifiedModel(**parts)
     except IdentifiedModelError as error:
@@ -110,39 +122,39 @@ def _write_quality(file: Any, quality: ModelQuality) -> None:
     write_texts(file, "quality_remarks", quality.remarks)
 
 
-def _quality(file: Any) -> ModelQuality | None:
+def _read_quality(file: Any) -> ModelQuality | None:
     """Quality of the model; None for a file of an earlier version. Raises ValueError for an unusable attribute."""
     if "expected_error" not in file.attrs:
         return None
-    found = {name: numbers_attribute(file, name, 1)[0] for name in QUALITY if name in file.attrs}
-    remarks = texts_attribute(file, "quality_remarks") if "quality_remarks" in file.attrs else ()
+    numbers = {name: read_numbers_attribute(file, name, 1)[0] for name in QUALITY if name in file.attrs}
+    remarks = read_texts_attribute(file, "quality_remarks") if "quality_remarks" in file.attrs else ()
     return ModelQuality(
-        expected_error=found["expected_error"],
-        misfit_error=found.get("misfit_error", found["expected_error"]),
-        scatter_error=found.get("scatter_error"),
-        held_out_error=found.get("held_out_error"),
-        held_out_noise=found.get("held_out_noise"),
-        held_out_s=found.get("held_out_s"),
+        expected_error=numbers["expected_error"],
+        misfit_error=numbers.get("misfit_error", numbers["expected_error"]),
+        scatter_error=numbers.get("scatter_error"),
+        held_out_error=numbers.get("held_out_error"),
+        held_out_noise=numbers.get("held_out_noise"),
+        held_out_s=numbers.get("held_out_s"),
         remarks=remarks,
     )
 
 
-def _parts(file: Any, problems: Problems) -> dict[str, Any]:
+def _read_parts(file: Any, problems: Problems) -> dict[str, Any]:
     """Fields of the model, by name. Problems are collected; a field with a problem has a substitute value."""
 
     def matrix(name: str) -> FloatArray:
-        return problems.attempt(lambda: float_dataset(file, name, "(rows, columns)"), np.empty((0, 0)))
+        return problems.attempt(lambda: read_float_dataset(file, name, "(rows, columns)"), np.empty((0, 0)))
 
     def texts(name: str) -> tuple[str, ...]:
-        return problems.attempt(lambda: texts_attribute(file, name), ())
+        return problems.attempt(lambda: read_texts_attribute(file, name), ())
 
     def numbers(name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
-        return problems.attempt(lambda: numbers_attribute(file, name, count, default), (0.0,) * count)
+        return problems.attempt(lambda: read_numbers_attribute(file, name, count, default), (0.0,) * count)
 
-    provenance: dict[str, Any] = problems.attempt(lambda: _provenance(file), {})
-    present = [name for name in ("covariance", "samples") if name in file]
+    provenance: dict[str, Any] = problems.attempt(lambda: _read_provenance(file), {})
+    optional_matrices = [name for name in ("covariance", "samples") if name in file]
     return {
-        **{name: matrix(name) for name in ("A", "B", "C", "D", *present)},
+        **{name: matrix(name) for name in ("A", "B", "C", "D", *optional_matrices)},
         **{name: text_or_list(texts(name)) for name in ("input_unit", "output_unit")},
         **{name: texts(name) for name in ("input_channels", "output_channels")},
         "sample_rate_hz": numbers("sample_rate_hz", 1)[0],
@@ -150,17 +162,17 @@ def _parts(file: Any, problems: Problems) -> dict[str, Any]:
         "delay_samples": numbers("delay_samples", 1, (0.0,))[0],
         "place_m": numbers("place_m", 3) if "place_m" in file.attrs else None,
         "provenance": provenance,
-        "quality": problems.attempt(lambda: _quality(file), None),
+        "quality": problems.attempt(lambda: _read_quality(file), None),
     }
 
 
-def _provenance(file: Any) -> dict[str, Any]:
+def _read_provenance(file: Any) -> dict[str, Any]:
     """Provenance, empty where the file has none. Raises ValueError where it is no JSON object."""
-    text = text_attribute(file, "provenance", "{}")
+    text = read_text_attribute(file, "provenance", "{}")
     try:
-        found = load_json(text)
+        provenance = load_json(text)
     except ValueError as error:
         raise ValueError(f"the attribute 'provenance' is not JSON: {error}") from error
-    if not isinstance(found, dict):
-        raise ValueError(f"the attribute 'provenance' is {found!r}; it must be a JSON object")
-    return found
+    if not isinstance(provenance, dict):
+        raise ValueError(f"the attribute 'provenance' is {provenance!r}; it must be a JSON object")
+    return provenance

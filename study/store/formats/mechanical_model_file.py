@@ -15,30 +15,40 @@ KIND = "mechanical model"
 """Name of this kind of file in messages."""
 
 LAYOUT = (
-    Entry("model.name", "text", "what it is a model of"),
-    Entry("model.quantity", "text", "of the response: " + ", ".join(f"`{word}`" for word in DERIVATIVE_OF_QUANTITY)),
-    Entry("model.mass", "n rows of n", "symmetric, positive definite; kg"),
-    Entry("model.damping", "n rows of n", "N s/m"),
-    Entry("model.stiffness", "n rows of n", "N/m"),
-    Entry("model.input", "n rows of m", "which coordinate each command drives"),
-    Entry("model.output", "p rows of n", "what each response sees; the same rows give the recorded position"),
-    Entry("model.rotational", "true or false", "kg m^2, N m s/rad, N m/rad in place of the above", False),
+    Entry("model.name", "text", "description of what is modelled"),
+    Entry(
+        "model.quantity",
+        "text",
+        "quantity of the response: " + ", ".join(f"`{word}`" for word in DERIVATIVE_OF_QUANTITY),
+    ),
+    Entry("model.mass", "n rows of n", "mass matrix, symmetric and positive definite; kg"),
+    Entry("model.damping", "n rows of n", "damping matrix; N s/m"),
+    Entry("model.stiffness", "n rows of n", "stiffness matrix; N/m"),
+    Entry("model.input", "n rows of m", "coordinate that each command drives"),
+    Entry(
+        "model.output",
+        "p rows of n",
+        "coordinates that each response measures; the same rows give the recorded position",
+    ),
+    Entry(
+        "model.rotational", "true or false", "if true: kg m^2, N m s/rad, N m/rad in place of the above units", False
+    ),
     Entry(
         "sensor.bandwidth_hz", "number", "one pole per channel: y += (1 - exp(-2 pi f / rate)) (x - y); 0 = none", False
     ),
     Entry("sensor.range", "number", "largest magnitude, in the response's SI unit; 0 = none", False),
-    Entry("actuator.delay_s", "number", "0 = none", False),
-    Entry("actuator.bandwidth_hz", "number", "one pole; 0 = none", False),
+    Entry("actuator.delay_s", "number", "delay; 0 = none", False),
+    Entry("actuator.bandwidth_hz", "number", "bandwidth of one pole; 0 = none", False),
     Entry("actuator.limit", "number", "largest force or torque; 0 = none", False),
-    Entry("effect.kind", "text", "a name of the table of effects; one [[effect]] per effect", False),
-    Entry("effect.axis", "text", "axis or channel; left out where all share it", False),
-    Entry("effect.acts_on", "text", "of a `discovered_law`: force, command or response", False),
-    Entry("effect.expression", "text", "of a `discovered_law`: its formula, see below", False),
-    Entry("effect.…", "number", "every parameter of the effect, by its name", False),
-    Entry("tolerance.mass_kg", "number", "one standard deviation, as calibrated, at each driven axis", False),
+    Entry("effect.kind", "text", "name in the table of effects; one [[effect]] per effect", False),
+    Entry("effect.axis", "text", "axis or channel; missing if the effect is common to all", False),
+    Entry("effect.acts_on", "text", "for a `discovered_law`: force, command or response", False),
+    Entry("effect.expression", "text", "for a `discovered_law`: its formula, see below", False),
+    Entry("effect.…", "number", "each parameter of the effect, by its name", False),
+    Entry("tolerance.mass_kg", "number", "standard deviation of the calibration at each driven axis", False),
     Entry("tolerance.damping_n_s_per_m", "number", "likewise", False),
     Entry("tolerance.stiffness_n_per_m", "number", "likewise", False),
-    Entry("tolerance.modes", "number", "relative, of modal frequencies and masses", False),
+    Entry("tolerance.modes", "number", "relative standard deviation of modal frequencies and masses", False),
     Entry("provenance.…", "anything", "versions, command, seeds, parents", False),
 )
 """Keys of the file, as docs/formats.md lists them."""

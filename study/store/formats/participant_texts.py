@@ -13,7 +13,13 @@ from protocols.definition.problem import Problem
 from protocols.document.dumping import dump_protocol
 from protocols.document.loading import Protocol, ProtocolError, load_protocol, protocol_from_values
 from protocols.wording.english import ENGLISH, LANGUAGES
-from protocols.wording.in_language import in_language, known_languages, language_of, own_words, table_problems
+from protocols.wording.in_language import (
+    find_language,
+    find_own_words,
+    find_table_problems,
+    list_languages,
+    translate_protocol,
+)
 from study.errors import WrongUseError
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_toml_text
@@ -36,14 +42,14 @@ def read_language(language: str, folder: Path | None = None) -> tuple[str, dict[
         raise WrongUseError(
             "There is no such language",
             f"'{language}' is neither a shipped language nor a .toml file.",
-            f"Use one of {known_languages()}, or the path of a file; `hapteq protocol texts` prints one to translate.",
+            f"Use one of {list_languages()}, or the path of a file; `hapteq protocol texts` prints one to translate.",
         )
     text = read_toml_text(path, KIND)
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise UnusableFileError(path, KIND, (f"it is not TOML: {error}",)) from error
-    if wrong := table_problems(table, whole=True):
+    if wrong := find_table_problems(table, require_all=True):
         raise UnusableFileError(path, KIND, tuple(map(str, wrong)))
     return path.stem, table
 
@@ -59,21 +65,21 @@ def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Proto
         values = tomllib.loads(text)
     except (ValueError, RecursionError):
         return load_protocol(text, source), text  # It raises ProtocolError with the cause.
-    language, words = language_of(values), own_words(values)
-    if wrong := table_problems(words, whole=False):
+    language, words = find_language(values), find_own_words(values)
+    if wrong := find_table_problems(words, require_all=False):
         raise ProtocolError(source, tuple(problem.below("text.words") for problem in wrong))
     if language == "en" or words.keys() >= ENGLISH.keys():
         return load_protocol(text, source), text
     try:
         name, table = read_language(language, folder)
     except WrongUseError as error:
-        allowed = f"{known_languages()}, or the path of a .toml file"
+        allowed = f"{list_languages()}, or the path of a .toml file"
         raise ProtocolError(source, (Problem("text.language", f'is "{language}"', allowed),)) from error
-    protocol = protocol_from_values(in_language(values, table, name), source)
+    protocol = protocol_from_values(translate_protocol(values, table, name), source)
     return protocol, dump_protocol(protocol)
 
 
-def language_template(language: str) -> str:
+def make_language_template(language: str) -> str:
     """A table as TOML text, to be translated. Above each text that differs from the English text, a comment holds the
     latter. Raises as `read_language`."""
     name, table = read_language(language)

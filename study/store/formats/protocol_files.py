@@ -14,7 +14,7 @@ from protocols.definition.problem import Problem
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.loading import Protocol, ProtocolError
-from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_of, lock_to_json
+from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_to_json, make_lock
 from study.errors import StudyError, WrongUseError
 from study.local_clock import machine_zone
 from study.regular_file import DOCUMENT_BYTES
@@ -83,7 +83,7 @@ def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]
     A lock beside the file or in `data` must agree with the protocol. Raises WrongUseError (no such protocol),
     CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock, a table of texts).
     """
-    path = None if name in list_shipped_protocols() else _path_of(name)
+    path = None if name in list_shipped_protocols() else _resolve_path(name)
     text = (
         files("protocols").joinpath(f"{name}.toml").read_text("utf-8")
         if path is None
@@ -99,18 +99,18 @@ def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]
 
 def read_study_protocol(name: str, data: Path | None = None) -> ProtocolFile[StudyProtocol]:
     """Read a study protocol. Raises as `read_protocol`, and WrongUseError for a recording protocol."""
-    found = read_protocol(name, data)
-    if not isinstance(found.protocol, StudyProtocol):
-        raise _other_kind(found.protocol, "a participant can take", "hapteq record")
-    return ProtocolFile(found.protocol, found.text, found.path, found.lock)
+    file = read_protocol(name, data)
+    if not isinstance(file.protocol, StudyProtocol):
+        raise _wrong_kind_error(file.protocol, "a participant can take", "hapteq record")
+    return ProtocolFile(file.protocol, file.text, file.path, file.lock)
 
 
 def read_recording_protocol(name: str, data: Path | None = None) -> ProtocolFile[RecordingProtocol]:
     """Read a recording protocol. Raises as `read_protocol`, and WrongUseError for a study protocol."""
-    found = read_protocol(name, data)
-    if not isinstance(found.protocol, RecordingProtocol):
-        raise _other_kind(found.protocol, "a device can record", "hapteq study")
-    return ProtocolFile(found.protocol, found.text, found.path, found.lock)
+    file = read_protocol(name, data)
+    if not isinstance(file.protocol, RecordingProtocol):
+        raise _wrong_kind_error(file.protocol, "a device can record", "hapteq study")
+    return ProtocolFile(file.protocol, file.text, file.path, file.lock)
 
 
 def lock_protocol(file: ProtocolFile[Protocol], folder: Path, locked_utc: str, hapteq: str) -> Path:
@@ -120,8 +120,8 @@ def lock_protocol(file: ProtocolFile[Protocol], folder: Path, locked_utc: str, h
     there, CannotWriteError, UnusableFileError (an existing lock).
     """
     path = lock_path(file.protocol, folder)
-    if _lock_at(path, file.protocol) is None:
-        write_text(path, lock_to_json(lock_of(file.protocol, locked_utc, hapteq)))
+    if _read_lock(path, file.protocol) is None:
+        write_text(path, lock_to_json(make_lock(file.protocol, locked_utc, hapteq)))
     return path
 
 
@@ -131,13 +131,13 @@ def lock_path(protocol: Protocol, folder: Path) -> Path:
 
 
 def _find_lock(protocol: Protocol, path: Path | None, data: Path | None) -> ProtocolLock | None:
-    """Lock of the protocol, in `data` or else beside its file; both are checked. Raises as `_lock_at`."""
+    """Lock of the protocol, in `data` or else beside its file; both are checked. Raises as `_read_lock`."""
     folders = [folder for folder in (data, path.parent if path else None) if folder is not None]
-    locks = [_lock_at(lock_path(protocol, folder), protocol) for folder in folders]
+    locks = [_read_lock(lock_path(protocol, folder), protocol) for folder in folders]
     return next((lock for lock in locks if lock is not None), None)
 
 
-def _lock_at(path: Path, protocol: Protocol) -> ProtocolLock | None:
+def _read_lock(path: Path, protocol: Protocol) -> ProtocolLock | None:
     """The lock at this path; None if there is none. Raises CannotReadError, UnusableFileError, and
     LockedProtocolChangedError where the protocol differs."""
     if not os.path.lexists(path):  # a dangling link is an unreadable lock, not a missing one
@@ -154,16 +154,16 @@ def _lock_at(path: Path, protocol: Protocol) -> ProtocolLock | None:
     return lock
 
 
-def _path_of(name: str) -> Path:
+def _resolve_path(name: str) -> Path:
     """The name as a path. Raises WrongUseError where it is neither a path nor a shipped protocol."""
     path = Path(name)
     if _is_toml(name) or path.parent != Path() or path.exists():
         return path
-    close = get_close_matches(name, list_shipped_protocols(), n=1)
-    guess = f" Did you mean {close[0]}?" if close else ""
+    suggestions = get_close_matches(name, list_shipped_protocols(), n=1)
+    hint = f" Did you mean {suggestions[0]}?" if suggestions else ""
     raise WrongUseError(
         title="There is no such protocol",
-        happened=f"'{name}' is neither a file nor a shipped protocol.{guess}",
+        happened=f"'{name}' is neither a file nor a shipped protocol.{hint}",
         do_now=f"Give the path of a .toml file, or one of {', '.join(list_shipped_protocols())}.",
     )
 
@@ -172,10 +172,10 @@ def _is_toml(name: str) -> bool:
     return name.endswith(".toml")
 
 
-def _other_kind(protocol: Protocol, wanted: str, command: str) -> WrongUseError:
+def _wrong_kind_error(protocol: Protocol, purpose: str, command: str) -> WrongUseError:
     """The error for a protocol of another kind. command: the command that takes it."""
     return WrongUseError(
         title="This protocol is of another kind",
-        happened=f"'{protocol.name}' is a {protocol.kind} protocol, not one that {wanted}.",
+        happened=f"'{protocol.name}' is a {protocol.kind} protocol, not one that {purpose}.",
         do_now=f"Use it with `{command}`, or choose another one; `hapteq protocol list` shows the shipped ones.",
     )

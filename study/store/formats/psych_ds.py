@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from protocols.trial import Trial
-from study.store.disk.csv_rows import CsvError, columns, rows_from_csv, rows_to_csv
+from study.store.disk.csv_rows import CsvError, column_names, rows_from_csv, rows_to_csv
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 from study.store.formats.answer_table import AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
-from study.store.formats.trials_file import trial_problems
+from study.store.formats.trials_file import find_trial_problems
 
 DESCRIPTION_NAME = "dataset_description.json"
 """Name of the dataset's description, as the standard sets it."""
@@ -70,14 +70,14 @@ def write_psych_ds(
     Raises CannotWriteError, and OSError where a folder cannot be made."""
     (folder / "data").mkdir()
     (folder / "materials").mkdir()
-    written = []
+    paths = []
     for session in dict.fromkeys(trial.session for trial in trials):
         rows = [trial for trial in trials if trial.session == session]
         path = folder / "data" / f"subject-{_keyword_value(rows[0].subject)}_session-{_keyword_value(session)}_data.csv"
         write_text(path, rows_to_csv(rows, Trial), overwrite=False)
-        written.append(path)
+        paths.append(path)
     if answers.columns:
-        written.append(folder / ANSWERS_NAME)
+        paths.append(folder / ANSWERS_NAME)
         write_text(folder / ANSWERS_NAME, answers.as_csv(), overwrite=False)
     write_text(folder / PROTOCOL_NAME, protocol_text, overwrite=False)
     description = {
@@ -87,8 +87,8 @@ def write_psych_ds(
         "description": "Trials of a study of force directions, one row per presentation, as hapteq logged them.",
         "schemaVersion": "Psych-DS 0.4.0",
         "variableMeasured": [
-            *(_variable(column, *TRIAL_COLUMNS[column]) for column in columns(Trial)),
-            *(_variable(column.name, column.description, column.question.unit) for column in answers.columns),
+            *(_describe_variable(column, *TRIAL_COLUMNS[column]) for column in column_names(Trial)),
+            *(_describe_variable(column.name, column.description, column.question.unit) for column in answers.columns),
         ],
         FACTS_KEY: dict(facts),
     }
@@ -96,7 +96,7 @@ def write_psych_ds(
     texts = {"README.md": README.format(name=name), "CHANGES.md": "# 1.0.0\n\nAs exported by hapteq.\n"}
     for file_name, text in texts.items():
         write_text(folder / file_name, text, overwrite=False)
-    return (*written, folder / PROTOCOL_NAME, folder / DESCRIPTION_NAME, *(folder / each for each in texts))
+    return (*paths, folder / PROTOCOL_NAME, folder / DESCRIPTION_NAME, *(folder / text_name for text_name in texts))
 
 
 def read_psych_ds(folder: Path) -> ExportedTrials:
@@ -115,23 +115,23 @@ def read_psych_ds(folder: Path) -> ExportedTrials:
             else f"the key '{FACTS_KEY}' is missing"
         )
         raise UnusableFileError(path, KIND, (missing,))
-    trials = tuple(trial for each in files for trial in trials_in(each, KIND))
+    trials = tuple(trial for file_path in files for trial in read_described_trials(file_path, KIND))
     return ExportedTrials(trials, read_text(folder / PROTOCOL_NAME), facts, files)
 
 
-def trials_in(path: Path, kind: str) -> tuple[Trial, ...]:
+def read_described_trials(path: Path, kind: str) -> tuple[Trial, ...]:
     """Trials of a CSV table. kind: name of the kind of dataset for messages. Raises CannotReadError,
     UnusableFileError."""
     try:
         rows = rows_from_csv(read_text(path), Trial)
     except CsvError as error:
         raise UnusableFileError(path, kind, error.problems) from error
-    if wrong := trial_problems(rows):
+    if wrong := find_trial_problems(rows):
         raise UnusableFileError(path, kind, wrong)
     return tuple(rows)
 
 
-def _variable(column: str, description: str, unit: str) -> dict[str, str]:
+def _describe_variable(column: str, description: str, unit: str) -> dict[str, str]:
     """Description of a column as a schema.org PropertyValue."""
     variable = {"@type": "PropertyValue", "name": column, "description": description}
     return {**variable, "unitText": unit} if unit else variable

@@ -14,13 +14,13 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import check_quantity, parse_unit
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.hdf5_attributes import (
-    numbers_attribute,
-    text_attribute,
+    read_numbers_attribute,
+    read_text_attribute,
+    read_texts_attribute,
     text_or_list,
-    texts_attribute,
     write_texts,
 )
-from study.store.disk.hdf5_file import Problems, float_dataset, open_hdf5, write_hdf5
+from study.store.disk.hdf5_file import Problems, open_hdf5, read_float_dataset, write_hdf5
 from study.store.disk.strict_json import load_json
 from study.store.formats.recording_layout import FORMAT, KIND, SEGMENT_FIELDS, VERSION
 
@@ -42,24 +42,24 @@ def read_recording(path: Path | str) -> Recording:
     path = Path(path)
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
         problems = Problems()
-        rate_hz = problems.attempt(lambda: _rate(file), 1.0)
+        rate_hz = problems.attempt(lambda: _read_rate(file), 1.0)
 
         def signal(name: str) -> Signal | None:
-            return problems.attempt(lambda: _signal(file, name, rate_hz), None)
+            return problems.attempt(lambda: _read_signal(file, name, rate_hz), None)
 
         command, response = signal("command"), signal("response")
         position, excitation, condition = (
             signal(name) if name in file else None for name in ("position", "excitation", "condition")
         )
-        device = problems.attempt(lambda: text_attribute(file, "device"), "")
+        device = problems.attempt(lambda: read_text_attribute(file, "device"), "")
         hold = problems.attempt(
-            lambda: _parse_hold(text_attribute(file, "hold", Hold.ZERO_ORDER.value)), Hold.ZERO_ORDER
+            lambda: _parse_hold(read_text_attribute(file, "hold", Hold.ZERO_ORDER.value)), Hold.ZERO_ORDER
         )
-        segments: tuple[Segment, ...] = problems.attempt(lambda: _segments(file), ())
-        time_s = problems.attempt(lambda: _time_s(file), None)
-        meta: dict[str, Any] = problems.attempt(lambda: _meta(file), {})
-    if problems.found or command is None or response is None:
-        raise UnusableFileError(path, KIND, tuple(problems.found))
+        segments: tuple[Segment, ...] = problems.attempt(lambda: _read_segments(file), ())
+        time_s = problems.attempt(lambda: _read_time_s(file), None)
+        meta: dict[str, Any] = problems.attempt(lambda: _read_meta(file), {})
+    if problems.messages or command is None or response is None:
+        raise UnusableFileError(path, KIND, tuple(problems.messages))
     recording = Recording(device, command, response, position, excitation, time_s, hold, segments, meta, condition)
     if wrong := check_recording(recording):
         raise UnusableFileError(path, KIND, wrong)
@@ -96,17 +96,17 @@ def write_recording(
     write_hdf5(Path(path), fill, overwrite=overwrite)
 
 
-def _rate(file: Any) -> float:
-    (rate_hz,) = numbers_attribute(file, "sample_rate_hz", 1)
+def _read_rate(file: Any) -> float:
+    (rate_hz,) = read_numbers_attribute(file, "sample_rate_hz", 1)
     if not (np.isfinite(rate_hz) and rate_hz > 0):
         raise ValueError(f"sample_rate_hz is {rate_hz:g}; it must be a positive number")
     return rate_hz
 
 
-def _signal(file: Any, name: str, rate_hz: float) -> Signal:
+def _read_signal(file: Any, name: str, rate_hz: float) -> Signal:
     """A signal, converted to SI: samples times factor plus offset of each channel's unit. Raises ValueError."""
-    samples = float_dataset(file, name, "(samples, channels)")
-    quantity, unit, channels = (texts_attribute(file[name], key) for key in ("quantity", "unit", "channels"))
+    samples = read_float_dataset(file, name, "(samples, channels)")
+    quantity, unit, channels = (read_texts_attribute(file[name], key) for key in ("quantity", "unit", "channels"))
     channels = _split_channel_names(channels, samples.shape[1])
     try:
         signal = Signal(samples, rate_hz, text_or_list(quantity), text_or_list(unit), channels)
@@ -133,10 +133,10 @@ def _split_channel_names(channels: tuple[str, ...], columns: int) -> tuple[str, 
     return names if len(names) == columns else tuple(f"{channels[0]} {number + 1}" for number in range(columns))
 
 
-def _time_s(file: Any) -> FloatArray | None:
+def _read_time_s(file: Any) -> FloatArray | None:
     if "time_s" not in file:
         return None
-    stamps = float_dataset(file, "time_s", "(samples)")
+    stamps = read_float_dataset(file, "time_s", "(samples)")
     stamps.flags.writeable = False
     return stamps
 
@@ -147,7 +147,7 @@ def _parse_hold(text: str) -> Hold:
     return Hold(text)
 
 
-def _segments(file: Any) -> tuple[Segment, ...]:
+def _read_segments(file: Any) -> tuple[Segment, ...]:
     if "segments" not in file:
         return ()
     rows = file["segments"][()]
@@ -155,34 +155,34 @@ def _segments(file: Any) -> tuple[Segment, ...]:
     missing = [name for name in names if name not in (rows.dtype.names or ())]
     if missing:
         raise ValueError(f"segments lacks {', '.join(missing)}; its rows are {', '.join(names)}")
-    scale = _amplitude_scale(file)
-    return tuple(_segment(row, scale) for row in rows.ravel())
+    scale = _read_amplitude_scale(file)
+    return tuple(_parse_segment(row, scale) for row in rows.ravel())
 
 
-def _segment(row: Any, scale: float) -> Segment:
+def _parse_segment(row: Any, scale: float) -> Segment:
     start, stop, period = (int(row[name]) for name in ("start", "stop", "period"))
     kind, role = (row[name].decode() if isinstance(row[name], bytes) else str(row[name]) for name in ("kind", "role"))
     return Segment(start, stop, kind, float(row["amplitude"]) * scale, period, role)
 
 
-def _amplitude_scale(file: Any) -> float:
+def _read_amplitude_scale(file: Any) -> float:
     """Factor to SI: amplitudes have the command's unit; unchanged if its channels differ in unit."""
     try:
-        factors = {parse_unit(text).factor for text in texts_attribute(file.get("command", file), "unit")}
+        factors = {parse_unit(text).factor for text in read_texts_attribute(file.get("command", file), "unit")}
     except ValueError:
         return 1.0  # problems of the command are reported by the command itself
     return factors.pop() if len(factors) == 1 else 1.0
 
 
-def _meta(file: Any) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+def _read_meta(file: Any) -> dict[str, Any]:
+    values: dict[str, Any] = {}
     for key in file["meta"].attrs if "meta" in file else ():
-        text = text_attribute(file["meta"], key)
+        text = read_text_attribute(file["meta"], key)
         try:
-            found[key] = load_json(text)
+            values[key] = load_json(text)
         except ValueError as error:
             raise ValueError(f"the attribute '{key}' of meta is not JSON: {error}") from error
-    return found
+    return values
 
 
 def _write_signal(file: Any, name: str, signal: Signal, precision: str) -> None:

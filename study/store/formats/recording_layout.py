@@ -15,35 +15,59 @@ KIND = "recording"
 LAYOUT = (
     Entry("format", "attribute, text", f"`{FORMAT}`"),
     Entry("version", "attribute, whole number", f"{VERSION}"),
-    Entry("sample_rate_hz", "attribute, number", "of every dataset; the faster of command and sensor"),
-    Entry("device", "attribute, text", "what was recorded"),
-    Entry("hold", "attribute, text", "how the command moves: " + ", ".join(f"`{h.value}`" for h in Hold), False),
-    Entry("command", "(n, m) float32 or float64", "what entered the plant; `command[k]` is held until t_(k+1)"),
-    Entry("response", "(n, p) float32 or float64", "what came out, taken at t_k just before `command[k]` is written"),
-    Entry("position", "(n, d) float32 or float64", "taken with the response", False),
-    Entry("excitation", "(n, m) float32 or float64", "the part of the command that was decided beforehand", False),
+    Entry("sample_rate_hz", "attribute, number", "sample rate of every dataset: the faster of command and sensor"),
+    Entry("device", "attribute, text", "name of the recorded device"),
+    Entry(
+        "hold",
+        "attribute, text",
+        "course of the command between samples: " + ", ".join(f"`{h.value}`" for h in Hold),
+        False,
+    ),
+    Entry("command", "(n, m) float32 or float64", "input of the plant; `command[k]` is held until t_(k+1)"),
+    Entry(
+        "response",
+        "(n, p) float32 or float64",
+        "output of the plant, sampled at t_k just before `command[k]` is written",
+    ),
+    Entry("position", "(n, d) float32 or float64", "sampled with the response", False),
+    Entry(
+        "excitation",
+        "(n, m) float32 or float64",
+        "the part of the command that was determined before the recording",
+        False,
+    ),
     Entry(
         "condition",
         "(n, q) float32 or float64",
-        "circumstances that were recorded too: temperature, pressure, a setting",
+        "recorded circumstances: a temperature, a pressure, a setting",
         False,
     ),
-    Entry("time_s", "(n) float32 or float64", "time stamps, where the device kept them", False),
-    Entry("segments", "rows of `start, stop, kind, amplitude, period, role`", "samples outside are rest", False),
+    Entry("time_s", "(n) float32 or float64", "time stamps, if the device recorded them", False),
+    Entry(
+        "segments",
+        "rows of `start, stop, kind, amplitude, period, role`",
+        "samples outside of all segments are rest",
+        False,
+    ),
     Entry(
         "meta",
         "group of attributes, each JSON text",
-        "place, sensor, feedback, grip, operator, added_mass_kg or added_inertia_kg_m2 (a weight on it), provenance; "
-        "`time` is `unknown` where samples are only numbered (then sample_rate_hz is 1)",
+        "place, sensor, feedback, grip, operator, added_mass_kg or added_inertia_kg_m2 (of a weight "
+        "on the device), provenance; `time` is `unknown` if the samples are only numbered (sample_rate_hz is "
+        "then 1)",
         False,
     ),
 )
 """Contents of the file, as docs/formats.md lists them."""
 SIGNAL_ATTRIBUTES = (
     Entry("quantity", "attribute, text or list", "one for all channels, or one per channel"),
-    Entry("unit", "attribute, text or list", f"likewise; converted to SI on reading; `{UNSTATED}` where none is known"),
     Entry(
-        "channels", "attribute, text or list", "one name per column; one text lists them (`fx, fy, fz`), or is numbered"
+        "unit", "attribute, text or list", f"likewise; converted to SI when read; `{UNSTATED}` if the unit is not known"
+    ),
+    Entry(
+        "channels",
+        "attribute, text or list",
+        "one name per column; a single text lists the names (`fx, fy, fz`), or is numbered",
     ),
 )
 """Attributes of each dataset of samples."""

@@ -69,13 +69,13 @@ def read_repeats(path: Path) -> Repeats:
     document = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:
-        found = REPEATS.validate_python(document)
+        repeats = REPEATS.validate_python(document)
     except ValidationError as error:
-        problems = tuple(f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in error.errors())
+        problems = tuple(f"{'.'.join(map(str, issue['loc']))}: {issue['msg']}" for issue in error.errors())
         raise UnusableFileError(path, KIND, problems) from error
-    if not 0 <= found.kept < len(found.errors):
-        raise UnusableFileError(path, KIND, (f"kept is {found.kept}, but there are {len(found.errors)} plays",))
-    return found
+    if not 0 <= repeats.kept < len(repeats.errors):
+        raise UnusableFileError(path, KIND, (f"kept is {repeats.kept}, but there are {len(repeats.errors)} plays",))
+    return repeats
 
 
 def write_repeats(path: Path, repeats: Repeats, provenance: Provenance | None = None) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from analysis.psychophysics.thresholds import Threshold
-from study.store.disk.csv_rows import CsvError, columns, rows_from_csv, rows_to_csv
+from study.store.disk.csv_rows import CsvError, column_names, rows_from_csv, rows_to_csv
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_text, write_text
 
@@ -16,7 +16,7 @@ THRESHOLDS_NAME = "thresholds.csv"
 """Table of direction thresholds."""
 DETECTION_NAME = "detection.csv"
 """Table of detection thresholds, written only if there are detection runs."""
-THRESHOLDS_HEADER = columns(Threshold)
+THRESHOLDS_HEADER = column_names(Threshold)
 """Names of the columns, in order."""
 KIND = "table of thresholds"
 """Name of this kind of file in error messages."""

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from protocols.trial import Trial
-from study.store.disk.csv_rows import columns, csv_line, rows_to_csv
+from study.store.disk.csv_rows import column_names, format_csv_line, rows_to_csv
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 from study.store.formats.answer_table import AnswerTable
-from study.store.formats.psych_ds import ExportedTrials, trials_in
+from study.store.formats.psych_ds import ExportedTrials, read_described_trials
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME = "trials.csv", "dictionary.csv", "protocol.toml", "facts.json"
@@ -42,11 +42,11 @@ def write_tidy_csv(
 ) -> tuple[Path, ...]:
     """Write the export and return its files. folder: existing and empty. name: of the study. protocol_text: TOML.
     facts: JSON values about the study and the program. Raises CannotWriteError."""
-    rows = [["column", "description", "unit"], *([column, *TRIAL_COLUMNS[column]] for column in columns(Trial))]
+    rows = [["column", "description", "unit"], *([column, *TRIAL_COLUMNS[column]] for column in column_names(Trial))]
     rows += [[column.name, column.description, column.question.unit] for column in answers.columns]
     texts = {
         TRIALS_NAME: rows_to_csv(trials, Trial),
-        DICTIONARY_NAME: "".join(csv_line(row) + "\n" for row in rows),
+        DICTIONARY_NAME: "".join(format_csv_line(row) + "\n" for row in rows),
         PROTOCOL_NAME: protocol_text,
         FACTS_NAME: json.dumps({"study": name, **facts}, indent=2, ensure_ascii=False) + "\n",
     }
@@ -68,4 +68,4 @@ def read_tidy_csv(folder: Path) -> ExportedTrials:
     if not isinstance(facts, dict):
         raise UnusableFileError(path, KIND, ("it is no JSON object",))
     table = folder / TRIALS_NAME
-    return ExportedTrials(trials_in(table, KIND), read_text(folder / PROTOCOL_NAME), facts, (table,))
+    return ExportedTrials(read_described_trials(table, KIND), read_text(folder / PROTOCOL_NAME), facts, (table,))

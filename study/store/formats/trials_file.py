@@ -9,13 +9,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from protocols.trial import Trial
-from study.store.disk.csv_rows import CsvError, columns, rows_from_csv, rows_to_csv
+from study.store.disk.csv_rows import CsvError, column_names, rows_from_csv, rows_to_csv
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_text, write_text
 
 TRIALS_NAME = "trials.csv"
 """Name of the file."""
-TRIALS_HEADER = columns(Trial)
+TRIALS_HEADER = column_names(Trial)
 """Names of the columns, in order."""
 KIND = "table of trials"
 """Name of this kind of file in error messages."""
@@ -28,35 +28,37 @@ def write_trials(path: Path, trials: Iterable[Trial]) -> None:
 
 def read_trials(path: Path | str) -> tuple[Trial, ...]:
     """Read the table. Raises CannotReadError where the file cannot be read, and UnusableFileError where it is not a
-    table of trials or has rows with `trial_problems`."""
+    table of trials or has rows with `find_trial_problems`."""
     path = Path(path)
     try:
         trials = rows_from_csv(read_text(path), Trial)
     except CsvError as error:
         raise UnusableFileError(path, KIND, error.problems) from error
-    if wrong := trial_problems(trials):
+    if wrong := find_trial_problems(trials):
         raise UnusableFileError(path, KIND, wrong)
     return trials
 
 
-def _not_finite(trial: Trial) -> list[str]:
+def _find_not_finite(trial: Trial) -> list[str]:
     """Names of the columns with an infinity or NaN. A session writes neither: a missing value is an empty field."""
     values = ((name, getattr(trial, name)) for name in TRIALS_HEADER)
     return [name for name, value in values if isinstance(value, float) and not math.isfinite(value)]
 
 
-def trial_problems(trials: Iterable[Trial]) -> tuple[str, ...]:
+def find_trial_problems(trials: Iterable[Trial]) -> tuple[str, ...]:
     """Problems of the rows that no session can have written, each with its line number (the header is line 1): invalid
     direction, answer, level or frequency, a `correct` that contradicts the answer, values that are not finite."""
-    found = []
+    problems = []
     for line, trial in enumerate(trials, start=2):
         if trial.direction_shown not in (1, 2):
-            found.append(f"line {line}: direction_shown is {trial.direction_shown}; directions are 1 and 2")
+            problems.append(f"line {line}: direction_shown is {trial.direction_shown}; directions are 1 and 2")
         if trial.answer not in (1, 2, None):
-            found.append(f"line {line}: answer is {trial.answer}; answers are 1, 2, or empty")
+            problems.append(f"line {line}: answer is {trial.answer}; answers are 1, 2, or empty")
         if trial.correct != (None if trial.answer is None else trial.answer == trial.direction_shown):
-            found.append(f"line {line}: correct does not follow from direction_shown and answer")
+            problems.append(f"line {line}: correct does not follow from direction_shown and answer")
         if not (trial.level_n > 0 and trial.frequency_hz > 0):
-            found.append(f"line {line}: level_n and frequency_hz must be above 0")
-        found += [f"line {line}: {name} is not finite; leave it empty if unknown" for name in _not_finite(trial)]
-    return tuple(found)
+            problems.append(f"line {line}: level_n and frequency_hz must be above 0")
+        problems += [
+            f"line {line}: {name} is not finite; leave it empty if unknown" for name in _find_not_finite(trial)
+        ]
+    return tuple(problems)

@@ -15,7 +15,7 @@ import numpy as np
 
 from protocols.trial import Trial
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.csv_rows import columns
+from study.store.disk.csv_rows import column_names
 from study.store.formats.answer_table import AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
@@ -36,47 +36,49 @@ def write_trials_mat(
     AlreadyThereError for an existing file, and CannotWriteError."""
     from scipy.io import savemat
 
-    written = io.BytesIO()
+    buffer = io.BytesIO()
     savemat(
-        written,
+        buffer,
         {
             "study": name,
-            "trials": {column: _column([getattr(trial, column) for trial in trials]) for column in columns(Trial)},
-            "units": {column: TRIAL_COLUMNS[column][1] for column in columns(Trial)},
-            "descriptions": {column: TRIAL_COLUMNS[column][0] for column in columns(Trial)},
-            **_answers(answers),
+            "trials": {
+                column: _convert_column([getattr(trial, column) for trial in trials]) for column in column_names(Trial)
+            },
+            "units": {column: TRIAL_COLUMNS[column][1] for column in column_names(Trial)},
+            "descriptions": {column: TRIAL_COLUMNS[column][0] for column in column_names(Trial)},
+            **_convert_answers(answers),
             "protocol": protocol_text,
             "provenance": json.dumps(dict(facts), ensure_ascii=False),
         },
         oned_as="column",
         long_field_names=True,  # up to 63 characters, not 31: the key of a question may have 40
     )
-    write_atomically(folder / NAME, written.getvalue(), overwrite=False)
+    write_atomically(folder / NAME, buffer.getvalue(), overwrite=False)
     return (folder / NAME,)
 
 
-def _answers(table: AnswerTable) -> dict[str, Any]:
+def _convert_answers(table: AnswerTable) -> dict[str, Any]:
     """Variables `answers` (cell arrays with a row per session) and `questions` (descriptions); none if the table has no
     columns."""
     if not table.columns:
         return {}
     rows = [(subject, session, *answers) for subject, session, answers in table.rows]
-    described = {column.name: column.description for column in table.columns}
+    descriptions = {column.name: column.description for column in table.columns}
     return {
-        "answers": dict(zip(table.header, map(_cells, zip(*rows, strict=True)), strict=False)),
-        "questions": described,
+        "answers": dict(zip(table.header, map(_make_cells, zip(*rows, strict=True)), strict=False)),
+        "questions": descriptions,
     }
 
 
-def _column(values: Sequence[Any]) -> Any:
+def _convert_column(values: Sequence[Any]) -> Any:
     """(n,) array of float, None as NaN; of cells if any value is text, None as empty text."""
-    plain = [value.value if isinstance(value, Enum) else value for value in values]
-    if any(isinstance(value, str) for value in plain):
-        return _cells(["" if value is None else value for value in plain])
-    return np.array([np.nan if value is None else float(value) for value in plain])
+    cell_values = [value.value if isinstance(value, Enum) else value for value in values]
+    if any(isinstance(value, str) for value in cell_values):
+        return _make_cells(["" if value is None else value for value in cell_values])
+    return np.array([np.nan if value is None else float(value) for value in cell_values])
 
 
-def _cells(values: Sequence[str]) -> Any:
+def _make_cells(values: Sequence[str]) -> Any:
     """(n,) array of objects, which scipy writes as a MATLAB cell array."""
     cells = np.empty(len(values), dtype=object)
     cells[:] = values

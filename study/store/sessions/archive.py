@@ -103,12 +103,12 @@ def new_session_folder(data: Path, subject: str) -> SessionFolder:
     at the same time. Raises WrongUseError for an invalid code, StudyError where the folder cannot be created."""
     check_subject(subject)
     try:
-        made = not data.exists()
+        is_new = not data.exists()
         make_folder(data, private=True)
         close_data_folder(data)
         for _ in range(1000):
-            taken = [folder_number(f.name) for f in session_folders(data) if f.subject == subject]
-            path = data / f"{subject}_{max(taken, default=0) + 1:03d}"
+            used_numbers = [folder_number(f.name) for f in list_session_folders(data) if f.subject == subject]
+            path = data / f"{subject}_{max(used_numbers, default=0) + 1:03d}"
             try:
                 path.mkdir(mode=PRIVATE_FOLDER)
             except FileExistsError:
@@ -116,7 +116,7 @@ def new_session_folder(data: Path, subject: str) -> SessionFolder:
             (path / "recordings").mkdir(mode=PRIVATE_FOLDER)
             for folder in (path, data):
                 sync_folder(folder)
-            if made:
+            if is_new:
                 with contextlib.suppress(OSError):  # the parent folder may not be readable
                     sync_folder(data.absolute().parent)
             return SessionFolder(path)
@@ -129,7 +129,7 @@ def new_session_folder(data: Path, subject: str) -> SessionFolder:
     raise StudyError("The session folder cannot be made", f"{data} is changing all the time.", "Try again.")
 
 
-def session_folders(data: Path) -> tuple[SessionFolder, ...]:
+def list_session_folders(data: Path) -> tuple[SessionFolder, ...]:
     """All session folders below `data`, withdrawn ones included, in alphabetical order."""
     if not data.is_dir():
         return ()
@@ -151,9 +151,9 @@ def find_session(session: str, data: Path) -> SessionFolder:
             raise SessionWithdrawnError(folder)
         if folder.log.exists():
             return folder
-    known = ", ".join(f.name for f in session_folders(data) if not f.withdrawn) or "none"
+    session_names = ", ".join(f.name for f in list_session_folders(data) if not f.withdrawn) or "none"
     raise WrongUseError(
         "There is no such session",
-        f"'{session}' is neither a session folder nor the name of one in {data}. Sessions there: {known}.",
+        f"'{session}' is neither a session folder nor the name of one in {data}. Sessions there: {session_names}.",
         "Give the folder, or its name together with --data.",
     )

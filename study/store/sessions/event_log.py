@@ -20,14 +20,14 @@ from study.store.disk.privacy import PRIVATE_FILE
 
 LOG_NAME = "events.jsonl"
 """Name of the log in the session's folder."""
-NO_LINES = Chain()
+EMPTY_CHAIN = Chain()
 """The hash chain before the first line."""
 
 
 class EventLog:
-    """A log that is open for appending. It may have a single writer, who holds the session's lock meanwhile."""
+    """A log that is open for appending. It has a single writer, which holds the session's lock."""
 
-    def __init__(self, path: Path, descriptor: int, chain: Chain | None = NO_LINES) -> None:
+    def __init__(self, path: Path, descriptor: int, chain: Chain | None = EMPTY_CHAIN) -> None:
         """descriptor: of the file, open for appending. chain: of the existing lines; None = read before the first
         line is added."""
         self._path = path
@@ -61,21 +61,21 @@ class EventLog:
 
     def append(self, event: Event) -> None:
         """Append one line; on return it is on the disk. Raises StudyError, leaving the log unchanged, on failure."""
-        before = os.fstat(self._descriptor).st_size
+        previous_size = os.fstat(self._descriptor).st_size
         if self._chain is None:
             self._chain = read_log(self._path).chain
-        after, line = write_chained(self._chain, event_line(event).removesuffix(b"\n"))
+        extended, line = write_chained(self._chain, event_line(event).removesuffix(b"\n"))
         try:
             _write_all(self._descriptor, line)
             os.fsync(self._descriptor)
         except BaseException as problem:
             # Also on Ctrl-C: an incomplete line would corrupt the next line.
             with contextlib.suppress(OSError):
-                os.ftruncate(self._descriptor, before)
+                os.ftruncate(self._descriptor, previous_size)
             if isinstance(problem, OSError):
-                raise _not_saved(self._path, event, problem) from problem
+                raise _make_save_error(self._path, event, problem) from problem
             raise
-        self._chain = after
+        self._chain = extended
 
     def close(self) -> None:
         """Close the file; its lines are on the disk already. Called once."""
@@ -93,7 +93,7 @@ class LogContents:
     """Length of the incomplete line in bytes."""
     chain: Chain
     """Hash chain after the last complete line."""
-    whole: bytes = field(repr=False)
+    complete_lines: bytes = field(repr=False)
     """All complete lines, as on the disk."""
 
 
@@ -108,13 +108,15 @@ def read_log(path: Path) -> LogContents:
             f"{path.name} in {path.parent.name}: {problem.strerror}.",
             "Check the folder's name and permissions.",
         ) from problem
-    *lines, tail = data.split(b"\n")
+    *lines, incomplete = data.split(b"\n")
     chain, events = Chain(), []
     for line in lines:
         chain, event = _parse_next(path, chain, line)
         events.append(event)
-    whole = data[: len(data) - len(tail)]
-    return LogContents(tuple(events), tail.decode("utf-8", errors="replace"), len(tail), chain, whole)
+    complete_lines = data[: len(data) - len(incomplete)]
+    return LogContents(
+        tuple(events), incomplete.decode("utf-8", errors="replace"), len(incomplete), chain, complete_lines
+    )
 
 
 def read_opening(path: Path) -> Event | None:
@@ -126,7 +128,7 @@ def read_opening(path: Path) -> Event | None:
     return _parse_next(path, Chain(), line.removesuffix(b"\n"))[1] if line.endswith(b"\n") else None
 
 
-def readable_events(path: Path) -> tuple[Event, ...]:
+def read_valid_events(path: Path) -> tuple[Event, ...]:
     """Events before the first damaged line, to inspect an unusable log; empty where the file cannot be read."""
     chain, events = Chain(), list[Event]()
     try:
@@ -138,7 +140,7 @@ def readable_events(path: Path) -> tuple[Event, ...]:
     return tuple(events)
 
 
-def mend(path: Path, contents: LogContents) -> None:
+def remove_incomplete_line(path: Path, contents: LogContents) -> None:
     """Remove an incomplete last line, so that the next event starts on a line of its own. Raises StudyError."""
     if not contents.torn_bytes:
         return
@@ -197,38 +199,38 @@ def _parse_next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
     """The chain after the next line, and its event. chain: of the lines before. line: without its line end. Raises
     StudyError for a line that is damaged, unknown, or of a newer version."""
     try:
-        after, event = read_chained(chain, line)
-        return after, parse_event(event)
+        extended, event = read_chained(chain, line)
+        return extended, parse_event(event)
     except ValueError as problem:
         number = chain.lines + 1
-        if number == 1 and _is_newer(line):
+        if number == 1 and _has_other_version(line):
             raise StudyError(
                 "This session was written by a newer hapteq",
                 f"The log of {path.parent.name} is of a version that this program does not know.",
                 "Use the hapteq that began it, or a newer one.",
                 saved="Nothing was changed.",
             ) from problem
-        wrong, whole = "is not an event that this version knows", f"The {number - 1} lines before it are whole."
+        clause, saved_text = "is not an event that this version knows", f"The {number - 1} lines before it are whole."
         if isinstance(problem, ChainBrokenError):
-            wrong = f"{problem}"
+            clause = f"{problem}"
             if number > 1 and not chain.since:  # This checksum covers earlier lines without a checksum, too.
-                wrong, whole = f"{problem}, or one of the lines before it was changed", "Nothing was changed."
+                clause, saved_text = f"{problem}, or one of the lines before it was changed", "Nothing was changed."
         raise StudyError(
             "The session log is damaged",
-            f"Line {number} of {path.name} in {path.parent.name} {wrong}.",
+            f"Line {number} of {path.name} in {path.parent.name} {clause}.",
             "Keep the folder as it is and restore the file from a copy; nothing was changed.",
-            saved=whole,
+            saved=saved_text,
         ) from problem
 
 
-def _is_newer(line: bytes) -> bool:
-    """Whether a first line is that of a session in another version of the format."""
+def _has_other_version(line: bytes) -> bool:
+    """Whether a first line opens a session in another version of the format than `SESSION_VERSION`, the first."""
     try:
-        opening = json.loads(line)
+        first_event = json.loads(line)
     except (ValueError, RecursionError):
         return False
-    known = isinstance(opening, dict) and opening.get("format") == SESSION_FORMAT
-    return known and opening.get("version") != SESSION_VERSION
+    is_session = isinstance(first_event, dict) and first_event.get("format") == SESSION_FORMAT
+    return is_session and first_event.get("version") != SESSION_VERSION
 
 
 def _write_all(descriptor: int, data: bytes) -> None:
@@ -237,7 +239,7 @@ def _write_all(descriptor: int, data: bytes) -> None:
         data = data[os.write(descriptor, data) :]
 
 
-def _not_saved(path: Path, event: Event, problem: OSError) -> StudyError:
+def _make_save_error(path: Path, event: Event, problem: OSError) -> StudyError:
     """The error for an event that could not be written."""
     return StudyError(
         "The session cannot be written to disk",

@@ -56,10 +56,10 @@ def read_live(folder: Path) -> Live | None:
         return None
     if (document.pop("format", None), document.pop("version", None)) != (LIVE_FORMAT, LIVE_VERSION):
         return None
-    return Live(**document) if _fits(document) else None
+    return Live(**document) if _has_valid_fields(document) else None
 
 
-def _fits(values: dict[str, Any]) -> bool:
+def _has_valid_fields(values: dict[str, Any]) -> bool:
     """Whether the values have exactly the fields of `Live`, with valid types, times and activity."""
     # Files of older versions lack these two fields, which then have their defaults.
     values = {"monotonic_s": None, "telemetry": "", **values}

@@ -49,10 +49,10 @@ SEAL: TypeAdapter[Seal] = TypeAdapter(Seal)
 """Validator and JSON schema of a seal."""
 
 
-def seal_paths(folder: Path) -> dict[int, Path]:
+def find_seals(folder: Path) -> dict[int, Path]:
     """Files of the seals in a session's folder by number, in the order of writing."""
-    found = ((_NAME.fullmatch(path.name), path) for path in folder.glob("seal*.json"))
-    return dict(sorted((int(match["number"] or 1), path) for match, path in found if match))
+    matches = ((_NAME.fullmatch(path.name), path) for path in folder.glob("seal*.json"))
+    return dict(sorted((int(match["number"] or 1), path) for match, path in matches if match))
 
 
 def write_seal(folder: Path, contents: LogContents) -> bool:
@@ -64,11 +64,11 @@ def write_seal(folder: Path, contents: LogContents) -> bool:
     seal = Seal(
         session=folder.name,
         lines=contents.chain.lines,
-        bytes=len(contents.whole),
+        bytes=len(contents.complete_lines),
         head=contents.chain.head,
-        sha256=hashlib.sha256(contents.whole).hexdigest(),
+        sha256=hashlib.sha256(contents.complete_lines).hexdigest(),
     )
-    number = max(seal_paths(folder), default=0) + 1
+    number = max(find_seals(folder), default=0) + 1
     path = folder / (SEAL_NAME if number == 1 else f"seal-{number}.json")
     with suppress(AlreadyThereError):  # another program has just written the same seal
         write_json(path, SEAL_FORMAT, SEAL_VERSION, asdict(seal))
@@ -89,20 +89,20 @@ def read_seal(path: Path) -> Seal:
         return SEAL.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        where = ".".join(map(str, first["loc"])) or "the document"
-        raise UnusableFileError(path, "seal of a session log", (f"{where}: {first['msg']}",)) from error
+        field_path = ".".join(map(str, first["loc"])) or "the document"
+        raise UnusableFileError(path, "seal of a session log", (f"{field_path}: {first['msg']}",)) from error
 
 
 def check_seals(folder: Path, contents: LogContents) -> int:
     """Number of lines of the log that seals cover; 0 without a seal. Raises StudyError if a seal is unreadable or does
     not match the log."""
     sealed = 0
-    for path in seal_paths(folder).values():
+    for path in find_seals(folder).values():
         try:
             seal = read_seal(path)
         except StudyError as problem:
-            raise _contradiction(folder, contents, f"{path.name} cannot be used: {problem.happened}") from problem
-        if len(contents.whole) < seal.bytes:
+            raise _contradiction_error(folder, contents, f"{path.name} cannot be used: {problem.happened}") from problem
+        if len(contents.complete_lines) < seal.bytes:
             raise StudyError(
                 "The end of this session's log is missing",
                 f"{folder.name} was closed with {seal.lines} lines in {LOG_NAME}, and {contents.chain.lines} whole "
@@ -110,8 +110,8 @@ def check_seals(folder: Path, contents: LogContents) -> int:
                 f"Restore {LOG_NAME} from a copy.",
                 saved="Nothing was changed.",
             )
-        if not _is_sealed_prefix(folder, seal, contents.whole[: seal.bytes]):
-            raise _contradiction(folder, contents, f"{path.name} does not match {LOG_NAME}.")
+        if not _is_sealed_prefix(folder, seal, contents.complete_lines[: seal.bytes]):
+            raise _contradiction_error(folder, contents, f"{path.name} does not match {LOG_NAME}.")
         sealed = max(sealed, seal.lines)
     return sealed
 
@@ -121,14 +121,14 @@ def is_sealed(folder: Path, content: bytes) -> bool:
 
     Raises StudyError if a seal is unreadable or does not match the log.
     """
-    *lines, tail = content.split(b"\n")
+    *lines, incomplete = content.split(b"\n")
     chain = Chain()
     try:
         for line in lines:
             chain, _ = read_chained(chain, line)
     except ChainBrokenError:
         return False
-    return not tail and check_seals(folder, LogContents((), "", 0, chain, content)) > 0
+    return not incomplete and check_seals(folder, LogContents((), "", 0, chain, content)) > 0
 
 
 def _is_sealed_prefix(folder: Path, seal: Seal, prefix: bytes) -> bool:
@@ -141,18 +141,18 @@ def _is_sealed_prefix(folder: Path, seal: Seal, prefix: bytes) -> bool:
     )
 
 
-def _contradiction(folder: Path, contents: LogContents, happened: str) -> StudyError:
-    """The error for a seal that does not match its log. happened: continues the sentence "In <folder>, ...". A seal
+def _contradiction_error(folder: Path, contents: LogContents, reason: str) -> StudyError:
+    """The error for a seal that does not match its log. reason: continues the sentence "In <folder>, ...". A seal
     may be deleted only where the log's own checksums still protect it."""
-    do_now = f"Restore {LOG_NAME} and the seal from a copy."
+    remedy = f"Restore {LOG_NAME} and the seal from a copy."
     if contents.chain.since:
-        do_now += (
+        remedy += (
             " The lines of the log match their own checksums: where there is no copy, move the seal out of the "
             "folder, and hapteq resume writes it again."
         )
     return StudyError(
         "The session log and its seal contradict each other",
-        f"In {folder.name}, {happened}",
-        do_now,
+        f"In {folder.name}, {reason}",
+        remedy,
         saved="Nothing was changed.",
     )

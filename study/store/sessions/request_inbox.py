@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from study.errors import StudyError
-from study.session.watching.requests import NoteAsked, PauseAsked, Request, StopAsked, Who
+from study.session.watching.requests import NoteAsked, PauseAsked, Request, RequestSource, StopAsked
 from study.store.disk.privacy import PRIVATE_FOLDER, write_private
 from study.store.disk.real_folder import is_real_folder
 from study.store.disk.strict_json import load_json
@@ -34,7 +34,7 @@ _STOP = "stop"
 """Beginning of the name of a request to stop: it counts even if its content cannot be read."""
 _NOTE = "note-"
 """Beginning of the name of a note: unread notes are kept from one sitting to the next."""
-_WHO = get_args(Who)
+_SOURCES = get_args(RequestSource)
 """Senders that a reader accepts."""
 _LARGEST = 1 << 16
 """Largest number of bytes of a request that are read; a note has only a few sentences."""
@@ -54,7 +54,7 @@ class RequestInbox:
 
     def send(self, request: Request) -> str:
         """Returns the request's name, for `unread` and `take_back`. Raises StudyError if it cannot be written."""
-        kind = next(word for word, known in KINDS.items() if isinstance(request, known))
+        kind = next(word for word, request_class in KINDS.items() if isinstance(request, request_class))
         key = f"{time.time_ns():020d}-{os.getpid():07d}-{next(_counter):06d}-{secrets.token_hex(4)}"
         name = f"{kind}-{key}.json"
         document = {"format": REQUEST_FORMAT, "version": REQUEST_VERSION, "request": kind, **asdict(request)}
@@ -99,11 +99,11 @@ class RequestInbox:
         """Take and remove requests, stops first, then oldest first. Never raises."""
         try:
             # listdir takes half the time of Path.iterdir, twenty times a second.
-            present = os.listdir(self._folder) if is_real_folder(self._folder) else ()  # noqa: PTH208
+            file_names = os.listdir(self._folder) if is_real_folder(self._folder) else ()  # noqa: PTH208
         except OSError:
             return ()
-        names = sorted((n for n in present if n[0] != "." and n not in self._passed_over), key=_stops_then_oldest)
-        return tuple(request for name in names[:_AT_ONCE] if (request := self._take_one(name)) is not None)
+        names = sorted((n for n in file_names if n[0] != "." and n not in self._passed_over), key=_stops_then_oldest)
+        return tuple(request for name in names[:_AT_ONCE] if (request := self._take_request(name)) is not None)
 
     def _make_folder(self) -> None:
         """Create the folder. Raises OSError, also for a symbolic link, which may lead outside the session."""
@@ -111,10 +111,10 @@ class RequestInbox:
         if not is_real_folder(self._folder):
             raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(self._folder))
 
-    def _take_one(self, name: str) -> Request | None:
+    def _take_request(self, name: str) -> Request | None:
         """Read and remove a request. An unreadable stop counts as the experimenter's; other unreadable requests are set
         aside."""
-        request = _parse_request(_content(self._folder / name))
+        request = _parse_request(_read_content(self._folder / name))
         if request is None and name.startswith(_STOP):
             request = StopAsked("experimenter")
         if request is None:
@@ -143,15 +143,15 @@ def _stops_then_oldest(name: str) -> tuple[bool, str]:
     return not name.startswith(_STOP), name.partition("-")[2]
 
 
-def _content(path: Path) -> bytes:
+def _read_content(path: Path) -> bytes:
     """Content of a regular file; empty for anything else. A link is not followed, and a named pipe does not block."""
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
     except OSError:
         return b""
     try:
-        plain = stat.S_ISREG(os.fstat(descriptor).st_mode)
-        return os.read(descriptor, _LARGEST) if plain else b""
+        is_regular = stat.S_ISREG(os.fstat(descriptor).st_mode)
+        return os.read(descriptor, _LARGEST) if is_regular else b""
     except OSError:
         return b""
     finally:
@@ -167,17 +167,17 @@ def _parse_request(content: bytes) -> Request | None:
     if not isinstance(document, dict) or document.pop("format", None) != REQUEST_FORMAT:
         return None
     kind = KINDS.get(str(document.pop("request", None)))
-    if document.pop("version", None) != REQUEST_VERSION or kind is None or not _fits(kind, document):
+    if document.pop("version", None) != REQUEST_VERSION or kind is None or not _has_valid_fields(kind, document):
         return None
     return kind(**document)
 
 
-def _fits(kind: type[Request], values: dict[str, Any]) -> bool:
+def _has_valid_fields(kind: type[Request], values: dict[str, Any]) -> bool:
     """Whether the values are exactly the fields of this kind, each of its type, from a known sender."""
-    known = {"who": str, "text": str, "adverse": bool}
-    wanted = {field.name for field in fields(kind)}
+    field_types = {"who": str, "text": str, "adverse": bool}
+    field_names = {field.name for field in fields(kind)}
     return (
-        values.keys() == wanted
-        and all(isinstance(value, known[name]) for name, value in values.items())
-        and values["who"] in _WHO
+        values.keys() == field_names
+        and all(isinstance(value, field_types[name]) for name, value in values.items())
+        and values["who"] in _SOURCES
     )

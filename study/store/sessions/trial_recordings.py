@@ -47,7 +47,7 @@ def save_trial_recording(
     name exists, because the end of a log was lost but not the recordings, the name gets a number. Raises StudyError
     where the file cannot be written.
     """
-    name = _free_name(folder.path, name)
+    name = _find_free_name(folder.path, name)
     path = folder.path / name
     write_recording(path, replace(recording, meta={**recording.meta, **conditions}), precision="float32")
     return SavedRecording(name, sha256_of(path))
@@ -59,19 +59,19 @@ def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecordi
     Raises StudyError where it cannot be read.
     """
     stem = Path(name).stem
-    of_trial = [path for path in folder.recordings.glob(f"{stem}_*.h5") if path.stem.rpartition("_")[2].isdigit()]
-    numbered = sorted(of_trial, key=lambda path: int(path.stem.rpartition("_")[2]))
-    path = [folder.path / name, *numbered][-1]
+    trial_paths = [path for path in folder.recordings.glob(f"{stem}_*.h5") if path.stem.rpartition("_")[2].isdigit()]
+    numbered_paths = sorted(trial_paths, key=lambda path: int(path.stem.rpartition("_")[2]))
+    path = [folder.path / name, *numbered_paths][-1]
     if not path.exists():
         return None
     return SavedRecording(path.relative_to(folder.path).as_posix(), sha256_of(path)), read_recording(path)
 
 
-def _free_name(folder: Path, name: str) -> str:
+def _find_free_name(folder: Path, name: str) -> str:
     """The name, or with the lowest number from 2 on that makes it new."""
-    taken = 1
+    number = 1
     free = name
     while (folder / free).exists():
-        taken += 1
-        free = name.replace(".h5", f"_{taken}.h5")
+        number += 1
+        free = name.replace(".h5", f"_{number}.h5")
     return free

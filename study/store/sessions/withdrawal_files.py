@@ -59,22 +59,28 @@ def read_intent(data: Path, subject: str) -> WithdrawalIntent | None:
     if not is_real_file(path):
         return None
     try:
-        left = read_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION)
+        document = read_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION)
         sessions = {
-            str(name): _parse_begun(begun) for name, begun in left["sessions"].items() if _is_of_subject(name, subject)
+            str(name): _parse_participant(facts)
+            for name, facts in document["sessions"].items()
+            if _is_of_subject(name, subject)
         }
-        derived = tuple(str(name) for name in left["derived"] if _is_plain_name(str(name)))
-        return WithdrawalIntent(subject, str(left["withdrawn_utc"]), sessions, derived)
+        derived = tuple(str(name) for name in document["derived"] if _is_plain_name(str(name)))
+        return WithdrawalIntent(subject, str(document["withdrawn_utc"]), sessions, derived)
     except (StudyError, AttributeError, KeyError, TypeError):
         return None
 
 
-def write_tombstone(folder: SessionFolder, withdrawn_utc: str, begun: SessionParticipant | None) -> None:
-    """Write the tombstone into the session's folder; an existing tombstone is kept. begun: facts on the session, if
-    they are known. Raises CannotWriteError."""
+def write_tombstone(folder: SessionFolder, withdrawn_utc: str, participant: SessionParticipant | None) -> None:
+    """Write the tombstone into the session's folder; an existing tombstone is kept. participant: facts on the session,
+    if they are known. Raises CannotWriteError."""
     if not is_real_file(folder.tombstone):
-        left = {"session": folder.name, "withdrawn_utc": withdrawn_utc, "begun": asdict(begun) if begun else None}
-        write_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION, left, overwrite=True)
+        document = {
+            "session": folder.name,
+            "withdrawn_utc": withdrawn_utc,
+            "begun": asdict(participant) if participant else None,
+        }
+        write_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION, document, overwrite=True)
 
 
 def read_tombstone(folder: SessionFolder) -> dict[str, Any]:
@@ -85,9 +91,9 @@ def read_tombstone(folder: SessionFolder) -> dict[str, Any]:
         return {}
 
 
-def read_begun(folder: SessionFolder) -> SessionParticipant | None:
+def read_participant(folder: SessionFolder) -> SessionParticipant | None:
     """Facts on the session in its tombstone; None without valid ones."""
-    return _parse_begun(read_tombstone(folder).get("begun"))
+    return _parse_participant(read_tombstone(folder).get("begun"))
 
 
 def list_remaining(folder: SessionFolder) -> tuple[str, ...]:
@@ -101,27 +107,31 @@ def list_remaining(folder: SessionFolder) -> tuple[str, ...]:
     return tuple(f"{name}/" if is_real_folder(folder.path / name) else name for name in names)
 
 
-def how_to_finish(folder: SessionFolder) -> str:
+def describe_unfinished(folder: SessionFolder) -> str:
     """Text for the user on an incomplete withdrawal: the files that are still there, and the command that continues it.
     Empty if the withdrawal is complete."""
-    left = list_remaining(folder)
-    if not left and folder.tombstone.exists() and not folder.withdrawal.exists():
+    remaining = list_remaining(folder)
+    if not remaining and folder.tombstone.exists() and not folder.withdrawal.exists():
         return ""
-    still = f"Still there: {', '.join(left)}. " if left else ""
-    return f"{still}Continue with: hapteq withdraw {folder.name} --data {folder.path.parent}"
+    remaining_text = f"Still there: {', '.join(remaining)}. " if remaining else ""
+    return f"{remaining_text}Continue with: hapteq withdraw {folder.name} --data {folder.path.parent}"
 
 
-def _parse_begun(left: Any) -> SessionParticipant | None:
+def _parse_participant(document: Any) -> SessionParticipant | None:
     """Facts on a session from JSON; None if they are missing, or have other fields or types."""
     try:
-        begun = SessionParticipant(**left) if left else None
+        participant = SessionParticipant(**document) if document else None
     except TypeError:
         return None
-    if begun is None or not isinstance(begun.protocol, str) or not isinstance(begun.simulated, bool):
-        return None
+    return participant if participant is not None and _has_valid_types(asdict(participant)) else None
+
+
+def _has_valid_types(facts: Mapping[str, Any]) -> bool:
+    """Whether facts on a session from a file have the types of `SessionParticipant`."""
+    number = facts["number"]
     # A bool is an int for Python, but no participant number.
-    is_number = isinstance(begun.number, int) and not isinstance(begun.number, bool) and begun.number >= 0
-    return begun if begun.number is None or is_number else None
+    is_number = isinstance(number, int) and not isinstance(number, bool) and number >= 0
+    return isinstance(facts["protocol"], str) and isinstance(facts["simulated"], bool) and (number is None or is_number)
 
 
 def _is_of_subject(name: Any, subject: str) -> bool:

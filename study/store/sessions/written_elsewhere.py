@@ -20,27 +20,31 @@ LINE_BREAK = "\0"
 """Replaces a line break within a path; no path contains this character."""
 
 
-def note_written(source: Path, out: Path, always: bool = False) -> None:
-    """Note the absolute path of `out`, unless it is noted already or a withdrawal would search it: the data folder, a
-    folder directly in it, or any folder within a session. A data folder that cannot be written to stays as it is.
+def note_written_folder(source: Path, folder: Path, always: bool = False) -> None:
+    """Note the absolute path of `folder`, unless it is noted already or a withdrawal would search it: the data folder,
+    a folder directly in it, or any folder within a session. A data folder that cannot be written to stays as it is.
 
-    source: the data folder, or a session folder in it. always: note `out` wherever it is, for
+    source: the data folder, or a session folder in it. always: note `folder` wherever it is, for
     an export, which a withdrawal does not find.
     """
-    out, source = out.resolve(), source.resolve()
+    folder, source = folder.resolve(), source.resolve()
     data = source.parent if FOLDER.fullmatch(source.name) else source
-    known = folders_written_elsewhere(data)
-    beside = out.relative_to(data).parts if out.is_relative_to(data) else None
-    found = not always and beside is not None and (len(beside) < 2 or FOLDER.fullmatch(beside[0]) is not None)
-    if found or out in known:
+    noted = read_written_folders(data)
+    relative_parts = folder.relative_to(data).parts if folder.is_relative_to(data) else None
+    is_searched = (
+        not always
+        and relative_parts is not None
+        and (len(relative_parts) < 2 or FOLDER.fullmatch(relative_parts[0]) is not None)
+    )
+    if is_searched or folder in noted:
         return
-    text = "".join(str(path).replace("\n", LINE_BREAK) + "\n" for path in (*known, out))
+    text = "".join(str(path).replace("\n", LINE_BREAK) + "\n" for path in (*noted, folder))
     with suppress(CannotWriteError):
         # fsencode keeps the bytes of a name as the system has them: they need not be UTF-8.
         write_atomically(data / WRITTEN_ELSEWHERE, os.fsencode(text), overwrite=True)
 
 
-def folders_written_elsewhere(data: Path) -> tuple[Path, ...]:
+def read_written_folders(data: Path) -> tuple[Path, ...]:
     """The noted folders, in the order in which they were noted; empty if there are none or the list cannot be read."""
     note = data / WRITTEN_ELSEWHERE
     if not is_real_file(note):

@@ -25,11 +25,11 @@ from study.tui.app.load_screens import load_screens
 from study.tui.app.sitting_screens import SittingScreens
 from study.tui.departure import leave_with_the_terminal
 from study.tui.engine.from_engine import Failed, Finished
-from study.tui.engine.to_engine import AskOtherSession, Begin, LetGo, Relay, Resume, SessionOrder, ShowSession
+from study.tui.engine.to_engine import AskOtherSession, BeginSession, LetGo, Relay, Resume, SessionOrder, ShowSession
 from study.tui.keys.key_names import key_name
 from study.tui.keys.keys_in_order import KeysInOrder
 from study.tui.screens.outcome import Decision, Outcome, OutcomeScreen
-from study.tui.themes import NEXT, register_themes
+from study.tui.themes import NEXT_THEME, register_themes
 from study.tui.watch.watch_in_app import Watching
 
 
@@ -70,7 +70,7 @@ class HapteqApp(App[None]):
         register_themes(self)
 
     async def on_event(self, event: Event) -> None:
-        await self._keys.take(event)
+        await self._keys.handle_event(event)
 
     def get_key_display(self, binding: Binding) -> str:
         return key_name(super().get_key_display(binding))
@@ -104,7 +104,7 @@ class HapteqApp(App[None]):
         """Texts in the language of the participant of this sitting."""
         return ENGLISH_WORDS if self._sitting is None else self._sitting.words
 
-    async def _begin_sitting(self, first: Begin | Resume) -> None:
+    async def _begin_sitting(self, first: BeginSession | Resume) -> None:
         self._direct = self._direct and first is self._start.first
         self.outcome = self._letting_go = None
         self._archive.clear()
@@ -124,15 +124,15 @@ class HapteqApp(App[None]):
             case Failed():
                 self._end_sitting(outcomes.failure_outcome(message, False, self._words), message)
             case _ if self._sitting is not None:
-                await self._sitting.hear(message)
+                await self._sitting.handle_message(message)
             case _:
-                await self._archive.hear(message)
+                await self._archive.handle_message(message)
 
     def _end_sitting(self, outcome: Outcome, end: Finished | Failed) -> None:
-        opened = self._sitting is not None and self._sitting.path
+        was_opened = self._sitting is not None and self._sitting.path
         self._sitting = self._letting_go = None
         self.outcome = end
-        if self._direct and not opened:
+        if self._direct and not was_opened:
             # What was typed in the terminal could not be begun: the terminal says why.
             self.exit()
             return
@@ -183,11 +183,11 @@ class HapteqApp(App[None]):
     def action_help(self) -> None:
         from study.tui.screens.help import HelpScreen
 
-        about: str = getattr(self.screen, "HELP", "")
-        self.push_screen(HelpScreen(about.rstrip() + self._words["help_everywhere"], self._words))
+        help_text: str = getattr(self.screen, "HELP", "")
+        self.push_screen(HelpScreen(help_text.rstrip() + self._words["help_everywhere"], self._words))
 
     def action_next_theme(self) -> None:
-        self.theme = NEXT[self.theme]
+        self.theme = NEXT_THEME[self.theme]
 
     def action_watch(self) -> None:
         if self._sitting is not None and self._sitting.path:
@@ -226,29 +226,29 @@ class HapteqApp(App[None]):
         if self._sitting is not None:
             self._sitting.send_trial_reply(reply)
 
-    async def on_begin_wanted(self, wanted: home_messages.BeginWanted) -> None:
+    async def on_begin_wanted(self, event: home_messages.BeginWanted) -> None:
         if self._sitting is not None:  # Enter twice: one sitting
             return
-        start = self._start = replace(self._start, device=wanted.device)
-        order = SessionOrder(wanted.protocol, wanted.device, wanted.subject, start.data, start.seed, wanted.model)
-        await self._begin_sitting(Begin(order))
+        start = self._start = replace(self._start, device=event.device)
+        order = SessionOrder(event.protocol, event.device, event.subject, start.data, start.seed, event.model)
+        await self._begin_sitting(BeginSession(order))
 
-    async def on_resume_wanted(self, wanted: home_messages.ResumeWanted) -> None:
+    async def on_resume_wanted(self, event: home_messages.ResumeWanted) -> None:
         if self._sitting is not None:
             return
-        await self._begin_sitting(Resume(wanted.path, self._start.device, self._start.data))
+        await self._begin_sitting(Resume(event.path, self._start.device, self._start.data))
 
     async def on_home_wanted(self) -> None:
         await self._archive.home()
 
-    def on_command_wanted(self, wanted: home_messages.CommandWanted) -> None:
-        self._engine.send(wanted.command)
+    def on_command_wanted(self, event: home_messages.CommandWanted) -> None:
+        self._engine.send(event.command)
 
-    async def on_diagnose_wanted(self, wanted: home_messages.DiagnoseWanted) -> None:
-        await self._archive.diagnose(wanted.command)
+    async def on_diagnose_wanted(self, event: home_messages.DiagnoseWanted) -> None:
+        await self._archive.diagnose(event.command)
 
-    def on_watch_wanted(self, wanted: home_messages.WatchWanted) -> None:
-        self._watching.confirm(wanted.path, lambda request: self._engine.send(AskOtherSession(wanted.path, request)))
+    def on_watch_wanted(self, event: home_messages.WatchWanted) -> None:
+        self._watching.confirm(event.path, lambda request: self._engine.send(AskOtherSession(event.path, request)))
 
     def on_demo_screen_pause_wanted(self) -> None:
         self.action_pause()

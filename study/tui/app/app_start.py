@@ -5,7 +5,7 @@ The module imports nothing heavy, so that the first frame appears soon.
 
 from dataclasses import dataclass
 
-from study.tui.engine.to_engine import Begin, Resume
+from study.tui.engine.to_engine import BeginSession, Resume
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 
 
@@ -19,7 +19,7 @@ class AppStart:
     """Name of the device."""
     keys: AnswerKeys = DIGITS
     """Keys that answer 1 and 2."""
-    first: Begin | Resume | None = None
+    first: BeginSession | Resume | None = None
     """Start directly with this sitting; None shows the start screen."""
     protocol: str = ""
     """Protocol that the start screen lists first, by name or path; empty for none."""

@@ -15,12 +15,12 @@ from study.session.views.archive_views import DiagnosisView, SessionView
 from study.tui.app.app_start import AppStart
 from study.tui.engine.from_engine import (
     Calibrated,
+    CalibrationStored,
     Diagnosis,
     FromEngine,
     Home,
     LayDown,
     Preparing,
-    SensorKept,
     Session,
     Trouble,
     Withdrawn,
@@ -63,21 +63,21 @@ class ArchiveScreens:
         while len(self._app.screen_stack) > 1 and self._app.screen is not self._home:
             self._app.pop_screen()
 
-    async def hear(self, message: FromEngine) -> None:
+    async def handle_message(self, message: FromEngine) -> None:
         """Display the content of a message from the engine. Called only outside sittings."""
         match message:
             case Home(view=view) if self._home is not None:
                 self._home.show(view)
             case Session(view=view):
                 await self._show_session(view)
-            case Working(what=what, share=share) if self._diagnosing is not None:
-                self._diagnosing.show(what, share)
+            case Working(step=step, share=share) if self._diagnosing is not None:
+                self._diagnosing.show(step, share)
             case Diagnosis(view=view):
                 self.end_diagnosing()
                 await self._show_diagnosis(view)
-            case LayDown() | Calibrated() | SensorKept():
+            case LayDown() | Calibrated() | CalibrationStored():
                 if (screen := self._sensor_screen()) is not None:
-                    screen.hear(message)
+                    screen.handle_message(message)
             case Withdrawn(sessions=sessions):
                 self._app.notify(f"Everything of the participant was erased: {', '.join(sessions)}.", markup=False)
                 await self.home()
@@ -88,14 +88,14 @@ class ArchiveScreens:
         """Start a diagnosis and show its progress. If the user stops it, the engine is told to stop."""
         from study.tui.screens.diagnosing import DiagnosingScreen
 
-        def stopped(stopped_here: bool | None) -> None:
+        def on_closed(is_stopped: bool | None) -> None:
             self._diagnosing = None
-            if stopped_here:
+            if is_stopped:
                 self._send(LetGo())
 
         self._send(command)
         self._diagnosing = DiagnosingScreen("Getting ready.")
-        await self._app.push_screen(self._diagnosing, stopped)
+        await self._app.push_screen(self._diagnosing, on_closed)
 
     def end_diagnosing(self) -> None:
         """Remove the diagnosis screen and everything above it."""
@@ -106,7 +106,7 @@ class ArchiveScreens:
     def end_calibrating(self) -> None:
         """Allow the calibration of the sensor to be started again after an error."""
         if (screen := self._sensor_screen()) is not None:
-            screen.begin_again()
+            screen.reset_after_error()
 
     def _sensor_screen(self) -> SensorScreen | None:
         """The sensor screen, if it is open."""

@@ -13,7 +13,7 @@ from textual.message import Message
 
 from study.tui.engine.client import EngineClient
 from study.tui.engine.from_engine import Failed, Finished, FromEngine
-from study.tui.engine.to_engine import Begin, Heartbeat, Resume, ToEngine
+from study.tui.engine.to_engine import BeginSession, Heartbeat, Resume, ToEngine
 
 HEARTBEAT_S = 0.1
 """Interval of the heartbeat (s)."""
@@ -53,7 +53,7 @@ class EngineLine:
         if self._engine.dead:
             self._engine = EngineClient(self._deliver)
             self._engine.start()
-        if isinstance(message, Begin | Resume):
+        if isinstance(message, BeginSession | Resume):
             self.last_end = None
         self._engine.send(message)
 

@@ -7,7 +7,7 @@ import gc
 import threading
 from importlib import import_module
 
-NEEDED_LATER = (
+LATER_MODULES = (
     "study.tui.app.sitting_screens",
     "study.tui.screens.trial",
     "study.tui.screens.help",
@@ -26,7 +26,7 @@ def load_screens() -> None:
 
 
 def _load() -> None:
-    for name in NEEDED_LATER:
+    for name in LATER_MODULES:
         import_module(name)
     # Imported modules stay in use. Without freezing, the garbage collector searched their objects again and again,
     # which delayed the event loop by 50 ms now and then.

@@ -25,9 +25,9 @@ def failure_outcome(failure: Failed, at_home: bool, words: Words = ENGLISH_WORDS
     who may still sit there."""
     error = failure.error
     parts = (("What happened", error.happened), ("What is safe", error.saved), ("What to do now", error.do_now))
-    way_on: tuple[Decision, ...] = ("back",) if at_home else ("home", "quit")
+    decisions: tuple[Decision, ...] = ("back",) if at_home else ("home", "quit")
     paragraphs = tuple((heading, text) for heading, text in parts if text)
-    return Outcome(error.title, (*_for_whom(words), *paragraphs), ("resume", *way_on) if failure.path else way_on)
+    return Outcome(error.title, (*_for_whom(words), *paragraphs), ("resume", *decisions) if failure.path else decisions)
 
 
 def completion_outcome(end: Finished, words: Words = ENGLISH_WORDS) -> Outcome:

@@ -20,13 +20,13 @@ from study.session.views.views import Reply as TrialReply
 from study.tui.engine.from_engine import (
     Ask,
     Call,
-    Close,
+    CloseRequest,
     Feedback,
     FromEngine,
     LookUpdate,
-    Opened,
     ParticipantWords,
     Preparing,
+    SessionReady,
     Trouble,
 )
 from study.tui.engine.to_engine import Reply, ToEngine
@@ -64,15 +64,15 @@ def screen_for(ask: Ask, keys: AnswerKeys, words: Words) -> Screen[Any]:
     """A new screen for a request other than a trial, whose screen is kept between requests. The screen is dismissed
     with the reply as its result."""
     if ask.call is Call.WELCOME:
-        return InstructionsScreen(ask.shown, keys, words)
+        return InstructionsScreen(ask.content, keys, words)
     if ask.call is Call.CHOOSE_DEMO:
-        return DemoScreen(ask.shown, keys, words)
+        return DemoScreen(ask.content, keys, words)
     if ask.call is Call.PAUSE:
-        return PauseScreen(ask.shown, ask.shown.reason == LEAVING.reason, words)
-    return SCREENS[ask.call](ask.shown, words)
+        return PauseScreen(ask.content, ask.content.reason == LEAVING.reason, words)
+    return SCREENS[ask.call](ask.content, words)
 
 
-def forget_drawn_before(app: App[Any]) -> None:
+def clear_render_caches(app: App[Any]) -> None:
     """Clear caches of Textual 8.2 that keep removed widgets alive; call it when screens change. Otherwise garbage
     collection of these widgets blocks the event loop for longer with every trial, finally for more than the half second
     after which a screen counts as dead."""
@@ -110,16 +110,16 @@ class SittingScreens:
         self._forget_earlier = forget_earlier
         self._number = 0
         """Number of the request that waits for a reply; 0 where none does."""
-        self._shown: Screen[Any] | None = None
+        self._request_screen: Screen[Any] | None = None
         self._trial: TrialScreen | None = None
         self._preparing: PreparingScreen | None = None
 
-    async def hear(self, message: FromEngine) -> None:
+    async def handle_message(self, message: FromEngine) -> None:
         """Handle one message of the engine, in the order of arrival."""
         match message:
             case Ask():
                 await self._ask(message)
-            case Close(number=number) if number == self._number:
+            case CloseRequest(number=number) if number == self._number:
                 self._drop()
             case LookUpdate():
                 self._update_handle(message)
@@ -128,7 +128,7 @@ class SittingScreens:
                 self._trial.show_feedback(correct)
             case Trouble(sentence=sentence):
                 self._show_trouble(sentence)
-            case Opened(path=path):
+            case SessionReady(path=path):
                 self.path = path
             case ParticipantWords(words=words):
                 self.words = words
@@ -144,7 +144,7 @@ class SittingScreens:
     async def prepare(self, sentence: str = "") -> None:
         """Show that the device is being prepared, while no request waits. sentence: empty before the language is
         known."""
-        self._number, self._shown, self._trial = 0, None, None
+        self._number, self._request_screen, self._trial = 0, None, None
         if self._preparing is None:
             self._preparing = PreparingScreen(sentence)
             await self._app.push_screen(self._preparing)
@@ -163,10 +163,10 @@ class SittingScreens:
             await self._app.push_screen(Screen())
         if ask.call is Call.ASK:
             trial = self._trial if self._trial is not None else await self._trial_screen()
-            trial.arm(ask.shown)
+            trial.arm(ask.content)
             return
-        self._shown = screen_for(ask, self._keys, self.words)
-        await self._app.push_screen(self._shown, partial(self._reply_once_dismissed, ask.number))
+        self._request_screen = screen_for(ask, self._keys, self.words)
+        await self._app.push_screen(self._request_screen, partial(self._reply_once_dismissed, ask.number))
         # Keys pressed before this screen could be read must not answer it.
         self._forget_earlier()
 
@@ -176,19 +176,19 @@ class SittingScreens:
         return self._trial
 
     def _update_handle(self, update: LookUpdate) -> None:
-        if update.number == self._number and isinstance(self._shown, HandleScreen):
-            self._shown.update_view(update.view)
+        if update.number == self._number and isinstance(self._request_screen, HandleScreen):
+            self._request_screen.update_view(update.view)
 
     def _show_trouble(self, sentence: str) -> None:
         sentence = self.words.fact(sentence)
         if self._trial is not None:
             self._trial.show_trouble(sentence)
-        if self._trial is None or self._shown is not None:
+        if self._trial is None or self._request_screen is not None:
             self._app.notify(sentence, severity="warning", timeout=TROUBLE_FOR_S, markup=False)
 
     def _reply_once_dismissed(self, number: int, value: Any) -> None:
         if number == self._number:
-            self._shown = None
+            self._request_screen = None
             self._reply(value)
 
     def _reply(self, value: Any) -> None:
@@ -202,7 +202,7 @@ class SittingScreens:
         if self._trial is not None:
             self._trial.show_saved()  # the engine continues only after the answer is on disk
             self._trial.disarm()
-        shown, self._shown = self._shown, None
-        while shown is not None and shown in self._app.screen_stack:
+        screen, self._request_screen = self._request_screen, None
+        while screen is not None and screen in self._app.screen_stack:
             self._app.pop_screen()
-        forget_drawn_before(self._app)
+        clear_render_caches(self._app)

@@ -62,13 +62,13 @@ class Canvas:
         length = math.dist(start, end)
         if length == 0:
             return
-        across = (start[1] - end[1]) / length * thickness / 2, (end[0] - start[0]) / length * thickness / 2
+        offset = (start[1] - end[1]) / length * thickness / 2, (end[0] - start[0]) / length * thickness / 2
         self.fill(
             (
-                (start[0] + across[0], start[1] + across[1]),
-                (end[0] + across[0], end[1] + across[1]),
-                (end[0] - across[0], end[1] - across[1]),
-                (start[0] - across[0], start[1] - across[1]),
+                (start[0] + offset[0], start[1] + offset[1]),
+                (end[0] + offset[0], end[1] + offset[1]),
+                (end[0] - offset[0], end[1] - offset[1]),
+                (start[0] - offset[0], start[1] - offset[1]),
             )
         )
 

@@ -39,10 +39,10 @@ def ends(picture: DirectionPicture, number: int, words: Words = ENGLISH_WORDS) -
 def draw_directions(picture: DirectionPicture, columns: int = 18, rows: int = 9) -> list[str]:
     """Lines of text with both directions side by side: 1 solid, 2 dashed, each with its number below. columns, rows:
     size of each drawing in characters."""
-    left = _draw_direction(picture.plane, picture.angle_deg[0], columns, rows, dashed=False)
-    right = _draw_direction(picture.plane, picture.angle_deg[1], columns, rows, dashed=True)
+    first_lines = _draw_direction(picture.plane, picture.angle_deg[0], columns, rows, dashed=False)
+    second_lines = _draw_direction(picture.plane, picture.angle_deg[1], columns, rows, dashed=True)
     numbers = f"{'1'.center(columns)}    {'2'.center(columns)}"
-    return [f"{a}    {b}".rstrip() for a, b in zip(left, right, strict=True)] + [numbers.rstrip()]
+    return [f"{a}    {b}".rstrip() for a, b in zip(first_lines, second_lines, strict=True)] + [numbers.rstrip()]
 
 
 @lru_cache(maxsize=64)
@@ -50,22 +50,22 @@ def draw_large_direction(picture: DirectionPicture, number: int, columns: int, r
     """One direction (1 or 2) as large as fits into columns x rows characters: a thick segment with an arrowhead at both
     ends; 1 solid, 2 dashed."""
     canvas = Canvas(columns, rows)
-    right, up = _on_screen(picture.plane, picture.angle_deg[number - 1])
+    unit_right, unit_up = _on_screen(picture.plane, picture.angle_deg[number - 1])
     x, y = canvas.middle
     reach = _half_length(picture, x, y)
     thick = max(2.5, reach / 8)
     head = 2.6 * thick
     shaft = reach - head
 
-    def at(along: float, across: float = 0.0) -> tuple[float, float]:
+    def canvas_point(distance: float, offset: float = 0.0) -> tuple[float, float]:
         # Point of the canvas from coordinates along and across the segment; y of the canvas points downwards.
-        return x + along * right + across * up, y - along * up + across * right
+        return x + distance * unit_right + offset * unit_up, y - distance * unit_up + offset * unit_right
 
     for side in (-1, 1):
         base = side * shaft
-        canvas.fill((at(side * reach), at(base, 1.5 * thick), at(base, -1.5 * thick)))
-    for begin, end in ((-shaft, shaft),) if number == 1 else _dash_ends(shaft, 2.2 * thick, 1.1 * thick):
-        canvas.stroke(at(begin), at(end), thick)
+        canvas.fill((canvas_point(side * reach), canvas_point(base, 1.5 * thick), canvas_point(base, -1.5 * thick)))
+    for dash_start, dash_end in ((-shaft, shaft),) if number == 1 else _dash_ends(shaft, 2.2 * thick, 1.1 * thick):
+        canvas.stroke(canvas_point(dash_start), canvas_point(dash_end), thick)
     return tuple(canvas.lines())
 
 
@@ -73,8 +73,8 @@ def _half_length(picture: DirectionPicture, x: float, y: float) -> float:
     """Half length of a segment in dots, the same for both directions, so that neither looks stronger. x, y: half width
     and half height of the canvas."""
     sides = [_on_screen(picture.plane, angle) for angle in picture.angle_deg]
-    fits = min(min(x / max(abs(right), 1e-9), y / max(abs(up), 1e-9)) for right, up in sides)
-    return min(fits, 1.25 * min(x, y))
+    longest = min(min(x / max(abs(unit_right), 1e-9), y / max(abs(unit_up), 1e-9)) for unit_right, unit_up in sides)
+    return min(longest, 1.25 * min(x, y))
 
 
 def _dash_ends(half_length: float, dash: float, gap: float) -> list[tuple[float, float]]:
@@ -82,21 +82,21 @@ def _dash_ends(half_length: float, dash: float, gap: float) -> list[tuple[float,
     ends. dash, gap: desired lengths, stretched so that a whole number of dashes fits."""
     count = max(1, round((2 * half_length - gap) / (dash + gap)))
     stretch = 2 * half_length / (count * dash + (count + 1) * gap)
-    begins = [-half_length + stretch * (gap + i * (dash + gap)) for i in range(count)]
-    return [(begin, begin + stretch * dash) for begin in begins]
+    starts = [-half_length + stretch * (gap + i * (dash + gap)) for i in range(count)]
+    return [(start, start + stretch * dash) for start in starts]
 
 
 def _draw_direction(plane: str, angle_deg: float, columns: int, rows: int, dashed: bool) -> list[str]:
     """Lines of text with a thin segment, with two barbs at each end."""
     canvas = Canvas(columns, rows)
-    right, up = _on_screen(plane, angle_deg)
+    unit_right, unit_up = _on_screen(plane, angle_deg)
     cx, cy = (canvas.width - 1) / 2, (canvas.height - 1) / 2
     reach = 0.95 * min(cx, cy)
-    start, end = (cx - reach * right, cy + reach * up), (cx + reach * right, cy - reach * up)
+    start, end = (cx - reach * unit_right, cy + reach * unit_up), (cx + reach * unit_right, cy - reach * unit_up)
     canvas.line(start, end, dashed)
     for tip, turn in ((start, 180.0), (end, 0.0)):
         for spread in (150.0, -150.0):
-            heading = math.degrees(math.atan2(up, right)) + turn + spread
+            heading = math.degrees(math.atan2(unit_up, unit_right)) + turn + spread
             h = math.radians(heading)
             barb = (tip[0] + 5 * math.cos(h), tip[1] - 5 * math.sin(h))
             canvas.line(tip, barb)
@@ -114,8 +114,8 @@ def _end_text(plane: str, angle_deg: float, words: Words) -> str:
     """One end of a direction in words; a component of at most 0.2 (about 11.5 degrees) is not mentioned."""
     (first_plus, first_minus), (second_plus, second_minus) = ENDS[plane]
     c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
-    along_second = words[second_plus if s > 0 else second_minus]
-    along_first = words[first_plus if c > 0 else first_minus]
+    second_word = words[second_plus if s > 0 else second_minus]
+    first_word = words[first_plus if c > 0 else first_minus]
     if abs(s) > 0.2 and abs(c) > 0.2:
-        return words.fill("end_both", {"first": along_second, "second": along_first})
-    return along_second if abs(s) > 0.2 else along_first
+        return words.fill("end_both", {"first": second_word, "second": first_word})
+    return second_word if abs(s) > 0.2 else first_word

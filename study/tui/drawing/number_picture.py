@@ -20,7 +20,7 @@ def large_number(number: int, columns: int, rows: int) -> tuple[str, ...]:
     x, y = canvas.middle
     thick = max(2.5, y / 5)
     reach = min(x, y) - thick / 2
-    corners = [(x + reach * right, y - reach * up) for right, up in _STROKES[number]]
+    corners = [(x + reach * corner_right, y - reach * corner_up) for corner_right, corner_up in _STROKES[number]]
     for start, end in pairwise(corners):
         canvas.stroke(start, end, thick)
     for corner in corners:

@@ -10,9 +10,9 @@ import math
 from study.session.views.archive_views import Staircase
 from study.tui.drawing.braille import Canvas
 
-RIGHT, WRONG, PEAK, VALLEY = "○", "×", "▼", "▲"
+RIGHT_MARK, WRONG_MARK, PEAK_MARK, VALLEY_MARK = "○", "×", "▼", "▲"
 """Marks of a right and a wrong answer, and of an upper and a lower reversal."""
-LEGEND = f"{RIGHT} right  {WRONG} wrong  {PEAK} peak  {VALLEY} valley  ┄ cap  ··· threshold"
+LEGEND = f"{RIGHT_MARK} right  {WRONG_MARK} wrong  {PEAK_MARK} peak  {VALLEY_MARK} valley  ┄ cap  ··· threshold"
 """Meaning of the marks, in one line."""
 
 LABEL_COLUMNS = 8
@@ -24,7 +24,7 @@ _DOTS_PER_TRIAL = 4.0
 where they fit."""
 _DOTTED = 4
 """Distance between the dots of the threshold line, in dots of the canvas."""
-_FIRST = (RIGHT, WRONG, VALLEY, PEAK)
+_FIRST = (RIGHT_MARK, WRONG_MARK, VALLEY_MARK, PEAK_MARK)
 """Marks by rising priority: of several trials in a character cell, the mark with the highest priority is shown."""
 
 
@@ -47,37 +47,37 @@ def staircase_lines(staircase: Staircase, columns: int, rows: int) -> tuple[str,
     if staircase.threshold_n is not None:
         for x in range(0, canvas.width, _DOTTED):
             canvas.dot(x, round(height(staircase.threshold_n)))
-    dots = [(place * pitch, height(level)) for place, level in enumerate(staircase.levels_n)]
+    dots = [(index * pitch, height(level)) for index, level in enumerate(staircase.levels_n)]
     for start, end in itertools.pairwise(dots):
         canvas.line(start, (end[0], start[1]))
         canvas.line((end[0], start[1]), end)
     labels = {0: staircase.cap_n, canvas.rows - 1: lowest_n}
     if staircase.threshold_n is not None:
         labels[round(height(staircase.threshold_n)) // 4] = staircase.threshold_n
-    drawn = _with_marks(canvas.lines(), dots, staircase)
-    lines = [f"{_label(labels.get(row)):>{LABEL_COLUMNS - 1}} {text}".rstrip() for row, text in enumerate(drawn)]
+    marked_lines = _with_marks(canvas.lines(), dots, staircase)
+    lines = [f"{_label(labels.get(row)):>{LABEL_COLUMNS - 1}} {text}".rstrip() for row, text in enumerate(marked_lines)]
     return (*lines, _trials(len(staircase.levels_n), round(dots[-1][0]) // 2))
 
 
 def summary(staircase: Staircase) -> str:
     """The run in one sentence: trials, right answers, reversals, and the threshold (N) if there is one."""
     turns = sum(staircase.reversals)
-    right = sum(staircase.correct)
-    counted = f"{len(staircase.levels_n)} trials, {right} right, {turns} reversals"
+    right_answers = sum(staircase.correct)
+    counts_text = f"{len(staircase.levels_n)} trials, {right_answers} right, {turns} reversals"
     if staircase.threshold_n is None:
-        return f"{counted}."
-    return f"{counted}; threshold {staircase.threshold_n:.3f} N."
+        return f"{counts_text}."
+    return f"{counts_text}; threshold {staircase.threshold_n:.3f} N."
 
 
 def _with_marks(lines: list[str], dots: list[tuple[float, float]], staircase: Staircase) -> list[str]:
     """The lines with the mark of each trial in the character cell of its dot (x, y)."""
     cells = [list(line) for line in lines]
-    shown: dict[tuple[int, int], str] = {}
-    for place, (x, y) in enumerate(dots):
-        mark = _mark(staircase.correct[place], staircase.reversals[place])
+    marks_by_cell: dict[tuple[int, int], str] = {}
+    for index, (x, y) in enumerate(dots):
+        mark = _mark(staircase.correct[index], staircase.reversals[index])
         cell = (min(max(round(y) // 4, 0), len(cells) - 1), round(x) // 2)
-        if cell not in shown or _FIRST.index(mark) >= _FIRST.index(shown[cell]):
-            shown[cell] = cells[cell[0]][cell[1]] = mark
+        if cell not in marks_by_cell or _FIRST.index(mark) >= _FIRST.index(marks_by_cell[cell]):
+            marks_by_cell[cell] = cells[cell[0]][cell[1]] = mark
     return ["".join(row) for row in cells]
 
 
@@ -85,8 +85,8 @@ def _mark(correct: bool, reversal: bool) -> str:
     """Mark of a trial. A reversal at a right answer is a peak, because the level falls from there; at a wrong answer it
     is a valley."""
     if reversal:
-        return PEAK if correct else VALLEY
-    return RIGHT if correct else WRONG
+        return PEAK_MARK if correct else VALLEY_MARK
+    return RIGHT_MARK if correct else WRONG_MARK
 
 
 def _label(level_n: float | None) -> str:

@@ -19,7 +19,7 @@ from typing import IO
 
 from study.errors import ExitCode
 from study.tui.engine.child_process import start_child
-from study.tui.engine.from_engine import ErrorText, Failed, FromEngine, Opened
+from study.tui.engine.from_engine import ErrorText, Failed, FromEngine, SessionReady
 from study.tui.engine.to_engine import Heartbeat, ToEngine
 
 CLOSING_S = 6.0
@@ -36,7 +36,7 @@ class EngineClient:
         self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection | None = None
         self._closing = False
-        self._opened: Opened | None = None
+        self._session: SessionReady | None = None
         self.dead = False
         """Whether the engine could not be started or ended without `close`; a new client can then be started."""
         self._thread = threading.Thread(target=self._run_thread, name="engine-client", daemon=True)
@@ -88,15 +88,15 @@ class EngineClient:
             connection.close()
             if not self._closing:
                 self.dead = True
-                self._deliver(_death(code, _last_words(output), self._opened))
+                self._deliver(_death(code, _last_words(output), self._session))
 
     def _read(self, connection: Connection) -> None:
         """Deliver messages until the pipe ends or a message cannot be decoded."""
         try:
             while True:
                 message: FromEngine = connection.recv()
-                if isinstance(message, Opened):
-                    self._opened = message
+                if isinstance(message, SessionReady):
+                    self._session = message
                 self._deliver(message)
         except (EOFError, OSError):
             return
@@ -124,9 +124,9 @@ def _code_at_end(process: "subprocess.Popen[bytes]") -> int:
 
 def _not_started(problem: OSError) -> Failed:
     """Message for an engine process that the system refused to start."""
-    happened = f"The system refused to start the process that drives the device: {problem.strerror or problem}."
-    do_now = "Close other programs, or start the computer anew, and begin again."
-    return Failed(ErrorText("The device program cannot be started", happened, "", do_now, int(ExitCode.ERROR)))
+    explanation = f"The system refused to start the process that drives the device: {problem.strerror or problem}."
+    advice = "Close other programs, or start the computer anew, and begin again."
+    return Failed(ErrorText("The device program cannot be started", explanation, "", advice, int(ExitCode.ERROR)))
 
 
 def _last_words(output: IO[bytes]) -> str:
@@ -136,16 +136,16 @@ def _last_words(output: IO[bytes]) -> str:
     return lines[-1].strip() if lines else ""
 
 
-def _death(code: int, last_words: str, opened: Opened | None) -> Failed:
-    """Message for an engine that ended unexpectedly. code: exit code, negative for a signal. opened: the session that
+def _death(code: int, last_words: str, session: SessionReady | None) -> Failed:
+    """Message for an engine that ended unexpectedly. code: exit code, negative for a signal. session: the session that
     can be resumed, if any."""
-    how = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
-    happened = f"The process that drives the device ended {how}."
+    end_text = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
+    explanation = f"The process that drives the device ended {end_text}."
     if last_words:
-        happened += f" Its last words: {last_words}"
-    do_now = "Take the hand off the handle until you know that no force is on."
-    if opened is not None:
-        do_now += f" Then continue with: hapteq resume {opened.path}"
-    saved = "Every answer that was given is on disk." if opened is not None else ""
-    text = ErrorText("The device program ended", happened, saved, do_now, int(ExitCode.DEVICE))
-    return Failed(text, opened.path if opened is not None else "")
+        explanation += f" Its last words: {last_words}"
+    advice = "Take the hand off the handle until you know that no force is on."
+    if session is not None:
+        advice += f" Then continue with: hapteq resume {session.path}"
+    saved = "Every answer that was given is on disk." if session is not None else ""
+    text = ErrorText("The device program ended", explanation, saved, advice, int(ExitCode.DEVICE))
+    return Failed(text, session.path if session is not None else "")

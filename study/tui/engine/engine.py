@@ -104,9 +104,9 @@ class Engine:
 
     def _fail(self, error: StudyError, exit_code: ExitCode) -> None:
         """Send an error to the screen, with the path of the session that can be resumed, if there is one."""
-        opened = self._commands.opened if self._commands is not None else None
+        session_folder = self._commands.session_folder if self._commands is not None else None
         # A withdrawn session cannot be resumed.
-        path = str(opened.path) if opened is not None and not opened.withdrawn else ""
+        path = str(session_folder.path) if session_folder is not None and not session_folder.withdrawn else ""
         text = ErrorText(error.title, error.happened, error.saved, error.do_now, int(exit_code))
         self._link.send(Failed(text, path))
 

@@ -14,25 +14,25 @@ from pathlib import Path
 from protocols.wording.words import Words
 from study.devices.clock import RealClock
 from study.devices.device import Device
-from study.devices.opening import calibrate_accelerometer, keep_accelerometer, lab_file_path
+from study.devices.opening import calibrate_accelerometer, lab_file_path, save_accelerometer_calibration
 from study.errors import StudyError, WrongUseError
 from study.local_clock import machine_zone
 from study.session.views.archive_views import HomeView
-from study.session.views.forms import words_of
+from study.session.views.forms import make_words
 from study.store.disk.privacy import data_folder_warning
 from study.store.sessions.archive import SessionFolder, find_session
 from study.tui.engine.from_engine import (
     Calibrated,
+    CalibrationStored,
     Diagnosis,
     Finished,
     Home,
     LayDown,
-    Opened,
     ParticipantWords,
     Preparing,
     Results,
-    SensorKept,
     Session,
+    SessionReady,
     Trouble,
     Withdrawn,
     Working,
@@ -42,7 +42,7 @@ from study.tui.engine.screen_link import ScreenLink
 from study.tui.engine.to_engine import (
     Analyze,
     AskOtherSession,
-    Begin,
+    BeginSession,
     CalibrateSensor,
     Command,
     Diagnose,
@@ -62,8 +62,8 @@ from study.workflows.session.end_sitting import end_sitting, finish_closed
 from study.workflows.session.plan_sitting import plan_sitting
 from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, withdraw
 from study.workflows.trial.display import PersonsHand
-from study.workflows.views.list_sessions import home_view, model_words, protocol_line
 from study.workflows.views.send_request import send_request
+from study.workflows.views.view_home import home_view, model_words, protocol_line
 from study.workflows.views.view_session import session_view
 
 REPLY_S = 0.5
@@ -74,25 +74,25 @@ CALIBRATION_STOPPED = StudyError("The calibration was stopped", "", "Begin it ag
 
 
 class EngineCommands:
-    """Performs the commands of one screen. `opened`: the session that the current command has opened and not finished,
-    which can be resumed; None without such a session."""
+    """Performs the commands of one screen. `session_folder`: the session that the current command has opened and not
+    finished, which can be resumed; None without such a session."""
 
     def __init__(self, link: ScreenLink) -> None:
         self._link = link
         self._clock = RealClock()
-        self.opened: SessionFolder | None = None
+        self.session_folder: SessionFolder | None = None
 
     def perform(self, command: Command) -> None:
         """Perform one command. Raises StudyError where it fails, KeyboardInterrupt where the user interrupts."""
-        self.opened = None
+        self.session_folder = None
         # An interruption that came after the command was sent, but before it was begun, takes effect here.
         if self._link.taken_is_let_go:
             raise KeyboardInterrupt
         match command:
             case ShowHome() | ShowSession() | ShowDiagnosis():
                 self._link.send(_read_view(command))
-            case Begin(order=order):
-                self._begin(order)
+            case BeginSession(order=order):
+                self._begin_session(order)
             case Resume():
                 self._resume(command)
             case Analyze(session=session):
@@ -108,21 +108,21 @@ class EngineCommands:
             case AskOtherSession(session=session, request=request):
                 send_request(SessionFolder(Path(session)), request, self._clock)
 
-    def _begin(self, order: SessionOrder) -> None:
+    def _begin_session(self, order: SessionOrder) -> None:
         """Plan and conduct a new session."""
         model = Path(order.model) if order.model else None
         plan = plan_sitting(order.protocol, order.subject, None, order.seed, Path(order.data), model)
         for note in plan.notes:
             self._link.send(Trouble(note))
-        words = words_of(plan.session.protocol)
+        words = make_words(plan.session.protocol)
         self._conduct_sitting(words, lambda participant: conduct_new(plan.session, order.device, participant))
 
     def _resume(self, command: Resume) -> None:
         """Continue a session, or write the missing results of a closed one. Raises WrongUseError for a session of a
         simulated participant."""
         folder = find_session(command.session, Path(command.data))
-        folded = fold_session(folder)
-        observer = folded.state.opened.observer
+        folded_session = fold_session(folder)
+        observer = folded_session.state.opened.observer
         if observer is not None:
             raise WrongUseError(
                 "This session belongs to a simulated participant",
@@ -130,14 +130,14 @@ class EngineCommands:
                 f"Continue it with: hapteq resume {folder.path}",
                 saved="Nothing was changed.",
             )
-        if still_open := data_folder_warning(folder.path.parent):
-            self._link.send(Trouble(still_open))
-        if folded.state.closed:
+        if folder_warning := data_folder_warning(folder.path.parent):
+            self._link.send(Trouble(folder_warning))
+        if folded_session.state.closed:
             self._link.send(Preparing("Making the tables and the report."))
-            written = finish_closed(folder, folded)
-            self._link.send(Finished(str(folder.path), folded.state.answers, _results(written)))
+            analysis = finish_closed(folder, folded_session)
+            self._link.send(Finished(str(folder.path), folded_session.state.answers, _results(analysis)))
             return
-        words = words_of(folded.state.protocol)
+        words = make_words(folded_session.state.protocol)
         self._conduct_sitting(words, lambda participant: conduct_resumed(folder, command.device, participant))
 
     def _conduct_sitting(self, words: Words, conduct: Callable[[Participant], ConductedSitting]) -> None:
@@ -147,11 +147,11 @@ class EngineCommands:
         with self._participant() as participant:
             end = conduct(participant)
         if end.state.closed:
-            self.opened = None  # a closed session cannot be resumed
-        if not end.left:
+            self.session_folder = None  # a closed session cannot be resumed
+        if not end.end_reason:
             self._link.send(Preparing(words["preparing_report"]))
-        written = end_sitting(end, self._clock.utc())
-        self._link.send(Finished(str(end.folder.path), end.state.answers, _results(written)))
+        analysis = end_sitting(end, self._clock.utc())
+        self._link.send(Finished(str(end.folder.path), end.state.answers, _results(analysis)))
 
     @contextlib.contextmanager
     def _participant(self) -> Iterator[Participant]:
@@ -166,50 +166,50 @@ class EngineCommands:
 
     def _report_requests(self, folder: SessionFolder, device: Device) -> None:
         """Called when session and device are open: the screen's requests and its emergency stop reach them."""
-        self.opened = folder
+        self.session_folder = folder
         self._link.stop_device = device.stop
-        self._link.send(Opened(folder.name, str(folder.path)))
+        self._link.send(SessionReady(folder.name, str(folder.path)))
 
     def _withdraw(self, folder: SessionFolder) -> None:
         """Erase the participant's sessions, and name copies that may exist elsewhere."""
         data, plan = folder.path.parent, plan_withdrawal(folder)
-        elsewhere = copies_elsewhere(data, plan)
+        external_copies = copies_elsewhere(data, plan)
         withdraw(data, plan, self._clock.utc())
-        for sentence in (*plan.doubtful, *elsewhere):
+        for sentence in (*plan.doubtful, *external_copies):
             self._link.send(Trouble(sentence))
         self._link.send(Withdrawn(plan.sessions))
 
-    def _diagnose(self, wanted: Diagnose) -> None:
+    def _diagnose(self, command: Diagnose) -> None:
         """Diagnose recordings, with progress, and send the result."""
         # Imported here, because compilers and solvers take long to load.
         from study.workflows.diagnosis.diagnose_at_screen import diagnose_at_screen, free_out
         from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan
 
         self._link.send(Working("getting ready", 0.0))
-        sources = tuple(Path(source) for source in wanted.sources)
-        out = Path(wanted.out) if wanted.out else free_out(sources[0])
-        model, clean = Path(wanted.model) if wanted.model else None, tuple(Path(each) for each in wanted.clean)
-        plan = DiagnosePlan(sources, out, model, clean=clean)
-        written = diagnose_at_screen(plan, lambda what, share: self._link.send(Working(what, share)))
-        self._link.send(_diagnosis(written))
+        sources = tuple(Path(source) for source in command.sources)
+        out_folder = Path(command.out) if command.out else free_out(sources[0])
+        model, clean = Path(command.model) if command.model else None, tuple(Path(path) for path in command.clean)
+        plan = DiagnosePlan(sources, out_folder, model, clean=clean)
+        document_path = diagnose_at_screen(plan, lambda step, share: self._link.send(Working(step, share)))
+        self._link.send(_diagnosis(document_path))
 
-    def _calibrate(self, wanted: CalibrateSensor | KeepSensor) -> None:
+    def _calibrate(self, command: CalibrateSensor | KeepSensor) -> None:
         """Calibrate the accelerometer with instructions on the screen, or store a calibration. Raises
         CALIBRATION_STOPPED where the user interrupts."""
-        if isinstance(wanted, KeepSensor):
-            self._link.send(SensorKept(str(keep_accelerometer(wanted.table))))
+        if isinstance(command, KeepSensor):
+            self._link.send(CalibrationStored(str(save_accelerometer_calibration(command.table))))
             return
         number = itertools.count(1)
         self._link.forget_replies()
 
-        def lay_down(position: str, heard: tuple[float, float, float] | None) -> None:
-            asked = LayDown(next(number), position, heard)
-            self._link.send(asked)
-            while (reply := self._link.reply(REPLY_S)) is None or reply.number != asked.number:
+        def lay_down(position: str, readings: tuple[float, float, float] | None) -> None:
+            request = LayDown(next(number), position, readings)
+            self._link.send(request)
+            while (reply := self._link.reply(REPLY_S)) is None or reply.number != request.number:
                 pass
 
         try:
-            table = calibrate_accelerometer(wanted.port, wanted.baud, lay_down)
+            table = calibrate_accelerometer(command.port, command.baud, lay_down)
         except KeyboardInterrupt:
             if self._link.ended:
                 raise
@@ -235,23 +235,23 @@ def _diagnosis(path: Path) -> Diagnosis:
     return Diagnosis(diagnosis_view(path))
 
 
-def _home_view(wanted: ShowHome) -> HomeView:
+def _home_view(command: ShowHome) -> HomeView:
     """Content of the start screen, with the protocol, device and model of the command line first in their lists."""
-    view = home_view(Path(wanted.data))
-    line = protocol_line(wanted.protocol, Path(wanted.data)) if wanted.protocol else None
-    protocols = (line, *(other for other in view.protocols if other.name != line.name)) if line else view.protocols
-    devices = tuple(sorted(view.devices, key=lambda name: name != wanted.device))
-    models = (wanted.model, *(name for name in view.models if name != wanted.model)) if wanted.model else view.models
-    known = dict(view.qualities)
-    qualities = tuple((model, known.get(model) or model_words(model)) for model in models)
+    view = home_view(Path(command.data))
+    line = protocol_line(command.protocol, Path(command.data)) if command.protocol else None
+    protocols = (line, *(listed for listed in view.protocols if listed.name != line.name)) if line else view.protocols
+    devices = tuple(sorted(view.devices, key=lambda name: name != command.device))
+    models = (command.model, *(name for name in view.models if name != command.model)) if command.model else view.models
+    known_qualities = dict(view.qualities)
+    qualities = tuple((model, known_qualities.get(model) or model_words(model)) for model in models)
     return replace(view, protocols=protocols, devices=devices, models=models, qualities=qualities)
 
 
-def _results(written: WrittenAnalysis) -> Results:
+def _results(analysis: WrittenAnalysis) -> Results:
     """The written analysis as a message, with thresholds and warnings as JSON text too."""
     document = {
-        "thresholds": [asdict(threshold) for threshold in written.thresholds],
-        "warnings": list(written.warnings),
-        "report": str(written.report),
+        "thresholds": [asdict(threshold) for threshold in analysis.thresholds],
+        "warnings": list(analysis.warnings),
+        "report": str(analysis.report),
     }
-    return Results(written.table, written.warnings, str(written.report), json.dumps(document, indent=2))
+    return Results(analysis.table, analysis.warnings, str(analysis.report), json.dumps(document, indent=2))

@@ -32,12 +32,12 @@ class Call(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """Request to show a screen and to send its reply. shown: the argument of the method of the display port."""
+    """Request to show a screen and to send its reply. content: the argument of the method of the display port."""
 
     number: int
     """Number of the request, from 1 within a sitting; the reply has the same number."""
     call: Call
-    shown: Any
+    content: Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class LookUpdate:
 
 
 @dataclass(frozen=True, slots=True)
-class Close:
+class CloseRequest:
     """The request of this number has ended: no reply is needed, and its screen can be closed."""
 
     number: int
@@ -108,7 +108,7 @@ class Preparing:
 class Working:
     """Progress of a diagnosis: current step, and share of the work that is done (0 to 1)."""
 
-    what: str
+    step: str
     share: float
 
 
@@ -120,7 +120,7 @@ class LayDown:
     """Number of the position, from 1; the reply has the same number."""
     position: str
     """The position in words."""
-    heard: tuple[float, float, float] | None
+    previous_reading: tuple[float, float, float] | None
     """Mean raw readings of the three axes in the previous position; None before the first."""
 
 
@@ -135,14 +135,14 @@ class Calibrated:
 
 
 @dataclass(frozen=True, slots=True)
-class SensorKept:
+class CalibrationStored:
     """The calibration was written to this file."""
 
     file: str
 
 
 @dataclass(frozen=True, slots=True)
-class Opened:
+class SessionReady:
     """The session and its device are open: its log has its first line and is locked."""
 
     session: str
@@ -205,7 +205,7 @@ class Failed:
 FromEngine = (
     Ask
     | LookUpdate
-    | Close
+    | CloseRequest
     | Feedback
     | Trouble
     | Home
@@ -216,8 +216,8 @@ FromEngine = (
     | Working
     | LayDown
     | Calibrated
-    | SensorKept
-    | Opened
+    | CalibrationStored
+    | SessionReady
     | Finished
     | Withdrawn
     | Failed

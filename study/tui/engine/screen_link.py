@@ -19,13 +19,15 @@ from study.workflows.trial.requests_port import QueuedRequests
 class ScreenLink:
     """Sends messages to the screen and distributes those from it.
 
-    interrupt: raises KeyboardInterrupt in the main thread if a command runs. gone: called last, when the screen's
-    process has ended. Both are called from the reading thread.
+    interrupt: raises KeyboardInterrupt in the main thread if a command runs. on_screen_ended: called last, when the
+    screen's process has ended. Both are called from the reading thread.
     """
 
-    def __init__(self, connection: Connection, interrupt: Callable[[], None], gone: Callable[[], None]) -> None:
+    def __init__(
+        self, connection: Connection, interrupt: Callable[[], None], on_screen_ended: Callable[[], None]
+    ) -> None:
         self._commands: SimpleQueue[Command | None] = SimpleQueue()
-        self._heard, self._taken, self._let_go_up_to = 0, 0, 0
+        self._received, self._taken_count, self._let_go_up_to = 0, 0, 0
         """Numbers of commands received, taken by the main thread, and received before the last interruption. They are
         needed because an interrupted command may not have been begun or taken yet."""
         self.requests = QueuedRequests()
@@ -35,7 +37,7 @@ class ScreenLink:
         """Whether the screen's process has ended, or the engine shall end."""
         self._connection = connection
         self._interrupt = interrupt
-        self._gone = gone
+        self._on_screen_ended = on_screen_ended
         self._replies: SimpleQueue[Reply] = SimpleQueue()
         self._sending = threading.Lock()
         self._heard_s = time.monotonic()
@@ -57,7 +59,7 @@ class ScreenLink:
     def next_command(self) -> Command | None:
         """Wait for the next command; None if the screen's process has ended."""
         command = self._commands.get()
-        self._taken += 1
+        self._taken_count += 1
         return command
 
     @property
@@ -68,7 +70,7 @@ class ScreenLink:
     @property
     def taken_is_let_go(self) -> bool:
         """Whether the user interrupted (`LetGo`) after sending the command that was taken last."""
-        return self._taken <= self._let_go_up_to
+        return self._taken_count <= self._let_go_up_to
 
     def reply(self, patience_s: float) -> Reply | None:
         """The next reply, of any number; None if no reply came within `patience_s` (s). Raises KeyboardInterrupt if the
@@ -104,7 +106,7 @@ class ScreenLink:
             try:
                 self._let_go()
             finally:
-                self._gone()
+                self._on_screen_ended()
 
     def _handle_message(self, message: ToEngine) -> None:
         """Put a message into the queue of its kind, or act on it at once (`LetGo`)."""
@@ -120,13 +122,13 @@ class ScreenLink:
             case LetGo():
                 self._let_go()
             case _:
-                self._heard += 1
+                self._received += 1
                 self._commands.put(message)
 
     def _let_go(self) -> None:
         """Interrupt the current command and take the force off. The interrupted main thread takes it off too, but it
         may be waiting for a disk or a driver."""
-        self._let_go_up_to = self._heard
+        self._let_go_up_to = self._received
         self._interrupt()
         if (stop := self.stop_device) is not None:
             stop()

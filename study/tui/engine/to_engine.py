@@ -57,7 +57,7 @@ class ShowDiagnosis:
 
 
 @dataclass(frozen=True, slots=True)
-class Begin:
+class BeginSession:
     """Begin a new session."""
 
     order: SessionOrder
@@ -162,7 +162,7 @@ Command = (
     ShowHome
     | ShowSession
     | ShowDiagnosis
-    | Begin
+    | BeginSession
     | Resume
     | Analyze
     | Withdraw

@@ -94,10 +94,10 @@ def feed(descriptor: int, session_path: str) -> None:
             return
 
 
-def _send_view(connection: Connection, what: WatchView | str) -> bool:
+def _send_view(connection: Connection, view_or_problem: WatchView | str) -> bool:
     """Send a view, or a problem as a sentence. False if the parent process has ended."""
     try:
-        connection.send(what)
+        connection.send(view_or_problem)
     except OSError:
         return False
     return True

@@ -16,9 +16,9 @@ class AnswerKeys:
     first: str = "1"
     second: str = "2"
 
-    def answer(self, typed: str) -> int | None:
+    def answer(self, character: str) -> int | None:
         """The answer 1 or 2 of a typed character; None for any other. The digits are always valid; case is ignored."""
-        key = typed.casefold()
+        key = character.casefold()
         if key in ("1", self.first):
             return 1
         return 2 if key in ("2", self.second) else None
@@ -53,10 +53,10 @@ def parse_keys(text: str) -> AnswerKeys:
     return AnswerKeys(first, second)
 
 
-def _refusal(why: str) -> WrongUseError:
-    """The error for invalid keys. why: the reason, a sentence without capital letter and full stop."""
+def _refusal(reason: str) -> WrongUseError:
+    """The error for invalid keys. reason: the reason, a sentence without capital letter and full stop."""
     return WrongUseError(
         "These answer keys cannot be used",
-        f"{why[0].upper()}{why[1:]}.",
+        f"{reason[0].upper()}{reason[1:]}.",
         f"Name two different characters, such as --keys f,j; not {' '.join(RESERVED)}. 1 and 2 work in any case.",
     )

@@ -3,8 +3,8 @@
 import re
 
 
-def key_name(shown: str) -> str:
-    """The name of a key or key combination, such as Shift+F4. shown: Textual's name, such as f5, shift+f4, esc or ^p.
-    Function keys and words are capitalised; single characters are unchanged."""
-    parts = shown.split("+") if len(shown) > 1 else [shown]
+def key_name(textual_name: str) -> str:
+    """The name of a key or key combination, such as Shift+F4. textual_name: Textual's name, such as f5, shift+f4, esc
+    or ^p. Function keys and words are capitalised; single characters are unchanged."""
+    parts = textual_name.split("+") if len(textual_name) > 1 else [textual_name]
     return "+".join(part.capitalize() if re.fullmatch(r"f\d+|[a-z]{2,}", part) else part for part in parts)

@@ -21,15 +21,15 @@ class KeyPresses:
     def __init__(self) -> None:
         self._last_s: dict[int, float] = {}
 
-    def is_press(self, answer: int, at_s: float, armed_s: float) -> bool:
+    def is_press(self, answer: int, event_s: float, armed_s: float) -> bool:
         """Whether an event is a press that may answer. False if it comes within `QUIET_S` of the event before, or may
-        be the first repetition of a key that was pressed before `armed_s`. at_s: time of the event (s); armed_s: time
-        from which answers count (s). Every event must be passed, also while no question is shown."""
+        be the first repetition of a key that was pressed before `armed_s`. event_s: time of the event (s); armed_s:
+        time from which answers count (s). Every event must be passed, also while no question is shown."""
         last_s = max(self._last_s.values(), default=float("-inf"))
-        same_s = self._last_s.get(answer, float("-inf"))
-        self._last_s[answer] = at_s
-        held = same_s < armed_s and at_s - same_s < FIRST_REPEAT_S
-        return at_s - last_s >= QUIET_S and not held
+        same_key_s = self._last_s.get(answer, float("-inf"))
+        self._last_s[answer] = event_s
+        is_repetition = same_key_s < armed_s and event_s - same_key_s < FIRST_REPEAT_S
+        return event_s - last_s >= QUIET_S and not is_repetition
 
 
 def arrival_s(event: Key) -> float:

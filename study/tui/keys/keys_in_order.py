@@ -44,42 +44,42 @@ class KeysInOrder:
         """Ignore keys that were pressed before now: they were meant for the screen before the one that is shown now."""
         self._ignored_until_s = time.monotonic()
 
-    async def take(self, event: Event) -> None:
+    async def handle_event(self, event: Event) -> None:
         """Take an event of the application: queue it if it is typed, else handle it at once. Called in the message
         loop."""
         if isinstance(event, Key) and event.key not in AT_ONCE and arrival_s(event) < self._ignored_until_s:
             # This includes a key that returns from a widget: it would now meet the bindings of another screen.
             return
-        if not _is_typed(event):
+        if not _is_user_input(event):
             await self._hand_on(event)
             return
         self._waiting.append(event)
         if self._settling is None:
-            await self._next()
+            await self._handle_next()
 
-    async def _next(self) -> None:
+    async def _handle_next(self) -> None:
         """Handle the next event of the queue that is not ignored, and begin to wait for its effects."""
         self._settling = None
         if self._waiting:
             event = self._waiting.popleft()
             if isinstance(event, Key) and arrival_s(event) < self._ignored_until_s:
-                await self._next()
+                await self._handle_next()
                 return
-            before = self._with_the_keyboard()
+            receivers = self._with_the_keyboard()
             await self._hand_on(event)
-            self._settling = asyncio.create_task(self._settle(before))
+            self._settling = asyncio.create_task(self._settle(receivers))
 
-    async def _settle(self, before: list[MessagePump]) -> None:
-        """Wait for the effects of an event, at most `LONGEST_WAIT_S`, then continue with the next. before: the chain of
-        widgets that received it; the focus may have moved since."""
+    async def _settle(self, receivers: list[MessagePump]) -> None:
+        """Wait for the effects of an event, at most `LONGEST_WAIT_S`, then continue with the next. receivers: the chain
+        of widgets that received it; the focus may have moved since."""
         try:
             async with asyncio.timeout(LONGEST_WAIT_S):
-                await _pass_through(before)
+                await _pass_through(receivers)
                 for _ in range(ROUNDS - 1):
                     await _pass_through(self._with_the_keyboard())
         except TimeoutError:
             pass
-        self._app.call_later(self._next)
+        self._app.call_later(self._handle_next)
 
     def _with_the_keyboard(self) -> list[MessagePump]:
         """The chain of nodes from the focused widget, or the screen, up to the application."""
@@ -88,7 +88,7 @@ class KeysInOrder:
         return list((self._app.focused or self._app.screen).ancestors_with_self)
 
 
-def _is_typed(event: Event) -> bool:
+def _is_user_input(event: Event) -> bool:
     """Whether the event is input of the user that must be serialised and was not forwarded to a widget before."""
     if isinstance(event, Key):
         return not event.is_forwarded and event.key not in AT_ONCE

@@ -13,7 +13,7 @@ from study.devices.clock import Clock
 from study.tui.line_mode.line_input import LineInput
 from study.workflows.trial.display import SignOfLife
 
-GLANCE_S = 0.05
+POLL_INTERVAL_S = 0.05
 """Interval of the signs of life (s): half of the 0.1 s that the display port allows (`display.SignOfLife`)."""
 LINE_WIDTH = 78
 """Characters per line: two less than the 80 columns of the narrowest usual terminal."""
@@ -45,9 +45,9 @@ class WaitOver(Enum):
 class Conversation:
     """Dialogue with the participant in lines of text, in the words of the protocol's language."""
 
-    def __init__(self, lines: LineInput, out: TextIO, clock: Clock, words: Words = ENGLISH_WORDS) -> None:
+    def __init__(self, lines: LineInput, output: TextIO, clock: Clock, words: Words = ENGLISH_WORDS) -> None:
         self._lines = lines
-        self._out = out
+        self._output = output
         self.clock = clock
         self.words = words
 
@@ -56,23 +56,23 @@ class Conversation:
         for text in sentences:
             # Lines of a drawing are never longer, so that only sentences are wrapped.
             lines = textwrap.wrap(text, LINE_WIDTH) if len(text) > LINE_WIDTH else [text]
-            self._out.write("\n".join(lines) + "\n")
-        self._out.flush()
+            self._output.write("\n".join(lines) + "\n")
+        self._output.flush()
 
-    def speak(self, *keys: str) -> None:
+    def say_texts(self, *keys: str) -> None:
         """Write the texts with these keys, each on a line of its own."""
         self.say(*(self.words[key] for key in keys))
 
     def refuse(self, key: str, line: Line) -> None:
         """Write that a line was not understood. key: of the text, which quotes the line."""
-        self.say(self.words.fill(key, {"typed": shown(line, self.words)}))
+        self.say(self.words.fill(key, {"typed": quote_line(line, self.words)}))
 
     def prompt(self, text: str) -> None:
         """Write a text without a line end, so that the answer is typed after it."""
-        self._out.write(text)
-        self._out.flush()
+        self._output.write(text)
+        self._output.flush()
 
-    def forget(self) -> None:
+    def discard_early_lines(self) -> None:
         """Drop lines that were typed before the question; lines of a pipe are kept."""
         self._lines.forget()
 
@@ -81,7 +81,7 @@ class Conversation:
         the sign of life ends the wait, a line that arrives at the same time does not count."""
         while True:
             try:
-                text = self._lines.read(GLANCE_S)
+                text = self._lines.read(POLL_INTERVAL_S)
             except EOFError:
                 return WaitOver.INPUT_ENDED
             now_s = self.clock.now_s()
@@ -128,10 +128,10 @@ def printable(text: str) -> str:
     return "".join(c for c in text if c.isprintable()).strip()
 
 
-def shown(line: Line, words: Words = ENGLISH_WORDS) -> str:
+def quote_line(line: Line, words: Words = ENGLISH_WORDS) -> str:
     """The typed line as quoted in a sentence, with at most 20 characters; words for an empty line."""
-    plain = printable(line.text)[:20]
-    return f"'{plain}'" if plain else words["line_enter_alone"]
+    quoted = printable(line.text)[:20]
+    return f"'{quoted}'" if quoted else words["line_enter_alone"]
 
 
 def _keep_waiting() -> bool:

@@ -14,7 +14,7 @@ class LineInput:
     def __init__(self, descriptor: int | None = None) -> None:
         self._descriptor = sys.stdin.fileno() if descriptor is None else descriptor
         self._pending = b""
-        self._over = False
+        self._at_end = False
         self.interactive = os.isatty(self._descriptor)
 
     def read(self, timeout_s: float) -> str | None:
@@ -35,7 +35,7 @@ class LineInput:
 
     def has_ended(self) -> bool:
         """Whether the input has ended and no line is left. Does not wait, and consumes no line."""
-        while b"\n" not in self._pending and not self._over:
+        while b"\n" not in self._pending and not self._at_end:
             if not select.select([self._descriptor], [], [], 0.0)[0]:
                 return False
             self._read_available()
@@ -53,9 +53,9 @@ class LineInput:
     def _read_available(self) -> bool:
         """Read the available bytes into the buffer. False at the end of the input."""
         data = os.read(self._descriptor, 4096)
-        self._over = not data
+        self._at_end = not data
         self._pending += data
-        return not self._over
+        return not self._at_end
 
     def _line_is_left(self) -> bool:
         """Whether a line is left at the end of the input. The last one of a pipe needs no line end, as for other
@@ -64,8 +64,8 @@ class LineInput:
 
     def _take_line(self) -> str | None:
         """Remove the first whole line from the buffer; None if there is none."""
-        line, newline, rest = self._pending.partition(b"\n")
+        line, newline, remainder = self._pending.partition(b"\n")
         if not newline:
             return None
-        self._pending = rest
+        self._pending = remainder
         return line.decode("utf-8", errors="replace").strip()

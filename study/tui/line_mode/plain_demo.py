@@ -6,30 +6,30 @@ from protocols.wording.words import Words
 from study.session.views.views import DemoChoice, DemoDone, DemoMenu, HandleView, PlayDemo, PlayingNotice, Unanswered
 from study.tui.drawing.direction_picture import ends
 from study.tui.keys.answer_keys import AnswerKeys
-from study.tui.line_mode.conversation import GLANCE_S, Conversation, WaitOver
-from study.tui.line_mode.plain_question import LEFT
+from study.tui.line_mode.conversation import POLL_INTERVAL_S, Conversation, WaitOver
+from study.tui.line_mode.plain_question import PARTICIPANT_LEFT
 from study.tui.trial_replies import PAUSE
-from study.tui.trial_words import felt_so_far
+from study.tui.trial_words import describe_felt
 from study.workflows.trial.display import SignOfLife
 
 SAY_AGAIN_S = 1.0
 """Shortest interval between two sentences on the handle (s), so that a screen reader can finish each sentence."""
 
-CUT_SHORT = Unanswered(WaitOver.CUT_SHORT.value, leave=False)
+CUT_SHORT = Unanswered(WaitOver.CUT_SHORT.value, ends_sitting=False)
 """Reply if the sign of life ended the wait."""
-INPUT_ENDED = Unanswered(WaitOver.INPUT_ENDED.value, leave=True)
+INPUT_ENDED = Unanswered(WaitOver.INPUT_ENDED.value, ends_sitting=True)
 """Reply at the end of the input."""
 
 
-def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> DemoChoice:
+def choose_demo(menu: DemoMenu, conversation: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> DemoChoice:
     """Let the participant choose a vibration (n, b) and a direction to play; Enter ends the demonstration. Raises
     KeyboardInterrupt when the participant leaves, or at the end of the input."""
-    talk.forget()
+    conversation.discard_early_lines()
     vibration = menu.vibration
-    talk.say("", _place_text(menu, vibration, talk.words))
+    conversation.say("", _place_text(menu, vibration, conversation.words))
     while True:
-        talk.prompt(talk.words.fill("line_demo_prompt", {"keys": keys.choice(talk.words)}))
-        line = talk.wait(sign_of_life)
+        conversation.prompt(conversation.words.fill("line_demo_prompt", {"keys": keys.choice(conversation.words)}))
+        line = conversation.wait(sign_of_life)
         if line is WaitOver.CUT_SHORT:
             return DemoDone()
         if isinstance(line, WaitOver) or line.word == "q":
@@ -37,67 +37,73 @@ def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_li
         if line.word in ("", "done"):
             return DemoDone()
         if line.word in ("n", "b"):
-            vibration, sentence = _step_vibration(menu, vibration, 1 if line.word == "n" else -1, talk.words)
-            talk.say(sentence)
+            vibration, sentence = _step_vibration(menu, vibration, 1 if line.word == "n" else -1, conversation.words)
+            conversation.say(sentence)
             continue
         number = keys.answer(line.text)
         if number is not None:
             return PlayDemo(vibration, number)
-        talk.refuse("line_demo_no_key", line)
+        conversation.refuse("line_demo_no_key", line)
 
 
-def show_playing(notice: PlayingNotice, talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
+def show_playing(notice: PlayingNotice, conversation: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
     """Wait `notice.seconds` while a stimulus plays. Of typed lines only p (pause) and q (leave) have an effect. None at
     the end; otherwise why the wait ended early."""
-    talk.forget()
+    conversation.discard_early_lines()
     if notice.title:  # the gap between two intervals has no title
-        along = "" if notice.picture is None else f" ({ends(notice.picture, notice.number, talk.words)})"
-        talk.say(f"{talk.words.fact(notice.title)}{along}")
-    until_s = talk.clock.now_s() + notice.seconds
-    while (left_s := until_s - talk.clock.now_s()) > 1e-9:
-        cut = _glance(talk, sign_of_life, min(GLANCE_S, left_s))
-        if cut is not None:
-            return cut
+        direction_text = (
+            "" if notice.picture is None else f" ({ends(notice.picture, notice.number, conversation.words)})"
+        )
+        conversation.say(f"{conversation.words.fact(notice.title)}{direction_text}")
+    until_s = conversation.clock.now_s() + notice.seconds
+    while (remaining_s := until_s - conversation.clock.now_s()) > 1e-9:
+        early_end = _wait_briefly(conversation, sign_of_life, min(POLL_INTERVAL_S, remaining_s))
+        if early_end is not None:
+            return early_end
     return None
 
 
-def await_handle(look: Callable[[], HandleView], talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
+def await_handle(
+    look: Callable[[], HandleView], conversation: Conversation, sign_of_life: SignOfLife
+) -> Unanswered | None:
     """Wait until the handle is in its place, and write how far it is from there. None when the handle is in its place;
     otherwise why the wait ended early."""
-    talk.forget()
+    conversation.discard_early_lines()
     last_sentence, said_at_s = "", float("-inf")
     while not (view := look()).ready:
-        now_s = talk.clock.now_s()
+        now_s = conversation.clock.now_s()
         if view.sentence != last_sentence and now_s - said_at_s >= SAY_AGAIN_S:
-            talk.say(talk.words.fact(view.sentence))
+            conversation.say(conversation.words.fact(view.sentence))
             last_sentence, said_at_s = view.sentence, now_s
-        cut = INPUT_ENDED if talk.input_is_over() else _glance(talk, sign_of_life, GLANCE_S)
-        if cut is not None:
-            return cut
+        early_end = (
+            INPUT_ENDED if conversation.input_is_over() else _wait_briefly(conversation, sign_of_life, POLL_INTERVAL_S)
+        )
+        if early_end is not None:
+            return early_end
     return None
 
 
-def _glance(talk: Conversation, sign_of_life: SignOfLife, seconds: float) -> Unanswered | None:
+def _wait_briefly(conversation: Conversation, sign_of_life: SignOfLife, seconds: float) -> Unanswered | None:
     """Wait for `seconds` (s), give a sign of life, and check for a typed p or q. None if the wait may continue."""
-    talk.clock.sleep(seconds)
+    conversation.clock.sleep(seconds)
     if not sign_of_life():
         return CUT_SHORT
-    line = talk.poll_line()
-    return {"q": LEFT, "p": PAUSE}.get(line.word) if line is not None else None
+    line = conversation.poll_line()
+    return {"q": PARTICIPANT_LEFT, "p": PAUSE}.get(line.word) if line is not None else None
 
 
 def _step_vibration(menu: DemoMenu, vibration: int, step: int, words: Words) -> tuple[int, str]:
     """Number of the next (step 1) or previous (-1) vibration, unchanged at either end, and a sentence on it."""
-    turned = vibration + step
-    if turned < 1:
+    new_vibration = vibration + step
+    if new_vibration < 1:
         return vibration, words["line_demo_first"]
-    if turned > menu.vibrations:
+    if new_vibration > menu.vibrations:
         return vibration, words["line_demo_last"]
-    return turned, _place_text(menu, turned, words)
+    return new_vibration, _place_text(menu, new_vibration, words)
 
 
 def _place_text(menu: DemoMenu, vibration: int, words: Words) -> str:
     """Which vibration is chosen, which of its directions were felt, and whether the device is simulated."""
     place = words.fill("line_demo_place", {"vibration": vibration, "vibrations": menu.vibrations})
     moves = "" if menu.handle_moves else f" {words['simulation']}"
-    return f"{place} {felt_so_far(menu, vibration, words)}{moves}"
+    return f"{place} {describe_felt(menu, vibration, words)}{moves}"

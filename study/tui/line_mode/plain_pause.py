@@ -8,7 +8,7 @@ from collections.abc import Callable
 from protocols.wording.words import Words
 from study.session.views.views import AfterPause, PauseNotice, RestNotice
 from study.session.watching.requests import NoteAsked
-from study.tui.line_mode.conversation import GLANCE_S, Conversation, Line, WaitOver, printable
+from study.tui.line_mode.conversation import POLL_INTERVAL_S, Conversation, Line, WaitOver, printable
 from study.tui.trial_words import progress_sentence
 from study.workflows.trial.display import SignOfLife
 
@@ -16,55 +16,55 @@ COUNT_EVERY_S = 10.0
 """Interval at which the remaining time is written (s)."""
 
 
-def rest(notice: RestNotice, talk: Conversation, sign_of_life: SignOfLife) -> float:
+def run_rest(notice: RestNotice, conversation: Conversation, sign_of_life: SignOfLife) -> float:
     """Count down an enforced rest, then wait for Enter. Returns the time rested (s). Raises KeyboardInterrupt when the
     participant leaves, or at the end of the input."""
-    words = talk.words
+    words = conversation.words
     rested = words.fill("line_rest", {"seconds": f"{notice.seconds:.0f}"})
-    talk.say("", f"{rested} {words.counted('runs_left', notice.runs_left)}")
+    conversation.say("", f"{rested} {words.fill_count('runs_left', notice.runs_left)}")
     if notice.progress is not None:
-        talk.say(progress_sentence(notice.progress, words))
-    started_s = talk.clock.now_s()
-    if _count_down(started_s + notice.seconds, talk, sign_of_life):
-        talk.forget()
-        talk.speak("enter_goes_on")
-        line = talk.wait(sign_of_life)
+        conversation.say(progress_sentence(notice.progress, words))
+    started_s = conversation.clock.now_s()
+    if _count_down(started_s + notice.seconds, conversation, sign_of_life):
+        conversation.discard_early_lines()
+        conversation.say_texts("enter_goes_on")
+        line = conversation.wait(sign_of_life)
         if line is WaitOver.INPUT_ENDED or (isinstance(line, Line) and line.word == "q"):
             raise KeyboardInterrupt
-    return talk.clock.now_s() - started_s
+    return conversation.clock.now_s() - started_s
 
 
 def pause(
-    notice: PauseNotice, talk: Conversation, note: Callable[[NoteAsked], None] | None, sign_of_life: SignOfLife
+    notice: PauseNotice, conversation: Conversation, note: Callable[[NoteAsked], None] | None, sign_of_life: SignOfLife
 ) -> AfterPause:
     """Wait in a pause until the participant decides how to continue; LEAVE if the sign of life ends the wait. note:
     stores a note in the log; None offers no notes. Raises KeyboardInterrupt at the end of the input."""
-    talk.forget()
-    words = talk.words
+    conversation.discard_early_lines()
+    words = conversation.words
     paused = words.fill("line_pause", {"reason": words.fact(notice.reason)})
-    talk.say("", f"{paused} {words.counted('saved', notice.answers)}")
-    talk.say(_choices(note is not None, words))
+    conversation.say("", f"{paused} {words.fill_count('saved', notice.answers)}")
+    conversation.say(_choices(note is not None, words))
     while True:
-        talk.prompt(words["line_pause_prompt"])
-        line = talk.wait(sign_of_life)
+        conversation.prompt(words["line_pause_prompt"])
+        line = conversation.wait(sign_of_life)
         if line is WaitOver.CUT_SHORT:
-            return AfterPause.LEAVE
+            return AfterPause.END_SITTING
         if isinstance(line, WaitOver):
             raise KeyboardInterrupt
         match line.word:
             case "":
-                return AfterPause.GO_ON
+                return AfterPause.CONTINUE_SITTING
             case "q":
-                return AfterPause.LEAVE
+                return AfterPause.END_SITTING
             case "w":
-                if _withdraws(talk):
+                if _withdraws(conversation):
                     return AfterPause.WITHDRAW
             case "n" | "e" if note is not None:
-                _take_note(line.word == "e", talk, note)
+                _take_note(line.word == "e", conversation, note)
             case "?":
-                talk.say(_choices(note is not None, words))
+                conversation.say(_choices(note is not None, words))
             case _:
-                talk.refuse("line_pause_no_key", line)
+                conversation.refuse("line_pause_no_key", line)
 
 
 def _choices(notes: bool, words: Words) -> str:
@@ -72,38 +72,38 @@ def _choices(notes: bool, words: Words) -> str:
     return " ".join(words[key] for key in ("line_pause_keys", *(["line_pause_notes"] if notes else [])))
 
 
-def _withdraws(talk: Conversation) -> bool:
+def _withdraws(conversation: Conversation) -> bool:
     """Whether the participant confirms the withdrawal of consent by typing a word."""
-    word = talk.words["withdraw_word"]
-    talk.speak("withdraw_all")
-    talk.prompt(talk.words.fill("line_withdraw", {"word": word}))
-    confirmed = talk.answer().word == word.casefold()
+    word = conversation.words["withdraw_word"]
+    conversation.say_texts("withdraw_all")
+    conversation.prompt(conversation.words.fill("line_withdraw", {"word": word}))
+    confirmed = conversation.answer().word == word.casefold()
     if not confirmed:
-        talk.speak("nothing_erased")
+        conversation.say_texts("nothing_erased")
     return confirmed
 
 
-def _take_note(adverse: bool, talk: Conversation, note: Callable[[NoteAsked], None]) -> None:
+def _take_note(adverse: bool, conversation: Conversation, note: Callable[[NoteAsked], None]) -> None:
     """Ask for the text of a note, or of an adverse event, and store it; an empty line stores nothing."""
-    talk.prompt(talk.words["line_happened" if adverse else "line_note"])
-    text = printable(talk.answer().text)
+    conversation.prompt(conversation.words["line_happened" if adverse else "line_note"])
+    text = printable(conversation.answer().text)
     if not text:
-        talk.speak("nothing_written")
+        conversation.say_texts("nothing_written")
         return
     note(NoteAsked("participant", text, adverse))
-    talk.speak("line_noted")
+    conversation.say_texts("line_noted")
 
 
-def _count_down(until_s: float, talk: Conversation, sign_of_life: SignOfLife) -> bool:
+def _count_down(until_s: float, conversation: Conversation, sign_of_life: SignOfLife) -> bool:
     """Write the remaining time every `COUNT_EVERY_S`, until `until_s` on the session's clock (s). False if the sign of
     life ended the wait."""
-    say_at_s = float("-inf")
-    while (left_s := until_s - talk.clock.now_s()) > 1e-9:  # tolerance for rounding of clock times
-        now_s = talk.clock.now_s()
-        if left_s > COUNT_EVERY_S and now_s >= say_at_s:
-            talk.say(f"{left_s:.0f} s")
-            say_at_s = now_s + COUNT_EVERY_S
-        talk.clock.sleep(min(GLANCE_S, left_s))
+    next_say_s = float("-inf")
+    while (remaining_s := until_s - conversation.clock.now_s()) > 1e-9:  # tolerance for rounding of clock times
+        now_s = conversation.clock.now_s()
+        if remaining_s > COUNT_EVERY_S and now_s >= next_say_s:
+            conversation.say(f"{remaining_s:.0f} s")
+            next_say_s = now_s + COUNT_EVERY_S
+        conversation.clock.sleep(min(POLL_INTERVAL_S, remaining_s))
         if not sign_of_life():
             return False
     return True

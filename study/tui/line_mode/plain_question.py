@@ -14,12 +14,12 @@ from study.session.views.views import (
 )
 from study.tui.drawing.direction_picture import draw_directions, sentence
 from study.tui.keys.answer_keys import AnswerKeys
-from study.tui.line_mode.conversation import Conversation, Line, WaitOver, shown
+from study.tui.line_mode.conversation import Conversation, Line, WaitOver, quote_line
 from study.tui.trial_replies import PAUSE, REPEAT, repeat_words
 from study.tui.trial_words import heading, plan
 from study.workflows.trial.display import SignOfLife
 
-LEFT = Unanswered("the participant left", leave=True)
+PARTICIPANT_LEFT = Unanswered("the participant left", ends_sitting=True)
 """Reply for the line q: the participant leaves the sitting."""
 
 
@@ -33,15 +33,15 @@ def picture_lines(picture: DirectionPicture, words: Words) -> tuple[str, ...]:
     return (*draw_directions(picture), sentence(picture, 1, words), sentence(picture, 2, words))
 
 
-def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
+def welcome(notice: Welcome, conversation: Conversation, keys: AnswerKeys) -> None:
     """Write title, instructions and plan of a sitting, and wait for Enter. Raises KeyboardInterrupt when the
     participant leaves."""
-    words = talk.words
-    talk.forget()
-    talk.say(notice.title, "")
+    words = conversation.words
+    conversation.discard_early_lines()
+    conversation.say(notice.title, "")
     if notice.resumed_after:
-        talk.say(words.counted("welcome_back", notice.resumed_after), "")
-    talk.say(
+        conversation.say(words.fill_count("welcome_back", notice.resumed_after), "")
+    conversation.say(
         words["line_hold"],
         "",
         *picture_lines(notice.picture, words),
@@ -50,39 +50,39 @@ def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
         plan(notice, words),
         keys_sentence(keys, words),
     )
-    if not notice.felt:
-        talk.say("", words.fill("not_felt", {"device": words.fact(notice.device)}))
-    talk.say("", words["enter_begins"])
-    talk.answer_or_leave()
+    if not notice.device_moves:
+        conversation.say("", words.fill("not_felt", {"device": words.fact(notice.device)}))
+    conversation.say("", words["enter_begins"])
+    conversation.answer_or_leave()
 
 
-def ask(question: Question, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
+def ask(question: Question, conversation: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
     """Ask the question of a trial until there is a reply, the time limit is over, or the stimulus ended early. Other
     lines are refused, and the question is asked again."""
-    words, choice = talk.words, {"keys": keys.choice(talk.words)}
-    talk.forget()
-    talk.say("", heading(question, words))
-    until_s = talk.clock.now_s() + question.time_limit_s if question.time_limit_s else float("inf")
+    words, choice = conversation.words, {"keys": keys.choice(conversation.words)}
+    conversation.discard_early_lines()
+    conversation.say("", heading(question, words))
+    until_s = conversation.clock.now_s() + question.time_limit_s if question.time_limit_s else float("inf")
     prompt = words.fill("line_which_interval" if question.task is Task.INTERVAL else "line_which", choice)
     while True:
-        talk.prompt(prompt)
-        line = talk.wait(sign_of_life, until_s)
+        conversation.prompt(prompt)
+        line = conversation.wait(sign_of_life, until_s)
         if isinstance(line, WaitOver):
             cause = VoidCause.LATE if line is WaitOver.TIME_LIMIT else VoidCause.FAULT
-            return Unanswered(line.value, leave=line is WaitOver.INPUT_ENDED, cause=cause)
+            return Unanswered(line.value, ends_sitting=line is WaitOver.INPUT_ENDED, cause=cause)
         reply = parse_reply(line, keys)
         if reply is REPEAT:
             if question.repeats_left == 0:
-                talk.say(f"{words['no_repeats']} {words.fill('line_type', choice)}")
+                conversation.say(f"{words['no_repeats']} {words.fill('line_type', choice)}")
                 continue
-            talk.say(repeat_words(question.repeats_left, words))
+            conversation.say(repeat_words(question.repeats_left, words))
         if reply is not None:
             return reply
         if line.word == "?":
-            talk.say(*_explanation(question, words), keys_sentence(keys, words))
+            conversation.say(*_explanation(question, words), keys_sentence(keys, words))
         else:
-            refused = words.fill("no_answer", {"typed": shown(line, words)})
-            talk.say(f"{refused} {words.fill('line_type', choice)}")
+            refused = words.fill("no_answer", {"typed": quote_line(line, words)})
+            conversation.say(f"{refused} {words.fill('line_type', choice)}")
 
 
 def _explanation(question: Question, words: Words) -> tuple[str, ...]:
@@ -97,12 +97,14 @@ def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
     answer = keys.answer(line.text)
     if answer is not None:
         return Answered(answer, line.at_s)
-    return {"q": LEFT, "p": PAUSE, "r": REPEAT}.get(line.word)
+    return {"q": PARTICIPANT_LEFT, "p": PAUSE, "r": REPEAT}.get(line.word)
 
 
-def practice_over(result: PracticeResult, talk: Conversation) -> None:
+def practice_over(result: PracticeResult, conversation: Conversation) -> None:
     """Write the result of a practice, and wait for Enter. Raises KeyboardInterrupt when the participant leaves."""
-    talk.forget()
-    talk.say("", talk.words.fill("line_practice", {"right": result.right, "asked": result.of}))
-    talk.speak("practice_enough" if result.passed else "practice_hard", "enter_goes_on")
-    talk.answer_or_leave()
+    conversation.discard_early_lines()
+    conversation.say(
+        "", conversation.words.fill("line_practice", {"right": result.correct_count, "asked": result.answer_count})
+    )
+    conversation.say_texts("practice_enough" if result.passed else "practice_hard", "enter_goes_on")
+    conversation.answer_or_leave()

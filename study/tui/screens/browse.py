@@ -78,9 +78,9 @@ class BrowseScreen(ModalScreen[None]):
         self.query_one(HapteqFiles).focus()
 
     @on(Input.Submitted, "#path")
-    def _go_to_path(self, typed: Input.Submitted) -> None:
+    def _go_to_path(self, event: Input.Submitted) -> None:
         """Open a typed session folder or file; show any other folder in the tree."""
-        path = Path(typed.value).expanduser()
+        path = Path(event.value).expanduser()
         if path.is_dir() and (path / LOG).exists():
             self._open_path(path / LOG)
         elif path.is_dir():
@@ -93,8 +93,8 @@ class BrowseScreen(ModalScreen[None]):
             self._show_message(f"There is nothing at {path}.")
 
     @on(DirectoryTree.FileSelected)
-    def _open_selected(self, selected: DirectoryTree.FileSelected) -> None:
-        self._open_path(selected.path)
+    def _open_selected(self, event: DirectoryTree.FileSelected) -> None:
+        self._open_path(event.path)
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(HELP))

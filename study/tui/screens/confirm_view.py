@@ -20,7 +20,9 @@ from study.tui.screens.help import HelpScreen
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
-SHOWN_HERE = "The participant's screen showed the experimenter's view: levels, and which answers were right or wrong."
+VIEW_SHOWN_NOTE = (
+    "The participant's screen showed the experimenter's view: levels, and which answers were right or wrong."
+)
 """Note that is written to the log if the screen of the participant showed the view."""
 
 
@@ -63,8 +65,8 @@ class ConfirmView(ModalScreen[bool]):
         yield Footer(show_command_palette=False)
 
     @on(Input.Submitted)
-    def _judge(self, typed: Input.Submitted) -> None:
-        if typed.value.strip() == self._session:
+    def _check_input(self, event: Input.Submitted) -> None:
+        if event.value.strip() == self._session:
             dismiss_screen(self, True)
         else:
             self.query_one("#message", LiteralText).update(f"That is not {self._session}. Nothing is opened.")
@@ -76,11 +78,11 @@ class ConfirmView(ModalScreen[bool]):
         dismiss_screen(self, False)
 
 
-def confirm_view(app: App[Any], session: str, go_on: Callable[[], object]) -> None:
-    """Open the dialog. session: name to be typed. go_on: called once after the confirmation."""
+def confirm_view(app: App[Any], session: str, on_confirmed: Callable[[], object]) -> None:
+    """Open the dialog. session: name to be typed. on_confirmed: called once after the confirmation."""
 
     def act_on_decision(confirmed: bool | None) -> None:
         if confirmed:
-            go_on()
+            on_confirmed()
 
     app.push_screen(ConfirmView(session), act_on_decision)

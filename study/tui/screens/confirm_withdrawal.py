@@ -44,9 +44,9 @@ class ConfirmWithdrawal(TranslatedScreen[bool], ModalScreen[bool]):
         yield Footer(show_command_palette=False)
 
     @on(Input.Submitted)
-    def _judge(self, typed: Input.Submitted) -> None:
+    def _check_input(self, event: Input.Submitted) -> None:
         word = self.words["withdraw_word"]
-        if typed.value.strip().casefold() == word.casefold():
+        if event.value.strip().casefold() == word.casefold():
             dismiss_screen(self, True)
         else:
             self.query_one("#message", LiteralText).update(self.words.fill("withdraw_other", {"word": word}))

@@ -18,7 +18,7 @@ from study.session.views.views import DemoChoice, DemoDone, DemoMenu, PlayDemo
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.translated_screen import TranslatedScreen
-from study.tui.trial_words import felt_so_far
+from study.tui.trial_words import describe_felt
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
 
@@ -83,14 +83,14 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
 
     def action_turn(self, step: int) -> None:
         """Select the next slower (-1) or faster (1) vibration; at the end of the range, say so."""
-        turned = self._vibration + step
-        if turned < 1:
+        vibration = self._vibration + step
+        if vibration < 1:
             self._show(self.words["demo_slowest"])
-        elif turned > self._menu.vibrations:
+        elif vibration > self._menu.vibrations:
             self._show(self.words["demo_fastest"])
         else:
-            self._vibration = turned
-            self._show(felt_so_far(self._menu, self._vibration, self.words))
+            self._vibration = vibration
+            self._show(describe_felt(self._menu, self._vibration, self.words))
 
     def action_pause(self) -> None:
         """Ask the application for a pause."""
@@ -99,7 +99,7 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
     def action_done(self) -> None:
         """End the demonstration. If a stimulus was not felt yet, Enter must be pressed twice: it is often pressed by
         habit."""
-        unfelt = 2 * self._menu.vibrations - len(set(self._menu.felt))
+        unfelt = 2 * self._menu.vibrations - len(set(self._menu.played_pairs))
         if unfelt and not self._asked:
             self._asked = True
             self._show(self.words.fill("demo_unfelt", {"unfelt": unfelt, "all": 2 * self._menu.vibrations}))
@@ -114,10 +114,10 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
         )
         self.query_one("#steps", LiteralText).update("  ".join(self._step(v + 1) for v in range(menu.vibrations)))
         for panel in self.query(DirectionPanel):
-            panel.mark = "felt" if (self._vibration, panel.number) in menu.felt else ""
+            panel.mark = "felt" if (self._vibration, panel.number) in menu.played_pairs else ""
         self.query_one("#message", LiteralText).update(sentence)
 
     def _step(self, vibration: int) -> str:
         """One vibration in the row of steps: its number, a mark per direction felt, brackets if selected."""
-        ticks = "".join("✓" if (vibration, number) in self._menu.felt else "·" for number in (1, 2))
+        ticks = "".join("✓" if (vibration, number) in self._menu.played_pairs else "·" for number in (1, 2))
         return f"[{vibration} {ticks}]" if vibration == self._vibration else f" {vibration} {ticks} "

@@ -89,18 +89,22 @@ class DiagnoseForm(ModalScreen[None]):
     @on(Input.Submitted)
     def action_begin(self) -> None:
         """Check the paths; post the request, or show what is wrong and move to that field."""
-        named: dict[str, tuple[str, ...]] = {}
+        paths_by_field: dict[str, tuple[str, ...]] = {}
         for field in ("sources", "clean"):
             try:
-                named[field] = tuple(str(Path(word).expanduser()) for word in shlex.split(self._text_of(field)))
+                paths_by_field[field] = tuple(
+                    str(Path(word).expanduser()) for word in shlex.split(self._text_of(field))
+                )
             except ValueError:
                 self._show_message("A quotation mark is open.", field)
                 return
-        sources = named["sources"]
-        model, out = (
-            str(Path(typed).expanduser()) if (typed := self._text_of(name)) else "" for name in ("model", "out")
+        sources = paths_by_field["sources"]
+        model, out_folder = (
+            str(Path(text).expanduser()) if (text := self._text_of(name)) else "" for name in ("model", "out")
         )
-        missing = next(((f, path) for f, paths in named.items() for path in paths if not Path(path).exists()), None)
+        missing = next(
+            ((f, path) for f, paths in paths_by_field.items() for path in paths if not Path(path).exists()), None
+        )
         if not sources:
             self._show_message("Name a recording, or the folder of a session.", "sources")
         elif missing is not None:
@@ -108,7 +112,7 @@ class DiagnoseForm(ModalScreen[None]):
         elif model and not Path(model).is_file():
             self._show_message(f"There is no file {model}.", "model")
         elif self.is_active:
-            self.app.post_message(DiagnoseWanted(Diagnose(sources, model, out, named["clean"])))
+            self.app.post_message(DiagnoseWanted(Diagnose(sources, model, out_folder, paths_by_field["clean"])))
             dismiss_screen(self, None)
 
     def action_help(self) -> None:

@@ -40,17 +40,17 @@ class DiagnosingScreen(Screen[bool]):
     """
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "stop", "Stop", key_display="Esc")]
 
-    def __init__(self, what: str, now_s: Callable[[], float] = time.monotonic) -> None:
-        """what: the first step, as a sentence; now_s: a monotonic clock (s)."""
+    def __init__(self, step: str, now_s: Callable[[], float] = time.monotonic) -> None:
+        """step: the first step, as a sentence; now_s: a monotonic clock (s)."""
         super().__init__()
-        self._what = what
+        self._step = step
         self._now_s = now_s
         self._began_s = now_s()
 
     def compose(self) -> ComposeResult:
         with Vertical() as box:
             box.border_title = "Diagnosing"
-            yield Static(self._what, id="what", markup=False)
+            yield Static(self._step, id="what", markup=False)
             yield ProgressBar(total=1.0, show_eta=False)
             yield Static(describe_elapsed(0.0), id="elapsed", markup=False)
         yield Footer(show_command_palette=False)
@@ -58,10 +58,10 @@ class DiagnosingScreen(Screen[bool]):
     def on_mount(self) -> None:
         self.set_interval(TICK_S, self._tick)
 
-    def show(self, what: str, share: float) -> None:
-        """Show the current step and progress. what: sentence without capital letter and full stop; share: 0 to 1."""
+    def show(self, step: str, share: float) -> None:
+        """Show the current step and progress. step: sentence without capital letter and full stop; share: 0 to 1."""
         if self.query("#what"):
-            self.query_one("#what", Static).update(f"{what[:1].upper()}{what[1:]}.")
+            self.query_one("#what", Static).update(f"{step[:1].upper()}{step[1:]}.")
             self.query_one(ProgressBar).update(progress=share)
 
     def action_stop(self) -> None:

@@ -103,20 +103,20 @@ class DiagnosisScreen(Screen[None]):
         return action != "open_report" or bool(self._view.report)
 
 
-def _compose_section(title: str, sentences: tuple[str, ...], none: str) -> ComposeResult:
-    """A title and its sentences as a list. none: text without sentences."""
+def _compose_section(title: str, sentences: tuple[str, ...], empty_text: str) -> ComposeResult:
+    """A title and its sentences as a list. empty_text: text without sentences."""
     yield Static(title, classes="title", markup=False)
     bullets = Table.grid(padding=(0, 1, 0, 0))
-    for sentence in sentences or (none,):
+    for sentence in sentences or (empty_text,):
         bullets.add_row("•" if sentences else "", Text(sentence))
     yield Static(bullets)
 
 
-def _table(title: str, rows: tuple[tuple[str, ...], ...], none: str) -> ComposeResult:
-    """A title and its table, of which the first row is the header. none: text without further rows."""
+def _table(title: str, rows: tuple[tuple[str, ...], ...], empty_text: str) -> ComposeResult:
+    """A title and its table, of which the first row is the header. empty_text: text without further rows."""
     yield Static(title, classes="title", markup=False)
     if len(rows) < 2:
-        yield Static(none, markup=False)
+        yield Static(empty_text, markup=False)
         return
     with Horizontal(classes="table"):
         yield TextTable(rows)

@@ -18,13 +18,13 @@ from textual.widgets import Button, Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.form_entry import (
     FormEntry,
-    blank_entry,
     click_choice,
     click_continue,
-    go_to,
+    make_blank_entry,
+    make_reply,
+    move_cursor,
     paste,
     press,
-    reply_of,
 )
 from study.session.views.form_views import Form, FormReply, find_missing_fields
 from study.tui.dismiss_screen import dismiss_screen
@@ -69,7 +69,10 @@ class FormScreen(TranslatedScreen[FormReply]):
     """
     AUTO_FOCUS = ""
     BINDINGS: ClassVar[list[BindingType]] = [
-        *(Binding(key, f"press('{key}', '{place}')", words, key_display=shown) for key, place, shown, words in KEYS),
+        *(
+            Binding(key, f"press('{key}', '{place}')", words, key_display=key_text)
+            for key, place, key_text, words in KEYS
+        ),
         Binding("pageup", "scroll(-1)", "Page up", show=False),
         Binding("pagedown", "scroll(1)", "Page down", show=False),
     ]
@@ -83,7 +86,7 @@ class FormScreen(TranslatedScreen[FormReply]):
 
     def __init__(self, form: Form, words: Words = ENGLISH_WORDS) -> None:
         super().__init__(words)
-        self._entry = blank_entry(form)
+        self._entry = make_blank_entry(form)
         self._alive: list[bool | None] = []
         """Whether each entry of `KEYS` had an effect when the footer was last drawn."""
 
@@ -102,6 +105,7 @@ class FormScreen(TranslatedScreen[FormReply]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
+        """Draw the empty form."""
         self._show(self._entry)
 
     @property
@@ -112,24 +116,28 @@ class FormScreen(TranslatedScreen[FormReply]):
     @property
     def stacked(self) -> bool:
         """Whether the choices under the cursor are listed vertically at this width."""
-        at = self._entry.at
-        return at < len(self._entry.form.fields) and self.query(FormQuestion)[at].stacked
+        index = self._entry.cursor
+        return index < len(self._entry.form.fields) and self.query(FormQuestion)[index].stacked
 
     def on_key(self, event: Key) -> None:
-        taken = self._take(press(self._entry, event.key, event.character, self.stacked))
+        """Apply a key to the form."""
+        is_handled = self._apply(press(self._entry, event.key, event.character, self.stacked))
         # Otherwise the binding of a footer key would act on it, later than on the keys that follow.
-        if taken or event.key in FOOTER_KEYS:
+        if is_handled or event.key in FOOTER_KEYS:
             event.stop()
             event.prevent_default()
 
     def on_paste(self, event: Paste) -> None:
+        """Insert pasted text."""
         event.stop()
-        self._take(paste(self._entry, event.text))
+        self._apply(paste(self._entry, event.text))
 
     def action_press(self, key: str, place: str) -> None:
-        self._take(press(self._entry, key, key if len(key) == 1 else None, self.stacked))
+        """Apply the key of a footer entry. place: kind of field where the entry applies."""
+        self._apply(press(self._entry, key, key if len(key) == 1 else None, self.stacked))
 
     def action_scroll(self, pages: int) -> None:
+        """Scroll by pages; negative: up."""
         sheet = self.query_one(Sheet)
         sheet.scroll_relative(y=pages * sheet.size.height, animate=False)
 
@@ -139,16 +147,20 @@ class FormScreen(TranslatedScreen[FormReply]):
             return True
         key, place = parameters
         field = self._entry.field
-        here = "continue" if field is None else "choice" if field.choices else "text"
-        keys = ("left", "right") if key == "left" else (str(key),)
+        field_kind = "continue" if field is None else "choice" if field.choices else "text"
+        key_names = ("left", "right") if key == "left" else (str(key),)
         stacked = self.is_mounted and self.stacked
-        pressed = [press(self._entry, name, name if len(name) == 1 else None, stacked) for name in keys]
-        return place in ("", here) and any(after not in (None, self._entry) for after in pressed)
+        next_entries = [press(self._entry, name, name if len(name) == 1 else None, stacked) for name in key_names]
+        return place in ("", field_kind) and any(next_entry not in (None, self._entry) for next_entry in next_entries)
 
     def _forward_event(self, event: Event) -> None:
         """Post a click as a message to the screen, so that it stays in order with the keys."""
-        if isinstance(event, Click) and not event.is_forwarded and (pointed := self._locate_click(event)) is not None:
-            self.post_message(pointed)
+        if (
+            isinstance(event, Click)
+            and not event.is_forwarded
+            and (click_message := self._locate_click(event)) is not None
+        ):
+            self.post_message(click_message)
             return
         super()._forward_event(event)
 
@@ -165,63 +177,70 @@ class FormScreen(TranslatedScreen[FormReply]):
         question = next((node for node in widget.ancestors_with_self if isinstance(node, FormQuestion)), None)
         return self.Pointed(question) if question is not None else None
 
-    def on_form_screen_pointed(self, pointed: Pointed) -> None:
-        if isinstance(pointed.widget, Button):
-            self._take(click_continue(self._entry))
+    def on_form_screen_pointed(self, click_message: Pointed) -> None:
+        """Apply a mouse click: on Continue, a question, or a choice."""
+        if isinstance(click_message.widget, Button):
+            self._apply(click_continue(self._entry))
             return
         questions = list(self.query(FormQuestion))
-        at = next(i for i, question in enumerate(questions) if question in pointed.widget.ancestors_with_self)
-        to = go_to(self._entry, at) if pointed.choice is None else click_choice(self._entry, at, pointed.choice)
-        self._take(to)
+        index = next(i for i, question in enumerate(questions) if question in click_message.widget.ancestors_with_self)
+        next_entry = (
+            move_cursor(self._entry, index)
+            if click_message.choice is None
+            else click_choice(self._entry, index, click_message.choice)
+        )
+        self._apply(next_entry)
 
-    def _take(self, entry: FormEntry | None) -> bool:
-        """Make this the present state, and draw it; dismiss the screen if the form was sent. Nothing else changes the
-        state. False for None: the key had no meaning."""
+    def _apply(self, entry: FormEntry | None) -> bool:
+        """Make this the present state, and draw it; dismiss the screen if the form was sent. All changes of the state
+        use this method. Returns False for None: the key had no meaning."""
         if entry is None:
             return False
-        before, self._entry = self._entry, entry
-        if entry.sent and not before.sent:
-            dismiss_screen(self, reply_of(entry))
-        elif entry != before:
+        previous_entry, self._entry = self._entry, entry
+        if entry.is_sent and not previous_entry.is_sent:
+            dismiss_screen(self, make_reply(entry))
+        elif entry != previous_entry:
             self._show(entry)
         return True
 
     def _show(self, entry: FormEntry) -> None:
         """Draw the state: answers, cursor, number of open questions, message and footer."""
         for index, question in enumerate(self.query(FormQuestion)):
-            question.show(entry.given[index], at=index == entry.at)
+            question.show(entry.field_entries[index], at=index == entry.cursor)
         button = self.query_one(Button)
         button.set_class(entry.field is None, "-at")
         if entry.field is None:
             button.scroll_visible(animate=False)
-        open_ones = len(find_missing_fields(entry.form, reply_of(entry)))
-        counts = {"title": entry.form.title, "open": open_ones, "all": len(entry.given)}
-        top = self.words.fill("form_open" if open_ones else "form_complete", counts)
-        self.query_one("#top", LiteralText).update(top)
-        self.query_one("#message", LiteralText).update(_message(entry, not open_ones, self.words))
-        alive = [self.check_action("press", key[:2]) for key in KEYS]
-        if alive != self._alive:
-            self._alive = alive
+        missing_count = len(find_missing_fields(entry.form, make_reply(entry)))
+        counts = {"title": entry.form.title, "open": missing_count, "all": len(entry.field_entries)}
+        status_text = self.words.fill("form_open" if missing_count else "form_complete", counts)
+        self.query_one("#top", LiteralText).update(status_text)
+        self.query_one("#message", LiteralText).update(_compose_message(entry, not missing_count, self.words))
+        enabled_entries = [self.check_action("press", key[:2]) for key in KEYS]
+        if enabled_entries != self._alive:
+            self._alive = enabled_entries
             self.refresh_bindings()
 
 
-def _message(entry: FormEntry, all_answered: bool, words: Words) -> str:
+def _compose_message(entry: FormEntry, all_answered: bool, words: Words) -> str:
     """The line below the form: the first missing answer, or changed answers to be checked, or that it is complete."""
     if entry.open:
-        left, field = len(entry.open) - 1, entry.form.fields[entry.open[0]]
-        asked = _quote(field.label, words) if field.limits is None else limits_words(field.limits, words)
-        please = words.fill("form_please", {"number": entry.open[0] + 1, "question": asked})
-        return f"{please} {words.counted('form_more', left)}" if left else please
+        remaining, field = len(entry.open) - 1, entry.form.fields[entry.open[0]]
+        question_text = _quote_label(field.label, words) if field.limits is None else limits_words(field.limits, words)
+        request = words.fill("form_please", {"number": entry.open[0] + 1, "question": question_text})
+        return f"{request} {words.fill_count('form_more', remaining)}" if remaining else request
     if entry.check:
         changes = ", ".join(
-            words.fill("form_change", {"number": index + 1, "answer": _quote(entry.given[index].answer, words)})
+            words.fill(
+                "form_change", {"number": index + 1, "answer": _quote_label(entry.field_entries[index].answer, words)}
+            )
             for index in entry.check
         )
         return words.fill("form_changed", {"changes": changes})
     return words["form_done"] if all_answered else ""
 
 
-def _quote(label: str, words: Words) -> str:
+def _quote_label(label: str, words: Words) -> str:
     """The text in quotation marks, cut to `LONGEST_QUOTE` characters."""
-    short = label if len(label) <= LONGEST_QUOTE else f"{label[: LONGEST_QUOTE - 1].rstrip()}…"
-    return words.fill("quoted", {"text": short})
+    shortened = label if len(label) <= LONGEST_QUOTE else f"{label[: LONGEST_QUOTE - 1].rstrip()}…"
+    return words.fill("quoted", {"text": shortened})

@@ -39,11 +39,11 @@ class GoodbyeScreen(TranslatedScreen[None]):
             else:
                 yield LiteralText(_stops(notice.reason, words), classes="strong")
             if notice.answers:
-                yield LiteralText(words.counted("saved", notice.answers), classes="gap")
+                yield LiteralText(words.fill_count("saved", notice.answers), classes="gap")
             if notice.answers and not notice.finished:
                 yield LiteralText(words["end_resume"], classes="gap")
-            held = "" if notice.outcome else f"{words['end_let_go']} "
-            yield LiteralText(f"{held}{words['end_close']}", classes="gap")
+            let_go_text = "" if notice.outcome else f"{words['end_let_go']} "
+            yield LiteralText(f"{let_go_text}{words['end_close']}", classes="gap")
         yield Footer(show_command_palette=False)
 
     def action_close_page(self) -> None:

@@ -156,32 +156,34 @@ class HomeScreen(Screen[None]):
         """Fill form and list, or show the hints for an empty list."""
         self.query_one("#name", Static).update(f"hapteq   force-direction studies   data: {home.data}")
         self.query_one(NewSessionForm).show(home)
-        some = bool(home.sessions)
-        self.query_one("#past", Vertical).border_title = f"Sessions ({len(home.sessions)})" if some else "Sessions"
+        has_sessions = bool(home.sessions)
+        self.query_one("#past", Vertical).border_title = (
+            f"Sessions ({len(home.sessions)})" if has_sessions else "Sessions"
+        )
         table = self.query_one(SessionTable)
-        table.display = some
-        self.query_one("#empty").display = not some
+        table.display = has_sessions
+        self.query_one("#empty").display = not has_sessions
         self.query_one("#detail", Static).update("")
-        self.query_one("#detail").display = some
+        self.query_one("#detail").display = has_sessions
         table.show(home.sessions)
-        if some and self.query_one("#empty").has_focus:  # F3 was pressed before the list was loaded
+        if has_sessions and self.query_one("#empty").has_focus:  # F3 was pressed before the list was loaded
             table.focus()
 
     @on(SessionTable.Looked)
-    def _describe(self, looked: SessionTable.Looked) -> None:
-        self.query_one("#detail", Static).update(describe(looked.line))
+    def _describe(self, event: SessionTable.Looked) -> None:
+        self.query_one("#detail", Static).update(describe(event.line))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Show F2 or F3 in the footer only while the focus is in the other half of the screen."""
-        here = {"new": "#new", "past": "#past"}.get(action)
-        return here is None or not self.query_one(here).has_focus_within
+        selector = {"new": "#new", "past": "#past"}.get(action)
+        return selector is None or not self.query_one(selector).has_focus_within
 
     def action_new(self) -> None:
         self.query_one("#code", Input).focus()
 
     def action_past(self) -> None:
-        some = self._home is not None and self._home.sessions
-        self.query_one("#sessions" if some else "#empty").focus()
+        has_sessions = self._home is not None and self._home.sessions
+        self.query_one("#sessions" if has_sessions else "#empty").focus()
 
     def action_browse(self) -> None:
         self.app.push_screen(BrowseScreen(self._home.data if self._home else "."))

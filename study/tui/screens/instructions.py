@@ -40,7 +40,7 @@ class InstructionsScreen(TranslatedScreen[None]):
         with Sheet():
             yield LiteralText(welcome.title, classes="title")
             if welcome.resumed_after:
-                yield LiteralText(words.counted("welcome_back", welcome.resumed_after))
+                yield LiteralText(words.fill_count("welcome_back", welcome.resumed_after))
             yield LiteralText(words["hold"])
             with Horizontal(id="pictures"):
                 yield DirectionPanel(1, welcome.picture, words)
@@ -48,7 +48,7 @@ class InstructionsScreen(TranslatedScreen[None]):
             yield LiteralText(words.fill("how", {"keys": self._keys.choice(words)}))
             yield LiteralText(plan(welcome, words))
             yield LiteralText(words["stop_any_time"])
-            if not welcome.felt:
+            if not welcome.device_moves:
                 yield LiteralText(words.fill("not_felt", {"device": words.fact(welcome.device)}), classes="practice")
             yield LiteralText(words["enter_begins"], classes="gap strong")
         yield Footer(show_command_palette=False)

@@ -12,7 +12,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Button, Footer, TextArea
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.watching.requests import NoteAsked, Who
+from study.session.watching.requests import NoteAsked, RequestSource
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.help import HelpScreen
 from study.tui.translated_screen import TranslatedScreen
@@ -22,7 +22,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 MOST_CHARACTERS = 500
 """Maximum length of a note: a few sentences, so that a line of the log stays readable."""
-WRITERS: tuple[Who, ...] = ("participant", "experimenter")
+WRITERS: tuple[RequestSource, ...] = ("participant", "experimenter")
 """Writers among whom the dialog lets the user choose, in this order."""
 
 
@@ -46,10 +46,12 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
         Binding("f1", "help", "Help"),
     ]
 
-    def __init__(self, adverse: bool = False, who: Who = "participant", words: Words = ENGLISH_WORDS) -> None:
+    def __init__(
+        self, adverse: bool = False, writer: RequestSource = "participant", words: Words = ENGLISH_WORDS
+    ) -> None:
         super().__init__(words)
         self._adverse = adverse
-        self._who = who
+        self._writer = writer
 
     def compose(self) -> ComposeResult:
         words = self.words
@@ -57,8 +59,8 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
             yield LiteralText(words["note_happened" if self._adverse else "note_what"])
             yield TextArea(soft_wrap=True, tab_behavior="focus")
             yield LiteralText(words["note_who"])
-            writers = tuple(words[f"note_{who}"] for who in WRITERS)
-            yield ChoiceRow(writers, WRITERS.index(self._who) if self._who in WRITERS else None, id="who")
+            writers = tuple(words[f"note_{writer}"] for writer in WRITERS)
+            yield ChoiceRow(writers, WRITERS.index(self._writer) if self._writer in WRITERS else None, id="who")
             yield LiteralText(words["note_adverse"])
             yield ChoiceRow((words["no"], words["yes"]), int(self._adverse), id="adverse")
             yield Button(words["note_button"], variant="primary", compact=True)
@@ -66,7 +68,7 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
         yield Footer(show_command_palette=False)
 
     @on(ChoiceRow.Left)
-    def _next(self) -> None:
+    def _focus_next(self) -> None:
         """Move the focus to the next field when a row of choices is left."""
         self.focus_next()
 
@@ -74,15 +76,15 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
     def action_save(self) -> None:
         """Dismiss with the note; refuse an empty or too long text, and a note without a writer."""
         text = " ".join(self.query_one(TextArea).text.split())
-        who = self.query_one("#who", ChoiceRow).chosen
+        writer = self.query_one("#who", ChoiceRow).chosen
         if not text:
             self._refuse(self.words["note_empty"])
         elif len(text) > MOST_CHARACTERS:
             self._refuse(self.words.fill("note_long", {"most": MOST_CHARACTERS, "count": len(text)}))
-        elif who is None:
+        elif writer is None:
             self._refuse(self.words["note_no_writer"])
         else:
-            dismiss_screen(self, NoteAsked(WRITERS[who], text, self.query_one("#adverse", ChoiceRow).chosen == 1))
+            dismiss_screen(self, NoteAsked(WRITERS[writer], text, self.query_one("#adverse", ChoiceRow).chosen == 1))
 
     def action_leave(self) -> None:
         """Dismiss without a note."""

@@ -24,8 +24,8 @@ from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 CHOICES = {
-    AfterPause.GO_ON: "pause_go_on",
-    AfterPause.LEAVE: "pause_leave",
+    AfterPause.CONTINUE_SITTING: "pause_go_on",
+    AfterPause.END_SITTING: "pause_leave",
     AfterPause.WITHDRAW: "pause_withdraw",
 }
 """Key of the text of each decision in `Words`, in the order of the list."""
@@ -66,13 +66,13 @@ class PauseScreen(TranslatedScreen[AfterPause]):
         with Card(words["pause_title"]):
             yield LiteralText(words["pause_free"], classes="strong")
             yield LiteralText(words.fill("pause_reason", {"reason": words.fact(self._notice.reason)}), classes="gap")
-            yield LiteralText(words.counted("saved", self._notice.answers))
+            yield LiteralText(words.fill_count("saved", self._notice.answers))
             yield OptionList(*(Option(words[key], id=choice.value) for choice, key in CHOICES.items()), markup=False)
             yield LiteralText(id="message")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        first = AfterPause.LEAVE if self._leaving else AfterPause.GO_ON
+        first = AfterPause.END_SITTING if self._leaving else AfterPause.CONTINUE_SITTING
         self.query_one(OptionList).highlighted = list(CHOICES).index(first)
 
     @on(OptionList.OptionSelected)

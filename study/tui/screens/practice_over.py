@@ -27,9 +27,9 @@ class PracticeOverScreen(TranslatedScreen[None]):
 
     def compose(self) -> ComposeResult:
         result, words = self._result, self.words
-        right = {"right": result.right, "asked": result.of}
+        counts = {"right": result.correct_count, "asked": result.answer_count}
         with Card(words["practice_title"]):
-            yield LiteralText(words.fill("practice_right", right), classes="strong")
+            yield LiteralText(words.fill("practice_right", counts), classes="strong")
             yield LiteralText(words["practice_enough" if result.passed else "practice_hard"], classes="gap")
             yield LiteralText(words["enter_goes_on"], classes="gap")
         yield Footer(show_command_palette=False)

@@ -13,7 +13,7 @@ from study.tui.translated_screen import TranslatedScreen
 
 TICK_S = 0.5
 """Interval (s) at which the elapsed time is drawn."""
-SILENT = "…"
+NO_TEXT = "…"
 """Shown as long as there is no sentence."""
 
 
@@ -42,7 +42,7 @@ class PreparingScreen(TranslatedScreen[None]):
     def compose(self) -> ComposeResult:
         with Vertical() as box:
             box.border_title = self._sentence and self.words["preparing_title"]
-            yield Static(self._sentence or SILENT, id="sentence", markup=False)
+            yield Static(self._sentence or NO_TEXT, id="sentence", markup=False)
             yield Static(self._wait_words(), id="elapsed", markup=False)
         footer = Footer(show_command_palette=False)
         footer.display = bool(self._sentence)
@@ -80,5 +80,5 @@ class PreparingScreen(TranslatedScreen[None]):
 
 def describe_elapsed(seconds: float, words: Words = ENGLISH_WORDS) -> str:
     """Elapsed time in words: minutes and seconds, or seconds alone below a minute."""
-    minutes, left = divmod(int(seconds), 60)
-    return words.fill("elapsed_min" if minutes else "elapsed_s", {"minutes": minutes, "seconds": left})
+    minutes, remainder_s = divmod(int(seconds), 60)
+    return words.fill("elapsed_min" if minutes else "elapsed_s", {"minutes": minutes, "seconds": remainder_s})

@@ -46,7 +46,7 @@ class RestScreen(TranslatedScreen[float]):
             yield LiteralText(words["rest_relax"], classes="strong")
             yield Digits()
             yield LiteralText(id="message", classes="gap strong")
-            yield LiteralText(words.counted("runs_left", notice.runs_left), classes="gap")
+            yield LiteralText(words.fill_count("runs_left", notice.runs_left), classes="gap")
             if notice.progress is not None:
                 yield LiteralText(progress_sentence(notice.progress, words))
         yield Footer(show_command_palette=False)
@@ -58,22 +58,24 @@ class RestScreen(TranslatedScreen[float]):
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         # Until the rest is over Enter does nothing, so the footer does not name it.
-        return action != "go_on" or self._is_over()
+        return action != "go_on" or self._has_ended()
 
     def action_go_on(self) -> None:
-        if self._is_over():
+        if self._has_ended():
             dismiss_screen(self, self._seconds_rested())
 
     def _tick(self) -> None:
-        left_s = max(0, math.ceil(self._notice.seconds - self._seconds_rested()))
-        self.query_one(Digits).update(f"{left_s // 60}:{left_s % 60:02d}")
-        self.query_one("#message", LiteralText).update(self.words["rest_ready" if self._is_over() else "rest_resting"])
-        if self._is_over():
+        remaining_s = max(0, math.ceil(self._notice.seconds - self._seconds_rested()))
+        self.query_one(Digits).update(f"{remaining_s // 60}:{remaining_s % 60:02d}")
+        self.query_one("#message", LiteralText).update(
+            self.words["rest_ready" if self._has_ended() else "rest_resting"]
+        )
+        if self._has_ended():
             self._ticking.stop()
             self.refresh_bindings()
 
     def _seconds_rested(self) -> float:
         return time.monotonic() - self._began_s
 
-    def _is_over(self) -> bool:
+    def _has_ended(self) -> bool:
         return self._seconds_rested() >= self._notice.seconds

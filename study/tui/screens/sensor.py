@@ -14,7 +14,7 @@ from textual.screen import Screen
 from textual.widgets import Footer, Input, Label, Static
 
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.engine.from_engine import Calibrated, LayDown, SensorKept
+from study.tui.engine.from_engine import Calibrated, CalibrationStored, LayDown
 from study.tui.engine.to_engine import CalibrateSensor, KeepSensor, LetGo, Reply
 from study.tui.home_messages import CommandWanted
 
@@ -88,23 +88,23 @@ class SensorScreen(Screen[None]):
     def on_mount(self) -> None:
         self.query_one("#port", Input).focus()
 
-    def hear(self, message: LayDown | Calibrated | SensorKept) -> None:
+    def handle_message(self, message: LayDown | Calibrated | CalibrationStored) -> None:
         """Handle a message of the engine: show the next position, the result, or that the result was written."""
         match message:
-            case LayDown(number=number, position=position, heard=heard):
+            case LayDown(number=number, position=position, previous_reading=readings):
                 self._waits_for = message
-                if heard is not None:
-                    self._note(f"✓ read {', '.join(f'{value:.0f}' for value in heard)}")
+                if readings is not None:
+                    self._note(f"✓ read {', '.join(f'{value:.0f}' for value in readings)}")
                 self._show_line(f"{number} of {STEPS}: lay the sensor down with {position}, let go of it, press Enter.")
             case Calibrated(table=table, file=file):
                 self._under_way, self._table = False, table
                 self.query_one("#seen", Static).update(table)
                 self._show_line(f"Enter writes this into {file}; Esc leaves it.")
-            case SensorKept(file=file):
+            case CalibrationStored(file=file):
                 self._lock(False)
                 self._show_line(f"Written into {file}. `hapteq doctor` checks the sensor. Esc goes back.")
 
-    def begin_again(self) -> None:
+    def reset_after_error(self) -> None:
         """Reset the screen after an error; a panel above the screen shows the error."""
         self._waits_for, self._under_way, self._table = None, False, ""
         self._show_line("F5 begins again.")
@@ -148,7 +148,7 @@ class SensorScreen(Screen[None]):
         dismiss_screen(self, None)
 
     @on(Input.Changed)
-    def _unsay(self) -> None:
+    def _clear_message(self) -> None:
         """Replace a message about a field once the field is edited."""
         if not self._under_way:
             self._show_line("F5 begins.")
@@ -166,10 +166,10 @@ class SensorScreen(Screen[None]):
 
     def _note(self, text: str) -> None:
         """Append a line about a position; its reading (✓) replaces the line that was shown during the measurement."""
-        seen = self.query_one("#seen", Static)
-        lines = [line for line in str(seen.content).split("\n") if line]
+        results = self.query_one("#seen", Static)
+        lines = [line for line in str(results.content).split("\n") if line]
         if text.startswith("✓") and lines:
             lines[-1] = f"{lines[-1].split(':')[0]}: {text}"
         else:
             lines.append(text)
-        seen.update("\n".join(lines))
+        results.update("\n".join(lines))

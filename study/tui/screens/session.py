@@ -86,12 +86,12 @@ class SessionScreen(Screen[None]):
         page = self.query_one(TabbedContent).active
         self._view = view
 
-        async def again() -> None:
+        async def redraw() -> None:
             await self.recompose()
             self.query_one(TabbedContent).active = page
             self.refresh_bindings()
 
-        self.call_later(again)
+        self.call_later(redraw)
 
     def compose(self) -> ComposeResult:
         view = self._view
@@ -186,8 +186,8 @@ def open_report(app: App[object], path: str) -> None:
         try:
             app.deliver_binary(path, open_method="browser", mime_type="text/html")
         except OSError as problem:
-            why = f"{problem.strerror or problem}: {path}. Make it anew, or open it where it is now."
-            app.notify(why, title="The report cannot be opened", severity="error", markup=False)
+            explanation = f"{problem.strerror or problem}: {path}. Make it anew, or open it where it is now."
+            app.notify(explanation, title="The report cannot be opened", severity="error", markup=False)
     else:
         app.open_url(file_url(path))
 
@@ -209,8 +209,8 @@ def _facts(facts: tuple[tuple[str, str], ...]) -> Table:
     table = Table.grid(padding=(0, 2, 0, 0))
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
-    for what, value in facts:
-        table.add_row(Text(what), Text(value))
+    for name, value in facts:
+        table.add_row(Text(name), Text(value))
     return table
 
 

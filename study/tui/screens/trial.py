@@ -27,11 +27,11 @@ from study.tui.widgets.direction_panel import DirectionPanel, Mark
 from study.tui.widgets.literal_text import LiteralText
 from study.tui.widgets.session_bar import SessionBar
 
-ASKED = {Task.DIRECTION: "asked_direction", Task.INTERVAL: "asked_interval"}
+QUESTION_TEXTS = {Task.DIRECTION: "asked_direction", Task.INTERVAL: "asked_interval"}
 """Key of the question's text, by task."""
 REPLIES = {"pause": PAUSE, "leave": LEAVING, "repeat": REPEAT}
 """Replies other than an answer, by the argument of their key binding."""
-AFTER = {
+REPLY_TEXTS = {
     PAUSE: "pause_let_go",
     LEAVING: "pause_let_go",
     TIME_OVER: "time_over",
@@ -79,13 +79,13 @@ class TrialScreen(TranslatedScreen[None]):
         self._question: Question | None = None
         self._repeats_left: int | None = None
         self._armed_s: float | None = None
-        self._taken = 0
+        self._accepted_answer = 0
         self._limit: Timer | None = None
         self._trouble = ""
         self._trouble_is_old = False
         self._verdict: bool | None = None
         """Whether the last answer was right; None without feedback."""
-        self._wanted: tuple[Unanswered, float] | None = None
+        self._pending_request: tuple[Unanswered, float] | None = None
 
     def compose(self) -> ComposeResult:
         yield SessionBar(self.words)
@@ -105,7 +105,7 @@ class TrialScreen(TranslatedScreen[None]):
         self._drop_limit()
         if self._question is not None and run_key(question) != run_key(self._question):
             self._verdict = None  # another kind of run begins, which may give no feedback
-        self._question, self._repeats_left, self._taken = question, question.repeats_left, 0
+        self._question, self._repeats_left, self._accepted_answer = question, question.repeats_left, 0
         # Feedback is repeated with the next question: the trial that it belongs to ends too soon to read it.
         last, self._verdict = self._verdict, None
         if self._trouble_is_old:
@@ -115,22 +115,22 @@ class TrialScreen(TranslatedScreen[None]):
             self._limit = self.set_timer(question.time_limit_s, self._time_over)
         self._show("" if last is None else f"{self.words['last_right' if last else 'last_wrong']} ")
         self._armed_s = time.monotonic()
-        if self._wanted is not None and self._armed_s - self._wanted[1] < WANTED_FOR_S:
-            self._reply(self._wanted[0])
-        self._wanted = None
+        if self._pending_request is not None and self._armed_s - self._pending_request[1] < WANTED_FOR_S:
+            self._reply(self._pending_request[0])
+        self._pending_request = None
 
     def disarm(self) -> None:
         """Accept no further reply until `arm` is called again."""
         self._armed_s = None
         self._drop_limit()
-        if not self._taken:
+        if not self._accepted_answer:
             self._show_message(self.words["wait"])
 
     def show_saved(self) -> None:
         """Show that the answer was written to the log on disk."""
-        if self._taken:
+        if self._accepted_answer:
             self._show_mark("saved")
-            saved = f"{self.words.fill('answer_saved', {'answer': self._taken})} {self.words['wait']}"
+            saved = f"{self.words.fill('answer_saved', {'answer': self._accepted_answer})} {self.words['wait']}"
             self._show_message(self._verdict_sentence() or saved)
 
     def show_feedback(self, correct: bool) -> None:
@@ -146,11 +146,11 @@ class TrialScreen(TranslatedScreen[None]):
             self.query_one("#trouble", LiteralText).update(sentence)
 
     def on_key(self, event: Key) -> None:
-        at_s = arrival_s(event)
+        arrival_time_s = arrival_s(event)
         answer = self._keys.answer(event.character or event.key)
         if answer is not None:
             event.stop()
-            self._take(answer, at_s)
+            self._take_answer(answer, arrival_time_s)
         elif self._armed_s is not None and event.key not in self.active_bindings:
             self._refuse(event)
 
@@ -166,26 +166,26 @@ class TrialScreen(TranslatedScreen[None]):
         elif self._armed_s is not None:
             self._reply(reply)
         elif reply.pause:
-            self._wanted = reply, time.monotonic()
+            self._pending_request = reply, time.monotonic()
             self._show_message(self.words["pause_comes"])
 
     def action_heard(self, answer: int) -> None:
         """Does nothing: the binding only gives the footer its entry. Answers are handled in `on_key`."""
 
-    def _take(self, answer: int, at_s: float) -> None:
-        """Post an answer (1 or 2), unless the key is held down or arrived before the question. at_s: arrival of the key
-        (s, monotonic clock)."""
+    def _take_answer(self, answer: int, arrival_time_s: float) -> None:
+        """Post an answer (1 or 2), unless the key is held down or arrived before the question. arrival_time_s: arrival
+        of the key (s, monotonic clock)."""
         armed_s = self._armed_s
-        is_press = self._presses.is_press(answer, at_s, float("inf") if armed_s is None else armed_s)
-        if armed_s is None or at_s < armed_s:
+        is_press = self._presses.is_press(answer, arrival_time_s, float("inf") if armed_s is None else armed_s)
+        if armed_s is None or arrival_time_s < armed_s:
             return
         if not is_press:
             self._show_message(f"{self.words['key_held']} {self._press()}")
             return
         self._armed_s = None
-        self.post_message(self.Replied(Answered(answer, at_s)))
+        self.post_message(self.Replied(Answered(answer, arrival_time_s)))
         self._drop_limit()
-        self._taken = answer
+        self._accepted_answer = answer
         self._show_mark("taken")
         self._show_message(self.words.fill("answer_taken", {"answer": answer}))
 
@@ -193,7 +193,9 @@ class TrialScreen(TranslatedScreen[None]):
         self._armed_s = None
         self.post_message(self.Replied(reply))
         self._drop_limit()
-        self._show_message(self.words[AFTER[reply]] if reply in AFTER else repeat_words(self._repeats_left, self.words))
+        self._show_message(
+            self.words[REPLY_TEXTS[reply]] if reply in REPLY_TEXTS else repeat_words(self._repeats_left, self.words)
+        )
 
     def _time_over(self) -> None:
         if self._armed_s is not None:
@@ -210,8 +212,8 @@ class TrialScreen(TranslatedScreen[None]):
             self._show_message(self.words["num_lock"])
         elif event.is_printable or event.key == "enter":
             key = {"enter": "enter_key", "space": "space_key"}.get(event.key)
-            typed = f"'{event.character}'" if key is None else self.words[key]
-            self._show_message(f"{self.words.fill('no_answer', {'typed': typed})} {self._press()}")
+            key_text = f"'{event.character}'" if key is None else self.words[key]
+            self._show_message(f"{self.words.fill('no_answer', {'typed': key_text})} {self._press()}")
 
     def _verdict_sentence(self) -> str:
         return "" if self._verdict is None else self.words["right" if self._verdict else "wrong"]
@@ -227,7 +229,7 @@ class TrialScreen(TranslatedScreen[None]):
             return
         bar = self.query_one(SessionBar)
         bar.heading, bar.progress = heading(question, self.words), question.progress
-        self.query_one("#asked", LiteralText).update(self.words[ASKED[question.task]])
+        self.query_one("#asked", LiteralText).update(self.words[QUESTION_TEXTS[question.task]])
         for panel in self.query(DirectionPanel):
             panel.picture = question.picture if question.task is Task.DIRECTION else None
             panel.mark = ""
@@ -240,7 +242,7 @@ class TrialScreen(TranslatedScreen[None]):
 
     def _show_mark(self, mark: Mark) -> None:
         for panel in self.query(DirectionPanel):
-            panel.mark = mark if panel.number == self._taken else ""
+            panel.mark = mark if panel.number == self._accepted_answer else ""
 
     def _press(self) -> str:
         return self.words.fill("press", {"keys": self._keys.choice(self.words)})

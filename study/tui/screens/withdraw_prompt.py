@@ -65,8 +65,8 @@ class WithdrawPrompt(ModalScreen[bool]):
         yield Footer(show_command_palette=False)
 
     @on(Input.Submitted)
-    def _judge(self, typed: Input.Submitted) -> None:
-        if typed.value.strip() == self._subject:
+    def _check_input(self, event: Input.Submitted) -> None:
+        if event.value.strip() == self._subject:
             dismiss_screen(self, True)
         else:
             self.query_one("#message", Static).update(f"That is not {self._subject}. Nothing was erased.")

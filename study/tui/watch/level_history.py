@@ -12,7 +12,7 @@ from textual.widget import Widget
 
 from study.session.watching.watch_view import StaircasePoint
 from study.tui.drawing.braille import Canvas
-from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG
+from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK_MARK, RIGHT_MARK, VALLEY_MARK, WRONG_MARK
 
 LEAST_RANGE = 4.0
 """Smallest ratio of the cap to the lowest level of the axis, so that small steps do not look large."""
@@ -21,14 +21,20 @@ DOTS_PER_TRIAL = 4.0
 
 MUTED = "$foreground 65%"
 """Style of labels and legend."""
-NEXT = "?"
+NEXT_MARK = "?"
 """Mark of the next level."""
-LEGEND = f"{RIGHT} right {WRONG} wrong {PEAK}{VALLEY} reversal {NEXT}next ┄cap"
+LEGEND = f"{RIGHT_MARK} right {WRONG_MARK} wrong {PEAK_MARK}{VALLEY_MARK} reversal {NEXT_MARK}next ┄cap"
 """Meaning of the marks, on a single line."""
 
-_STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error", NEXT: "bold"}
+_STYLES = {
+    RIGHT_MARK: "$text-success",
+    WRONG_MARK: "bold $text-error",
+    PEAK_MARK: "bold",
+    VALLEY_MARK: "bold $text-error",
+    NEXT_MARK: "bold",
+}
 """Style of each mark."""
-_FIRST = {WRONG: 1, RIGHT: 0, PEAK: 2, VALLEY: 2, NEXT: 3}
+_FIRST = {WRONG_MARK: 1, RIGHT_MARK: 0, PEAK_MARK: 2, VALLEY_MARK: 2, NEXT_MARK: 3}
 """Priority of the marks: where several fall into the same cell, that with the highest number is drawn."""
 
 
@@ -77,7 +83,7 @@ def level_history(
     for start, end in itertools.pairwise(dots):
         canvas.line(start, end)
     marks: dict[tuple[int, int], str] = {}
-    for (x, y), mark in zip(dots, [*map(_point_mark, points), NEXT], strict=False):
+    for (x, y), mark in zip(dots, [*map(_point_mark, points), NEXT_MARK], strict=False):
         cell = (round(y) // 4, round(x) // 2)
         if cell not in marks or _FIRST[mark] >= _FIRST[marks[cell]]:
             marks[cell] = mark
@@ -92,8 +98,8 @@ def level_history(
 def _point_mark(point: StaircasePoint) -> str:
     """Mark of a trial. A reversal after a right answer is a peak of the staircase, after a wrong answer a valley."""
     if point.reversal:
-        return PEAK if point.correct else VALLEY
-    return RIGHT if point.correct else WRONG
+        return PEAK_MARK if point.correct else VALLEY_MARK
+    return RIGHT_MARK if point.correct else WRONG_MARK
 
 
 def _line(row: int, text: str, marks: dict[tuple[int, int], str], label_n: float | None) -> Content:

@@ -17,7 +17,7 @@ from study.session.watching.requests import Request
 from study.tui.departure import leave_with_the_terminal
 from study.tui.keys.key_names import key_name
 from study.tui.keys.keys_in_order import KeysInOrder
-from study.tui.themes import DARK, NEXT, register_themes
+from study.tui.themes import DARK, NEXT_THEME, register_themes
 from study.tui.watch.watch_screen import WatchScreen
 from study.tui.watch.watch_source import WatchSource
 
@@ -47,7 +47,7 @@ class WatchApp(App[None]):
         register_themes(self, theme)
 
     async def on_event(self, event: Event) -> None:
-        await self._keys.take(event)
+        await self._keys.handle_event(event)
 
     def get_key_display(self, binding: Binding) -> str:
         return key_name(super().get_key_display(binding))
@@ -60,4 +60,4 @@ class WatchApp(App[None]):
         self.exit()
 
     def action_next_theme(self) -> None:
-        self.theme = NEXT[self.theme]
+        self.theme = NEXT_THEME[self.theme]

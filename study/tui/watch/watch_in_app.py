@@ -35,13 +35,13 @@ class Watching:
         if self._screen is not None and self._app.screen is self._screen:
             self.close()
             return
-        from study.tui.screens.confirm_view import SHOWN_HERE, confirm_view
+        from study.tui.screens.confirm_view import VIEW_SHOWN_NOTE, confirm_view
 
-        def go_on() -> None:
-            ask(NoteAsked("program", SHOWN_HERE))
+        def open_confirmed() -> None:
+            ask(NoteAsked("program", VIEW_SHOWN_NOTE))
             self.open(path, ask)
 
-        confirm_view(self._app, Path(path).name, go_on)
+        confirm_view(self._app, Path(path).name, open_confirmed)
 
     def confirm(self, path: str, ask: Callable[[Request], object]) -> None:
         """Open the view of a session that runs elsewhere, after confirmation by its name; nothing is logged."""

@@ -30,23 +30,25 @@ LABEL_CELLS = 11
 """Width of the label at the start of each line of `status`, in character cells; long lines are indented by it."""
 
 
-def changes(before: WatchView | None, now: WatchView) -> list[str]:
+def changes(previous: WatchView | None, current: WatchView) -> list[str]:
     """One line for each change from one view to the next: alarms first, each with a bell, then trials, notes (oldest
-    first), drifts, the staircase and the state of the session. before: None at the start: the whole view follows the
+    first), drifts, the staircase and the state of the session. previous: None at the start: the whole view follows the
     alarms."""
-    reported = {(alarm.kind, alarm.since) for alarm in before.alarms} if before is not None else set()
-    lines = [f"{BELL}ALARM {alarm.sentence}" for alarm in now.alarms if (alarm.kind, alarm.since) not in reported]
-    if before is None:
-        return [*lines, *status(now)]
-    lines += [_trial_line(trial) for trial in _new_trials(before, now)]
-    known = len(before.notes)
-    lines += [f"Note by the {note.who}: {note.text}" for note in now.notes[: len(now.notes) - known][::-1]]
-    known_drifts = {drift.sentence for drift in before.drifts}
-    lines += [f"Drift: {drift.sentence}" for drift in now.drifts if drift.sentence not in known_drifts]
-    if now.shown_run != before.shown_run and now.shown_run is not None:
-        lines.append(staircase_title(now))
-    if now.standing != before.standing:
-        lines.append(f"{now.standing.upper()}: {describe_activity(now)}")
+    reported = {(alarm.kind, alarm.since) for alarm in previous.alarms} if previous is not None else set()
+    lines = [f"{BELL}ALARM {alarm.sentence}" for alarm in current.alarms if (alarm.kind, alarm.since) not in reported]
+    if previous is None:
+        return [*lines, *status(current)]
+    lines += [_trial_line(trial) for trial in _new_trials(previous, current)]
+    known_notes = len(previous.notes)
+    lines += [
+        f"Note by the {note.who}: {note.text}" for note in current.notes[: len(current.notes) - known_notes][::-1]
+    ]
+    known_drifts = {drift.sentence for drift in previous.drifts}
+    lines += [f"Drift: {drift.sentence}" for drift in current.drifts if drift.sentence not in known_drifts]
+    if current.shown_run != previous.shown_run and current.shown_run is not None:
+        lines.append(staircase_title(current))
+    if current.standing != previous.standing:
+        lines.append(f"{current.standing.upper()}: {describe_activity(current)}")
     return lines
 
 
@@ -78,14 +80,14 @@ def status(view: WatchView) -> list[str]:
     return lines
 
 
-def _new_trials(before: WatchView, now: WatchView) -> list[ClosedTrial]:
+def _new_trials(previous: WatchView, current: WatchView) -> list[ClosedTrial]:
     """Trials that were not in the view before, oldest first. A trial that is still being measured is left to a later
     view."""
-    reported = {(t.run, t.trial, t.attempt) for t in before.last if t.status != "measuring"}
-    fresh = [t for t in now.last if (t.run, t.trial, t.attempt) not in reported and t.status != "measuring"]
+    reported = {(t.run, t.trial, t.attempt) for t in previous.last if t.status != "measuring"}
+    unreported = [t for t in current.last if (t.run, t.trial, t.attempt) not in reported and t.status != "measuring"]
     # A view holds the latest trials only: one before the newest of the previous view was reported long ago.
-    newest = (before.last[0].run, before.last[0].trial, before.last[0].attempt) if before.last else (-1, 0, 0)
-    return [t for t in fresh[::-1] if (t.run, t.trial, t.attempt) >= newest]
+    newest = (previous.last[0].run, previous.last[0].trial, previous.last[0].attempt) if previous.last else (-1, 0, 0)
+    return [t for t in unreported[::-1] if (t.run, t.trial, t.attempt) >= newest]
 
 
 def _trial_line(trial: ClosedTrial) -> str:
@@ -96,8 +98,8 @@ def _trial_line(trial: ClosedTrial) -> str:
     if trial.response_time_s is not None:
         parts.append(f"{trial.response_time_s:.1f} s")
     if trial.delivered_mps2 is not None:
-        across = "" if trial.off_axis_mps2 is None else f", {trial.off_axis_mps2:.1f} across"
-        parts.append(f"{trial.delivered_mps2:.1f} m/s²{across}")
+        off_axis_text = "" if trial.off_axis_mps2 is None else f", {trial.off_axis_mps2:.1f} across"
+        parts.append(f"{trial.delivered_mps2:.1f} m/s²{off_axis_text}")
     elif not_measured(trial):
         parts.append("not measured")
     if trial.reversal:

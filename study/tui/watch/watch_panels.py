@@ -27,7 +27,7 @@ from study.tui.watch.watch_words import (
     verdict,
 )
 
-Piece = Content | str | tuple[str, str]
+StyledText = Content | str | tuple[str, str]
 """A part of a line: text, text with its style, or content."""
 
 MUTED = "$foreground 65%"
@@ -59,14 +59,14 @@ def describe_standing(view: WatchView) -> Content:
     )
 
 
-def alarm_lines(unseen: Sequence[Alarm], seen: Sequence[Alarm]) -> Content:
+def alarm_lines(new_alarms: Sequence[Alarm], seen_alarms: Sequence[Alarm]) -> Content:
     """Alarms with their times: new ones first, acknowledged ones below."""
-    loud = [
+    new_lines = [
         Content.assemble((f"▲ {alarm.sentence}", "bold $text-error"), (f"  since {clock_time(alarm.since)}", ""))
-        for alarm in unseen
+        for alarm in new_alarms
     ]
-    quiet = [Content.styled(f"  seen: {alarm.sentence}", MUTED) for alarm in seen]
-    return Content("\n").join([*loud, *quiet])
+    seen_lines = [Content.styled(f"  seen: {alarm.sentence}", MUTED) for alarm in seen_alarms]
+    return Content("\n").join([*new_lines, *seen_lines])
 
 
 def runs_lines(view: WatchView, rows: int) -> Content:
@@ -87,9 +87,9 @@ def trials_lines(view: WatchView, rows: int, columns: int) -> Content:
         lines.append(Content(f"{trial.trial + 1:>5} {trial.level_n:5.3g}  hidden until it is answered"))
     room = max(0, rows - len(lines))
     legend = [Content.styled(f"{NOT_MEASURED_MARK} {NOT_MEASURED}", MUTED)]
-    explained = room > 1 and any(map(not_measured, view.last[: room - 1]))
-    lines += [_trial_line(row, columns) for row in view.last[: room - explained]]
-    lines += legend * explained
+    has_legend = room > 1 and any(map(not_measured, view.last[: room - 1]))
+    lines += [_trial_line(row, columns) for row in view.last[: room - has_legend]]
+    lines += legend * has_legend
     return Content("\n").join(lines)
 
 
@@ -106,17 +106,17 @@ def gauges(view: WatchView) -> Content:
         ("Device", Content(device_words(view))),
     ]
     if view.probes:
-        beyond = any(drift.beyond for drift in view.drifts)
-        rows.append(("Drift", Content.styled(drift_words(view), "bold $text-error" if beyond else "")))
+        over_limit = any(drift.beyond for drift in view.drifts)
+        rows.append(("Drift", Content.styled(drift_words(view), "bold $text-error" if over_limit else "")))
     return Content("\n").join(Content.assemble((f"{name:<6} ", MUTED), text) for name, text in rows)
 
 
 def details(view: WatchView) -> Content:
     """Participant, device, forms, practice, drift and notes as text, in sections."""
-    who = f"simulated '{view.observer}'" if view.observer else "a person"
+    participant = f"simulated '{view.observer}'" if view.observer else "a person"
     answers = "1 answer" if view.answers == 1 else f"{view.answers} answers"
-    parts: list[Piece] = [
-        *_section("Session", [f"{view.subject}, {who}, {answers}", view.protocol, f"Device: {view.device}"]),
+    parts: list[StyledText] = [
+        *_section("Session", [f"{view.subject}, {participant}, {answers}", view.protocol, f"Device: {view.device}"]),
         *_section("Forms", [f"{clock_time(f.utc)}  {f.form}: {_outcome_words(f.passed)}" for f in view.forms]),
         *_section(
             "Practice",
@@ -131,7 +131,7 @@ def details(view: WatchView) -> Content:
     return Content.assemble(*parts)
 
 
-def _section(title: str, lines: Sequence[str]) -> list[Piece]:
+def _section(title: str, lines: Sequence[str]) -> list[StyledText]:
     return [(f"{title}\n", "bold"), *(f"{line}\n" for line in lines or ["none so far"]), "\n"]
 
 
@@ -142,8 +142,8 @@ def _outcome_words(passed: bool) -> str:
 def _around_the_present(runs: tuple[WatchedRun, ...], rows: int) -> tuple[WatchedRun, ...]:
     """At most `rows` consecutive runs, with the current run near their middle; the last runs where there is no current
     run."""
-    present = next((place for place, run in enumerate(runs) if run.status == "present"), len(runs) - 1)
-    first = max(0, min(present - rows // 2, len(runs) - rows))
+    present_index = next((index for index, run in enumerate(runs) if run.status == "present"), len(runs) - 1)
+    first = max(0, min(present_index - rows // 2, len(runs) - rows))
     return runs[first : first + max(1, rows)]
 
 
@@ -158,18 +158,21 @@ def _trial_line(trial: ClosedTrial, columns: int) -> Content:
     stands for it. A "+" after the number marks each repetition, up to two."""
     word = verdict(trial)
     number = f"{trial.trial + 1}{'+' * min(trial.attempt, 2)}"
-    left = f"{number:>5} {trial.level_n:5.3g} {_or_dash(trial.shown, 5)} {_or_dash(trial.answer, 4)} "
+    left_text = f"{number:>5} {trial.level_n:5.3g} {_or_dash(trial.shown, 5)} {_or_dash(trial.answer, 4)} "
     delivered = NOT_MEASURED_MARK if not_measured(trial) else _number(trial.delivered_mps2, 4)
-    right = f"{_number(trial.response_time_s, 4)} {delivered} {_number(trial.off_axis_mps2, 4)}"
+    right_text = f"{_number(trial.response_time_s, 4)} {delivered} {_number(trial.off_axis_mps2, 4)}"
     reversed_here = "↺" if trial.reversal else " "
-    room = columns - len(left) - len(right) - 9
+    room = columns - len(left_text) - len(right_text) - 9
     remark = trial.remark or ("measuring" if trial.status == "measuring" else "")
     if trial.phase == "catch":
         remark = f"catch {remark}".rstrip()
     shortened = remark if len(remark) <= room else f"{remark[: room - 1]}…"
-    tail = f"  {shortened}" if room >= 8 else " !" if remark else ""
+    remark_text = f"  {shortened}" if room >= 8 else " !" if remark else ""
     return Content.assemble(
-        left, (f"{word:<5}", _VERDICT_STYLES.get(word, MUTED)), f"{reversed_here} {right}", (tail, MUTED)
+        left_text,
+        (f"{word:<5}", _VERDICT_STYLES.get(word, MUTED)),
+        f"{reversed_here} {right_text}",
+        (remark_text, MUTED),
     )
 
 
@@ -183,6 +186,8 @@ def _number(value: float | None, width: int) -> str:
 
 def _bar(share: float, words: str) -> Content:
     """A bar for a share of a limit, with words: in the style of a warning from 0.8, of an error from 1."""
-    filled = round(min(1.0, share) * BAR_CELLS)
+    filled_cells = round(min(1.0, share) * BAR_CELLS)
     style = "bold $text-error" if share >= 1 else "bold $text-warning" if share >= 0.8 else ""
-    return Content.assemble(("█" * filled, style), ("░" * (BAR_CELLS - filled), MUTED), (f" {words}", style))
+    return Content.assemble(
+        ("█" * filled_cells, style), ("░" * (BAR_CELLS - filled_cells), MUTED), (f" {words}", style)
+    )

@@ -1,6 +1,6 @@
-"""The experimenter's view of a running session: everything but the direction of the open trial.
+"""Screen of `hapteq watch`: the experimenter's view of a running session, without the direction of the open trial.
 
-It follows read-only; it can request a stop or a pause, and add notes.
+It reads the session's files; it can request a stop or a pause, and add notes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from textual.widgets import Footer, Static
 
 from study.errors import StudyError
 from study.session.watching.requests import NoteAsked, PauseAsked, Request, StopAsked
-from study.session.watching.watch_view import ON, Alarm, WatchView
+from study.session.watching.watch_view import RUNNING_STATUSES, Alarm, WatchView
 from study.tui.screens.note_prompt import NotePrompt
 from study.tui.screens.watch_help import GUIDE, HELP
 from study.tui.screens.watch_style import STYLE
@@ -28,70 +28,70 @@ from study.tui.watch.watch_panels import alarm_lines, describe_standing, details
 from study.tui.watch.watch_source import WatchSource
 from study.tui.watch.watch_words import staircase_title
 
-RING_EVERY_S = 4.0
+BELL_INTERVAL_S = 4.0
 """Interval at which the bell repeats while an urgent alarm is not acknowledged (s)."""
-FORGOTTEN_AFTER_S = 10.0
-"""An alarm that returns within this time (s) is the same one; later it is new."""
+SAME_ALARM_WITHIN_S = 10.0
+"""An alarm that returns within this time (s) counts as the same alarm; later it is new."""
 
-Key = tuple[str, str]
+AlarmKey = tuple[str, str]
 """An alarm's kind and when it began."""
 
 
 class AlarmBook:
-    """Which alarms were acknowledged, and when the bell rings. Pure: the time is an argument."""
+    """Which alarms were acknowledged, and when the bell rings. It reads no clock: the time is an argument."""
 
     def __init__(self) -> None:
         self._alarms: tuple[Alarm, ...] = ()
-        self._seen: dict[Key, float] = {}
+        self._acknowledged: dict[AlarmKey, float] = {}
         """Acknowledged alarms, and when each was last present (s)."""
-        self._rung: dict[Key, float] = {}
+        self._rung: dict[AlarmKey, float] = {}
         """Alarms for which the bell has rung, and when each was last present (s)."""
-        self._rang_s = float("-inf")
+        self._last_ring_s = float("-inf")
 
     @property
-    def unseen(self) -> tuple[Alarm, ...]:
+    def new_alarms(self) -> tuple[Alarm, ...]:
         """Current alarms that were not acknowledged."""
-        return tuple(alarm for alarm in self._alarms if _key(alarm) not in self._seen)
+        return tuple(alarm for alarm in self._alarms if _identify_alarm(alarm) not in self._acknowledged)
 
     @property
-    def seen(self) -> tuple[Alarm, ...]:
+    def seen_alarms(self) -> tuple[Alarm, ...]:
         """Current alarms that were acknowledged."""
-        return tuple(alarm for alarm in self._alarms if _key(alarm) in self._seen)
+        return tuple(alarm for alarm in self._alarms if _identify_alarm(alarm) in self._acknowledged)
 
-    def take(self, alarms: Sequence[Alarm], now_s: float) -> bool:
+    def update(self, alarms: Sequence[Alarm], now_s: float) -> bool:
         """Update with the current alarms. Returns whether the bell is to ring."""
         self._alarms = tuple(alarms)
-        present = {_key(alarm) for alarm in alarms}
-        for book in (self._seen, self._rung):
-            book.update({key: now_s for key in book if key in present})
-            for key in [key for key, last_s in book.items() if now_s - last_s > FORGOTTEN_AFTER_S]:
-                del book[key]
-        new = [_key(alarm) for alarm in self.unseen if _key(alarm) not in self._rung]
-        again = any(alarm.urgent for alarm in self.unseen) and now_s - self._rang_s >= RING_EVERY_S
-        if not new and not again:
+        present_keys = {_identify_alarm(alarm) for alarm in alarms}
+        for last_present_s in (self._acknowledged, self._rung):
+            last_present_s.update({key: now_s for key in last_present_s if key in present_keys})
+            for key in [key for key, last_s in last_present_s.items() if now_s - last_s > SAME_ALARM_WITHIN_S]:
+                del last_present_s[key]
+        new = [_identify_alarm(alarm) for alarm in self.new_alarms if _identify_alarm(alarm) not in self._rung]
+        repeats_bell = any(alarm.urgent for alarm in self.new_alarms) and now_s - self._last_ring_s >= BELL_INTERVAL_S
+        if not new and not repeats_bell:
             return False
         self._rung.update(dict.fromkeys(new, now_s))
-        self._rang_s = now_s
+        self._last_ring_s = now_s
         return True
 
     def acknowledge(self, now_s: float) -> int:
         """Acknowledge all current alarms. Returns how many were new."""
-        unseen = self.unseen
-        self._seen.update({_key(alarm): now_s for alarm in unseen})
-        return len(unseen)
+        new_alarms = self.new_alarms
+        self._acknowledged.update({_identify_alarm(alarm): now_s for alarm in new_alarms})
+        return len(new_alarms)
 
 
-def _key(alarm: Alarm) -> Key:
+def _identify_alarm(alarm: Alarm) -> AlarmKey:
     return alarm.kind, alarm.since if alarm.event else ""
 
 
 POLL_EVERY_S = 0.1
 """Interval at which the session's files are read (s)."""
-UNHEARD_AFTER_S = 2.0
+STOP_TIMEOUT_S = 2.0
 """Time (s) after which a stop without effect is an alarm; a session checks for requests twenty times a second."""
-NO_NEWS_AFTER_S = 3.0
-"""Time without a new view (s) after which the screen says that it is old."""
-SAID_FOR_S = 8.0
+STALE_AFTER_S = 3.0
+"""Time without a new view (s) after which an alarm says that the view is out of date."""
+MESSAGE_DURATION_S = 8.0
 """Time for which a message stays (s)."""
 
 
@@ -135,11 +135,11 @@ class WatchScreen(Screen[None]):
         self._source = source
         self._ask = ask
         self._book = AlarmBook()
-        self._taken: WatchView | None = None
-        self._news_s = self._clock_s()
+        self._latest_view: WatchView | None = None
+        self._last_update_s = self._clock_s()
         self._stop_sent_s: float | None = None
         self._stopped_here = False
-        self._said_s = float("-inf")
+        self._message_shown_s = float("-inf")
 
     def compose(self) -> ComposeResult:
         yield Static(id="standing")
@@ -166,17 +166,17 @@ class WatchScreen(Screen[None]):
         self.poll()
 
     def poll(self) -> None:
-        """Ten times a second: check for a new view, the bell, and whether a stop was received."""
+        """Every `POLL_EVERY_S`: check for a new view, alarms, and whether a stop was received."""
         view = self._source.latest()
-        if view is not None and view is not self._taken:
-            self._taken = view
+        if view is not None and view is not self._latest_view:
+            self._latest_view = view
             self.post_message(WatchMessage(view))
         elif self.is_mounted:
             self._redraw()
 
     def on_watch_message(self, message: WatchMessage) -> None:
-        self._news_s = self._clock_s()
-        self._stopped_here = self._stopped_here and message.view.standing not in ON
+        self._last_update_s = self._clock_s()
+        self._stopped_here = self._stopped_here and message.view.standing not in RUNNING_STATUSES
         self.view = message.view
 
     def watch_view(self, view: WatchView | None) -> None:
@@ -203,43 +203,43 @@ class WatchScreen(Screen[None]):
 
     def _redraw(self) -> None:
         now_s = self._clock_s()
-        alarms = (*self._own_alarms(now_s), *self._alarms_of_the_view())
-        if self._book.take(alarms, now_s):
+        alarms = (*self._find_view_alarms(now_s), *self._filter_session_alarms())
+        if self._book.update(alarms, now_s):
             self.app.bell()
         self._show_alarms()
-        if now_s - self._said_s > SAID_FOR_S:
-            self._guide(GUIDE, reply=False)
+        if now_s - self._message_shown_s > MESSAGE_DURATION_S:
+            self._update_guide(GUIDE, reply=False)
 
-    def _alarms_of_the_view(self) -> tuple[Alarm, ...]:
+    def _filter_session_alarms(self) -> tuple[Alarm, ...]:
         """Alarms of the view, except for an end that was requested here."""
         alarms = self.view.alarms if self.view is not None else ()
         return tuple(alarm for alarm in alarms if not (self._stopped_here and alarm.kind == "ended"))
 
-    def _own_alarms(self, now_s: float) -> list[Alarm]:
+    def _find_view_alarms(self, now_s: float) -> list[Alarm]:
         """Alarms about the view itself: the log is not read any more, or a stop was not received."""
-        since = self.view.utc if self.view is not None else ""
+        since_utc = self.view.utc if self.view is not None else ""
         alarms = []
-        if self._stop_sent_s is not None and self.view is not None and self.view.standing not in ON:
+        if self._stop_sent_s is not None and self.view is not None and self.view.standing not in RUNNING_STATUSES:
             self._stop_sent_s, self._stopped_here = None, True
             self._show_message(f"The session has stopped: {self.view.reason}.")
-        if self._stop_sent_s is not None and now_s - self._stop_sent_s > UNHEARD_AFTER_S:
+        if self._stop_sent_s is not None and now_s - self._stop_sent_s > STOP_TIMEOUT_S:
             unheard = "The session has not answered the stop. Hand off the handle; switch the device off."
-            alarms.append(Alarm("stop unheard", unheard, since))
+            alarms.append(Alarm("stop unheard", unheard, since_utc))
         if self._source.problem:
-            alarms.append(Alarm("no reader", f"This view receives no more data: {self._source.problem}", since))
-        elif self.view is not None and now_s - self._news_s > NO_NEWS_AFTER_S:
+            alarms.append(Alarm("no reader", f"This view receives no more data: {self._source.problem}", since_utc))
+        elif self.view is not None and now_s - self._last_update_s > STALE_AFTER_S:
             alarms.append(
-                Alarm("no news", "This view has not been updated for seconds; look at the session itself.", since)
+                Alarm("no news", "This view has not been updated for seconds; look at the session itself.", since_utc)
             )
         return alarms
 
     def _show_alarms(self) -> None:
-        unseen, seen = self._book.unseen, self._book.seen
+        new_alarms, seen_alarms = self._book.new_alarms, self._book.seen_alarms
         panel = self.query_one("#alarms", Static)
-        panel.set_class(bool(unseen or seen), "any")
-        panel.set_class(not unseen, "seen")
-        panel.border_title = "! ALARM: press a when you have seen it" if unseen else "Alarms that you have seen"
-        panel.update(alarm_lines(unseen, seen))
+        panel.set_class(bool(new_alarms or seen_alarms), "any")
+        panel.set_class(not new_alarms, "seen")
+        panel.border_title = "! ALARM: press a when you have seen it" if new_alarms else "Alarms that you have seen"
+        panel.update(alarm_lines(new_alarms, seen_alarms))
 
     def action_stop(self) -> None:
         self._stop_sent_s = self._clock_s()
@@ -261,8 +261,10 @@ class WatchScreen(Screen[None]):
         self.app.push_screen(NotePrompt(adverse, self.action_stop), write)
 
     def action_acknowledge(self) -> None:
-        seen = self._book.acknowledge(self._clock_s())
-        self._show_message(f"{seen} alarm{'' if seen == 1 else 's'} seen." if seen else "There is no alarm to be seen.")
+        count = self._book.acknowledge(self._clock_s())
+        self._show_message(
+            f"{count} alarm{'' if count == 1 else 's'} seen." if count else "There is no alarm to be seen."
+        )
         self._show_alarms()
 
     def action_details(self) -> None:
@@ -284,15 +286,15 @@ class WatchScreen(Screen[None]):
             self._show_message(f"NOT sent: {error.happened} {error.do_now}")
             self.app.bell()
             return
-        if self.view is not None and self.view.standing not in ON:
+        if self.view is not None and self.view.standing not in RUNNING_STATUSES:
             text = "Nothing runs here; it was sent all the same."
         self._show_message(text)
 
     def _show_message(self, sentence: str) -> None:
-        self._said_s = self._clock_s()
-        self._guide(sentence, reply=True)
+        self._message_shown_s = self._clock_s()
+        self._update_guide(sentence, reply=True)
 
-    def _guide(self, sentence: str, reply: bool) -> None:
+    def _update_guide(self, sentence: str, reply: bool) -> None:
         guide = self.query_one("#guide", Static)
         guide.set_class(reply, "said")
         guide.update(sentence)

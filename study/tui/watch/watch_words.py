@@ -5,9 +5,9 @@ Each function turns a value of a `WatchView` into words or a number with its uni
 
 from study.local_clock import machine_zone
 from study.session.views.local_time import local_parts
-from study.session.watching.watch_view import ClosedTrial, Exposure, Standing, WatchedRun, WatchView
+from study.session.watching.watch_view import ClosedTrial, Exposure, SittingStatus, WatchedRun, WatchView
 
-SYMBOLS: dict[Standing, str] = {
+SYMBOLS: dict[SittingStatus, str] = {
     "running": "●",
     "paused": "‖",
     "resting": "◌",
@@ -35,10 +35,10 @@ def clock_time(utc: str) -> str:
 
 def duration(seconds: float) -> str:
     """A duration in words, rounded down: "4 s", "2 min 05 s", "1 h 02 min"."""
-    whole = int(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    minutes, seconds_left = divmod(whole, 60)
+    whole_s = int(seconds)
+    if whole_s < 60:
+        return f"{whole_s} s"
+    minutes, seconds_left = divmod(whole_s, 60)
     if minutes < 60:
         return f"{minutes} min {seconds_left:02d} s"
     return f"{minutes // 60} h {minutes % 60:02d} min"
@@ -52,10 +52,11 @@ def describe_activity(view: WatchView) -> str:
     trial, run = view.open_trial, view.present_run
     if trial is None or run is None:
         return f"{view.activity}, {duration(view.activity_s)}"
-    again = f", attempt {trial.attempt + 1}" if trial.attempt else ""
-    catch = ", a catch trial" if trial.catch else ""
+    attempt_text = f", attempt {trial.attempt + 1}" if trial.attempt else ""
+    catch_text = ", a catch trial" if trial.catch else ""
     return (
-        f"trial {trial.trial + 1}{again} at {trial.level_n:.3g} N{catch}: {view.activity}, {duration(view.activity_s)}"
+        f"trial {trial.trial + 1}{attempt_text} at {trial.level_n:.3g} N{catch_text}: {view.activity}, "
+        f"{duration(view.activity_s)}"
     )
 
 
@@ -71,12 +72,14 @@ def reversals(run: WatchedRun) -> str:
 
 def staircase_title(view: WatchView) -> str:
     """Title of the drawn staircase: run, frequency (Hz), reversals, next level (N)."""
-    shown = next((run for run in view.runs if run.run == view.shown_run), None)
-    if shown is None:
+    shown_run = next((run for run in view.runs if run.run == view.shown_run), None)
+    if shown_run is None:
         return "Staircase: nothing answered yet"
     level = f", now {view.next_level_n:.3g} N" if view.next_level_n is not None else ", run over"
-    reversals = f", {shown.reversals} of {shown.reversals_needed} reversals" if shown.reversals_needed else ""
-    return f"{run_name(view, shown)}, {shown.frequency_hz:g} Hz{reversals}{level}"
+    reversals = (
+        f", {shown_run.reversals} of {shown_run.reversals_needed} reversals" if shown_run.reversals_needed else ""
+    )
+    return f"{run_name(view, shown_run)}, {shown_run.frequency_hz:g} Hz{reversals}{level}"
 
 
 def verdict(trial: ClosedTrial) -> str:
@@ -146,7 +149,7 @@ def drift_words(view: WatchView) -> str:
     """Number of responses that changed between probes, and how many changed more than allowed; empty without probes."""
     if not view.probes:
         return ""
-    beyond = sum(drift.beyond for drift in view.drifts)
+    over_limit = sum(drift.beyond for drift in view.drifts)
     if not view.drifts:
         return f"none in {view.probes} probes"
-    return f"{len(view.drifts)} changed, {beyond} beyond what is allowed"
+    return f"{len(view.drifts)} changed, {over_limit} beyond what is allowed"

@@ -71,9 +71,9 @@ class ChoiceRow(Widget, can_focus=True):
     def on_key(self, event: Key) -> None:
         if event.key in ("up", "down") and self._move_within(1 if event.key == "down" else -1):
             event.stop()
-        elif event.character and (named := find_choice(self._choices, event.character)) is not None:
+        elif event.character and (index := find_choice(self._choices, event.character)) is not None:
             event.stop()
-            self._choose(named)
+            self._choose(index)
 
     def on_click(self, event: Click) -> None:
         index = self.choice_at(event.x, event.y)
@@ -82,8 +82,8 @@ class ChoiceRow(Widget, can_focus=True):
 
     def choice_at(self, x: int, y: int) -> int | None:
         """Index of the choice drawn in the cell at column x and row y; None between choices."""
-        for index, (left, row) in enumerate(self._places(self.size.width)):
-            if row == y and left <= x < left + len(self._label(index)):
+        for index, (column, row) in enumerate(self._places(self.size.width)):
+            if row == y and column <= x < column + len(self._label(index)):
                 return index
         return None
 
@@ -138,10 +138,10 @@ class ChoiceRow(Widget, can_focus=True):
     def _move_within(self, step: int) -> bool:
         """Move the cursor through vertically listed choices. Returns False beyond their ends and for choices side by
         side: then the key is left to the form, which goes to another question."""
-        there = move_mark(self.cursor, step, len(self._choices), stay=False) if self.stacked else None
-        if there is None:
+        new_cursor = move_mark(self.cursor, step, len(self._choices), stop_at_ends=False) if self.stacked else None
+        if new_cursor is None:
             return False
-        self.cursor = there
+        self.cursor = new_cursor
         return True
 
     def _choose(self, index: int) -> None:

@@ -20,7 +20,7 @@ from study.tui.drawing.number_picture import large_number
 
 NUMBERS = {1: ("╺┓ ", " ┃ ", "╺┻╸"), 2: ("┏━┓", "┏━┛", "┗━╸")}
 """Large digits, three lines each."""
-BESIDE = 5
+NUMBER_COLUMNS = 5
 """Columns kept free for the number, left of the drawing, and as many on its right."""
 
 Mark = Literal["", "taken", "saved", "now", "felt"]
@@ -55,26 +55,26 @@ class DirectionPanel(Widget):
         self.number = number
         self.set_reactive(DirectionPanel.picture, picture)
 
-    def watch_mark(self, before: Mark, after: Mark) -> None:
-        self.remove_class(f"-{before}")
-        self.set_class(bool(after), f"-{after}")
-        self.border_subtitle = f"{self.number} {self._texts[f'mark_{after}']}" if after else ""
+    def watch_mark(self, old_mark: Mark, new_mark: Mark) -> None:
+        self.remove_class(f"-{old_mark}")
+        self.set_class(bool(new_mark), f"-{new_mark}")
+        self.border_subtitle = f"{self.number} {self._texts[f'mark_{new_mark}']}" if new_mark else ""
 
     def render_line(self, y: int) -> Strip:
         width, height = self.size
-        plain = self.rich_style
-        coloured = plain + self.get_component_rich_style(
+        base_style = self.rich_style
+        coloured = base_style + self.get_component_rich_style(
             "direction-panel--one" if self.number == 1 else "direction-panel--two", partial=True
         )
         words = self._lines()
         above = height - len(words)
         if y >= above:
-            return Strip([Segment(words[y - above].center(width)[:width], plain + Style(bold=True))], width)
-        drawing, beside = self._make_drawing()
+            return Strip([Segment(words[y - above].center(width)[:width], base_style + Style(bold=True))], width)
+        drawing, margin = self._make_drawing()
         row = y - (above - len(drawing)) // 2
-        drawn = drawing[row] if 0 <= row < len(drawing) else ""
+        row_text = drawing[row] if 0 <= row < len(drawing) else ""
         number = NUMBERS[self.number][y] if y < 3 and self.picture is not None else ""
-        text = f" {number}".ljust(beside) + drawn
+        text = f" {number}".ljust(margin) + row_text
         return Strip([Segment(text.ljust(width)[:width], coloured)], width)
 
     def _make_drawing(self) -> tuple[tuple[str, ...], int]:
@@ -100,5 +100,5 @@ class DirectionPanel(Widget):
 def _room(size: Size) -> Size:
     """Largest area within `size`, less the columns of the numbers, that looks square: cells are taken as twice as high
     as wide."""
-    rows = max(1, min(size.height, (size.width - 2 * BESIDE) // 2))
+    rows = max(1, min(size.height, (size.width - 2 * NUMBER_COLUMNS) // 2))
     return Size(2 * rows, rows)

@@ -44,7 +44,7 @@ class FormQuestion(Vertical):
         """Whether it has choices and they are listed vertically at this width."""
         return bool(self.field.choices) and self.query_one(ChoiceRow).stacked
 
-    def show(self, given: FieldEntry, at: bool) -> None:
+    def show(self, entry: FieldEntry, at: bool) -> None:
         """Show the state of the answer. at: whether the cursor of the form is on this question, which is then scrolled
         into view."""
         if at and not self.has_class("-at"):
@@ -53,14 +53,14 @@ class FormQuestion(Vertical):
         self.set_class(at, "-at")
         if self.field.choices:
             row = self.query_one(ChoiceRow)
-            row.cursor, row.at = given.marked, at
-            row.chosen = self.field.choices.index(given.answer) if given.answer in self.field.choices else None
+            row.cursor, row.at = entry.marked, at
+            row.chosen = self.field.choices.index(entry.answer) if entry.answer in self.field.choices else None
         else:
-            self.query_one(".written", Static).update(self._answer_text(given, at))
+            self.query_one(".written", Static).update(self._answer_text(entry, at))
 
-    def _answer_text(self, given: FieldEntry, at: bool) -> Text:
+    def _answer_text(self, entry: FieldEntry, at: bool) -> Text:
         """The entered text, or a hint (with the range of a number) while nothing is entered; `at` shows the cursor."""
-        if not given.answer:
+        if not entry.answer:
             hint = self._texts["form_type" if self.field.needed else "form_type_or_not"]
             if self.field.limits is not None:
                 hint = f"{hint} ({limits_words(self.field.limits, self._texts)})"
@@ -68,7 +68,7 @@ class FormQuestion(Vertical):
             if at:
                 text.stylize("reverse", 0, 1)
             return text
-        text = Text(given.answer + (" " if at else ""))
+        text = Text(entry.answer + (" " if at else ""))
         if at:
-            text.stylize("reverse", given.caret, given.caret + 1)
+            text.stylize("reverse", entry.caret, entry.caret + 1)
         return text

@@ -50,9 +50,9 @@ def _draw_target(view: HandleView, columns: int, rows: int) -> list[str]:
         canvas.circle((x, y), radius)
     canvas.line((x - 3, y), (x + 3, y))
     canvas.line((x, y - 3), (x, y + 3))
-    right, up = view.offset_mm
+    right_mm, up_mm = view.offset_mm
     size = max(2.0, edge / 14)
-    away = dots_per_mm * math.hypot(right, up)
-    shrink = min(1.0, (edge - size) / away) if away > 0 else 1.0
-    canvas.disc((x + shrink * dots_per_mm * right, y - shrink * dots_per_mm * up), size)
+    distance = dots_per_mm * math.hypot(right_mm, up_mm)
+    shrink = min(1.0, (edge - size) / distance) if distance > 0 else 1.0
+    canvas.disc((x + shrink * dots_per_mm * right_mm, y - shrink * dots_per_mm * up_mm), size)
     return canvas.lines()

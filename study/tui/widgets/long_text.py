@@ -8,7 +8,7 @@ from textual.geometry import Size
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-_LEAD = re.compile(r".{1,16}?\s{2,}")
+_LINE_HEAD = re.compile(r".{1,16}?\s{2,}")
 """A time or name at the start of a line, followed by two spaces or more: continuation lines are indented by its
 length."""
 
@@ -22,30 +22,30 @@ class LongText(ScrollView, can_focus=True):
     def __init__(self, lines: tuple[str, ...], *, id: str | None = None) -> None:
         super().__init__(id=id)
         self._lines = lines
-        self._broken: list[str] = []
+        self._wrapped: list[str] = []
         self._width = 0
 
     def show(self, lines: tuple[str, ...]) -> None:
         """Replace the lines."""
         self._lines, self._width = lines, 0
-        self._break(self.scrollable_content_region.width)
+        self._wrap(self.scrollable_content_region.width)
 
     def on_resize(self) -> None:
-        self._break(self.scrollable_content_region.width)
+        self._wrap(self.scrollable_content_region.width)
 
     def render_line(self, y: int) -> Strip:
-        place = y + self.scroll_offset.y
-        text = self._broken[place] if place < len(self._broken) else ""
+        index = y + self.scroll_offset.y
+        text = self._wrapped[index] if index < len(self._wrapped) else ""
         width = self.scrollable_content_region.width
         return Strip([Segment(text, self.rich_style)]).adjust_cell_length(width, self.rich_style)
 
-    def _break(self, width: int) -> None:
+    def _wrap(self, width: int) -> None:
         """Wrap all lines to `width` cells, unless they are wrapped to it already."""
         if width <= 0 or width == self._width:
             return
         self._width = width
-        self._broken = [part for line in self._lines for part in _parts(line, width)]
-        self.virtual_size = Size(width, len(self._broken))
+        self._wrapped = [part for line in self._lines for part in _parts(line, width)]
+        self.virtual_size = Size(width, len(self._wrapped))
         self.refresh()
 
 
@@ -53,6 +53,6 @@ def _parts(line: str, width: int) -> list[str]:
     """A line wrapped to `width` characters, continuation lines indented; not indented by half the width or more."""
     if len(line) <= width:
         return [line]
-    lead = _LEAD.match(line)
-    indent = " " * lead.end() if lead and lead.end() < width // 2 else ""
+    head = _LINE_HEAD.match(line)
+    indent = " " * head.end() if head and head.end() < width // 2 else ""
     return textwrap.wrap(line, width, subsequent_indent=indent) or [""]

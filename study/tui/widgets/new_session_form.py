@@ -13,12 +13,12 @@ from textual.containers import Horizontal, Vertical
 from textual.widgets import Button, Input, Label, Select, Static
 
 from study.session.views.archive_views import HomeView, SessionLine
-from study.session.views.participant_codes import code_problem, is_code, next_code
+from study.session.views.participant_codes import code_problem, is_code, suggest_code
 from study.tui.home_messages import BeginWanted
 
 SIMULATED = "simulated"
 """Name of the simulated device; the list of devices adds that nothing moves."""
-NOTHING_YET = [("…", "")]
+PLACEHOLDER = [("…", "")]
 """Entry of a list whose choices are not known yet; the list is disabled."""
 
 
@@ -51,13 +51,13 @@ class NewSessionForm(Vertical):
             yield Input(placeholder="code, such as P01", compact=True, id="code", max_length=64)
         with Horizontal(classes="field"):
             yield Label("Protocol")
-            yield Select[str](NOTHING_YET, allow_blank=False, compact=True, id="protocol", disabled=True)
+            yield Select[str](PLACEHOLDER, allow_blank=False, compact=True, id="protocol", disabled=True)
         with Horizontal(classes="field"):
             yield Label("Device")
-            yield Select[str](NOTHING_YET, allow_blank=False, compact=True, id="device", disabled=True)
+            yield Select[str](PLACEHOLDER, allow_blank=False, compact=True, id="device", disabled=True)
         with Horizontal(classes="field", id="equalizer"):
             yield Label("Model")
-            yield Select[str](NOTHING_YET, allow_blank=False, compact=True, id="model", disabled=True)
+            yield Select[str](PLACEHOLDER, allow_blank=False, compact=True, id="model", disabled=True)
         yield Static("", id="about", markup=False)
         yield Button("Begin (F5)", variant="primary", compact=True, id="begin", disabled=True)
 
@@ -67,17 +67,17 @@ class NewSessionForm(Vertical):
         self._set_options("#protocol", [(_protocol_prompt(p.name, p.locked), p.name) for p in home.protocols])
         self._set_options("#device", [(_device_prompt(name), name) for name in home.devices])
         self._set_options("#model", [(_model_prompt(path, home), path) for path in home.models])
-        proposed = next_code(tuple(line.subject for line in home.sessions if line.observer is None))
+        proposed = suggest_code(tuple(line.subject for line in home.sessions if line.observer is None))
         self.query_one("#code", Input).placeholder = f"code, such as {proposed}"
         self.query_one("#begin", Button).disabled = not (home.protocols and home.devices)
         self._show_problem()
 
     def action_begin(self) -> None:
-        self._begin()
+        self._submit()
 
     @on(Input.Submitted, "#code")
     @on(Button.Pressed, "#begin")
-    def _begin(self) -> None:
+    def _submit(self) -> None:
         if self._home is None or self.query_one("#begin", Button).disabled:
             return
         code = self._code
@@ -144,23 +144,23 @@ class NewSessionForm(Vertical):
     def _sessions(self, code: str) -> list[SessionLine]:
         return [line for line in self._home.sessions if line.subject == code] if self._home and code else []
 
-    def _read_selected(self, which: str) -> str:
-        value = self.query_one(which, Select).value
+    def _read_selected(self, selector: str) -> str:
+        value = self.query_one(selector, Select).value
         return value if isinstance(value, str) else ""
 
-    def _set_options(self, which: str, options: list[tuple[str, str]]) -> None:
-        select: Select[str] = self.query_one(which, Select)
-        before = select.value
-        values = [value for _, value in options or NOTHING_YET]
-        select.set_options(options or NOTHING_YET)
+    def _set_options(self, selector: str, options: list[tuple[str, str]]) -> None:
+        select: Select[str] = self.query_one(selector, Select)
+        previous_value = select.value
+        values = [value for _, value in options or PLACEHOLDER]
+        select.set_options(options or PLACEHOLDER)
         select.disabled = not options
-        select.value = before if before in values else values[0]
+        select.value = previous_value if previous_value in values else values[0]
 
     def _show_about(self, text: str, kind: str) -> None:
-        about = self.query_one("#about", Static)
-        about.set_class(kind == "-problem", "-problem")
-        about.set_class(kind == "-notice", "-notice")
-        about.update(f"! {text}" if kind else text)
+        about_line = self.query_one("#about", Static)
+        about_line.set_class(kind == "-problem", "-problem")
+        about_line.set_class(kind == "-notice", "-notice")
+        about_line.update(f"! {text}" if kind else text)
 
 
 def _protocol_prompt(name: str, locked: bool) -> str:

@@ -9,7 +9,7 @@ from textual.widget import Widget
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Progress
 
-DONE, LEFT = "━", "─"
+DONE, REMAINING = "━", "─"
 """Characters of the bar: done, and still to do."""
 
 
@@ -36,11 +36,13 @@ class SessionBar(Widget):
         width = self.size.width
         # The bar has at most 40 columns or a quarter of the width; it shrinks to 8, so that the words are not cut off.
         room = width - len(self.heading) - 1 - len(self._progress_text(0))
-        right = self._progress_text(max(8, min(40, width // 4, room)))
-        left = self.heading[: max(0, width - len(right) - 1)]
-        gap = " " * (width - len(left) - len(right))
+        right_text = self._progress_text(max(8, min(40, width // 4, room)))
+        left_text = self.heading[: max(0, width - len(right_text) - 1)]
+        gap = " " * (width - len(left_text) - len(right_text))
         style = self.rich_style
-        return Strip([Segment(left, style + Style(bold=True)), Segment(gap + right, style)], width).crop(0, width)
+        return Strip([Segment(left_text, style + Style(bold=True)), Segment(gap + right_text, style)], width).crop(
+            0, width
+        )
 
     def _progress_text(self, bar: int) -> str:
         """The bar, `bar` columns wide, the share and the minutes left; empty without progress."""
@@ -48,5 +50,5 @@ class SessionBar(Widget):
             return ""
         done = min(bar, round(self.progress.share_done * bar))
         minutes = self.progress.minutes_left
-        left = "" if minutes is None else f"  {self._words.fill('bar_left', {'minutes': minutes})}"
-        return f"{DONE * done}{LEFT * (bar - done)} {self.progress.share_done:4.0%}{left}"
+        minutes_text = "" if minutes is None else f"  {self._words.fill('bar_left', {'minutes': minutes})}"
+        return f"{DONE * done}{REMAINING * (bar - done)} {self.progress.share_done:4.0%}{minutes_text}"

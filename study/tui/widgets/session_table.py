@@ -20,7 +20,7 @@ from study.tui.engine.to_engine import ShowSession
 from study.tui.home_messages import CommandWanted, ResumeWanted, WatchWanted
 from study.tui.session_status import STYLES, status_text
 
-_NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = (
+_NAME, _STATUS, _START, _RUNS, _ANSWERS, _PROTOCOL = (
     "Session",
     "Standing",
     "Begun",
@@ -28,7 +28,7 @@ _NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = (
     "Answers",
     "Protocol",
 )
-_FIXED = {_STANDING: 12, _RUNS: 5, _ANSWERS: 7}
+_FIXED = {_STATUS: 12, _RUNS: 5, _ANSWERS: 7}
 """Fixed column widths in cells: measuring every entry of a long list would take time. The protocol gets the remaining
 width, and is wrapped."""
 _LEAST_PROTOCOL, _PADDING = 10, 2
@@ -60,7 +60,7 @@ class SessionTable(DataTable[Content | str]):
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id, cursor_type="row", zebra_stripes=False)
         self._lines: tuple[SessionLine, ...] = ()
-        self._begun: tuple[str, ...] = ()
+        self._start_times: tuple[str, ...] = ()
         self._widths: dict[str, int] = {}
         self._fitted_to = 0
 
@@ -68,8 +68,8 @@ class SessionTable(DataTable[Content | str]):
         """Replace the sessions; the cursor stays on its session if that is still listed."""
         chosen = self._chosen
         self._lines = lines
-        offset, self._begun = local_column([line.begun_utc for line in lines], machine_zone)
-        self._widths = self._fit_columns(f"{_BEGUN} ({offset})" if offset else _BEGUN)
+        offset, self._start_times = local_column([line.begun_utc for line in lines], machine_zone)
+        self._widths = self._fit_columns(f"{_START} ({offset})" if offset else _START)
         self.clear(columns=True)
         for title, width in self._widths.items():
             self.add_column(title, width=width)
@@ -80,18 +80,22 @@ class SessionTable(DataTable[Content | str]):
         if self._lines and event.size.width != self._fitted_to:
             self.show(self._lines)
 
-    def _fit_columns(self, begun: str) -> dict[str, int]:
+    def _fit_columns(self, start_title: str) -> dict[str, int]:
         """Column widths (cells) by title. Where the protocol has too little room, the column of answers, then that of
-        runs, is left out: the sentence below the list states both. begun: title of the column of times."""
+        runs, is left out: the sentence below the list states both. start_title: title of the column of times."""
         self._fitted_to = self.size.width
-        names, protocols = ([getattr(line, which) for line in self._lines] for which in ("name", "protocol"))
-        widths = {_NAME: max(map(len, (_NAME, *names))), _STANDING: _FIXED[_STANDING]}
-        widths |= {begun: max(map(len, (begun, *self._begun))), _RUNS: _FIXED[_RUNS], _ANSWERS: _FIXED[_ANSWERS]}
-        wanted = max(map(len, (_PROTOCOL, *protocols)))
-        for title, least in ((_ANSWERS, wanted), (_RUNS, _LEAST_PROTOCOL)):
-            if self._room(widths) < least:
+        names, protocols = ([getattr(line, attribute) for line in self._lines] for attribute in ("name", "protocol"))
+        widths = {_NAME: max(map(len, (_NAME, *names))), _STATUS: _FIXED[_STATUS]}
+        widths |= {
+            start_title: max(map(len, (start_title, *self._start_times))),
+            _RUNS: _FIXED[_RUNS],
+            _ANSWERS: _FIXED[_ANSWERS],
+        }
+        protocol_width = max(map(len, (_PROTOCOL, *protocols)))
+        for title, least_width in ((_ANSWERS, protocol_width), (_RUNS, _LEAST_PROTOCOL)):
+            if self._room(widths) < least_width:
                 del widths[title]
-        return widths | {_PROTOCOL: min(wanted, max(_LEAST_PROTOCOL, self._room(widths)))}
+        return widths | {_PROTOCOL: min(protocol_width, max(_LEAST_PROTOCOL, self._room(widths)))}
 
     def _room(self, widths: Mapping[str, int]) -> int:
         """Width (cells) that the given columns and the scroll bar leave for the protocol."""
@@ -103,13 +107,13 @@ class SessionTable(DataTable[Content | str]):
         the session to put the cursor on; empty for none."""
         if lines is not self._lines:
             return  # the list was replaced since this call was scheduled
-        have = self.row_count
-        part = lines[have : have + AT_ONCE]
-        for place, line in enumerate(part, start=have):
+        start = self.row_count
+        part = lines[start : start + AT_ONCE]
+        for index, line in enumerate(part, start=start):
             protocol = wrap(line.protocol, self._widths[_PROTOCOL])  # the table would cut it instead of wrapping it
-            self.add_row(*self._row(line, self._begun[place], "\n".join(protocol)), height=max(1, len(protocol)))
+            self.add_row(*self._row(line, self._start_times[index], "\n".join(protocol)), height=max(1, len(protocol)))
             if line.name == chosen:
-                self.move_cursor(row=place)
+                self.move_cursor(row=index)
         if self.row_count < len(lines):
             self.set_timer(_BREATH_S, lambda: self._add_more(lines, chosen))
 
@@ -134,17 +138,17 @@ class SessionTable(DataTable[Content | str]):
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """The footer shows only actions that apply to the session under the cursor."""
-        wanted = {"resume": "unfinished", "watch": "running"}.get(action)
-        return wanted is None or (self._chosen is not None and self._chosen.standing == wanted)
+        needed_status = {"resume": "unfinished", "watch": "running"}.get(action)
+        return needed_status is None or (self._chosen is not None and self._chosen.standing == needed_status)
 
     def _post_looked(self) -> None:
         self.refresh_bindings()
         if self._chosen is not None:
             self.post_message(self.Looked(self._chosen))
 
-    def _row(self, line: SessionLine, begun: str, protocol: str) -> tuple[Content | str, ...]:
-        known = line.standing in ("finished", "unfinished", "running")
-        runs = (f"{line.runs_done}/{line.runs}" if known else "",) if _RUNS in self._widths else ()
-        answers = (f"{line.answers:>7}" if known else "",) if _ANSWERS in self._widths else ()
-        standing = Content.styled(status_text(line.standing), STYLES[line.standing])
-        return Content(line.name), standing, begun, *runs, *answers, Content(protocol)
+    def _row(self, line: SessionLine, start_time: str, protocol: str) -> tuple[Content | str, ...]:
+        has_counts = line.standing in ("finished", "unfinished", "running")
+        runs = (f"{line.runs_done}/{line.runs}" if has_counts else "",) if _RUNS in self._widths else ()
+        answers = (f"{line.answers:>7}" if has_counts else "",) if _ANSWERS in self._widths else ()
+        status = Content.styled(status_text(line.standing), STYLES[line.standing])
+        return Content(line.name), status, start_time, *runs, *answers, Content(protocol)

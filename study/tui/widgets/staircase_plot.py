@@ -9,13 +9,26 @@ from textual.content import Content
 from textual.widget import Widget
 
 from study.session.views.archive_views import Staircase
-from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG, staircase_lines, summary
+from study.tui.drawing.staircase_drawing import (
+    LABEL_COLUMNS,
+    PEAK_MARK,
+    RIGHT_MARK,
+    VALLEY_MARK,
+    WRONG_MARK,
+    staircase_lines,
+    summary,
+)
 
-_STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error"}
+_STYLES = {
+    RIGHT_MARK: "$text-success",
+    WRONG_MARK: "bold $text-error",
+    PEAK_MARK: "bold",
+    VALLEY_MARK: "bold $text-error",
+}
 """Style of each mark."""
 MUTED = "$foreground 65%"
 """Style of labels and of the summary."""
-_BESIDES = 2
+_TEXT_LINES = 2
 """Number of lines of title and summary, which the plot leaves free."""
 
 
@@ -30,11 +43,11 @@ class StaircasePlot(Widget):
 
     def render(self) -> Content:
         width, height = self.content_size.width, self.content_size.height
-        drawn = staircase_lines(self._staircase, width, height - _BESIDES)
+        lines = staircase_lines(self._staircase, width, height - _TEXT_LINES)
         return Content("\n").join(
             [
                 Content.styled(self._staircase.title, "bold"),
-                *map(_apply_styles, drawn),
+                *map(_apply_styles, lines),
                 Content.styled(summary(self._staircase), MUTED),
             ]
         )

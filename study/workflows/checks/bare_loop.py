@@ -63,7 +63,7 @@ class BareRun:
     failed; why: the reason, if it failed."""
 
     result: BareLoop | None = None
-    why: str = ""
+    failure_reason: str = ""
 
 
 @contextlib.contextmanager
@@ -83,7 +83,7 @@ def run_bare_loop_beside(seconds: float, rate_hz: float, raised_priority: bool) 
         try:
             process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
         except OSError as problem:
-            run.why = f"it could not be started ({problem.strerror})"
+            run.failure_reason = f"it could not be started ({problem.strerror})"
             yield run
             return
         with process:
@@ -101,21 +101,22 @@ def _read(process: "subprocess.Popen[bytes]", seconds: float, run: BareRun) -> N
         ticks, late, latest_s, granted = output.split()
         run.result = BareLoop(int(ticks), int(late), float(latest_s), int(granted) > 0)
     except (subprocess.TimeoutExpired, ValueError):
-        run.why = "it gave no result"
+        run.failure_reason = "it gave no result"
 
 
-def judge_beside(late_ticks: int, ticks: int, run: BareRun) -> DeviceFinding:
+def compare_with_bare_loop(late_ticks: int, ticks: int, run: BareRun) -> DeviceFinding:
     """Compare the late ticks of the device's loop with those of the C loop. late_ticks, ticks: of the device's loop,
     missed ticks included. Too many late ticks are a warning, not an obstacle."""
     if run.result is None:
-        return DeviceFinding(NAME, f"not compared: {run.why}", fine=True)
-    bare = run.result
-    most = _most_late(WORSE_BY * bare.late_ticks * ticks / max(bare.ticks, 1))
-    fine = late_ticks <= most
+        return DeviceFinding(NAME, f"not compared: {run.failure_reason}", fine=True)
+    reference = run.result
+    max_late = _most_late(WORSE_BY * reference.late_ticks * ticks / max(reference.ticks, 1))
+    fine = late_ticks <= max_late
     value = (
-        f"{bare.late_ticks} of {bare.ticks} late ({bare.late_ticks / max(bare.ticks, 1):.2%}) at the same time, the "
-        f"latest by {1000 * bare.latest_s:.1f} ms; this loop: {late_ticks} of {ticks} "
-        f"({late_ticks / max(ticks, 1):.2%}), where up to {most} are fine ({WORSE_BY:g} times as many, and chance)"
+        f"{reference.late_ticks} of {reference.ticks} late "
+        f"({reference.late_ticks / max(reference.ticks, 1):.2%}) at the same time, the latest by "
+        f"{1000 * reference.latest_s:.1f} ms; this loop: {late_ticks} of {ticks} "
+        f"({late_ticks / max(ticks, 1):.2%}), where up to {max_late} are fine ({WORSE_BY:g} times as many, and chance)"
     )
     return DeviceFinding(NAME, value, fine, "" if fine else ADVICE, warning=not fine)
 
@@ -134,7 +135,9 @@ def _compile(folder: Path, run: BareRun) -> Path | None:
     """Path of the compiled program; None, with the reason in `run.why`, if it could not be compiled."""
     compiler = _compiler()
     if sys.platform == "win32" or compiler is None:
-        run.why = "no C compiler is here (pip install '.[compiler]')" if compiler is None else "not on Windows"
+        run.failure_reason = (
+            "no C compiler is here (pip install '.[compiler]')" if compiler is None else "not on Windows"
+        )
         return None
     program = folder / "bare_loop"
     try:
@@ -145,14 +148,14 @@ def _compile(folder: Path, run: BareRun) -> Path | None:
             timeout=COMPILING_S,
         )
     except (OSError, subprocess.SubprocessError) as problem:
-        run.why = f"it could not be compiled ({type(problem).__name__})"
+        run.failure_reason = f"it could not be compiled ({type(problem).__name__})"
         return None
     return program
 
 
 def _compiler() -> list[str] | None:
     """Command of a C compiler; the Python package `ziglang` contains one."""
-    found = next((path for name in COMPILERS if (path := shutil.which(name))), None)
-    if found is not None:
-        return [found]
+    compiler_path = next((path for name in COMPILERS if (path := shutil.which(name))), None)
+    if compiler_path is not None:
+        return [compiler_path]
     return [sys.executable, "-m", "ziglang", "cc"] if find_spec("ziglang") else None

@@ -61,14 +61,18 @@ def check_installation(data: Path, terminal: Terminal | None) -> tuple[DeviceFin
 def check_packages() -> tuple[DeviceFinding, ...]:
     """Versions of Python and of the installed packages, against the requirements of the installed hapteq."""
     try:
-        wanted_python, wanted = metadata(HAPTEQ)["Requires-Python"], requires(HAPTEQ) or []
+        python_requirement, package_requirements = metadata(HAPTEQ)["Requires-Python"], requires(HAPTEQ) or []
     except PackageNotFoundError:
         advice = "Run `make study` in its folder once: that installs hapteq and what it needs."
         return (DeviceFinding(HAPTEQ, "not installed, so what it needs is not known", fine=False, advice=advice),)
     return (
         DeviceFinding(HAPTEQ, version(HAPTEQ), fine=True),
-        check_version("Python", platform.python_version(), SpecifierSet(wanted_python)),
-        *(check_requirement(requirement) for requirement in map(Requirement, wanted) if _always(requirement)),
+        check_version("Python", platform.python_version(), SpecifierSet(python_requirement)),
+        *(
+            check_requirement(requirement)
+            for requirement in map(Requirement, package_requirements)
+            if _always(requirement)
+        ),
     )
 
 
@@ -80,25 +84,30 @@ def check_requirement(requirement: Requirement) -> DeviceFinding:
         return DeviceFinding(requirement.name, "not installed", fine=False, advice=_INSTALL)
 
 
-def check_version(name: str, found: str, wanted: SpecifierSet) -> DeviceFinding:
+def check_version(name: str, installed: str, required: SpecifierSet) -> DeviceFinding:
     """Whether a version satisfies a specifier; prereleases count."""
-    fine = wanted.contains(found, prereleases=True)
-    needs = f" (needs {wanted})" if str(wanted) else ""
-    return DeviceFinding(name, f"{found}{needs}", fine, "" if fine else _INSTALL)
+    fine = required.contains(installed, prereleases=True)
+    needs = f" (needs {required})" if str(required) else ""
+    return DeviceFinding(name, f"{installed}{needs}", fine, "" if fine else _INSTALL)
 
 
 def check_name(name: str, owners: Mapping[str, Sequence[str]], home: Path) -> DeviceFinding:
     """Whether `import name` gives hapteq's own package. owners: distributions by the top-level names that they install.
     home: folder that contains hapteq's packages."""
-    others = sorted(set(owners.get(name, ())) - {HAPTEQ})
-    if others:
-        advice = f"Install hapteq into an environment of its own: {', '.join(others)} must not share one with it."
-        return DeviceFinding(f"import {name}", f"belongs to {' and '.join(others)} as well", fine=False, advice=advice)
+    other_distributions = sorted(set(owners.get(name, ())) - {HAPTEQ})
+    if other_distributions:
+        advice = (
+            "Install hapteq into an environment of its own: "
+            f"{', '.join(other_distributions)} must not share one with it."
+        )
+        return DeviceFinding(
+            f"import {name}", f"belongs to {' and '.join(other_distributions)} as well", fine=False, advice=advice
+        )
     spec = importlib.util.find_spec(name)
     if spec is None or spec.origin is None or Path(spec.origin) != home / name / "__init__.py":
-        where = "nowhere to be found" if spec is None or spec.origin is None else f"taken from {spec.origin}"
+        origin = "nowhere to be found" if spec is None or spec.origin is None else f"taken from {spec.origin}"
         advice = "Rename that file, or start hapteq without its folder on PYTHONPATH."
-        return DeviceFinding(f"import {name}", where, fine=False, advice=advice)
+        return DeviceFinding(f"import {name}", origin, fine=False, advice=advice)
     return DeviceFinding(f"import {name}", "hapteq's own", fine=True)
 
 
@@ -118,7 +127,7 @@ def check_terminal(terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
         return (DeviceFinding("Terminal", "none here, so it was not checked", fine=True),)
     unicode = terminal.encoding.lower().replace("-", "") == "utf8"
     size = (terminal.columns, terminal.rows)
-    large = all(has >= needs for has, needs in zip(size, SMALLEST, strict=True))
+    large = all(actual >= minimum for actual, minimum in zip(size, SMALLEST, strict=True))
     able = terminal.kind not in ("", "dumb")
     smallest = f"{SMALLEST[0]} x {SMALLEST[1]}"
     return (

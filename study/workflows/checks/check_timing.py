@@ -13,7 +13,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray, Signal
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault, Health
-from study.devices.opening import loop_priority, telemetry_of
+from study.devices.opening import check_loop_priority, open_telemetry
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.timing_verdict import (
     Lateness,
@@ -21,7 +21,7 @@ from study.session.stimulus.timing_verdict import (
     judge_lateness,
     judge_load,
     judge_missed,
-    lateness_of,
+    measure_lateness,
 )
 from study.session.views.views import DeviceFinding
 
@@ -68,7 +68,7 @@ def check_timing(
         late_s = _lateness_s(device, clock, seconds, partial(_attend, device, on_progress))
     finally:
         health = device.release().health
-    lateness = lateness_of(late_s, rate_hz)
+    lateness = measure_lateness(late_s, rate_hz)
     return Timing(seconds, health, lateness, _findings(device, seconds, health, lateness, load_per_processor))
 
 
@@ -78,13 +78,15 @@ def check_computer(
     """Findings about the computer before a sitting: wake-ups at rate_hz, load, priority of the loop. Takes `SITTING_S`,
     commands nothing. load_per_processor: None if unknown."""
     late_s = wake_at_every_tick(clock, rate_hz, SITTING_S, lambda done_s: True)
-    lateness = judge_lateness(lateness_of(np.array(late_s), rate_hz), simulated)
-    return (lateness, judge_load(load_per_processor), *(() if simulated else (loop_priority(),)))
+    lateness = judge_lateness(measure_lateness(np.array(late_s), rate_hz), simulated)
+    return (lateness, judge_load(load_per_processor), *(() if simulated else (check_loop_priority(),)))
 
 
-def wake_at_every_tick(clock: Clock, rate_hz: float, seconds: float, go_on: Callable[[float], bool]) -> list[float]:
-    """Lateness of each wake-up (s), not negative. `go_on(done_s)` is called every `SIGN_OF_LIFE_EVERY` wake-ups; the
-    measurement stops if it returns False."""
+def wake_at_every_tick(
+    clock: Clock, rate_hz: float, seconds: float, should_continue: Callable[[float], bool]
+) -> list[float]:
+    """Lateness of each wake-up (s), not negative. `should_continue(done_s)` is called every `SIGN_OF_LIFE_EVERY`
+    wake-ups; the measurement stops if it returns False."""
     late_s: list[float] = []
     tick_s = 1.0 / rate_hz
     started_s = clock.now_s()
@@ -92,12 +94,12 @@ def wake_at_every_tick(clock: Clock, rate_hz: float, seconds: float, go_on: Call
         due_s = started_s + (len(late_s) + 1) * tick_s
         clock.sleep(due_s - clock.now_s())
         late_s.append(max(0.0, clock.now_s() - due_s))
-        if len(late_s) % SIGN_OF_LIFE_EVERY == 0 and not go_on(len(late_s) * tick_s):
+        if len(late_s) % SIGN_OF_LIFE_EVERY == 0 and not should_continue(len(late_s) * tick_s):
             break
     return late_s
 
 
-def _lateness_s(device: Device, clock: Clock, seconds: float, go_on: Callable[[float], bool]) -> FloatArray:
+def _lateness_s(device: Device, clock: Clock, seconds: float, should_continue: Callable[[float], bool]) -> FloatArray:
     """(n,), s: lateness of the readings of a real device's loop, from the time stamps of its telemetry; without
     telemetry, and for a simulated device, of this program's wake-ups.
 
@@ -106,19 +108,21 @@ def _lateness_s(device: Device, clock: Clock, seconds: float, go_on: Callable[[f
     """
     rate_hz = device.info.sample_rate_hz
     if device.info.simulated or not device.telemetry:
-        return np.array(wake_at_every_tick(clock, rate_hz, seconds, go_on))
-    reader, after_due_s, missed = telemetry_of(device.telemetry), [], []
+        return np.array(wake_at_every_tick(clock, rate_hz, seconds, should_continue))
+    reader, after_due_s, missed = open_telemetry(device.telemetry), [], []
     started_s = clock.now_s()
-    while go_on(done_s := clock.now_s() - started_s) and done_s < seconds:
+    while should_continue(done_s := clock.now_s() - started_s) and done_s < seconds:
         clock.sleep(SIGN_OF_LIFE_EVERY / rate_hz)
         ticks = reader.read()
         after_due_s.append(ticks.time_s - ticks.tick / rate_hz)
         missed.append(ticks.missed)
-    found = np.concatenate(after_due_s or [np.zeros(0)])
-    if not len(found):
+    raw_lateness_s = np.concatenate(after_due_s or [np.zeros(0)])
+    if not len(raw_lateness_s):
         return np.array([seconds])  # no tick was read: late by the whole time
-    so_far: FloatArray = np.concatenate(missed)
-    late_s: FloatArray = found - found.min() + np.diff(so_far, prepend=so_far[:1]) / rate_hz
+    missed_so_far: FloatArray = np.concatenate(missed)
+    late_s: FloatArray = (
+        raw_lateness_s - raw_lateness_s.min() + np.diff(missed_so_far, prepend=missed_so_far[:1]) / rate_hz
+    )
     return late_s
 
 

@@ -23,7 +23,7 @@ from study.store.formats.daily_check_file import DailyCheck, read_daily_check, w
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks.device_changes import change_findings
-from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on
+from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on_device
 
 if TYPE_CHECKING:
     from analysis.device_change.compare_devices import Change
@@ -58,32 +58,36 @@ def seconds_of_play() -> float:
     return RecordingPlan(_protocol(), "", (0.0, 0.0, 0.0), 1, Path()).total_s
 
 
-def record_baseline(name: str, moving: MotionCallbacks) -> tuple[str, str]:
+def record_baseline(name: str, motion_callbacks: MotionCallbacks) -> tuple[str, str]:
     """Record the baseline of the daily checks. Returns its name in `device_folder` and its SHA-256. Raises StudyError,
     also where the recording is not good enough for a comparison."""
     plan = _plan(name, BASELINES)
     with contextlib.closing(_open_free_device(plan)) as device:
-        return _record_baseline_on(device, plan, moving)
+        return _record_baseline_on(device, plan, motion_callbacks)
 
 
-def _record_baseline_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -> tuple[str, str]:
+def _record_baseline_on(device: Device, plan: RecordingPlan, motion_callbacks: MotionCallbacks) -> tuple[str, str]:
     """As `record_baseline`, on an open device."""
-    record_on(device, plan, moving.show, moving.announce)
+    record_on_device(device, plan, motion_callbacks.show, motion_callbacks.announce)
     recorded = read_recording(plan.out)
     facts = recorded.meta["segments"]
     limited = [
-        each
-        for each in facts
-        if each["played_amplitude_n"] < each["requested_amplitude_n"] or each["sensor_clipped"] or each["total_clipped"]
+        segment
+        for segment in facts
+        if segment["played_amplitude_n"] < segment["requested_amplitude_n"]
+        or segment["sensor_clipped"]
+        or segment["total_clipped"]
     ]
-    found = [f"Sensor or force was at its limit in {len(limited)} of {len(facts)} pieces."] if limited else []
+    problems = [f"Sensor or force was at its limit in {len(limited)} of {len(facts)} pieces."] if limited else []
     # A recording compared with itself does not differ: a finding means that it is too inaccurate to detect a later
     # change.
-    unsure = [finding for finding in change_findings(compare_recordings(recorded, recorded)) if not finding.fine]
-    found += [f"Too inaccurate to compare with: {finding.name}, {finding.value}." for finding in unsure]
-    if found:
-        do_now = "Look for what holds the handle, disturbs the sensor or shakes the table; then accept it again."
-        raise DeviceError("The device was not accepted", " ".join(found), do_now, f"The recording is {plan.out}.")
+    inaccurate_findings = [
+        finding for finding in change_findings(compare_recordings(recorded, recorded)) if not finding.fine
+    ]
+    problems += [f"Too inaccurate to compare with: {finding.name}, {finding.value}." for finding in inaccurate_findings]
+    if problems:
+        advice = "Look for what holds the handle, disturbs the sensor or shakes the table; then accept it again."
+        raise DeviceError("The device was not accepted", " ".join(problems), advice, f"The recording is {plan.out}.")
     return f"{BASELINES}/{plan.out.name}", sha256_of(plan.out)
 
 
@@ -93,30 +97,30 @@ def require_real(name: str) -> None:
         raise WrongUseError("There is nothing to compare with", f"{name!r} is never accepted.", "Leave --daily out.")
 
 
-def check_today(name: str, moving: MotionCallbacks) -> CheckedToday:
+def check_today(name: str, motion_callbacks: MotionCallbacks) -> CheckedToday:
     """Play the excitation of the baseline and write what changed. Raises StudyError."""
     plan = _plan(name, CHECKS)
     with contextlib.closing(_open_free_device(plan)) as device:
-        return check_on(device, plan, moving)
+        return check_on(device, plan, motion_callbacks)
 
 
-def check_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -> CheckedToday:
+def check_on(device: Device, plan: RecordingPlan, motion_callbacks: MotionCallbacks) -> CheckedToday:
     """Carry out the check of `check_today` on an open device."""
     baseline, digest = _read_baseline(device.info, plan.protocol)
-    begun: list[str] = []
+    notices: list[str] = []
 
     def announce(notice: str) -> None:
-        moving.announce(notice)
-        begun.append(notice)
+        motion_callbacks.announce(notice)
+        notices.append(notice)
 
     try:
-        record_on(device, plan, moving.show, announce)
+        record_on_device(device, plan, motion_callbacks.show, announce)
         changes = compare_recordings(baseline, read_recording(plan.out))
     except BaseException as error:
-        if begun:  # A check that was passed earlier on the same day must not remain valid.
+        if notices:  # A check that was passed earlier on the same day must not remain valid.
             with contextlib.suppress(StudyError, OSError):
-                why = str(error) or type(error).__name__
-                _write_check(device.info, plan, digest, False, (f"It broke off: {why}",), ())
+                reason = str(error) or type(error).__name__
+                _write_check(device.info, plan, digest, False, (f"It broke off: {reason}",), ())
         raise
     findings = change_findings(changes)
     passed = all(finding.fine for finding in findings)
@@ -148,7 +152,7 @@ def _write_check(
     return file
 
 
-def compare_recordings(baseline: Recording, today: Recording) -> tuple["Change", ...]:
+def compare_recordings(baseline: Recording, todays_recording: Recording) -> tuple["Change", ...]:
     """Changes of friction, gain, response and noise between the accepted recording and today's. Raises DeviceError
     where one of the recordings does not allow to measure them."""
     # Imported here: every sitting reads the last check, but only a check needs the comparison, which is slow to import.
@@ -156,21 +160,21 @@ def compare_recordings(baseline: Recording, today: Recording) -> tuple["Change",
     from analysis.device_change.measure_device import NotMeasurableError
 
     try:
-        return compare_devices(baseline, today)
+        return compare_devices(baseline, todays_recording)
     except NotMeasurableError as refusal:
         raise _not_comparable_error(refusal) from refusal
 
 
-def last_check(info: DeviceInfo, needed: bool = False) -> DeviceFinding:
+def last_check(info: DeviceInfo, required: bool = False) -> DeviceFinding:
     """Whether this device passed today, as a line of the check before a sitting: a warning where it did not.
 
-    needed: as the protocol asks; then it is a DeviceError.
+    required: as the protocol asks; then it is a DeviceError.
     """
-    found = _find_last_check(info)
-    if needed and not found.fine:
+    finding = _find_last_check(info)
+    if required and not finding.fine:
         title = "The sitting did not begin: its protocol requires a passed daily check"
-        raise DeviceError(title, f"Daily check: {found.value}.", found.advice)
-    return found
+        raise DeviceError(title, f"Daily check: {finding.value}.", finding.advice)
+    return finding
 
 
 def _find_last_check(info: DeviceInfo) -> DeviceFinding:
@@ -185,19 +189,25 @@ def _find_last_check(info: DeviceInfo) -> DeviceFinding:
             continue
         if (check.device, check.details) != (info.name, info.details):
             continue
-        when = f"{local_time(check.utc, machine_zone)}, {path}"
+        time_and_path = f"{local_time(check.utc, machine_zone)}, {path}"
         if local_parts(check.utc, machine_zone)[0] != day:
-            return DeviceFinding("Daily check", f"none today; the last one was {when}", False, advice, warning=True)
+            return DeviceFinding(
+                "Daily check", f"none today; the last one was {time_and_path}", False, advice, warning=True
+            )
         if check.baseline_sha256 != _digest_of_baseline(info):
-            text = f"none since it was accepted anew; the last one was {when}"
+            text = f"none since it was accepted anew; the last one was {time_and_path}"
             return DeviceFinding("Daily check", text, False, advice, warning=True)
         if not check.changes:
-            return DeviceFinding("Daily check", f"it broke off ({when})", False, advice, warning=True)
+            return DeviceFinding("Daily check", f"it broke off ({time_and_path})", False, advice, warning=True)
         if check.passed:
-            return DeviceFinding("Daily check", f"nothing changed since the acceptance ({when})", fine=True)
-        changed = ", ".join(dict.fromkeys(str(each["kind"]) for each in check.changes if each["changed"]))
-        text = f"{changed} changed since the acceptance" if changed else "measured too inaccurately to detect a change"
-        return DeviceFinding("Daily check", f"{text} ({when})", False, advice, True)
+            return DeviceFinding("Daily check", f"nothing changed since the acceptance ({time_and_path})", fine=True)
+        changed_kinds = ", ".join(dict.fromkeys(str(change["kind"]) for change in check.changes if change["changed"]))
+        text = (
+            f"{changed_kinds} changed since the acceptance"
+            if changed_kinds
+            else "measured too inaccurately to detect a change"
+        )
+        return DeviceFinding("Daily check", f"{text} ({time_and_path})", False, advice, True)
     return DeviceFinding("Daily check", "none yet", False, advice, warning=True)
 
 
@@ -213,24 +223,30 @@ def _read_baseline(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recor
     """The recording of this device's acceptance, and its SHA-256. Raises DeviceError where there is none, or it is not
     comparable with a recording by this protocol."""
     name, digest = find_accepted_baseline(info, datetime.now(UTC).date())
-    again = f"Accept it anew: hapteq doctor --device {info.name.replace('.', '')} --timing 60 --accept 'NAME'."
+    acceptance_advice = (
+        f"Accept it anew: hapteq doctor --device {info.name.replace('.', '')} --timing 60 --accept 'NAME'."
+    )
     if not name:
         raise DeviceError(
-            "There is nothing to compare with", "The device was accepted without a recording (no accelerometer).", again
+            "There is nothing to compare with",
+            "The device was accepted without a recording (no accelerometer).",
+            acceptance_advice,
         )
     path = device_folder() / name
     if not path.is_file() or sha256_of(path) != digest:
-        raise DeviceError("There is nothing to compare with", f"{path} is gone, or is not what was accepted.", again)
+        raise DeviceError(
+            "There is nothing to compare with", f"{path} is gone, or is not what was accepted.", acceptance_advice
+        )
     baseline = read_recording(path)
     if baseline.meta["provenance"]["protocol_hash"] != protocol_hash(protocol):
-        happened = f"{path} was played by another version of the protocol {protocol.name!r}."
-        raise DeviceError("There is nothing to compare with", happened, again)
+        explanation = f"{path} was played by another version of the protocol {protocol.name!r}."
+        raise DeviceError("There is nothing to compare with", explanation, acceptance_advice)
     return baseline, digest
 
 
 def _not_comparable_error(refusal: "NotMeasurableError") -> DeviceError:
-    happened = f"The recording does not show how the device responds: {refusal}."
-    return DeviceError("The device was not compared", happened, "Check accelerometer and handle, and try again.")
+    explanation = f"The recording does not show how the device responds: {refusal}."
+    return DeviceError("The device was not compared", explanation, "Check accelerometer and handle, and try again.")
 
 
 def _plan(name: str, folder: str) -> RecordingPlan:

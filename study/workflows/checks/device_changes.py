@@ -43,8 +43,8 @@ def _finding(kind: str, changes: Sequence["Change"], friction_changed: bool) -> 
     advice = f"It changed ({axes}). {causes}"
     if axes:
         return DeviceFinding(kind.capitalize(), value, fine=False, advice=advice)
-    if unclear := ", ".join(dict.fromkeys(change.axis for change in changes if change.unclear)):
-        return DeviceFinding(kind.capitalize(), value, False, f"Not told ({unclear}). {TOO_NOISY}", warning=True)
+    if unclear_axes := ", ".join(dict.fromkeys(change.axis for change in changes if change.unclear)):
+        return DeviceFinding(kind.capitalize(), value, False, f"Not told ({unclear_axes}). {TOO_NOISY}", warning=True)
     return DeviceFinding(kind.capitalize(), value, fine=True)
 
 
@@ -57,15 +57,17 @@ def _change_text(change: "Change") -> str:
         case "response":
             return f"{change.axis} {100 * change.today:.1f} %{_place_words(change)}"
         case _:
-            then, now = _number(change.accepted), _number(change.today)
-            return f"{change.axis} {now} {change.unit}, accepted {then}"
+            accepted_text, today_text = _number(change.accepted), _number(change.today)
+            return f"{change.axis} {today_text} {change.unit}, accepted {accepted_text}"
 
 
 def _place_words(change: "Change") -> str:
     if change.band_hz is None:
         return ""
-    moved = f", strongest at {change.peaks_hz[1]:g} Hz, accepted {change.peaks_hz[0]:g} Hz" if change.peaks_hz else ""
-    return f" at {change.band_hz[0]:g} to {change.band_hz[1]:g} Hz{moved}"
+    peak_text = (
+        f", strongest at {change.peaks_hz[1]:g} Hz, accepted {change.peaks_hz[0]:g} Hz" if change.peaks_hz else ""
+    )
+    return f" at {change.band_hz[0]:g} to {change.band_hz[1]:g} Hz{peak_text}"
 
 
 def _limit_words(change: "Change") -> str:

@@ -17,7 +17,7 @@ from study.session.stimulus.timing_verdict import judge_load
 from study.session.views.handle_notice import limit_test_notice
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.store.formats.protocol_files import read_study_protocol
-from study.workflows.checks.bare_loop import judge_beside, run_bare_loop_beside
+from study.workflows.checks.bare_loop import compare_with_bare_loop, run_bare_loop_beside
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_installation import Terminal, check_installation
 from study.workflows.checks.check_timing import Timing, check_timing
@@ -28,7 +28,7 @@ from study.workflows.device_settings import device_settings
 PROTOCOL = "direction_threshold"
 """Protocol whose safety limits and settings the device is opened with."""
 
-NOT_NEEDED = ("Accelerometer",)
+OPTIONAL_FINDINGS = ("Accelerometer",)
 """Names of findings that do not affect the force: they do not prevent the use of the device."""
 
 SPARE_S = 5.0
@@ -53,7 +53,7 @@ class Examination:
     @property
     def sensed(self) -> bool:
         """Whether no finding about the accelerometer is bad."""
-        return all(finding.fine for finding in self.findings if finding.name in NOT_NEEDED)
+        return all(finding.fine for finding in self.findings if finding.name in OPTIONAL_FINDINGS)
 
     @property
     def exit_code(self) -> ExitCode:
@@ -82,9 +82,9 @@ def _examine_device(
     clock, settings = RealClock(), _settings(name, timing_s)
     driver = examine_device(name)
     report = DeviceReport(name, simulated=False, findings=driver)
-    if any(finding.wrong and finding.name not in NOT_NEEDED for finding in driver):
+    if any(finding.wrong and finding.name not in OPTIONAL_FINDINGS for finding in driver):
         return report, None
-    sensed = all(finding.fine for finding in driver if finding.name in NOT_NEEDED)
+    sensed = all(finding.fine for finding in driver if finding.name in OPTIONAL_FINDINGS)
     settings = replace(settings, with_sensor=sensed)
     try:
         with contextlib.closing(open_device(name, settings, clock, seed=1)) as device:
@@ -108,8 +108,8 @@ def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[f
     if simulated:
         ticks = round(seconds * device.info.sample_rate_hz)
         late = round(timing.lateness.missing_a_tick * ticks)
-    beside = judge_beside(late, ticks, run)
-    return replace(timing, findings=(*timing.findings, beside, judge_load(load)))
+    comparison = compare_with_bare_loop(late, ticks, run)
+    return replace(timing, findings=(*timing.findings, comparison, judge_load(load)))
 
 
 def _settings(name: str, timing_s: float) -> DeviceSettings:
@@ -118,8 +118,8 @@ def _settings(name: str, timing_s: float) -> DeviceSettings:
     settings = device_settings(read_study_protocol(PROTOCOL).protocol)
     longest_s = max(settings.limits.longest_hold_s, timing_s + SPARE_S)
     limits = replace(settings.limits, longest_hold_s=longest_s)
-    still = replace(settings, limits=limits, spring_frequency_hz=0.0, spring_damping_n_s_per_m=0.0)
-    return replace(still, hand_on_handle=False) if needs_real_time(name) else still
+    free_settings = replace(settings, limits=limits, spring_frequency_hz=0.0, spring_damping_n_s_per_m=0.0)
+    return replace(free_settings, hand_on_handle=False) if needs_real_time(name) else free_settings
 
 
 def require_sensor(examination: Examination) -> None:
@@ -134,20 +134,22 @@ def require_sensor(examination: Examination) -> None:
         )
 
 
-def accept(name: str, examination: Examination, operator: str, moving: MotionCallbacks) -> str:
+def accept(name: str, examination: Examination, operator: str, motion_callbacks: MotionCallbacks) -> str:
     """Record the baseline of the daily checks and the acceptance of the device for use with a hand, signed by
     `operator`; returns a sentence about it. Without an accelerometer no baseline is recorded. Raises DeviceError
     without a timing or with a wrong finding, WrongUseError for a simulated device."""
     if not needs_real_time(name):
         raise WrongUseError("There is nothing to accept", f"{name!r} moves no hand.", "Leave --accept out.")
     timing = examination.timing
-    hinders = [finding for finding in examination.findings if finding.wrong and finding.name not in NOT_NEEDED]
+    hinders = [finding for finding in examination.findings if finding.wrong and finding.name not in OPTIONAL_FINDINGS]
     if timing is None or hinders:
-        found = ", ".join(finding.name for finding in hinders) or "the timing was not measured"
-        raise DeviceError("The device was not accepted", f"Not fine: {found}.", "Mend that first, as said above.")
+        problem_names = ", ".join(finding.name for finding in hinders) or "the timing was not measured"
+        raise DeviceError(
+            "The device was not accepted", f"Not fine: {problem_names}.", "Mend that first, as said above."
+        )
     sensed = examination.sensed
-    baseline = record_baseline(name, moving) if sensed else ("", "")
-    moving.announce(limit_test_notice(name, limit_test_force_n()))
+    baseline = record_baseline(name, motion_callbacks) if sensed else ("", "")
+    motion_callbacks.announce(limit_test_notice(name, limit_test_force_n()))
     settings = replace(_settings(name, 0.0), with_sensor=sensed)
     sentence = accept_device(name, settings, RealClock(), operator, baseline)
     return sentence if sensed else f"{sentence}. Without an accelerometer no daily check will be possible."

@@ -27,5 +27,5 @@ def free_out(source: Path) -> Path:
     """Unused path for the result folder: `diagnosis` in the folder of a session, or NAME-diagnosis next to the
     recording NAME.h5; numbered from 2 where it exists."""
     folder, name = (source, "diagnosis") if source.is_dir() else (source.parent, f"{source.stem}-diagnosis")
-    numbered = (folder / (name if number == 1 else f"{name}-{number}") for number in count(1))
-    return next(path for path in numbered if not path.exists())
+    numbered_paths = (folder / (name if number == 1 else f"{name}-{number}") for number in count(1))
+    return next(path for path in numbered_paths if not path.exists())

@@ -61,7 +61,7 @@ class DiagnosePlan:
     """A new or empty folder."""
     model: Path | None = None
     """Mechanical model to compare with; None: one is fitted, or identified from the simulated device."""
-    without: tuple[str, ...] = ()
+    excluded_effects: tuple[str, ...] = ()
     """Names of effects that are not considered."""
     clean: tuple[Path, ...] = ()
     """Reference recordings of the intact device, or one session's folder."""
@@ -120,23 +120,25 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
 def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> Answer:
     """First part of `diagnose_recordings`: the diagnosis without writing, so that its answer can be shown before the
     figures are drawn. Raises StudyError."""
-    check_names(plan.without)
+    check_names(plan.excluded_effects)
     require_new_folder(plan.out)
     on_progress("reading", 0.0)
-    plain = plan.model is None and not plan.clean
-    found, clean = _add_clean(plan, read_input(plan.sources, plan.seed, plain, plan.force_constants))
+    for_balance = plan.model is None and not plan.clean
+    inputs, clean = _add_clean(plan, read_input(plan.sources, plan.seed, for_balance, plan.force_constants))
     on_progress("reading", READ)
     time_left = _time_budget(plan)
     guard = crash_guard()
-    first = _model(plan, found, clean, (time_left, guard), on_progress)
+    first = _model(plan, inputs, clean, (time_left, guard), on_progress)
     # A model that was fitted to these recordings already contains the spring.
-    spring = found.spring_n_per_m if plan.model is not None or found.simulated else 0.0
-    held = with_spring(first.model, spring)
-    begun = FITTED if plan.model is None else READ
-    _check_compared(plan, found, held)
-    settings = replace(_settings(plan, found, clean, first.balances), time_left=time_left, guard=guard)
+    spring = inputs.spring_n_per_m if plan.model is not None or inputs.simulated else 0.0
+    model = with_spring(first.model, spring)
+    start = FITTED if plan.model is None else READ
+    _check_compared(plan, inputs, model)
+    settings = replace(_settings(plan, inputs, clean, first.balances), time_left=time_left, guard=guard)
     try:
-        findings = engine(found.recordings, held, settings, map_forked, _scale_progress(on_progress, begun, DIAGNOSED))
+        findings = engine(
+            inputs.recordings, model, settings, map_forked, _scale_progress(on_progress, start, DIAGNOSED)
+        )
     except NothingLearned as refusal:
         raise not_diagnosable_error(
             (str(refusal),), "Leave --clean out, or record the device in order in the same way."
@@ -149,22 +151,22 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     findings = replace(
         findings,
         improved=with_spring(findings.improved, -spring),
-        remarks=(*found.remarks, *spring_remark(spring), *first.remarks, *findings.remarks),
+        remarks=(*inputs.remarks, *spring_remark(spring), *first.remarks, *findings.remarks),
     )
     return Answer(
-        findings, plan, (*found.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
+        findings, plan, (*inputs.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
     )
 
 
-def _add_clean(plan: DiagnosePlan, found: DiagnosisInput) -> tuple[DiagnosisInput, DiagnosisInput | None]:
+def _add_clean(plan: DiagnosePlan, inputs: DiagnosisInput) -> tuple[DiagnosisInput, DiagnosisInput | None]:
     """The recordings, and those of the intact device in the same form; None where the plan has none."""
     if not plan.clean:
-        return found, None
+        return inputs, None
     # Imported here: most diagnoses have no recordings of the intact device.
-    from study.workflows.diagnosis.clean_recordings import with_clean
+    from study.workflows.diagnosis.clean_recordings import read_clean_reference
 
-    both = with_clean(found, plan.sources, plan.clean, plan.seed)
-    return both.found, both.clean
+    reduced_inputs = read_clean_reference(inputs, plan.sources, plan.clean, plan.seed)
+    return reduced_inputs.diagnosed, reduced_inputs.clean
 
 
 def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
@@ -175,9 +177,9 @@ def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
     on_progress("writing the report", DIAGNOSED)
     plan = answer.plan
     for session in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
-        from study.store.sessions.written_elsewhere import note_written
+        from study.store.sessions.written_elsewhere import note_written_folder
 
-        note_written(session, plan.out)
+        note_written_folder(session, plan.out)
     with new_folder(plan.out) as folder:
         findings = write_diagnosis_into(folder, answer.findings, answer.parents)
     on_progress("done", 1.0)
@@ -186,21 +188,18 @@ def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
 
 def _time_budget(plan: DiagnosePlan) -> TimeBudget:
     """Whether processor time is left, counted from now; always True without a limit."""
-    worked = processor_s()
-    return lambda: plan.seconds is None or processor_s() - worked < plan.seconds
+    start_s = processor_s()
+    return lambda: plan.seconds is None or processor_s() - start_s < plan.seconds
 
 
 def _settings(
-    plan: DiagnosePlan,
-    found: DiagnosisInput,
-    clean: DiagnosisInput | None,
-    balances: "tuple[Balance, ...] | None",
+    plan: DiagnosePlan, inputs: DiagnosisInput, clean: DiagnosisInput | None, balances: "tuple[Balance, ...] | None"
 ) -> DiagnosisSettings:
     return DiagnosisSettings(
-        without=plan.without,
-        names=found.names,
+        without=plan.excluded_effects,
+        names=inputs.names,
         clean=() if clean is None else clean.recordings,
-        fitted=plan.model is None and not found.simulated,
+        fitted=plan.model is None and not inputs.simulated,
         balances=balances,
         compared=plan.compare,
         kept=_read_effects(plan.effect_files),
@@ -216,22 +215,22 @@ def _read_effects(paths: Sequence[Path]) -> tuple[LawEntry, ...]:
     return tuple(read_entry(path) for path in paths)
 
 
-def _check_compared(plan: DiagnosePlan, found: DiagnosisInput, model: MechanicalModel) -> None:
+def _check_compared(plan: DiagnosePlan, inputs: DiagnosisInput, model: MechanicalModel) -> None:
     """Raise WrongUseError if the requested comparison is not possible."""
     if plan.compare == "force" and plan.clean:
-        happened = "With --clean, hapteq chooses the comparison, so that both sets of recordings are measured alike."
-    elif plan.compare == "force" and not all(has_motion(each, model) for each in found.recordings):
-        happened = "Neither positions nor velocities of every driven axis were measured, so no force can be computed."
+        reason = "With --clean, hapteq chooses the comparison, so that both sets of recordings are measured alike."
+    elif plan.compare == "force" and not all(has_motion(recording, model) for recording in inputs.recordings):
+        reason = "Neither positions nor velocities of every driven axis were measured, so no force can be computed."
     else:
         return
     raise WrongUseError(
-        "Forces cannot be compared", happened, "Leave --compare out, or ask for motion.", saved="Nothing was written."
+        "Forces cannot be compared", reason, "Leave --compare out, or ask for motion.", saved="Nothing was written."
     )
 
 
-def check_names(without: Sequence[str]) -> None:
+def check_names(excluded_effects: Sequence[str]) -> None:
     """Check the names of effects to leave out. Raises WrongUseError for a name that no effect has."""
-    for name in without:
+    for name in excluded_effects:
         if name not in EFFECTS_BY_NAME:
             raise WrongUseError(
                 f"There is no effect '{name}' to exclude",
@@ -243,42 +242,42 @@ def check_names(without: Sequence[str]) -> None:
 
 def _model(
     plan: DiagnosePlan,
-    found: DiagnosisInput,
+    inputs: DiagnosisInput,
     clean: DiagnosisInput | None,
     bounds: tuple[TimeBudget, Guard],
     on_progress: Progress,
 ) -> FirstModel:
     """The model to compare with: the given one; for a session on the simulated device, its twin; with clean recordings,
     a linear model of these; otherwise a model fitted to the recordings themselves."""
-    within = _scale_progress(on_progress, READ, FITTED)
+    fit_progress = _scale_progress(on_progress, READ, FITTED)
     if plan.model is not None:
-        return FirstModel(read_given_model(plan.model, found), ())
-    if found.simulated:
-        return FirstModel(_twin(within), (TWIN_REMARK,))
+        return FirstModel(read_given_model(plan.model, inputs), ())
+    if inputs.simulated:
+        return FirstModel(_twin(fit_progress), (TWIN_REMARK,))
     # Imported here: a given model needs no fit of a first one.
     from study.workflows.diagnosis.fit_without_model import first_model_of, fit_linear_model
 
     if clean is None:
-        return first_model_of(found, plan.without, bounds, within)
-    what = "fitting a linear model, as none was given"
-    on_progress(what, READ)
-    return FirstModel(*fit_linear_model(clean, lambda share: within(what, share), "the clean recordings"))
+        return first_model_of(inputs, plan.excluded_effects, bounds, fit_progress)
+    step = "fitting a linear model, as none was given"
+    on_progress(step, READ)
+    return FirstModel(*fit_linear_model(clean, lambda share: fit_progress(step, share), "the clean recordings"))
 
 
 def _twin(on_progress: Progress) -> MechanicalModel:
     """The linear model of the simulated device, identified anew and not kept."""
     from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
 
-    what = "identifying the simulated device's twin"
-    on_progress(what, 0.0)
+    step = "identifying the simulated device's twin"
+    on_progress(step, 0.0)
     with tempfile.TemporaryDirectory() as folder:
         plan = TwinPlan(Path(folder) / "twin.toml")
-        return write_twin(plan, lambda share: on_progress(what, share)).model
+        return write_twin(plan, lambda share: on_progress(step, share)).model
 
 
-def _scale_progress(on_progress: Progress, begin: float, end: float) -> Callable[[str, float], None]:
-    """Progress of a step whose share 0 to 1 becomes begin to end of the whole."""
-    return lambda what, share: on_progress(what, begin + (end - begin) * min(max(share, 0.0), 1.0))
+def _scale_progress(on_progress: Progress, start_share: float, end_share: float) -> Callable[[str, float], None]:
+    """Progress of a step whose share 0 to 1 becomes `start_share` to `end_share` of the whole."""
+    return lambda step, share: on_progress(step, start_share + (end_share - start_share) * min(max(share, 0.0), 1.0))
 
 
 def with_spring(model: MechanicalModel, spring_n_per_m: float) -> MechanicalModel:

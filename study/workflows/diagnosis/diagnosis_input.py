@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_alike, require_model_of
-from analysis.diagnosis.prepare_recordings import comparable, prepare
+from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_comparable, require_model_of
+from analysis.diagnosis.prepare_recordings import prepare_comparison, prepare_recordings
 from analysis.wording import begin_sentence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -42,11 +42,11 @@ class DiagnosisInput:
 
 
 def read_input(
-    sources: Sequence[Path], seed: int, plain: bool = False, constants: tuple[float, ...] = ()
+    sources: Sequence[Path], seed: int, for_force_balance: bool = False, constants: tuple[float, ...] = ()
 ) -> DiagnosisInput:
-    """Read recordings, or the folder of one session. seed: of the choice among a session's trials. plain: convert to
-    one motion per force, as a force balance needs (`one_motion_per_force`). constants: see `with_force_constant`.
-    Raises StudyError."""
+    """Read recordings, or the folder of one session. seed: of the choice among a session's trials. for_force_balance:
+    convert to one motion per force, as a force balance needs (`one_motion_per_force`). constants: see
+    `with_force_constant`. Raises StudyError."""
     folders = [source for source in sources if source.is_dir()]
     if folders and len(sources) > 1:
         raise not_diagnosable_error(
@@ -58,21 +58,23 @@ def read_input(
         from study.workflows.diagnosis.session_references import find_references
 
         if (references := find_references(folders[0])) is not None:
-            free = read_input(references.paths, seed, plain)
+            free = read_input(references.paths, seed, for_force_balance)
             parents, remarks = (references.log, *references.paths), (*references.remarks, *free.remarks)
             return replace(free, parents=parents, remarks=remarks)
         session = session_recordings(folders[0], seed)
-        kept = _translate_refusal(lambda: comparable((session.recording,), (session.name,), plain))
+        comparable_trials = _translate_refusal(
+            lambda: prepare_comparison((session.recording,), (session.name,), for_force_balance)
+        )
         return DiagnosisInput(
-            kept.recordings, (session.name,), session.parents, (*session.remarks, *kept.remarks), session.simulated,
-            session.spring_n_per_m,
+            comparable_trials.recordings, (session.name,), session.parents,
+            (*session.remarks, *comparable_trials.remarks), session.simulated, session.spring_n_per_m,
         )  # fmt: skip
-    taken = [read_any_recording(source) for source in sources]
-    read, names = tuple(recording for recording, _ in taken), _names(sources)
-    _translate_refusal(lambda: require_alike(read, names))
-    forces, stated = _as_forces(read, constants)
-    ready = _translate_refusal(lambda: prepare(forces, names, plain))
-    remarks = (*_notes(taken), *stated, *ready.remarks)
+    recordings_with_notes = [read_any_recording(source) for source in sources]
+    read, names = tuple(recording for recording, _ in recordings_with_notes), _names(sources)
+    _translate_refusal(lambda: require_comparable(read, names))
+    forces, constant_remarks = _as_forces(read, constants)
+    ready = _translate_refusal(lambda: prepare_recordings(forces, names, for_force_balance))
+    remarks = (*_notes(recordings_with_notes), *constant_remarks, *ready.remarks)
     return DiagnosisInput(ready.recordings, names, tuple(sources), remarks, constants=constants)
 
 
@@ -93,26 +95,26 @@ def _as_forces(
     from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
 
     try:
-        found = [with_force_constant(recording, constants) for recording in recordings]
+        converted = [with_force_constant(recording, constants) for recording in recordings]
     except NoForceConstant as refusal:
         raise WrongUseError(
             "The force constant cannot be used", f"{begin_sentence(str(refusal))}.",
             "Leave --force-constant out, or correct it.",
             saved="Nothing was written.",
         ) from refusal  # fmt: skip
-    return tuple(recording for recording, _ in found), (found[0][1],)
+    return tuple(recording for recording, _ in converted), (converted[0][1],)
 
 
-def _notes(taken: Sequence[tuple[Recording, tuple[str, ...]]]) -> tuple[str, ...]:
+def _notes(recordings_with_notes: Sequence[tuple[Recording, tuple[str, ...]]]) -> tuple[str, ...]:
     """Remarks on the import of all recordings, each only once."""
-    return tuple(dict.fromkeys(note for _, notes in taken for note in notes))
+    return tuple(dict.fromkeys(note for _, notes in recordings_with_notes for note in notes))
 
 
-def read_given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:
+def read_given_model(path: Path, diagnosis_input: DiagnosisInput) -> MechanicalModel:
     """Read the given model. Raises StudyError if it does not fit the recordings' device."""
     model = read_mechanical_model(path)
     try:
-        require_model_of(model, found.recordings)
+        require_model_of(model, diagnosis_input.recordings)
     except NothingToDiagnose as refusal:
         raise StudyError(
             "Model and recording do not belong together",
@@ -124,10 +126,10 @@ def read_given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:
     return model
 
 
-def not_diagnosable_error(problems: Sequence[str], do_now: str = "Correct them, or record again.") -> StudyError:
+def not_diagnosable_error(problems: Sequence[str], advice: str = "Correct them, or record again.") -> StudyError:
     """The error for input that cannot be diagnosed."""
     return StudyError(
-        "These recordings cannot be diagnosed", _sentences(problems), do_now, saved="Nothing was written."
+        "These recordings cannot be diagnosed", _sentences(problems), advice, saved="Nothing was written."
     )
 
 

@@ -43,24 +43,28 @@ ENTRY = LawEntry(
 """Template of an effect file, filled in by `write_entry`."""
 
 
-def write_entry(found: Path, out: Path, number: int = 1) -> LawEntry:
+def write_entry(source: Path, out_path: Path, number: int = 1) -> LawEntry:
     """Write a law of a diagnosis (folder or JSON) or of a model (TOML) as an effect file. number: which law, from 1.
-    Raises StudyError if there is no such law, or if the name of `out` is not a new valid name."""
-    laws = _laws(found)
+    Raises StudyError if there is no such law, or if the name of `out_path` is not a new valid name."""
+    laws = _laws(source)
     if number > len(laws):
-        has = f"holds {len(laws)} law{'s' if len(laws) > 1 else ''}" if laws else "holds no discovered law"
-        raise _refusal(f"{found} {has}.", "Give a diagnosis or model that has one, or another --number.")
-    if out.suffix != ".py" or not NAME.fullmatch(out.stem) or out.stem in (*EFFECTS_BY_NAME, DISCOVERED_LAW):
+        content_text = f"holds {len(laws)} law{'s' if len(laws) > 1 else ''}" if laws else "holds no discovered law"
+        raise _refusal(f"{source} {content_text}.", "Give a diagnosis or model that has one, or another --number.")
+    if (
+        out_path.suffix != ".py"
+        or not NAME.fullmatch(out_path.stem)
+        or out_path.stem in (*EFFECTS_BY_NAME, DISCOVERED_LAW)
+    ):
         raise _refusal(
-            f"'{out.name}' cannot be an effect's name.",
+            f"'{out_path.name}' cannot be an effect's name.",
             "Choose a name of small letters, digits and _ that is not in the catalogue, such as my_effect.py.",
         )
     law = laws[number - 1]
     signature = f"it varies with {', '.join(law.variables) or 'nothing'} as the formula states"
     about = f"Discovered law without a name: {law.text} (acts on the {law.acts_on} at {law.axis})."
-    entry = LawEntry(out.stem, law, f"found by hapteq: {found.name}", signature)
+    entry = LawEntry(out_path.stem, law, f"found by hapteq: {source.name}", signature)
     write_text(
-        out,
+        out_path,
         TEXT.format(
             # Escaped: the texts come from a file, and an unescaped quote would end the docstring and run as code.
             about=about.replace("\\", r"\\").replace('"', r"\""),
@@ -83,8 +87,8 @@ def read_entry(path: Path) -> LawEntry:
     except Exception as error:
         raise _refusal(f"{path} fails: {error}.", "Correct it, or leave --effect-file out.") from error
     entry = getattr(module, "ENTRY", None)
-    taken = (*EFFECTS_BY_NAME, DISCOVERED_LAW)
-    if not isinstance(entry, LawEntry) or entry.name in taken or not NAME.fullmatch(entry.name):
+    catalogue_names = (*EFFECTS_BY_NAME, DISCOVERED_LAW)
+    if not isinstance(entry, LawEntry) or entry.name in catalogue_names or not NAME.fullmatch(entry.name):
         raise _refusal(
             f"{path} defines no ENTRY, or one by a name of the catalogue.",
             "Write one with `hapteq effect FOUND --out EFFECT.py`, and change that.",
@@ -92,15 +96,15 @@ def read_entry(path: Path) -> LawEntry:
     return entry
 
 
-def _laws(found: Path) -> list[Law]:
+def _laws(source: Path) -> list[Law]:
     """Discovered laws of a diagnosis (effects first, then candidates) or of a model file, in their order."""
-    if found.suffix == ".toml":
-        return [effect.law for effect in read_mechanical_model(found).effects if effect.law is not None]
-    document: Diagnosis = read_diagnosis(found / "diagnosis.json" if found.is_dir() else found)
+    if source.suffix == ".toml":
+        return [effect.law for effect in read_mechanical_model(source).effects if effect.law is not None]
+    document: Diagnosis = read_diagnosis(source / "diagnosis.json" if source.is_dir() else source)
     laws = [effect.law for effect in document.effects] + [candidate.law for candidate in document.candidates]
     return [law_of(law.expression, law.acts_on, law.axis) for law in laws if law is not None]
 
 
-def _refusal(happened: str, do: str) -> StudyError:
+def _refusal(explanation: str, advice: str) -> StudyError:
     """Error with what happened and what to do."""
-    return StudyError("There is no effect of your own", happened, do, saved="Nothing was written.")
+    return StudyError("There is no effect of your own", explanation, advice, saved="Nothing was written.")

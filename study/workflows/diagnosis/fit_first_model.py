@@ -50,34 +50,40 @@ class FirstModel:
 def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) -> FirstModel:
     """Fit a model and write it. `on_progress(share)`, 0 to 1. Raises StudyError for a folder, for recordings with an
     added weight, and where no structure fits; nothing is written then."""
-    wanted = _parse_structure(plan.structure)
+    requested_kind = _parse_structure(plan.structure)
     require_free(plan.out, title=TITLE, kind="models")
     if folders := [path for path in plan.recordings if path.is_dir()]:
         raise StudyError(
             TITLE, f"{folders[0]} is a folder, and a model is fitted to recordings.", "Give its recordings, REC.h5.",
             saved="Nothing was written.",
         )  # fmt: skip
-    found = read_input(plan.recordings, 1, True, plan.force_constants)
-    if has_carried_weight(found.recordings):
+    diagnosis_input = read_input(plan.recordings, 1, True, plan.force_constants)
+    if has_carried_weight(diagnosis_input.recordings):
         raise _refusal(
             "A recording was made with a weight on the handle, and a model fitted to it would include the weight."
         )
     try:
-        choice = choose_structure(found.recordings, wanted, on_progress)
+        choice = choose_structure(diagnosis_input.recordings, requested_kind, on_progress)
     except StructureRefused as refusal:
-        what, verb = ("No structure", "can") if wanted is None else (f"The structure {wanted}", "cannot")
-        raise _refusal(f"{what} {verb} be fitted to these recordings: {refusal}.") from refusal
+        subject, verb = (
+            ("No structure", "can") if requested_kind is None else (f"The structure {requested_kind}", "cannot")
+        )
+        raise _refusal(f"{subject} {verb} be fitted to these recordings: {refusal}.") from refusal
     origin = {
-        **gather_provenance(parents=found.parents).as_dict(),
+        **gather_provenance(parents=diagnosis_input.parents).as_dict(),
         "structure": choice.fit.kind,
         "reason": choice.reason,
         "compared": choice.fit.compared,
         "held_out_error": max(choice.fit.held_out),
     }
-    write_mechanical_model(plan.out, replace(as_recorded(choice.fit.model, found.recordings[0]), provenance=origin))
+    write_mechanical_model(
+        plan.out, replace(as_recorded(choice.fit.model, diagnosis_input.recordings[0]), provenance=origin)
+    )
     on_progress(1.0)
     return FirstModel(
-        plan, choice, (*found.remarks, *filter(None, [constant_sentence(choice.fit.model)]), *choice.fit.remarks)
+        plan,
+        choice,
+        (*diagnosis_input.remarks, *filter(None, [constant_sentence(choice.fit.model)]), *choice.fit.remarks),
     )
 
 
@@ -85,16 +91,16 @@ def first_model_lines(done: FirstModel) -> tuple[str, ...]:
     """Lines for the terminal: the chosen structure and the reason, errors of the structures tried, parameters with 95 %
     intervals, held-out error of each channel (%), and a sentence on the error that remains."""
     choice, fit = done.choice, done.choice.fit
-    rows = [_row(each) for each in fit.parameters]
+    rows = [_row(parameter) for parameter in fit.parameters]
     errors = [
         f"Held-out error at {name}: {100 * error:.3g} % of the {fit.compared}"
         for name, error in zip(fit.channels, fit.held_out, strict=True)
     ]
-    others = [
-        f"  {each.kind}: " + (each.why_not if each.error is None else f"{100 * each.error:.3g} %")
-        for each in choice.tried
+    attempts = [
+        f"  {attempt.kind}: " + (attempt.refusal if attempt.error is None else f"{100 * attempt.error:.3g} %")
+        for attempt in choice.tried
     ]
-    return (str(done.plan.out), f"Structure: {fit.kind}. {choice.reason}", *others, *rows, *errors, choice.remains)
+    return (str(done.plan.out), f"Structure: {fit.kind}. {choice.reason}", *attempts, *rows, *errors, choice.remains)
 
 
 def first_model_summary(done: FirstModel) -> dict[str, Any]:
@@ -105,13 +111,13 @@ def first_model_summary(done: FirstModel) -> dict[str, Any]:
         "structure": fit.kind,
         "reason": choice.reason,
         "numbers": [
-            {"name": each.name, "unit": each.unit, "value": each.value,
-             "ci95": None if each.half is None else [each.value - each.half, each.value + each.half]}
-            for each in fit.parameters
+            {"name": p.name, "unit": p.unit, "value": p.value,
+             "ci95": None if p.half_width is None else [p.value - p.half_width, p.value + p.half_width]}
+            for p in fit.parameters
         ],
         "compared": fit.compared,
         "held_out": dict(zip(fit.channels, fit.held_out, strict=True)),
-        "tried": [{"structure": each.kind, "error": each.error, "why_not": each.why_not} for each in choice.tried],
+        "tried": [{"structure": t.kind, "error": t.error, "why_not": t.refusal} for t in choice.tried],
         "remains": choice.remains,
         "remarks": list(done.remarks),
     }  # fmt: skip
@@ -120,9 +126,9 @@ def first_model_summary(done: FirstModel) -> dict[str, Any]:
 def _row(estimate: ParameterEstimate) -> str:
     """A parameter with its unit and, where it is known, its 95 % interval."""
     value = typeset(f"{estimate.value:.4g}")
-    if estimate.half is None:
+    if estimate.half_width is None:
         return f"  {estimate.name}: {value} {estimate.unit}"
-    low, high = (typeset(f"{estimate.value + sign * estimate.half:.4g}") for sign in (-1, 1))
+    low, high = (typeset(f"{estimate.value + sign * estimate.half_width:.4g}") for sign in (-1, 1))
     return f"  {estimate.name}: {value} {estimate.unit} (95 %: {low} to {high})"
 
 
@@ -141,8 +147,8 @@ def _parse_structure(structure: str) -> Kind | None:
     )
 
 
-def _refusal(happened: str) -> StudyError:
+def _refusal(explanation: str) -> StudyError:
     return StudyError(
-        TITLE, happened, "Choose another --structure, or record positions or velocities along every command.",
+        TITLE, explanation, "Choose another --structure, or record positions or velocities along every command.",
         saved="Nothing was written.",
     )  # fmt: skip

@@ -20,27 +20,35 @@ GIVE_A_MODEL = "Give a model of the device alone with --model, or a recording th
 
 
 def first_model_of(
-    found: DiagnosisInput, without: Sequence[str], bounds: tuple[TimeBudget, Guard], on_progress: Progress
+    diagnosis_input: DiagnosisInput,
+    excluded_effects: Sequence[str],
+    bounds: tuple[TimeBudget, Guard],
+    on_progress: Progress,
 ) -> FirstModel:
-    """Fit a first model by force balance or, if that crashes, to spectra. without: names of effects that are left out.
-    bounds: remaining time, and the guard that catches crashes. Raises StudyError for unsuitable recordings."""
+    """Fit a first model by force balance or, if that crashes, to spectra. excluded_effects: names of effects that are
+    left out. bounds: remaining time, and the guard that catches crashes. Raises StudyError for unsuitable
+    recordings."""
     time_left, guard = bounds
 
     def fit_by_balance() -> FirstModel | None:
-        return fit_without_model.first_model_of(found.recordings, without, time_left, on_progress, map_forked)
+        return fit_without_model.first_model_of(
+            diagnosis_input.recordings, excluded_effects, time_left, on_progress, map_forked
+        )
 
     with _translate_refusals():
-        first = guard.part(BALANCE, "the first model", fit_by_balance, None, (NothingToDiagnose,))
-    return first or FirstModel(*fit_linear_model(found, lambda share: on_progress("fitting a linear model", share)), ())
+        first = guard.run(BALANCE, "the first model", fit_by_balance, None, (NothingToDiagnose,))
+    return first or FirstModel(
+        *fit_linear_model(diagnosis_input, lambda share: on_progress("fitting a linear model", share)), ()
+    )
 
 
 def fit_linear_model(
-    found: DiagnosisInput, on_progress: Callable[[float], None], whose: str = "these recordings"
+    diagnosis_input: DiagnosisInput, on_progress: Callable[[float], None], origin: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
-    """Fit a linear model to the spectra; also returns remarks. whose: origin of the recordings, for the model's name.
+    """Fit a linear model to the spectra; also returns remarks. origin: origin of the recordings, for the model's name.
     Raises StudyError."""
     with _translate_refusals():
-        return fit_without_model.fit_first_linear_model(found.recordings, on_progress, whose)
+        return fit_without_model.fit_first_linear_model(diagnosis_input.recordings, on_progress, origin)
 
 
 @contextmanager

@@ -72,28 +72,32 @@ def session_recordings(session: Path, seed: int) -> SessionRecordings:
     """Read the trials of a session. session: its folder. seed: of the draw of trials if there are too many, and of
     those kept for the test. Raises StudyError where no trial is complete."""
     folder = find_session(str(session), session.absolute().parent)
-    folded = fold_session(folder)
-    opened = folded.state.opened
-    logged = {e.recording: e.sha256 for e in folded.contents.events if isinstance(e, TrialMeasured) and e.recording}
+    folded_session = fold_session(folder)
+    session_opened = folded_session.state.opened
+    logged = {
+        e.recording: e.sha256
+        for e in folded_session.log_contents.events
+        if isinstance(e, TrialMeasured) and e.recording
+    }
     paths = [path for path in sorted(folder.recordings.glob("*.h5")) if not path.name.startswith(PROBE_PREFIX)]
-    found = [_trial(path, logged) for path in paths]
-    usable = [trial for trial in found if trial is not None]
+    trials = [_trial(path, logged) for path in paths]
+    usable = [trial for trial in trials if trial is not None]
     if not usable:
         raise StudyError(
             "This session holds nothing to diagnose",
-            f"{folder.name} has {len(found)} recordings of trials, and none is whole.",
+            f"{folder.name} has {len(trials)} recordings of trials, and none is whole.",
             "Give a session in which trials were measured, or recordings of `hapteq record`.",
             saved="Nothing was written.",
         )
     draw = np.random.default_rng(seed)
-    taken = _draw_trials(usable, draw)
-    spring = estimate_spring([trial.recording for trial in taken])
+    drawn_trials = _draw_trials(usable, draw)
+    spring = estimate_spring([trial.recording for trial in drawn_trials])
     return SessionRecordings(
-        recording=_concatenate_trials(taken, folder, draw),
+        recording=_concatenate_trials(drawn_trials, folder, draw),
         name=folder.name,
-        parents=(folder.log, *(trial.path for trial in taken)),
-        remarks=tuple(_remarks(folder, found, usable, taken)),
-        simulated=opened.device.simulated,
+        parents=(folder.log, *(trial.path for trial in drawn_trials)),
+        remarks=tuple(_remarks(folder, trials, usable, drawn_trials)),
+        simulated=session_opened.device.simulated,
         spring_n_per_m=spring,
     )
 
@@ -106,8 +110,8 @@ def _trial(path: Path, logged: Mapping[str, str | None]) -> _Trial | None:
         return None
     recording = read_recording(path)
     meta = recording.meta
-    whole = np.isfinite(recording.command.samples).all() and np.isfinite(recording.response.samples).all()
-    if not whole or meta.get("flags") or not isinstance(meta.get("frequency_hz"), int | float):
+    is_complete = np.isfinite(recording.command.samples).all() and np.isfinite(recording.response.samples).all()
+    if not is_complete or meta.get("flags") or not isinstance(meta.get("frequency_hz"), int | float):
         return None
     if not recording.segments or not isinstance(meta.get("level_n"), int | float):
         return None
@@ -119,12 +123,12 @@ def _draw_trials(trials: Sequence[_Trial], draw: np.random.Generator) -> list[_T
     group."""
     seconds = sum(trial.recording.response.duration_s for trial in trials)
     share = min(1.0, MOST_S / seconds)
-    taken: list[_Trial] = []
+    drawn_trials: list[_Trial] = []
     for _, members in groupby(sorted(trials, key=_key), key=_key):
         group = list(members)
         count = max(1, round(share * len(group)))
-        taken += [group[place] for place in sorted(draw.permutation(len(group))[:count])]
-    return taken
+        drawn_trials += [group[index] for index in sorted(draw.permutation(len(group))[:count])]
+    return drawn_trials
 
 
 def _key(trial: _Trial) -> tuple[float, int]:
@@ -139,21 +143,21 @@ def _rung(level_n: float) -> int:
 def _concatenate_trials(trials: Sequence[_Trial], folder: SessionFolder, draw: np.random.Generator) -> Recording:
     """The trials, each with its lead, as a recording with a segment for each trial. trials: sorted by `_key`."""
     first = trials[0].recording
-    lead = round(LEAD_S * first.sample_rate_hz)
+    lead_samples = round(LEAD_S * first.sample_rate_hz)
     parts: list[Mapping[str, FloatArray]] = []
     segments: list[Segment] = []
-    begin = 0
+    trial_start = 0
     for (_, rung), members in groupby(trials, key=_key):
         group = list(members)
         tested = set(draw.permutation(len(group))[: len(group) // TESTED_OF].tolist())
-        for place, trial in enumerate(group):
-            parts.append(_with_lead(trial.recording, lead))
-            own = trial.recording.segments[0]
-            start, stop = begin + lead + own.start, begin + lead + own.stop
-            role = "test" if place in tested else "fit"
-            period = _group_period(own.period, trial.recording.sample_rate_hz)
+        for index, trial in enumerate(group):
+            parts.append(_with_lead(trial.recording, lead_samples))
+            segment = trial.recording.segments[0]
+            start, stop = trial_start + lead_samples + segment.start, trial_start + lead_samples + segment.stop
+            role = "test" if index in tested else "fit"
+            period = _group_period(segment.period, trial.recording.sample_rate_hz)
             segments.append(Segment(start, stop, "sine", 10 ** (rung * LEVEL_STEP_DB / 20), period, role))
-            begin += lead + len(trial.recording)
+            trial_start += lead_samples + len(trial.recording)
     decided = _concatenate_signal("command", parts, _excitation(first))
     return Recording(
         device=first.device,
@@ -172,54 +176,54 @@ def _excitation(recording: Recording) -> Signal:
 
 def _group_period(period: int, sample_rate_hz: float) -> int:
     """Period in samples: `REPEAT_S` where it is a multiple of the trial's own period, otherwise that period."""
-    longer = round(REPEAT_S * sample_rate_hz)
-    return longer if period > 0 and longer % period == 0 else period
+    repeat_samples = round(REPEAT_S * sample_rate_hz)
+    return repeat_samples if period > 0 and repeat_samples % period == 0 else period
 
 
-def _with_lead(recording: Recording, lead: int) -> dict[str, FloatArray]:
+def _with_lead(recording: Recording, lead_samples: int) -> dict[str, FloatArray]:
     """Command and response, (lead + n, channels): before the trial the command is continued periodically and faded in
     over the first half of the lead; the response there is NaN."""
-    played, answered = _excitation(recording).samples, recording.response.samples
+    command, response = _excitation(recording).samples, recording.response.samples
     period = recording.segments[0].period or len(recording)
-    fade = np.minimum(1.0, np.arange(lead) / max(1, lead // 2))[:, None]
-    before = fade * played[np.arange(-lead, 0) % min(period, len(played))]
+    fade = np.minimum(1.0, np.arange(lead_samples) / max(1, lead_samples // 2))[:, None]
+    lead_command = fade * command[np.arange(-lead_samples, 0) % min(period, len(command))]
     return {
-        "command": np.vstack([before, played]),
-        "response": np.vstack([np.full((lead, answered.shape[1]), np.nan), answered]),
+        "command": np.vstack([lead_command, command]),
+        "response": np.vstack([np.full((lead_samples, response.shape[1]), np.nan), response]),
     }
 
 
 def estimate_spring(recordings: Sequence[Recording]) -> float:
     """Stiffness k (N/m) of the virtual spring by least squares from command - excitation = -k position, over all
     channels. 0 where a recording holds no excitation or no complete position of each channel."""
-    pushed, way = 0.0, 0.0
+    force_times_position, squared_position = 0.0, 0.0
     for recording in recordings:
         if recording.excitation is None or recording.position is None:
             return 0.0
-        place = recording.position.samples
-        if place.shape != recording.command.samples.shape or not np.isfinite(place).all():
+        position = recording.position.samples
+        if position.shape != recording.command.samples.shape or not np.isfinite(position).all():
             return 0.0
-        pushed -= float(np.sum((recording.command.samples - recording.excitation.samples) * place))
-        way += float(np.sum(place**2))
-    return pushed / way if way > 0 else 0.0
+        force_times_position -= float(np.sum((recording.command.samples - recording.excitation.samples) * position))
+        squared_position += float(np.sum(position**2))
+    return force_times_position / squared_position if squared_position > 0 else 0.0
 
 
-def _concatenate_signal(name: str, parts: Sequence[Mapping[str, FloatArray]], like: Signal) -> Signal:
-    return replace(like, samples=np.vstack([part[name] for part in parts]))
+def _concatenate_signal(name: str, parts: Sequence[Mapping[str, FloatArray]], template: Signal) -> Signal:
+    return replace(template, samples=np.vstack([part[name] for part in parts]))
 
 
 def _remarks(
-    folder: SessionFolder, found: Sequence[Any], usable: Sequence[_Trial], taken: Sequence[_Trial]
+    folder: SessionFolder, trials: Sequence[Any], usable: Sequence[_Trial], drawn_trials: Sequence[_Trial]
 ) -> Iterator[str]:
-    seconds = sum(trial.recording.response.duration_s for trial in taken)
+    seconds = sum(trial.recording.response.duration_s for trial in drawn_trials)
     yield (
-        f"{len(taken)} of the {len(found)} trials of {folder.name} were used, {seconds:.0f} s in all, with a hand on "
-        "the handle: they contain single frequencies at the levels of the staircases, and no slow or strong motion "
-        "and no other frequencies. Effects that show only there cannot be found here."
+        f"{len(drawn_trials)} of the {len(trials)} trials of {folder.name} were used, {seconds:.0f} s in all, with a "
+        "hand on the handle: they contain single frequencies at the levels of the staircases, and no slow or strong "
+        "motion and no other frequencies. Effects that show only there cannot be found here."
     )
-    if len(usable) < len(found):
+    if len(usable) < len(trials):
         yield (
-            f"{len(found) - len(usable)} trials were left out: samples were missing, something was wrong while "
+            f"{len(trials) - len(usable)} trials were left out: samples were missing, something was wrong while "
             "they were played, or the file was changed since."
         )
     yield (

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.session.facts.events import ProbeMeasured, ProbePlayed
-from study.session.watching.followed_session import begin_watching, follow
+from study.session.watching.followed_session import apply_followed_event, begin_watching
 from study.store.disk.provenance import sha256_of
 from study.store.sessions.archive import SessionFolder, find_session
 from study.workflows.results.fold_session import FoldedSession, fold_session
@@ -29,10 +29,10 @@ def find_references(session: Path) -> SessionReferences | None:
     """The references whose recordings are complete and match the log. session: its folder. None where there is none.
     Raises StudyError where the session cannot be read."""
     folder = find_session(str(session), session.absolute().parent)
-    folded = fold_session(folder)
-    if not folded.state.protocol.probes.played:
+    folded_session = fold_session(folder)
+    if not folded_session.state.protocol.probes.played:
         return None
-    events = folded.contents.events
+    events = folded_session.log_contents.events
     kinds = {event.number: event.kind for event in events if isinstance(event, ProbePlayed)}
     measured = [e for e in events if isinstance(e, ProbeMeasured) and e.recording and not e.trouble]
     paths = tuple(
@@ -42,12 +42,12 @@ def find_references(session: Path) -> SessionReferences | None:
     )
     if not paths:
         return None
-    what, were = ("the reference", "was") if len(paths) == 1 else (f"the {len(paths)} references", "were")
+    subject, were = ("the reference", "was") if len(paths) == 1 else (f"the {len(paths)} references", "were")
     text = (
-        f"Of {folder.name} {what} without a hand {were} diagnosed, and not its trials, which contain single "
+        f"Of {folder.name} {subject} without a hand {were} diagnosed, and not its trials, which contain single "
         "frequencies with a hand."
     )
-    return SessionReferences(folder.log, paths, (text, *_drifts(folder, folded)))
+    return SessionReferences(folder.log, paths, (text, *_drifts(folder, folded_session)))
 
 
 def _is_as_logged(folder: SessionFolder, event: ProbeMeasured) -> bool:
@@ -56,10 +56,10 @@ def _is_as_logged(folder: SessionFolder, event: ProbeMeasured) -> bool:
     return path.is_file() and sha256_of(path) == event.sha256
 
 
-def _drifts(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
+def _drifts(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
     """A remark on the changes of the device from probe to probe, or that there are none."""
-    watched = begin_watching(folded.state.opened, folded.state.protocol)
-    for event in folded.contents.events[1:]:
-        watched = follow(watched, event)
+    watched = begin_watching(folded_session.state.opened, folded_session.state.protocol)
+    for event in folded_session.log_contents.events[1:]:
+        watched = apply_followed_event(watched, event)
     text = "; ".join(drift.sentence for drift in DriftReader(folder).look(watched.probes))
     return (f"In its {len(watched.probes)} probes {f'there changed: {text}' if text else 'no change was detected'}.",)

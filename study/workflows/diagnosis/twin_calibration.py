@@ -37,11 +37,11 @@ def inertia_effects(model: MechanicalModel, calibration: LinkageCalibration) -> 
     """
     slopes, axes = inertia_about(calibration, np.zeros(3))[1], driven_axes(model)
     driven_kg = np.einsum("na,nm,ma->a", axes, model.mass, axes)
-    per_m = _own_slopes(slopes) / driven_kg
+    per_m = _diagonal_slopes(slopes) / driven_kg
     return tuple(
-        ModelEffect("pose_dependent_inertia", letter, {"per_m": float(each)})
-        for letter, each in zip("xyz", per_m, strict=True)
-        if abs(each) > LEAST_PER_M
+        ModelEffect("pose_dependent_inertia", letter, {"per_m": float(slope_per_m)})
+        for letter, slope_per_m in zip("xyz", per_m, strict=True)
+        if abs(slope_per_m) > LEAST_PER_M
     )
 
 
@@ -52,23 +52,24 @@ def calibration_notes(
     inertia. identified_kg: (3,), masses along x, y, z from the recordings."""
     inertia, slopes = inertia_about(calibration, np.zeros(3))
     masses_kg = np.diag(inertia)
-    apart = float(np.abs(identified_kg / masses_kg - 1).max())
-    named = {effect.axis for effect in model.effects}
+    largest_difference = float(np.abs(identified_kg / masses_kg - 1).max())
+    changing_axes = {effect.axis for effect in model.effects}
     changing = ", ".join(
         f"{slope:.3g} kg/m along {letter}"
-        for letter, slope in zip("xyz", _own_slopes(slopes), strict=True)
-        if letter in named
+        for letter, slope in zip("xyz", _diagonal_slopes(slopes), strict=True)
+        if letter in changing_axes
     )
     return (
-        f"The calibration of the {calibration.device} says {', '.join(f'{each:.3g}' for each in masses_kg)} kg at the "
-        f"centre; the recordings say {', '.join(f'{each:.3g}' for each in identified_kg)} kg, up to {apart:.0%} apart. "
+        f"The calibration of the {calibration.device} says {', '.join(f'{mass_kg:.3g}' for mass_kg in masses_kg)} kg "
+        f"at the centre; the recordings say {', '.join(f'{mass_kg:.3g}' for mass_kg in identified_kg)} kg, up to "
+        f"{largest_difference:.0%} apart. "
         "The model has those of the recordings, with all that moves at the handle.",
         f"How its inertia changes is the calibration's, as pose_dependent_inertia: {changing or 'nowhere'}. What "
         "changes with the position across an axis is not in the model.",
     )
 
 
-def _own_slopes(slopes: FloatArray) -> FloatArray:
+def _diagonal_slopes(slopes: FloatArray) -> FloatArray:
     """(3,), kg/m: derivative of the inertia along each axis with the position along the same axis. slopes: (3, 3, 3),
     entry [a] is the derivative of the inertia matrix along axis a."""
     return np.array([slopes[axis, axis, axis] for axis in range(3)])

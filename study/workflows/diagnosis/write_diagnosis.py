@@ -31,10 +31,14 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
     write_mechanical_model(folder / MODEL_NAME, improved)
     guard = crash_guard()
     parts = [replace(part, work=partial(_draw_pictures, part.work)) for part in diagnosis_drawings(findings)]
-    drawn = [each for several in guard.parts(map_forked, parts) for each in several]
+    drawn_pictures = [
+        drawn_picture for part_pictures in guard.run_parts(map_forked, parts) for drawn_picture in part_pictures
+    ]
     findings = replace(findings, remarks=(*guard.sentences, *findings.remarks))
-    write_drawn(folder / "figures", drawn)
-    page = render_diagnosis_report(findings, [each.picture for each in drawn], _origin_entries(origin), local_now())
+    write_drawn(folder / "figures", drawn_pictures)
+    page = render_diagnosis_report(
+        findings, [drawn_picture.picture for drawn_picture in drawn_pictures], _origin_entries(origin), local_now()
+    )
     write_text(folder / PAGE_NAME, page)
     return findings
 

@@ -39,7 +39,7 @@ from study.workflows.recording.record_device import RecordingPlan, record_device
 TITLE = "The model was not made"
 """Title of the errors of this workflow."""
 STANDARD_GRAVITY = 9.80665
-"""m/s², exact by definition."""
+"""Standard acceleration of free fall (m/s²), exact by definition (CGPM 1901)."""
 SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY)
 """Bandwidth (Hz) and range (m/s²) of the accelerometer ADXL335, by its data sheet; the bandwidth follows from the
 filter capacitors of its board."""
@@ -66,7 +66,7 @@ class TwinPlan:
     simulated device is given the calibration's linkage and masses."""
 
     @property
-    def recorded(self) -> str:
+    def opened_device(self) -> str:
         """Name under which the device is opened."""
         as_calibrated = self.calibration is not None and self.device == SIMULATED
         return f"{CALIBRATED}{self.calibration}" if as_calibrated else self.device
@@ -80,7 +80,7 @@ class WrittenTwin:
     model: MechanicalModel
     """The model as written."""
     fit: MechanicalFit
-    piece: RigidBody
+    rigid_body: RigidBody
     """The fit as a rigid body at low frequencies, with the damping that is due to friction."""
     notes: tuple[str, ...]
     """Sentences on assumptions and on the effect of friction."""
@@ -93,46 +93,46 @@ def write_twin(
 ) -> WrittenTwin:
     """Record, fit and write the model. on_progress: called with the share done, 0 to 1. before_moving: as for
     `record_device`. Raises StudyError, and then writes no model."""
-    check_free(plan)
+    check_output_and_band(plan)
     calibration = None if plan.calibration is None else read_calibration(plan.calibration)
     protocol = read_recording_protocol(plan.protocol).protocol
-    _check_protocol(plan, protocol)
+    _require_three_axes(plan, protocol)
     with tempfile.TemporaryDirectory() as folder:
-        ways = [
-            RecordingPlan(level, plan.recorded, (0.0, 0.0, 0.0), plan.seed, Path(folder) / f"{name}.h5")
+        recording_plans = [
+            RecordingPlan(level, plan.opened_device, (0.0, 0.0, 0.0), plan.seed, Path(folder) / f"{name}.h5")
             for name, level in (("strong", protocol), ("weaker", _reduce_amplitudes(protocol)))
         ]
-        strong = _record(ways[0], lambda share: on_progress(0.15 * share), before_moving)
-        if calibration is not None and plan.recorded == plan.device:
-            check_same_device(calibration, strong.device, TITLE)
-        weaker = _record(ways[1], lambda share: on_progress(0.15 + 0.15 * share), before_moving)
-    fit, piece = _fit(plan, strong, weaker, lambda share: on_progress(0.3 + 0.6 * share))
-    linear = remove_friction_damping(fit.model, piece.of_friction)
+        stronger = _record_and_read(recording_plans[0], lambda share: on_progress(0.15 * share), before_moving)
+        if calibration is not None and plan.opened_device == plan.device:
+            check_same_device(calibration, stronger.device, TITLE)
+        weaker = _record_and_read(recording_plans[1], lambda share: on_progress(0.15 + 0.15 * share), before_moving)
+    fit, rigid_body = _fit_models(plan, stronger, weaker, lambda share: on_progress(0.3 + 0.6 * share))
+    linear = remove_friction_damping(fit.model, rigid_body.of_friction)
     model = replace(
         linear,
-        name=f"{strong.device}, as identified",
+        name=f"{stronger.device}, as identified",
         effects=() if calibration is None else inertia_effects(linear, calibration),
-        tolerance=piece.tolerance,
-        provenance=_provenance(plan, protocol, strong, fit),
+        tolerance=rigid_body.tolerance,
+        provenance=_gather_model_provenance(plan, protocol, stronger, fit),
     )
     write_mechanical_model(plan.out, model)
     on_progress(1.0)
-    notes = _notes(strong, fit, piece)
+    notes = _describe_assumptions(stronger, fit, rigid_body)
     if calibration is not None:
-        notes += calibration_notes(model, piece.mass, calibration)
-    return WrittenTwin(plan, model, fit, piece, notes)
+        notes += calibration_notes(model, rigid_body.mass, calibration)
+    return WrittenTwin(plan, model, fit, rigid_body, notes)
 
 
-def _fit(
-    plan: TwinPlan, strong: Recording, weaker: Recording, on_progress: Callable[[float], None]
+def _fit_models(
+    plan: TwinPlan, stronger: Recording, weaker: Recording, on_progress: Callable[[float], None]
 ) -> tuple[MechanicalFit, RigidBody]:
     """Fit of the whole band, and rigid-body fit of both recordings. Raises StudyError where a fit is refused."""
     settings = MechanicalFitSettings(
         band_hz=plan.band_hz, sensor=SENSOR, actuator=ACTUATOR, joint=True, fit_delay=False
     )
     try:
-        fit = fit_mechanical_model([strong], settings, on_progress, plan.device)
-        return fit, fit_rigid_body(fit, strong, weaker, settings)
+        fit = fit_mechanical_model([stronger], settings, on_progress, plan.device)
+        return fit, fit_rigid_body(fit, stronger, weaker, settings)
     except MechanicalFitRefused as refusal:
         raise StudyError(
             TITLE,
@@ -142,7 +142,7 @@ def _fit(
         ) from refusal
 
 
-def check_free(plan: TwinPlan) -> None:
+def check_output_and_band(plan: TwinPlan) -> None:
     """Check the output path and the band, before anything moves. Raises StudyError."""
     require_free(plan.out, title=TITLE, kind="models", saved="Nothing moved and nothing was written.")
     low, high = plan.band_hz
@@ -155,10 +155,10 @@ def check_free(plan: TwinPlan) -> None:
         )
 
 
-def _check_protocol(plan: TwinPlan, protocol: RecordingProtocol) -> None:
+def _require_three_axes(plan: TwinPlan, protocol: RecordingProtocol) -> None:
     """Raise WrongUseError unless multisines drive x, y and z, which the masses and their coupling require."""
-    driven = {segment.along for segment in protocol.segments if segment.kind == "multisine"}
-    if not {"x", "y", "z"} <= driven and "all" not in driven:
+    driven_directions = {segment.along for segment in protocol.segments if segment.kind == "multisine"}
+    if not {"x", "y", "z"} <= driven_directions and "all" not in driven_directions:
         raise WrongUseError(
             TITLE,
             f"The protocol {plan.protocol} does not play multisines along x, y and z, so that masses and coupling "
@@ -174,28 +174,34 @@ def _reduce_amplitudes(protocol: RecordingProtocol) -> RecordingProtocol:
     return replace(protocol, segments=segments)
 
 
-def _record(plan: RecordingPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving) -> Recording:
+def _record_and_read(
+    plan: RecordingPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving
+) -> Recording:
     """Record by the plan and read the recording back. on_progress: share done, 0 to 1."""
     total = max(plan.total_s, 1e-9)
     record_device(plan, lambda seconds: on_progress(min(seconds / total, 1.0)), before_moving)
-    return _last_realisation_tests(read_recording(plan.out))
+    return _assign_test_roles(read_recording(plan.out))
 
 
-def _last_realisation_tests(recording: Recording) -> Recording:
+def _assign_test_roles(recording: Recording) -> Recording:
     """Set the role of the last multisine realisation along each direction to "test", if there are several; else
     "fit"."""
-    facts: list[Mapping[str, Any]] = recording.meta["segments"]
-    last: dict[str, int] = {}
-    for fact in facts:
-        last[fact["along"]] = max(last.get(fact["along"], 0), fact["realisation"] or 0)
+    segment_metadata: list[Mapping[str, Any]] = recording.meta["segments"]
+    last_realisations: dict[str, int] = {}
+    for metadata in segment_metadata:
+        last_realisations[metadata["along"]] = max(
+            last_realisations.get(metadata["along"], 0), metadata["realisation"] or 0
+        )
     segments = tuple(
-        replace(segment, role="test" if 1 < last[fact["along"]] == fact["realisation"] else "fit")
-        for segment, fact in zip(recording.segments, facts, strict=True)
+        replace(segment, role="test" if 1 < last_realisations[metadata["along"]] == metadata["realisation"] else "fit")
+        for segment, metadata in zip(recording.segments, segment_metadata, strict=True)
     )
     return replace(recording, segments=segments)
 
 
-def _provenance(plan: TwinPlan, protocol: RecordingProtocol, strong: Recording, fit: MechanicalFit) -> dict[str, Any]:
+def _gather_model_provenance(
+    plan: TwinPlan, protocol: RecordingProtocol, stronger: Recording, fit: MechanicalFit
+) -> dict[str, Any]:
     """Origin of the model: software, seed, device, protocol, band and quality of the fit."""
     parents = () if plan.calibration is None else (plan.calibration,)
     return {
@@ -209,15 +215,15 @@ def _provenance(plan: TwinPlan, protocol: RecordingProtocol, strong: Recording, 
         "actuator": "assumed",
         "held_out_error": fit.held_out,
         "noise": fit.noise,
-        "feedback": strong.meta.get("feedback"),
+        "feedback": stronger.meta.get("feedback"),
         "reason": fit.reason,
     }
 
 
-def _notes(strong: Recording, fit: MechanicalFit, piece: RigidBody) -> tuple[str, ...]:
+def _describe_assumptions(stronger: Recording, fit: MechanicalFit, rigid_body: RigidBody) -> tuple[str, ...]:
     """Sentences for the user on the assumptions of the model and on the damping that was subtracted."""
-    spring = strong.meta.get("feedback") or {}
-    stiffness = float(spring.get("stiffness_n_per_m", 0.0))
+    feedback = stronger.meta.get("feedback") or {}
+    stiffness = float(feedback.get("stiffness_n_per_m", 0.0))
     return (
         f"The model is from the whole command to the acceleration: the virtual spring of {stiffness:.0f} N/m pushed as "
         "a part of the command, so it is not in the model's stiffness.",
@@ -227,6 +233,7 @@ def _notes(strong: Recording, fit: MechanicalFit, piece: RigidBody) -> tuple[str
         "between the two sides of a cable: half on each side is assumed.",
         "Dry friction is no part of a linear model: it appears as additional damping, which decreases as the force "
         f"increases. From the change when the force was lowered to {LOWER_LEVEL:.0%}, "
-        f"{', '.join(f'{each:.3g}' for each in piece.of_friction)} N s/m were attributed to friction and subtracted.",
+        f"{', '.join(f'{damping:.3g}' for damping in rigid_body.of_friction)} N s/m were attributed to friction and "
+        "subtracted.",
         fit.reason,
     )

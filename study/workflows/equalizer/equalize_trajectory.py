@@ -55,11 +55,11 @@ class EqualizedTrajectory:
     """Forces computed for a wanted trajectory, with the models and the solution behind them."""
 
     plan: EqualizePlan
-    wanted: Trajectory
+    reference: Trajectory
     forces: Trajectory
     """Forces to play in N, including those that compensate known effects."""
     models: PlaybackModels
-    solved: Feedforward
+    feedforward: Feedforward
     """Feedforward from the linear models alone."""
     peaks: Peaks
     """Force peaks of `forces`."""
@@ -70,20 +70,20 @@ class EqualizedTrajectory:
 def equalize_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     """Read, solve and write. Raises StudyError; nothing is written then."""
     check_free(plan.out)
-    solved = solve_trajectory(plan)
-    write_trajectory(plan.out, solved.forces)
-    return solved
+    equalized = solve_trajectory(plan)
+    write_trajectory(plan.out, equalized.forces)
+    return equalized
 
 
 def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     """Read and solve without writing. Raises StudyError."""
-    wanted = _read_wanted(plan.trajectory)
+    reference = _read_reference(plan.trajectory)
     models = read_playback_models(plan.models, plan.at_m, plan.weight)
     physics = None if plan.physics is None else read_mechanical_model(plan.physics)
     amplitude_n = None if physics is None else _amplitude_n(models.nearest)
     try:
-        require_rate(wanted, models.largest.sample_rate_hz)
-        solved, bands = _solve(plan, wanted, models)
+        require_rate(reference, models.largest.sample_rate_hz)
+        feedforward, bands = _solve(plan, reference, models)
     except ForceLimitError as limit:
         raise StudyError(
             "The forces would be too strong",
@@ -94,24 +94,24 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     except ValueError as problem:
         _require_weight(plan, models)
         raise _not_equalized(f"{plan.trajectory.name}: {problem}.") from problem
-    _require_reached(plan, solved, in_bands=bands is not None)
+    _require_reached(plan, feedforward, in_bands=bands is not None)
     compensation = None
     if physics is not None:
-        compensation = _compensate(plan, solved, models.largest, physics, amplitude_n)
-    samples = solved.forces.samples if compensation is None else compensation.forces
-    forces = replace(solved.forces, samples=samples)
+        compensation = _compensate(plan, feedforward, models.largest, physics, amplitude_n)
+    samples = feedforward.forces.samples if compensation is None else compensation.forces
+    forces = replace(feedforward.forces, samples=samples)
     peaks = require_under_cap(samples, plan.cap_n, forces.sample_rate_hz)
     return EqualizedTrajectory(
-        plan, wanted, Trajectory(forces, wanted.start_s), models, solved, peaks, bands, compensation
+        plan, reference, Trajectory(forces, reference.start_s), models, feedforward, peaks, bands, compensation
     )
 
 
-def check_free(out: Path, *more: Path) -> None:
+def check_free(out_path: Path, *further_paths: Path) -> None:
     """Check the output paths before any work. Raises StudyError."""
-    require_free(out, *more, title="The forces were not computed", kind="tables")
+    require_free(out_path, *further_paths, title="The forces were not computed", kind="tables")
 
 
-def _read_wanted(path: Path) -> Trajectory:
+def _read_reference(path: Path) -> Trajectory:
     trajectory = read_trajectory(path)
     if trajectory.kind is not TRAJECTORY:
         raise WrongUseError(
@@ -123,16 +123,16 @@ def _read_wanted(path: Path) -> Trajectory:
     sizes = np.abs(trajectory.signal.samples)
     if not sizes.max() <= HIGHEST_MPS2:
         row, axis = np.unravel_index(int(sizes.argmax()), sizes.shape)
-        found = trajectory.signal.samples[row, axis]
+        acceleration = trajectory.signal.samples[row, axis]
         raise _not_equalized(
-            f"{path.name} wants {found:g} m/s^2 of {TRAJECTORY.header[1 + axis]} in line {row + 2}; the largest "
+            f"{path.name} wants {acceleration:g} m/s^2 of {TRAJECTORY.header[1 + axis]} in line {row + 2}; the largest "
             f"acceleration that is accepted is {HIGHEST_MPS2:g} m/s^2."
         )
     return trajectory
 
 
 def _require_weight(plan: EqualizePlan, models: PlaybackModels) -> None:
-    if math.sqrt(plan.weight) < LEAST_WEIGHT_RATIO * max(peak_gain(model) for model in models.given):
+    if math.sqrt(plan.weight) < LEAST_WEIGHT_RATIO * max(peak_gain(model) for model in models.all_models):
         raise StudyError(
             "The forces were not computed",
             f"--weight {plan.weight:g} is too small to keep forces finite where the model hardly moves.",
@@ -141,43 +141,43 @@ def _require_weight(plan: EqualizePlan, models: PlaybackModels) -> None:
         )
 
 
-def _require_reached(plan: EqualizePlan, solved: Feedforward, in_bands: bool) -> None:
+def _require_reached(plan: EqualizePlan, feedforward: Feedforward, in_bands: bool) -> None:
     """Raise if the models cannot reproduce the wanted signal. Where the cap costs accuracy, the error without the
     cap decides."""
-    missed = solved.error if solved.loss is None else solved.loss.error_free
-    if not missed <= LARGEST_ERROR and in_bands:
+    tracking_error = feedforward.error if feedforward.loss is None else feedforward.loss.error_free
+    if not tracking_error <= LARGEST_ERROR and in_bands:
         raise StudyError(
             "The forces were not computed",
-            f"According to the model, the error of the best forces would be {100 * missed:.0f} % of the wanted "
+            f"According to the model, the error of the best forces would be {100 * tracking_error:.0f} % of the wanted "
             "acceleration: the three bands need time to rise and decay, and the table begins or ends too close to "
             "the motion.",
             "Put 3 s of zeros before and after the motion, or give one model.",
             saved="Nothing was written.",
         )
-    if not missed <= LARGEST_ERROR:
+    if not tracking_error <= LARGEST_ERROR:
         raise StudyError(
             "The forces were not computed",
-            f"According to the model, the error of the best forces would be {100 * missed:.0f} % of the wanted "
+            f"According to the model, the error of the best forces would be {100 * tracking_error:.0f} % of the wanted "
             f"acceleration: along some direction the device hardly moves, for --weight {plan.weight:g}.",
             "Check units and axes of the recording that it was made from and identify it again, or lower --weight.",
             saved="Nothing was written.",
         )
 
 
-def _solve(plan: EqualizePlan, wanted: Trajectory, models: PlaybackModels) -> tuple[Feedforward, BandFacts | None]:
+def _solve(plan: EqualizePlan, reference: Trajectory, models: PlaybackModels) -> tuple[Feedforward, BandFacts | None]:
     settings = FeedforwardSettings(plan.weight, plan.cap_n, plan.constrain)
-    if models.two is None:
-        return feedforward_at(models.at, wanted.signal, settings), None
-    banded = solve_banded_feedforward(models.two, wanted.signal, settings)
+    if models.two_bands is None:
+        return feedforward_at(models.at, reference.signal, settings), None
+    banded = solve_banded_feedforward(models.two_bands, reference.signal, settings)
     return banded.feedforward, banded.facts
 
 
 def _amplitude_n(model: IdentifiedModel) -> float | None:
     """Force amplitude of the identification; None if the effects were removed from its recordings."""
-    found = model.provenance.get("amplitude_n", 0.0)
-    if found is None:
+    amplitude_n = model.provenance.get("amplitude_n", 0.0)
+    if amplitude_n is None:
         return None
-    if not found > 0:
+    if not amplitude_n > 0:
         raise StudyError(
             "Known physics cannot be compensated with this model",
             "The model's file does not state the force amplitude of its identification. The damping that friction adds "
@@ -185,18 +185,20 @@ def _amplitude_n(model: IdentifiedModel) -> float | None:
             "Identify it again from recordings whose segments state their amplitude, or leave out --physics.",
             saved="Nothing was written.",
         )
-    return float(found)
+    return float(amplitude_n)
 
 
 def _compensate(
     plan: EqualizePlan,
-    solved: Feedforward,
+    feedforward: Feedforward,
     model: IdentifiedModel,
     physics: MechanicalModel,
     amplitude_n: float | None,
 ) -> Compensation:
     try:
-        found = compensate(solved.forces.samples, solved.wanted, model, physics, amplitude_n, plan.cap_n)
+        compensation = compensate(
+            feedforward.forces.samples, feedforward.reference, model, physics, amplitude_n, plan.cap_n
+        )
     except ValueError as problem:
         raise StudyError(
             "The known physics does not fit the model",
@@ -204,13 +206,13 @@ def _compensate(
             "Correct the [[effect]] sections, or leave out --physics.",
             saved="Nothing was written.",
         ) from problem
-    return found
+    return compensation
 
 
-def _not_equalized(happened: str) -> StudyError:
+def _not_equalized(explanation: str) -> StudyError:
     return StudyError(
         "The forces were not computed",
-        happened,
+        explanation,
         "Correct what is named, or give a table and a model that fit each other.",
         saved="Nothing was written.",
     )

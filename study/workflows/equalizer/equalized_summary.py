@@ -18,29 +18,29 @@ WORTH_SAYING = 0.01
 
 def summary(done: EqualizedTrajectory) -> dict[str, Any]:
     """The figures as plain values; units by the suffix of a key, errors as fractions."""
-    solved, bands, compensation = done.solved, done.bands, done.compensation
-    found: dict[str, Any] = {
+    feedforward, bands, compensation = done.feedforward, done.bands, done.compensation
+    values: dict[str, Any] = {
         "forces": str(done.plan.out),
         "quality": quality_document(done.models.quality),
-        "quality_of_models": [quality_document(model.quality) for model in done.models.given],
+        "quality_of_models": [quality_document(model.quality) for model in done.models.all_models],
         "band_hz": list(done.models.band_hz),
         "predicted_error": predicted_error(done),
-        "left_out": solved.left_out,
+        "left_out": feedforward.out_of_band_share,
         "peak_n": done.peaks.peak_n,
         "cap_n": done.peaks.cap_n,
         "capped": None,
         "place_m": list(done.models.at.place_m),
         "remarks": [*done.models.held_out, *done.models.remarks],
     }
-    if solved.loss is not None:
-        found["capped"] = {
-            "error_free": solved.loss.error_free,
-            "error_capped": solved.loss.error_capped,
-            "error_clipped": solved.loss.error_clipped,
+    if feedforward.loss is not None:
+        values["capped"] = {
+            "error_free": feedforward.loss.error_free,
+            "error_capped": feedforward.loss.error_capped,
+            "error_clipped": feedforward.loss.error_clipped,
         }
-    found |= _interpolation_facts(done)
+    values |= _interpolation_facts(done)
     if bands is not None:
-        found["bands"] = {
+        values["bands"] = {
             "edges_hz": list(bands.edges_hz),
             "middle_error_if_only_cut": bands.cut_error,
             "middle_error_with_run_in": bands.whole_error,
@@ -49,10 +49,10 @@ def summary(done: EqualizedTrajectory) -> dict[str, Any]:
             "travel_m": bands.travel_m,
         }
     if compensation is not None:
-        found["compensated"] = [effect.kind for effect in compensation.used]
-        found["not_compensated"] = {effect.kind: why for effect, why in compensation.not_used}
-        found["compensated_share"] = compensation.share
-    return found
+        values["compensated"] = [effect.kind for effect in compensation.used]
+        values["not_compensated"] = {effect.kind: reason for effect, reason in compensation.not_used}
+        values["compensated_share"] = compensation.share
+    return values
 
 
 def _interpolation_facts(done: EqualizedTrajectory) -> dict[str, Any]:
@@ -75,15 +75,15 @@ def _interpolation_facts(done: EqualizedTrajectory) -> dict[str, Any]:
 
 def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
     """The figures as terminal lines."""
-    solved = done.solved
+    feedforward = done.feedforward
     lines = [*_quality_lines(done), *done.models.held_out, _prediction_line(done), *done.models.remarks]
     lines += _band_lines(done)
-    if solved.left_out > WORTH_SAYING:
+    if feedforward.out_of_band_share > WORTH_SAYING:
         lines.append(
-            f"{100 * solved.left_out:.0f} % of the wanted acceleration (rms) lies outside the "
+            f"{100 * feedforward.out_of_band_share:.0f} % of the wanted acceleration (rms) lies outside the "
             f"{'bands' if done.bands else 'band'} and is not played."
         )
-    if solved.loss is not None and done.bands is None and (outside := _force_outside(done)) > WORTH_SAYING:
+    if feedforward.loss is not None and done.bands is None and (outside := _force_outside(done)) > WORTH_SAYING:
         lines.append(
             f"Forces that are held at the cap have corners: {100 * outside:.0f} % of them (rms) lies outside the "
             "band, where the model does not describe the device's response."
@@ -96,28 +96,28 @@ def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
 def _quality_lines(done: EqualizedTrajectory) -> list[str]:
     """Measured quality of the models, before their own prediction."""
     models = done.models
-    known = models.quality
-    if len(models.given) == 1:
-        return [quality_sentence(known), *(known.remarks if known else ())]
-    where = "narrower" if models.two is not None else "nearest"
-    nearest, worst = models.nearest.quality, known
-    lines = [f"Of the {where} model: {quality_sentence(nearest)}"]
+    worst_quality = models.quality
+    if len(models.all_models) == 1:
+        return [quality_sentence(worst_quality), *(worst_quality.remarks if worst_quality else ())]
+    position = "narrower" if models.two_bands is not None else "nearest"
+    nearest, worst = models.nearest.quality, worst_quality
+    lines = [f"Of the {position} model: {quality_sentence(nearest)}"]
     if worst != nearest:
-        lines.append(f"Of the worst of the {len(models.given)} models: {quality_sentence(worst)}")
-    return [*lines, *dict.fromkeys(remark for each in (nearest, worst) if each for remark in each.remarks)]
+        lines.append(f"Of the worst of the {len(models.all_models)} models: {quality_sentence(worst)}")
+    return [*lines, *dict.fromkeys(remark for quality in (nearest, worst) if quality for remark in quality.remarks)]
 
 
 def predicted_error(done: EqualizedTrajectory) -> float:
     """Relative error as the model predicts it. Under an active cap it includes the corners of the capped forces, so
     that it can be compared with the error without a cap."""
-    loss = done.solved.loss
-    return done.solved.error if loss is None else loss.error_capped
+    loss = done.feedforward.loss
+    return done.feedforward.error if loss is None else loss.error_capped
 
 
 def _prediction_line(done: EqualizedTrajectory) -> str:
     """Predicted error, what the cap adds to it, and the highest force."""
-    loss, (low, high) = done.solved.loss, done.models.band_hz
-    who = "the model itself predicts" if len(done.models.given) == 1 else "the models themselves predict"
+    loss, (low, high) = done.feedforward.loss, done.models.band_hz
+    subject = "the model itself predicts" if len(done.models.all_models) == 1 else "the models themselves predict"
     cost = ""
     if loss is not None:
         cost = (
@@ -125,8 +125,8 @@ def _prediction_line(done: EqualizedTrajectory) -> str:
             f"{100 * loss.error_clipped:.2f} %)"
         )
     return (
-        f"As {who}: error {100 * predicted_error(done):.2f} % of the wanted acceleration within {low:g} to {high:g} "
-        f"Hz{cost}; highest force {done.peaks.peak_n:.3g} N of {done.peaks.cap_n:g} N."
+        f"As {subject}: error {100 * predicted_error(done):.2f} % of the wanted acceleration within {low:g} to "
+        f"{high:g} Hz{cost}; highest force {done.peaks.peak_n:.3g} N of {done.peaks.cap_n:g} N."
     )
 
 
@@ -139,13 +139,13 @@ def _force_outside(done: EqualizedTrajectory) -> float:
 
 def _band_lines(done: EqualizedTrajectory) -> list[str]:
     """Edges and errors of the three bands; empty where a single band was solved for."""
-    bands, two = done.bands, done.models.two
-    if bands is None or two is None:
+    bands, two_bands = done.bands, done.models.two_bands
+    if bands is None or two_bands is None:
         return []
     low, high = bands.edges_hz
     lines = [
         f"Bands: a rigid model below {low:g} Hz (the handle travels {1e3 * bands.travel_m:.1f} mm), the narrower "
-        f"model up to {high:g} Hz, from there to {two.wide.band_hz[1]:g} Hz only the loudness is reproduced, all "
+        f"model up to {high:g} Hz, from there to {two_bands.wide.band_hz[1]:g} Hz only the loudness is reproduced, all "
         "along one direction.",
         "The bands begin before the table's first row and end after its last; only its rows are written, and the "
         f"middle band is solved for them. Its error would be {100 * bands.whole_error:.2f} % if all rows were "
@@ -166,7 +166,7 @@ def _physics_lines(done: EqualizedTrajectory) -> list[str]:
     share = f"; {100 * compensation.share:.0f} % of it fits under the cap" if compensation.share < 1 else ""
     used = ", ".join(effect.kind for effect in compensation.used) or "nothing"
     lines = [f"Compensated: {used}{share}."]
-    return lines + [f"Not compensated: {effect.kind}: {why}." for effect, why in compensation.not_used]
+    return lines + [f"Not compensated: {effect.kind}: {reason}." for effect, reason in compensation.not_used]
 
 
 def _spring_line(done: EqualizedTrajectory) -> str:

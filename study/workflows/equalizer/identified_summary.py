@@ -29,17 +29,17 @@ def summary(device: IdentifiedDevice) -> dict[str, Any]:
 
 def summary_lines(device: IdentifiedDevice) -> tuple[str, ...]:
     """The summary as lines for the terminal."""
-    found = summary(device)
-    low, high = found["band_hz"]
+    values = summary(device)
+    low, high = values["band_hz"]
     lines = [
         quality_sentence(device.model.quality),
-        f"Order {found['order']}, {low:g} to {high:g} Hz, stable (slowest pole {found['spectral_radius']:.5f}), "
-        f"from {found['lines']} lines.",
-        f"Model against estimate: {100 * found['rms_relative_error']:.2f} % rms, worst line "
-        f"{100 * found['worst_relative_error']:.2f} %; both include the noise of the estimate.",
+        f"Order {values['order']}, {low:g} to {high:g} Hz, stable (slowest pole {values['spectral_radius']:.5f}), "
+        f"from {values['lines']} lines.",
+        f"Model against estimate: {100 * values['rms_relative_error']:.2f} % rms, worst line "
+        f"{100 * values['worst_relative_error']:.2f} %; both include the noise of the estimate.",
     ]
-    if found["freed_of"]:
+    if values["freed_of"]:
         lines.append(
-            f"Subtracted from the recordings: {', '.join(found['freed_of'])}; give --physics when playing, too."
+            f"Subtracted from the recordings: {', '.join(values['freed_of'])}; give --physics when playing, too."
         )
     return tuple(lines)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.wording import as_sentence, capitalise
+from analysis.wording import capitalise, format_sentence
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError
 from equalizer.identification.state_space.held_out import HeldOut, validate_on_test
@@ -31,8 +31,8 @@ from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import read_recording
 from study.workflows.equalizer.recordings_without_effects import (
-    reasons_not_removed,
-    removable_effects,
+    explain_unremovable_effects,
+    list_removable_effects,
     remove_effects,
 )
 from study.workflows.free_name import require_free
@@ -81,9 +81,9 @@ class IdentifiedDevice:
     @property
     def remarks(self) -> tuple[str, ...]:
         """Sentences for the user on the quality of the model, on the estimate and on effects that were not removed."""
-        known = self.model.quality.remarks if self.model.quality else ()
-        left = (f"Not subtracted from the recordings: {sentence}" for sentence in self.not_removed)
-        return (*known, *(as_sentence(remark) for remark in self.estimate.remarks), *left)
+        quality_remarks = self.model.quality.remarks if self.model.quality else ()
+        not_removed = (f"Not subtracted from the recordings: {sentence}" for sentence in self.not_removed)
+        return (*quality_remarks, *(format_sentence(remark) for remark in self.estimate.remarks), *not_removed)
 
 
 def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> IdentifiedDevice:
@@ -99,10 +99,10 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     if plan.physics is not None and physics is not None:
         recordings = remove_effects(recordings, physics, plan.physics)
     try:
-        found = identify_recordings(recordings, settings, plan.smooth, on_progress)
-        model = _add_place(plan, recordings, found.identified.model, physics)
+        identification = identify_recordings(recordings, settings, plan.smooth, on_progress)
+        model = _add_place(plan, recordings, identification.identified.model, physics)
         tested = validate_on_test(model, recordings)
-        model = replace(model, quality=_quality(found, recordings, tested))
+        model = replace(model, quality=_quality(identification, recordings, tested))
     except (TransferEstimateError, IdentificationRefused) as refusal:
         raise _no_model(str(refusal)) from refusal
     except np.linalg.LinAlgError as problem:
@@ -113,24 +113,35 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     except ValueError as problem:
         raise _no_model(f"{problem}.") from problem
     write_identified_model(plan.out, model)
-    left = () if physics is None else reasons_not_removed(physics)
-    return IdentifiedDevice(plan, recordings, found.estimate, found.fitted, found.identified, model, tested, left)
+    not_removed = () if physics is None else explain_unremovable_effects(physics)
+    return IdentifiedDevice(
+        plan,
+        recordings,
+        identification.estimate,
+        identification.fitted,
+        identification.identified,
+        model,
+        tested,
+        not_removed,
+    )
 
 
-def _quality(found: IdentifiedRecordings, recordings: Sequence[Recording], tested: HeldOut | None) -> ModelQuality:
+def _quality(
+    identification: IdentifiedRecordings, recordings: Sequence[Recording], tested: HeldOut | None
+) -> ModelQuality:
     """Figures of the quality: misfit, scatter and held-out error. The misfit is that of the estimate itself, even if
     the model was fitted to local averages."""
-    identified, estimate = found.identified, found.estimate
+    identified, estimate = identification.identified, identification.estimate
     misfit = misfit_of_estimate(identified.model, estimate)
     remarks = (*identified.remarks, *held_out_remarks(tested, identified.cost, misfit, recordings))
     measured = None if tested is None else (tested.error, tested.noise, tested.seconds)
-    sentences = tuple(as_sentence(remark) for remark in remarks)
-    return model_quality(misfit.error, identified.scatter, measured, sentences, misfit.most)
+    sentences = tuple(format_sentence(remark) for remark in remarks)
+    return model_quality(misfit.error, identified.scatter, measured, sentences, misfit.upper_bound)
 
 
-def check_free(out: Path) -> None:
+def check_free(out_path: Path) -> None:
     """Check before any work that the output path can be written. Raises StudyError."""
-    require_free(out, title="The model was not made", kind="models")
+    require_free(out_path, title="The model was not made", kind="models")
 
 
 def _settings(plan: IdentifyPlan) -> IdentificationSettings:
@@ -159,7 +170,7 @@ def _add_place(
         "input": "excitation" if plan.with_spring else "command",
         # None: these effects are compensated fully, because the model contains nothing of them.
         "amplitude_n": _amplitude_n(recordings) if physics is None else None,
-        "freed_of": [] if physics is None else removable_effects(physics),
+        "freed_of": [] if physics is None else list_removable_effects(physics),
     }
     return replace(model, place_m=_common_place(recordings), provenance=provenance)
 
@@ -174,10 +185,12 @@ def _amplitude_n(recordings: Sequence[Recording]) -> float:
 def _check_alike(recordings: Sequence[Recording], with_spring: bool) -> None:
     """Raise StudyError unless all recordings are of the same system: all with a hand or all without, and, where the
     spring becomes part of the model, all under the same spring."""
-    found = {"the hand on the handle": {str(r.meta["hand"]) for r in recordings if r.meta.get("hand") is not None}}
+    values_by_name = {
+        "the hand on the handle": {str(r.meta["hand"]) for r in recordings if r.meta.get("hand") is not None}
+    }
     if with_spring:
-        found["the spring"] = {_spring_words(r.meta.get("feedback")) for r in recordings}
-    for name, values in found.items():
+        values_by_name["the spring"] = {_spring_words(r.meta.get("feedback")) for r in recordings}
+    for name, values in values_by_name.items():
         if len(values) > 1:
             raise _no_model(f"The recordings differ in {name} ({'; '.join(sorted(values))}); identify each separately.")
 
@@ -209,10 +222,10 @@ def _common_place(recordings: Sequence[Recording]) -> tuple[float, float, float]
     return x, y, z
 
 
-def _no_model(happened: str) -> StudyError:
+def _no_model(explanation: str) -> StudyError:
     return StudyError(
         "No model can be made from these recordings",
-        capitalise(happened),
+        capitalise(explanation),
         "Record what is missing (hapteq record), or choose another --band or --order.",
         saved="Nothing was written.",
     )

@@ -45,11 +45,11 @@ from study.workflows.equalizer.playback_models import PlaybackModels, Vector, re
 
 GAIN_LINES = 100
 """Number of frequencies in the band, in a geometric series, over which the gain of the comparison is averaged."""
-REST = Padding(after_s=0.5)
+REST_PADDING = Padding(after_s=0.5)
 """Time (s) that is played after the recording, in which the handle comes to rest."""
 FADE_S = 0.2
 """Fade-out (s) at the end: the last forces of a solution with a free end are useless, and would end with a step."""
-AGAIN, NOTHING = "Start again.", "Nothing was written."
+RESTART, UNSAVED = "Start again.", "Nothing was written."
 SETTLE_S = 1.0
 """Time (s) without stimulus before and after each play."""
 
@@ -85,18 +85,18 @@ class PlayedTransient:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactPlay:
-    """A transient at a contact: as wanted, as predicted by the model, and as played with and without the model."""
+    """A transient at a contact: as requested, as predicted by the model, and as played with and without the model."""
 
     plan: ContactPlan
     normal: FloatArray
     """(3,), of length 1."""
     sample_rate_hz: float
     band_hz: tuple[float, float]
-    wanted: FloatArray
+    reference: FloatArray
     """(N, 3), m/s^2: the part in the model's band, followed by the time to come to rest."""
     start: CausalStart
     equalized: PlayedTransient
-    plain: PlayedTransient
+    single_gain: PlayedTransient
     """The recording played as a force along the normal, with a single gain for all frequencies."""
 
 
@@ -106,83 +106,83 @@ def play_contact(
     """Solve, play with and without the model, and write. on_progress: takes the share played, 0 to 1. before_moving:
     see `BeforeMoving`. Raises StudyError, before any motion where the input is unsuitable; nothing is written then."""
     require_new_folder(plan.out)
-    normal = _unit(plan.normal)
-    transient = _transient(plan)
+    normal = _normalise(plan.normal)
+    transient = _read_transient(plan)
     models = read_playback_models((plan.model,), None, plan.weight)
     require_device_alone(models)
     model, rate_hz, band_hz = models.nearest, models.nearest.sample_rate_hz, models.band_hz
     try:
         require_rate(transient, rate_hz)
         recording = plan.scale * transient.signal.samples[:, 0]
-        start = causal_start(make_tracking_problem(model, TrackingWeights(plan.weight)), recording, REST)
+        start = causal_start(make_tracking_problem(model, TrackingWeights(plan.weight)), recording, REST_PADDING)
     except ValueError as problem:
-        raise _refusal(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
-    tracked = start.basis.forces(normal)
-    wanted = _along_normal(recording, normal, len(tracked))
+        raise _make_error(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
+    feedforward = start.basis.forces(normal)
+    reference = _extend_along_normal(recording, normal, len(feedforward))
     forces = (
-        _within_cap(_fade_out(_beside_spring(tracked, wanted, models), rate_hz), plan, rate_hz),
-        _within_cap(_plain_forces(model, wanted), plan, rate_hz),
+        _require_cap(_fade_out(_subtract_spring_force(feedforward, reference, models), rate_hz), plan, rate_hz),
+        _require_cap(_single_gain_forces(model, reference), plan, rate_hz),
     )
     measured = _play_both(plan, models, forces, on_progress, before_moving)
-    in_band = band_part(wanted, rate_hz, band_hz)
-    equalized, plain = (
-        PlayedTransient(sent, band_part(came, rate_hz, band_hz), band_error(wanted, came, rate_hz, band_hz))
-        for sent, came in zip(forces, measured, strict=True)
+    in_band = band_part(reference, rate_hz, band_hz)
+    equalized, single_gain = (
+        PlayedTransient(force, band_part(response, rate_hz, band_hz), band_error(reference, response, rate_hz, band_hz))
+        for force, response in zip(forces, measured, strict=True)
     )
-    done = ContactPlay(plan, normal, rate_hz, band_hz, in_band, start, equalized, plain)
-    _write(done, models)
-    return done
+    play = ContactPlay(plan, normal, rate_hz, band_hz, in_band, start, equalized, single_gain)
+    _write_play(play, models)
+    return play
 
 
-def _unit(normal: Vector) -> FloatArray:
+def _normalise(normal: Vector) -> FloatArray:
     length = float(np.linalg.norm(normal))
     if not (np.isfinite(length) and length > 0):
         raise WrongUseError(
-            "This is no normal", f"--normal is {' '.join(f'{part:g}' for part in normal)}.", "Such as --normal 0 0 1."
+            "This is no normal", f"--normal is {' '.join(f'{entry:g}' for entry in normal)}.", "Such as --normal 0 0 1."
         )
     return np.asarray(normal, dtype=np.float64) / length
 
 
-def _transient(plan: ContactPlan) -> Trajectory:
-    found = read_trajectory(plan.transient)
-    if found.kind is not TRANSIENT:
+def _read_transient(plan: ContactPlan) -> Trajectory:
+    table = read_trajectory(plan.transient)
+    if table.kind is not TRANSIENT:
         raise WrongUseError(
             "This is no table of a transient",
-            f"{plan.transient.name} holds {found.kind.name}; its header must be {','.join(TRANSIENT.header)}.",
+            f"{plan.transient.name} holds {table.kind.name}; its header must be {','.join(TRANSIENT.header)}.",
             "Give the recorded acceleration along the normal, in m/s^2, from the moment of contact on.",
             saved="Nothing moved.",
         )
-    return found
+    return table
 
 
-def _along_normal(recording: FloatArray, normal: FloatArray, rows: int) -> FloatArray:
-    return np.outer(np.pad(recording, (0, rows - len(recording))), normal)
+def _extend_along_normal(recording: FloatArray, normal: FloatArray, count: int) -> FloatArray:
+    return np.outer(np.pad(recording, (0, count - len(recording))), normal)
 
 
-def _beside_spring(forces: FloatArray, wanted: FloatArray, models: PlaybackModels) -> FloatArray:
-    """Commands minus the force that the spring will add along the wanted motion."""
+def _subtract_spring_force(forces: FloatArray, reference: FloatArray, models: PlaybackModels) -> FloatArray:
+    """Commands minus the force that the spring will add along the reference motion."""
     spring, rate_hz = find_acting_spring(models), models.nearest.sample_rate_hz
-    return compensate_spring(lambda _: forces, spring, rate_hz, models.band_hz)(wanted)
+    return compensate_spring(lambda _: forces, spring, rate_hz, models.band_hz)(reference)
 
 
 def _fade_out(forces: FloatArray, rate_hz: float) -> FloatArray:
-    left_s = np.arange(len(forces))[::-1] / rate_hz
-    share = np.clip(left_s / FADE_S, 0.0, 1.0)
+    remaining_s = np.arange(len(forces))[::-1] / rate_hz
+    share = np.clip(remaining_s / FADE_S, 0.0, 1.0)
     return np.asarray(forces * (0.5 - 0.5 * np.cos(np.pi * share))[:, np.newaxis])
 
 
-def _plain_forces(model: IdentifiedModel, wanted: FloatArray) -> FloatArray:
-    return np.asarray(static_gain(model, np.geomspace(*model.band_hz, GAIN_LINES)).response[0, 0, 0].real * wanted)
+def _single_gain_forces(model: IdentifiedModel, reference: FloatArray) -> FloatArray:
+    return np.asarray(static_gain(model, np.geomspace(*model.band_hz, GAIN_LINES)).response[0, 0, 0].real * reference)
 
 
-def _within_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatArray:
+def _require_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatArray:
     try:
         require_under_cap(forces, plan.cap_n, rate_hz)
     except ForceLimitError as limit:
-        fits = np.floor(1e3 * plan.scale * limit.peaks.largest_scale) / 1e3
-        raise _refusal(
+        largest_scale = np.floor(1e3 * plan.scale * limit.peaks.largest_scale) / 1e3
+        raise _make_error(
             f"The forces would reach {limit.peaks.peak_n:.3g} N, above the cap of {plan.cap_n:g} N.",
-            f"Give --scale {fits:g} or less, or raise --cap for a device that no hand holds.",
+            f"Give --scale {largest_scale:g} or less, or raise --cap for a device that no hand holds.",
         ) from limit
     return forces
 
@@ -196,7 +196,7 @@ def _play_both(
 ) -> list[FloatArray]:
     """Measured accelerations, (N, 3) in m/s^2, of each of the forces."""
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
-    settings = _settings(plan, models, forces)
+    settings = _make_settings(plan, models, forces)
     measured: list[FloatArray] = []
 
     def advance(share: float) -> None:
@@ -204,28 +204,28 @@ def _play_both(
 
     with contextlib.closing(open_device(plan.device, settings, clock, plan.seed)) as device:
         if device.info.sample_rate_hz != models.nearest.sample_rate_hz:
-            raise _refusal(
+            raise _make_error(
                 f"The model is at {models.nearest.sample_rate_hz:g} Hz, the device runs at "
                 f"{device.info.sample_rate_hz:g} Hz.",
                 "Identify a model from recordings of this device.",
             )
-        total_s = sum(len(each) / device.info.sample_rate_hz + 2 * SETTLE_S for each in forces)
+        total_s = sum(len(command) / device.info.sample_rate_hz + 2 * SETTLE_S for command in forces)
         try:
             announce_motion(device, plan.cap_n, total_s, before_moving)
-            for each in forces:
-                measured.append(_play_transient(device, each, advance))
+            for command in forces:
+                measured.append(_play_transient(device, command, advance))
         except KeyboardInterrupt as interruption:
             if device.fault() is Fault.FORCE_LEFT:
-                raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, AGAIN, NOTHING) from None
-            happened = f"{len(measured)} of {len(forces)} plays were measured; the force was released."
-            raise UserInterruptError("Interrupted", happened, AGAIN, NOTHING) from interruption
+                raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, RESTART, UNSAVED) from None
+            explanation = f"{len(measured)} of {len(forces)} plays were measured; the force was released."
+            raise UserInterruptError("Interrupted", explanation, RESTART, UNSAVED) from interruption
     return measured
 
 
-def _settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[FloatArray, FloatArray]) -> DeviceSettings:
+def _make_settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[FloatArray, FloatArray]) -> DeviceSettings:
     """Settings of the device. The slew limit allows the initial step: forces begin at the contact without fade-in."""
     settings, rate_hz = playback_settings(plan.cap_n, models), models.nearest.sample_rate_hz
-    steps = [np.linalg.norm(np.diff(each, axis=0, prepend=0, append=0), axis=1).max() for each in forces]
+    steps = [np.linalg.norm(np.diff(command, axis=0, prepend=0, append=0), axis=1).max() for command in forces]
     slew_n_per_s = max(settings.limits.slew_n_per_s, float(max(steps)) * rate_hz + SPRING_SLEW_N_PER_S)
     return replace(settings, limits=replace(settings.limits, slew_n_per_s=slew_n_per_s))
 
@@ -237,58 +237,58 @@ def _play_transient(device: Device, forces: FloatArray, on_share: Callable[[floa
     return read_measured_acceleration(play_forces(device, padded, on_share))[settle : settle + len(forces)]
 
 
-def _write(done: ContactPlay, models: PlaybackModels) -> None:
+def _write_play(play: ContactPlay, models: PlaybackModels) -> None:
     from analysis.figures.contact_transient import contact_picture
     from study.workflows.picture_files import write_pictures
 
-    rate_hz = done.sample_rate_hz
-    with new_folder(done.plan.out) as folder:
+    rate_hz = play.sample_rate_hz
+    with new_folder(play.plan.out) as folder:
         for name, samples, kind in (
-            ("forces.csv", done.equalized.forces, FORCES),
-            ("wanted.csv", done.wanted, TRAJECTORY),
-            ("measured.csv", done.equalized.measured, TRAJECTORY),
+            ("forces.csv", play.equalized.forces, FORCES),
+            ("wanted.csv", play.reference, TRAJECTORY),
+            ("measured.csv", play.equalized.measured, TRAJECTORY),
         ):
             signal = Signal(samples, rate_hz, kind.quantity, kind.unit, kind.header[1:])
             write_trajectory(folder / name, Trajectory(signal))
-        write_pictures(folder, [contact_picture(done.normal, rate_hz, done.wanted, *_plays(done))])
-        provenance = gather_provenance(seeds={"device": done.plan.seed}).as_dict()
-        document = {**contact_summary(done), "model_sha256": models.sha256, "provenance": provenance}
+        write_pictures(folder, [contact_picture(play.normal, rate_hz, play.reference, *_list_plays(play))])
+        provenance = gather_provenance(seeds={"device": play.plan.seed}).as_dict()
+        document = {**summarise_contact(play), "model_sha256": models.sha256, "provenance": provenance}
         write_json(folder / "contact.json", "hapteq-contact", 1, document, overwrite=False)
 
 
-def _plays(done: ContactPlay) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
+def _list_plays(play: ContactPlay) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
     return (
-        ("through the model", done.equalized.forces, done.equalized.measured),
-        ("one gain", done.plain.forces, done.plain.measured),
+        ("through the model", play.equalized.forces, play.equalized.measured),
+        ("one gain", play.single_gain.forces, play.single_gain.measured),
     )
 
 
-def contact_summary(done: ContactPlay) -> dict[str, Any]:
+def summarise_contact(play: ContactPlay) -> dict[str, Any]:
     """Values of contact.json and `--json`: relative errors in the band (1 = 100 %), and the largest force (N)."""
     return {
-        "out": str(done.plan.out),
-        "normal": done.normal.tolist(),
-        "band_hz": list(done.band_hz),
-        "predicted_error": done.start.error(done.normal),
-        "early_error": done.start.early_error(done.normal),
-        "worst_error": done.start.worst_error,
-        "measured_error": done.equalized.error,
-        "plain_error": done.plain.error,
-        "peak_n": float(np.linalg.norm(done.equalized.forces, axis=1).max()),
+        "out": str(play.plan.out),
+        "normal": play.normal.tolist(),
+        "band_hz": list(play.band_hz),
+        "predicted_error": play.start.error(play.normal),
+        "early_error": play.start.early_error(play.normal),
+        "worst_error": play.start.worst_error,
+        "measured_error": play.equalized.error,
+        "plain_error": play.single_gain.error,
+        "peak_n": float(np.linalg.norm(play.equalized.forces, axis=1).max()),
     }
 
 
-def contact_lines(done: ContactPlay) -> tuple[str, ...]:
+def format_contact(play: ContactPlay) -> tuple[str, ...]:
     """Lines for the terminal: errors by the model and as measured (%), and the largest force (N)."""
-    found = contact_summary(done)
-    low, high = done.band_hz
+    values = summarise_contact(play)
+    low, high = play.band_hz
     return (
-        f"By the model: error {_percent(found['predicted_error'])} between {low:g} and {high:g} Hz, "
-        f"{_percent(found['worst_error'])} at most for any normal; {_percent(found['early_error'])} if forces might "
+        f"By the model: error {_percent(values['predicted_error'])} between {low:g} and {high:g} Hz, "
+        f"{_percent(values['worst_error'])} at most for any normal; {_percent(values['early_error'])} if forces might "
         "begin before the contact.",
-        f"As measured: error {_percent(found['measured_error'])}; as a force along the normal with one gain "
-        f"{_percent(found['plain_error'])}.",
-        f"The highest force is {found['peak_n']:.3g} N.",
+        f"As measured: error {_percent(values['measured_error'])}; as a force along the normal with one gain "
+        f"{_percent(values['plain_error'])}.",
+        f"The highest force is {values['peak_n']:.3g} N.",
     )
 
 
@@ -296,5 +296,5 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
-def _refusal(happened: str, do_now: str) -> StudyError:
-    return StudyError("The transient was not played", happened, do_now, saved="Nothing moved.")
+def _make_error(explanation: str, advice: str) -> StudyError:
+    return StudyError("The transient was not played", explanation, advice, saved="Nothing moved.")

@@ -12,7 +12,7 @@ from typing import Any
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.trajectory import FORCES
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
-from study.devices.device import Device, DeviceSettings, Fault, Played
+from study.devices.device import Device, DeviceSettings, Fault, PlaybackResult
 from study.devices.opening import HAND_STIMULUS_CAP_N
 from study.errors import DeviceError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
@@ -36,7 +36,7 @@ RELEASE_S = 0.05
 def require_device_alone(models: PlaybackModels) -> None:
     """Raise StudyError for a model that was identified with a hand on the handle: it does not hold for the free
     handle."""
-    if any("held" in model.provenance.get("hand", ()) for model in models.given):
+    if any("held" in model.provenance.get("hand", ()) for model in models.all_models):
         raise _refusal(
             "The model was recorded with a hand on the handle: its forces are valid only for that hand at that moment.",
             "Take a model of the device alone, and leave the handle alone.",
@@ -46,20 +46,20 @@ def require_device_alone(models: PlaybackModels) -> None:
 def find_acting_spring(models: PlaybackModels) -> VirtualSpring:
     """The spring that adds to the commands and is not in the model. Raises StudyError where it is not known."""
     feedback = _feedback(models)
-    acting = VirtualSpring(float(feedback.get("stiffness_n_per_m", 0.0)), float(feedback.get("damping_n_s_per_m", 0.0)))
+    spring = VirtualSpring(float(feedback.get("stiffness_n_per_m", 0.0)), float(feedback.get("damping_n_s_per_m", 0.0)))
     if not feedback:
         raise _refusal(
             "The model does not say under which spring it was recorded, so the spring's share of the forces is not "
             "known.",
             "Identify it from recordings that hapteq record made.",
         )
-    return spring_outside_model(models.nearest, acting)
+    return spring_outside_model(models.nearest, spring)
 
 
 def _feedback(models: PlaybackModels) -> dict[str, Any]:
     """Spring of the recordings of the nearest model, from its provenance; empty where it states none."""
-    found = models.nearest.provenance.get("feedback")
-    return found if isinstance(found, dict) else {}
+    feedback = models.nearest.provenance.get("feedback")
+    return feedback if isinstance(feedback, dict) else {}
 
 
 def playback_settings(cap_n: float, models: PlaybackModels) -> DeviceSettings:
@@ -97,20 +97,20 @@ def announce_motion(device: Device, peak_n: float, total_s: float, before_moving
         before_moving(free_handle_notice(device.info.name, peak_n, total_s))
 
 
-def play_forces(device: Device, forces: FloatArray, on_progress: Callable[[float], None]) -> Played:
+def play_forces(device: Device, forces: FloatArray, on_progress: Callable[[float], None]) -> PlaybackResult:
     """Play forces, (samples, 3) in N at the device's rate. on_progress: takes the share played, 0 to 1. Raises
     DeviceError."""
     commands = Signal(forces, device.info.sample_rate_hz, FORCES.quantity, FORCES.unit, FORCES.header[1:])
     return device.play(commands, on_progress)
 
 
-def read_measured_acceleration(played: Played) -> FloatArray:
+def read_measured_acceleration(play: PlaybackResult) -> FloatArray:
     """(samples, 3), m/s²: what the accelerometer read. Raises DeviceError where it cannot be taken for the effect of
     the forces: a fault ended the play, a reading clipped, a force was limited, or ticks were missed."""
-    health = played.health
-    if played.recording is None or health.fault is not Fault.NONE:
+    health = play.health
+    if play.recording is None or health.fault is not Fault.NONE:
         raise DeviceError("The device let go", f"While playing: {health.fault.value}.", "Check the device.")
-    spoilt = {
+    sample_counts = {
         "the accelerometer clipped": health.sensor_clipped,
         "the force was limited": health.stimulus_clipped
         + health.feedback_clipped
@@ -118,14 +118,14 @@ def read_measured_acceleration(played: Played) -> FloatArray:
         + health.slew_limited,
         "ticks were missed": health.missed_ticks,
     }
-    if found := [f"{what} ({count} samples)" for what, count in spoilt.items() if count]:
+    if problems := [f"{problem} ({count} samples)" for problem, count in sample_counts.items() if count]:
         raise DeviceError(
             "The measured acceleration is not that of the forces",
-            f"While playing, {' and '.join(found)}.",
+            f"While playing, {' and '.join(problems)}.",
             "Make the trajectory smaller, or the limits wider if they are meant to be.",
         )
-    return played.recording.response.samples
+    return play.recording.response.samples
 
 
-def _refusal(happened: str, do_now: str) -> StudyError:
-    return StudyError("Nothing was played", happened, do_now, saved="Nothing moved.")
+def _refusal(explanation: str, advice: str) -> StudyError:
+    return StudyError("Nothing was played", explanation, advice, saved="Nothing moved.")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.wording import as_sentence, typeset
+from analysis.wording import format_sentence, typeset
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_quality import ModelQuality, worst_quality
 from equalizer.plant.model_response import model_response
@@ -44,11 +44,11 @@ Vector = tuple[float, float, float]
 class PlaybackModels:
     """Identified models read from files and combined for a place in the workspace."""
 
-    given: tuple[IdentifiedModel, ...]
+    all_models: tuple[IdentifiedModel, ...]
     """The models as read, in the order of the files."""
     at: ModelsAtPlace
     """Models and weights at the place of playback; for two bands the narrow model only."""
-    two: TwoModels | None
+    two_bands: TwoModels | None
     """The narrow and the wide model of two bands; None otherwise."""
     choice: InterpolationChoice | None
     """How models of several places are interpolated; None for models of a single place."""
@@ -62,15 +62,15 @@ class PlaybackModels:
     @property
     def quality(self) -> ModelQuality | None:
         """Quality of the model with the largest error; None if a model states none."""
-        return worst_quality(tuple(model.quality for model in self.given))
+        return worst_quality(tuple(model.quality for model in self.all_models))
 
     @property
     def nearest(self) -> IdentifiedModel:
         """The given model nearest to the place; for two bands the narrow one."""
-        if self.two is not None:
-            return self.two.narrow
+        if self.two_bands is not None:
+            return self.two_bands.narrow
         place_m = self.at.place_m
-        return min(self.given, key=lambda model: math.dist(model.place_m or place_m, place_m))
+        return min(self.all_models, key=lambda model: math.dist(model.place_m or place_m, place_m))
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -101,15 +101,15 @@ def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: f
     try:
         return _several_places(paths, WorkspaceModels(models), at_m, weight)
     except WorkspaceError as problem:
-        numbered = ", ".join(f"{number}: {path.name}" for number, path in enumerate(paths, start=1))
+        numbered_files = ", ".join(f"{number}: {path.name}" for number, path in enumerate(paths, start=1))
         raise _unfit_error(
-            f"{as_sentence(str(problem))} Models are {numbered}.", "Give models that belong together."
+            f"{format_sentence(str(problem))} Models are {numbered_files}.", "Give models that belong together."
         ) from problem
 
 
 def _single_model(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> PlaybackModels:
     at = ModelsAtPlace(at_m or model.place_m or (0.0, 0.0, 0.0), (model,), (1.0,))
-    return PlaybackModels((model,), at, None, None, _far(paths[0], model, at_m), (), _sha256(paths))
+    return PlaybackModels((model,), at, None, None, _distance_warning(paths[0], model, at_m), (), _sha256(paths))
 
 
 def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_m: Vector | None) -> PlaybackModels:
@@ -123,7 +123,7 @@ def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_
             f"They run at {narrow.sample_rate_hz:g} and {wide.sample_rate_hz:g} Hz.", "Identify both at one rate."
         )
     try:
-        two = TwoModels(narrow, wide)
+        two_bands = TwoModels(narrow, wide)
     except ValueError as problem:
         raise _unfit_error(
             f"Both models are of one place, but {problem}.",
@@ -131,7 +131,7 @@ def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_
             "--band 5 400 --order 40.",
         ) from problem
     at = ModelsAtPlace(at_m or narrow.place_m or (0.0, 0.0, 0.0), (narrow,), (1.0,))
-    return PlaybackModels(models, at, two, None, _far(paths[0], narrow, at_m), (), _sha256(paths))
+    return PlaybackModels(models, at, two_bands, None, _distance_warning(paths[0], narrow, at_m), (), _sha256(paths))
 
 
 def _several_places(
@@ -151,9 +151,9 @@ def _several_places(
         raise WorkspaceError("some models include the spring they were recorded under and some do not")
     choice = choose_interpolation(workspace, weight=weight)
     at = choice.at(at_m)
-    remarks = [as_sentence(choice.reason)]
+    remarks = [format_sentence(choice.reason)]
     outside = place_weights(workspace.places_m, at_m).remark
-    remarks += [as_sentence(remark) for remark in dict.fromkeys((*at.remarks, *([outside] if outside else [])))]
+    remarks += [format_sentence(remark) for remark in dict.fromkeys((*at.remarks, *([outside] if outside else [])))]
     if not choice.checks:
         remarks.append("No place could be held out: what the error is between the models' places is not known.")
     held_out = tuple(_held_out_sentence(check) for check in choice.checks)
@@ -213,21 +213,23 @@ def _of_one_place(models: tuple[IdentifiedModel, ...]) -> bool:
     places = [model.place_m for model in models]
     if all(place is None for place in places):
         return True
-    known = [place for place in places if place is not None]
-    return len(known) == len(places) and all(math.dist(known[0], place) <= SAME_PLACE_M for place in known)
+    known_places = [place for place in places if place is not None]
+    return len(known_places) == len(places) and all(
+        math.dist(known_places[0], place) <= SAME_PLACE_M for place in known_places
+    )
 
 
-def _far(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, ...]:
+def _distance_warning(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, ...]:
     """A warning where the place of playback is far from that of the model, or that of the model is not known."""
     if at_m is None:
         return ()
     if model.place_m is None:
         return (f"{path.name} does not say where it was identified; it is used as if it were at the place.",)
-    away_m = math.dist(model.place_m, at_m)
-    if away_m <= FAR_M:
+    distance_m = math.dist(model.place_m, at_m)
+    if distance_m <= FAR_M:
         return ()
     return (
-        f"{path.name} was identified {1e3 * away_m:.0f} mm from the place: the coupling between axes that remains "
+        f"{path.name} was identified {1e3 * distance_m:.0f} mm from the place: the coupling between axes that remains "
         "after equalization increases with the distance. Models of several places on both sides of it can be "
         "interpolated.",
     )
@@ -236,10 +238,10 @@ def _far(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, 
 def _sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
     """SHA-256 of the files in any order, and of the place. For a single file it is that of the file, so that it can be
     compared by hand."""
-    each = [sha256_of(path) for path in paths]
-    if len(each) == 1:
-        return each[0]
-    return hashlib.sha256(" ".join([*sorted(each), repr(at_m)]).encode()).hexdigest()
+    digests = [sha256_of(path) for path in paths]
+    if len(digests) == 1:
+        return digests[0]
+    return hashlib.sha256(" ".join([*sorted(digests), repr(at_m)]).encode()).hexdigest()
 
 
 def _mm(place_m: Vector | None) -> str:
@@ -248,5 +250,5 @@ def _mm(place_m: Vector | None) -> str:
     )
 
 
-def _unfit_error(happened: str, do_now: str) -> StudyError:
-    return StudyError("These models cannot equalize the table", happened, do_now, saved="Nothing was written.")
+def _unfit_error(explanation: str, advice: str) -> StudyError:
+    return StudyError("These models cannot equalize the table", explanation, advice, saved="Nothing was written.")

@@ -9,11 +9,18 @@ import numpy as np
 
 from analysis.wording import capitalise
 from equalizer.tracking.feedforward.band_part import band_part
-from equalizer.tracking.learning.iteration import IterationState, Repetition, Verdict, begin, next_forces, noise_of_rest
+from equalizer.tracking.learning.iteration import (
+    IterationState,
+    Repetition,
+    Verdict,
+    next_forces,
+    noise_of_rest,
+    start_iteration,
+)
 from equalizer.tracking.learning.model_inverse import compensate_spring
 from equalizer.tracking.lqr.padding import CAUSAL
 from study.devices.clock import RealClock, VirtualClock
-from study.devices.device import Device, Fault, Played
+from study.devices.device import Device, Fault, PlaybackResult
 from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
@@ -24,11 +31,11 @@ from study.workflows.equalizer.play_forces import (
     play_forces,
     read_measured_acceleration,
 )
-from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, make_result, write_repeated
+from study.workflows.equalizer.repeat_results import RepeatPlan, RepeatResult, make_result, write_best_forces
 
 REST_S = 2.0
 """Rest (s) before the first play, to measure the sensor's noise."""
-AGAIN = "Start again; a run for the same trajectory and model can continue from forces that were written."
+RESTART_ADVICE = "Start again; a run for the same trajectory and model can continue from forces that were written."
 """What to do after an interruption or a fault."""
 
 OnProgress = Callable[[int, float], None]
@@ -37,7 +44,7 @@ OnProgress = Callable[[int, float], None]
 
 def repeat_playback(
     plan: RepeatPlan, on_progress: OnProgress, before_moving: BeforeMoving = refuse_unannounced
-) -> Repeated:
+) -> RepeatResult:
     """Play and correct. If interrupted (KeyboardInterrupt) or stopped by the device, the best result so far is written
     and the error says so.
 
@@ -47,23 +54,25 @@ def repeat_playback(
     _check(plan)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
     with contextlib.closing(open_device(plan.device, plan.settings, clock, plan.seed)) as device:
-        played: list[Played] = []
+        plays: list[PlaybackResult] = []
         states: list[IterationState] = []
         try:
-            total_s = (plan.repeats + 1) * plan.wanted.signal.duration_s
+            total_s = (plan.repeats + 1) * plan.reference.signal.duration_s
             announce_motion(device, plan.settings.limits.stimulus_cap_n, total_s, before_moving)
-            _play_all(plan, device, states, played, on_progress)
+            _play_all(plan, device, states, plays, on_progress)
         except KeyboardInterrupt as interruption:
-            saved = _write_best(plan, states, played)
+            saved = _write_best(plan, states, plays)
             if device.fault() is Fault.FORCE_LEFT:
-                raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, AGAIN, saved) from None
-            happened = f"{len(played)} of up to {plan.repeats + 1} plays were measured; the force was released."
-            raise UserInterruptError("Interrupted", happened, AGAIN, saved) from interruption
+                raise DeviceError(
+                    "The force may still be on", Fault.FORCE_LEFT.sentence, RESTART_ADVICE, saved
+                ) from None
+            explanation = f"{len(plays)} of up to {plan.repeats + 1} plays were measured; the force was released."
+            raise UserInterruptError("Interrupted", explanation, RESTART_ADVICE, saved) from interruption
         except DeviceError as error:
-            error.saved = _write_best(plan, states, played)
+            error.saved = _write_best(plan, states, plays)
             raise
-        write_repeated(plan, states[-1], interrupted=False)
-        return make_result(plan, states[-1], played)
+        write_best_forces(plan, states[-1], interrupted=False)
+        return make_result(plan, states[-1], plays)
 
 
 def _check(plan: RepeatPlan) -> None:
@@ -81,65 +90,67 @@ def _check(plan: RepeatPlan) -> None:
         raise not_repeated(f"There is no folder {plan.out.parent} to write {plan.out.name} into.", "Make it first.")
 
 
-def not_repeated(happened: str, do_now: str) -> StudyError:
+def not_repeated(explanation: str, advice: str) -> StudyError:
     """The error of a refusal before anything moved."""
-    return StudyError("Nothing was repeated", happened, do_now, saved="Nothing moved.")
+    return StudyError("Nothing was repeated", explanation, advice, saved="Nothing moved.")
 
 
 def _play_all(
     plan: RepeatPlan,
     device: Device,
     states: list[IterationState],
-    played: list[Played],
+    plays: list[PlaybackResult],
     on_progress: OnProgress,
 ) -> None:
-    begun = _start_iteration(plan, device)
+    initial_state = _start_iteration(plan, device)
     zeros_n = np.zeros((round(REST_S * device.info.sample_rate_hz), 3))
-    rest = read_measured_acceleration(play_forces(device, zeros_n, lambda _: None))
-    repetition = replace(begun.repetition, noise_floor=noise_of_rest(rest, begun.repetition))
-    states.append(replace(begun, repetition=repetition, noise_floor=repetition.noise_floor))
-    while states[-1].verdict is Verdict.CONTINUE and len(played) <= plan.repeats:
-        number = len(played)
-        last = play_forces(device, states[-1].forces, lambda share: on_progress(number, share))  # noqa: B023
-        measured = read_measured_acceleration(last)
-        played.append(last)
+    rest_acceleration = read_measured_acceleration(play_forces(device, zeros_n, lambda _: None))
+    repetition = replace(
+        initial_state.repetition, noise_floor=noise_of_rest(rest_acceleration, initial_state.repetition)
+    )
+    states.append(replace(initial_state, repetition=repetition, noise_floor=repetition.noise_floor))
+    while states[-1].verdict is Verdict.CONTINUE and len(plays) <= plan.repeats:
+        number = len(plays)
+        play = play_forces(device, states[-1].forces, lambda share: on_progress(number, share))  # noqa: B023
+        measured = read_measured_acceleration(play)
+        plays.append(play)
         states.append(next_forces(states[-1], measured))
 
 
 def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
-    signal, rate_hz = plan.wanted.signal, device.info.sample_rate_hz
+    signal, rate_hz = plan.reference.signal, device.info.sample_rate_hz
     if signal.sample_rate_hz != rate_hz:
         raise not_repeated(
             f"The trajectory is at {signal.sample_rate_hz:g} Hz, the device runs at {rate_hz:g} Hz.",
             "Resample the trajectory to the device's rate.",
         )
-    after = CAUSAL.samples(rate_hz)[1]
-    wanted = np.pad(signal.samples, ((0, after), (0, 0)))
-    invert = compensate_spring(plan.inverse(len(wanted)), plan.spring, rate_hz, plan.band_hz)
-    inside, limits = band_part(wanted, rate_hz, plan.band_hz), plan.settings.limits
+    padding_rows = CAUSAL.samples(rate_hz)[1]
+    reference = np.pad(signal.samples, ((0, padding_rows), (0, 0)))
+    invert = compensate_spring(plan.inverse(len(reference)), plan.spring, rate_hz, plan.band_hz)
+    reference_in_band, limits = band_part(reference, rate_hz, plan.band_hz), plan.settings.limits
     repetition = Repetition(
-        wanted=inside,
+        reference=reference_in_band,
         invert=invert,
         sample_rate_hz=rate_hz,
         band_hz=plan.band_hz,
         first_gain=plan.first_gain,
         cap=limits.stimulus_cap_n,
         slew=max(0.0, limits.slew_n_per_s - SPRING_SLEW_N_PER_S),
-        judged=(0, len(signal)),
+        judged_rows=(0, len(signal)),
     )
     try:
         if plan.first is None:
-            return begin(repetition)
+            return start_iteration(repetition)
         if plan.first.shape != signal.samples.shape:
             raise ValueError(f"forces of shape {plan.first.shape} do not match {len(signal)} rows")
         # After the last row of the table, the model's own forces are played.
-        return begin(repetition, np.vstack([plan.first, invert(inside)[len(signal) :]]))
+        return start_iteration(repetition, np.vstack([plan.first, invert(reference_in_band)[len(signal) :]]))
     except ValueError as error:
         raise not_repeated(f"{capitalise(str(error))}.", "Make the trajectory smaller, or correct it.") from error
 
 
-def _write_best(plan: RepeatPlan, states: list[IterationState], played: list[Played]) -> str:
+def _write_best(plan: RepeatPlan, states: list[IterationState], plays: list[PlaybackResult]) -> str:
     if plan.out is None or not (states and states[-1].residuals):
         return "Nothing was written."
-    write_repeated(plan, states[-1], interrupted=True)
-    return f"The best forces of {len(played)} plays are in {plan.out}."
+    write_best_forces(plan, states[-1], interrupted=True)
+    return f"The best forces of {len(plays)} plays are in {plan.out}."

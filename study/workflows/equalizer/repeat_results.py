@@ -15,7 +15,7 @@ from equalizer.tracking.feedforward.trajectory import FORCES, Trajectory, trajec
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 from equalizer.tracking.learning.iteration import IterationState, Verdict
 from equalizer.tracking.learning.model_inverse import InverseOfLength
-from study.devices.device import DeviceSettings, Played
+from study.devices.device import DeviceSettings, PlaybackResult
 from study.errors import StudyError
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.repeats_file import Repeats, read_repeats, repeats_path, write_repeats
@@ -27,7 +27,7 @@ class RepeatPlan:
     """Arguments of repeated playback: wanted signal, inverse of the model, settings of the device, number of
     corrections."""
 
-    wanted: Trajectory
+    reference: Trajectory
     """Wanted accelerations (m/s²), from rest to rest; only their part in the band is played."""
     inverse: InverseOfLength
     """Inverse of the model, from wanted accelerations to forces."""
@@ -51,7 +51,7 @@ class RepeatPlan:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Repeated:
+class RepeatResult:
     """Result of repeated playback: the best forces, and the error of each play."""
 
     forces: Trajectory
@@ -62,54 +62,56 @@ class Repeated:
     """Relative error that noise alone causes; 0 where it is not known."""
     verdict: Verdict
     """Why the repetition ended."""
-    kept: int
+    best_play: int
     """Number of the play with the smallest residual, from 0: that of the forces kept."""
     remark: str
-    played: tuple[Played, ...]
+    plays: tuple[PlaybackResult, ...]
 
 
-def make_result(plan: RepeatPlan, state: IterationState, played: list[Played]) -> Repeated:
+def make_result(plan: RepeatPlan, state: IterationState, plays: list[PlaybackResult]) -> RepeatResult:
     """The result after the last play; a repetition that could continue counts as ended with the best forces."""
     verdict = Verdict.BEST_KEPT if state.verdict is Verdict.CONTINUE else state.verdict
-    return Repeated(
-        forces=_table(plan, state),
+    return RepeatResult(
+        forces=_make_force_table(plan, state),
         errors=state.errors,
-        noise_floor=_floor(state),
+        noise_floor=_relative_noise_floor(state),
         verdict=verdict,
-        kept=int(np.argmin(state.residuals)),
+        best_play=int(np.argmin(state.residuals)),
         remark=state.remark,
-        played=tuple(played),
+        plays=tuple(plays),
     )
 
 
-def _table(plan: RepeatPlan, state: IterationState) -> Trajectory:
-    rows, rate_hz = len(plan.wanted.signal), plan.wanted.signal.sample_rate_hz
+def _make_force_table(plan: RepeatPlan, state: IterationState) -> Trajectory:
+    """The best forces as a trajectory of the length of the reference."""
+    rows, rate_hz = len(plan.reference.signal), plan.reference.signal.sample_rate_hz
     signal = Signal(state.best[:rows], rate_hz, FORCES.quantity, FORCES.unit, FORCES.header[1:])
-    return Trajectory(signal, plan.wanted.start_s)
+    return Trajectory(signal, plan.reference.start_s)
 
 
-def _floor(state: IterationState) -> float:
+def _relative_noise_floor(state: IterationState) -> float:
+    """Noise floor relative to the level of the reference; 0 where it is not known."""
     return (state.noise_floor or 0.0) / state.repetition.level
 
 
-def write_repeated(plan: RepeatPlan, state: IterationState, interrupted: bool) -> None:
+def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool) -> None:
     """Write the best forces so far and the document to `plan.out`; nothing without such a path. interrupted: whether
     the repetition was stopped by the user."""
     if plan.out is None:
         return
-    table = _table(plan, state)
+    table = _make_force_table(plan, state)
     write_trajectory(plan.out, table)
     verdict = Verdict.BEST_KEPT if state.verdict is Verdict.CONTINUE else state.verdict
     repeats = Repeats(
-        trajectory_sha256=trajectory_sha256(plan.wanted),
+        trajectory_sha256=hash_trajectory(plan.reference),
         model_sha256=plan.model_sha256,
-        forces_sha256=_text_sha256(trajectory_csv(table)),
+        forces_sha256=_hash_text(trajectory_csv(table)),
         device=plan.device,
         place_m=plan.settings.place_m,
         band_hz=plan.band_hz,
         errors=state.errors,
         kept=int(np.argmin(state.residuals)),
-        noise_floor=_floor(state),
+        noise_floor=_relative_noise_floor(state),
         gains=state.gains,
         fitted=state.fitted,
         verdict=verdict.name.lower(),
@@ -119,30 +121,31 @@ def write_repeated(plan: RepeatPlan, state: IterationState, interrupted: bool) -
     write_repeats(repeats_path(plan.out), repeats, gather_provenance(seeds={"device": plan.seed}))
 
 
-def earlier_forces(forces: Path, wanted: Trajectory, model_sha256: str) -> FloatArray:
+def read_earlier_forces(forces: Path, reference: Trajectory, model_sha256: str) -> FloatArray:
     """(N, 3), N: forces that an earlier run found for the same trajectory and model. Raises StudyError if one of them
     differs, or the table was changed."""
     document, table = read_repeats(repeats_path(forces)), read_trajectory(forces)
-    found = {
-        "another trajectory": document.trajectory_sha256 == trajectory_sha256(wanted),
+    matches_by_subject = {
+        "another trajectory": document.trajectory_sha256 == hash_trajectory(reference),
         "another model": document.model_sha256 == model_sha256,
-        "a table of forces that was changed since": document.forces_sha256 == _text_sha256(trajectory_csv(table)),
+        "a table of forces that was changed since": document.forces_sha256 == _hash_text(trajectory_csv(table)),
     }
-    if wrong := [what for what, same in found.items() if not same]:
+    if differing_subjects := [subject for subject, matches in matches_by_subject.items() if not matches]:
         raise StudyError(
             "The repeats cannot continue from the earlier forces",
-            f"{repeats_path(forces).name} belongs to {' and '.join(wrong)}.",
+            f"{repeats_path(forces).name} belongs to {' and '.join(differing_subjects)}.",
             "Leave it out to begin with the model's own forces.",
             saved="Nothing moved.",
         )
     return table.signal.samples
 
 
-def trajectory_sha256(wanted: Trajectory) -> str:
+def hash_trajectory(reference: Trajectory) -> str:
     """SHA-256 of sample rate and samples of a trajectory, by which a later run recognises it."""
-    rate = np.float64(wanted.signal.sample_rate_hz).tobytes()
-    return hashlib.sha256(rate + wanted.signal.samples.astype("<f8").tobytes()).hexdigest()
+    rate = np.float64(reference.signal.sample_rate_hz).tobytes()
+    return hashlib.sha256(rate + reference.signal.samples.astype("<f8").tobytes()).hexdigest()
 
 
-def _text_sha256(text: str) -> str:
+def _hash_text(text: str) -> str:
+    """SHA-256 of a text in UTF-8, as hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()

@@ -33,11 +33,11 @@ PAGE_NAME = "report.html"
 def report_identification(device: IdentifiedDevice, folder: Path, on_progress: Callable[[float], None]) -> Path:
     """Write report.html and figures/ into `folder`; returns the path of the page. on_progress: called with the share
     done, 0 to 1. Raises CannotWriteError."""
-    found = findings(device, lambda share: on_progress(0.8 * share))
-    pictures = identification_pictures(found)
+    report_findings = findings(device, lambda share: on_progress(0.8 * share))
+    pictures = identification_pictures(report_findings)
     write_pictures(folder / "figures", pictures)
     on_progress(0.95)
-    page = render_identification_report(found, pictures, _origin_entries(device), local_now())
+    page = render_identification_report(report_findings, pictures, _origin_entries(device), local_now())
     write_text(folder / PAGE_NAME, page, overwrite=True)
     on_progress(1.0)
     return folder / PAGE_NAME
@@ -62,11 +62,11 @@ def findings(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> 
 
 def _order(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> OrderReport | None:
     """Comparison of the order asked for with lower ones; None where the estimate has too few lines for it."""
-    asked = device.plan.order
-    orders = sorted({order for order in (10, 14, 16, 20, 26) if order <= asked} | {asked})
+    requested_order = device.plan.order
+    orders = sorted({order for order in (10, 14, 16, 20, 26) if order <= requested_order} | {requested_order})
     # With a tighter bound on the decay time than the device needs, no order could fit its slowly decaying resonances.
     needed_s = FREER * device.identified.relaxed[0].decay_s if device.identified.relaxed else None
-    settings = IdentificationSettings(device.plan.band_hz, asked, device.plan.longest_decay_s or needed_s)
+    settings = IdentificationSettings(device.plan.band_hz, requested_order, device.plan.longest_decay_s or needed_s)
     try:
         return compare_orders(device.fitted, settings, orders, on_progress)
     except IdentificationRefused:  # half of the lines, used for each fit, are too few for the order

@@ -10,7 +10,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 from study.errors import StudyError
 
-SAME = 0.01
+SPRING_TOLERANCE = 0.01
 """Relative difference of stiffness and of damping up to which two springs count as equal."""
 
 
@@ -20,16 +20,18 @@ def spring_outside_model(model: IdentifiedModel, spring: VirtualSpring) -> Virtu
     if model.provenance.get("input") != "excitation":
         return spring
     feedback = model.provenance.get("feedback")
-    held = feedback if isinstance(feedback, dict) else {}
-    inside = VirtualSpring(float(held.get("stiffness_n_per_m", 0.0)), float(held.get("damping_n_s_per_m", 0.0)))
+    settings = feedback if isinstance(feedback, dict) else {}
+    model_spring = VirtualSpring(
+        float(settings.get("stiffness_n_per_m", 0.0)), float(settings.get("damping_n_s_per_m", 0.0))
+    )
     if not (
-        math.isclose(inside.stiffness_n_per_m, spring.stiffness_n_per_m, rel_tol=SAME)
-        and math.isclose(inside.damping_n_s_per_m, spring.damping_n_s_per_m, rel_tol=SAME)
+        math.isclose(model_spring.stiffness_n_per_m, spring.stiffness_n_per_m, rel_tol=SPRING_TOLERANCE)
+        and math.isclose(model_spring.damping_n_s_per_m, spring.damping_n_s_per_m, rel_tol=SPRING_TOLERANCE)
     ):
         raise StudyError(
             "This model was made under another spring",
-            f"It holds a spring of {inside.stiffness_n_per_m:.4g} N/m and {inside.damping_n_s_per_m:.3g} N s/m, but "
-            f"one of {spring.stiffness_n_per_m:.4g} N/m and {spring.damping_n_s_per_m:.3g} N s/m will act.",
+            f"It holds a spring of {model_spring.stiffness_n_per_m:.4g} N/m and {model_spring.damping_n_s_per_m:.3g} "
+            f"N s/m, but one of {spring.stiffness_n_per_m:.4g} N/m and {spring.damping_n_s_per_m:.3g} N s/m will act.",
             "Record and identify under the same spring, or identify without --with-spring.",
             saved="Nothing moved.",
         )

@@ -2,5 +2,6 @@
 
 `file_content` (the file, opened once) -> `recognisers`, `session_recognisers` (one function per format) -> `validate`
 (one file) -> `validate_apart` (many files, in a separate process) -> `validate_together` (files against each other).
-`format_docs` and `importing_docs` write pages of docs/ from the code. Begin at `validate.py`.
+`format_docs` and `importing_docs` generate pages of docs/, with the prose of `format_text` and `importing_text`.
+Begin at `validate.py`.
 """

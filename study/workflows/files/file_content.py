@@ -13,7 +13,7 @@ from typing import Any
 
 from study.regular_file import DOCUMENT_BYTES
 from study.store.disk.file_errors import CannotReadError, UnusableFileError
-from study.store.disk.hdf5_file import format_of, is_hdf5
+from study.store.disk.hdf5_file import is_hdf5, read_format
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import TOML_BYTES, read_text, too_long_key
 
@@ -54,7 +54,7 @@ def open_content(path: Path) -> FileContent:
         if path.is_dir():
             return FileContent(path, is_folder=True)
         if is_hdf5(path):
-            return FileContent(path, hdf5_format=format_of(path))
+            return FileContent(path, hdf5_format=read_format(path))
     except OSError as problem:
         raise CannotReadError(path, problem) from problem
     if path.is_file() and path.suffix.lower() in (".h5", ".hdf5"):

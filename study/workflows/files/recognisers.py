@@ -20,7 +20,7 @@ from protocols.document.schema import ADAPTERS, protocol_schema
 from study.importing.map_format.import_map import ChannelMap, ComputedMap
 from study.importing.map_format.map_toml import KIND as MAP_KIND
 from study.importing.map_format.map_toml import is_map, parse_map
-from study.store.disk.csv_rows import header_problem
+from study.store.disk.csv_rows import find_header_problem
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats import calibration_file, identified_model_file, recording_layout
 from study.store.formats.calibration_file import read_calibration
@@ -50,25 +50,25 @@ def recognise_recording(content: FileContent) -> str | None:
     reports."""
     if content.hdf5_format != recording_layout.FORMAT:
         return None
-    found = read_recording(content.path)
-    if silent := silent_segments(found):
-        raise UnusableFileError(content.path, recording_layout.KIND, silent)
-    return f"recording, {describe_recording(found)}"
+    recording = read_recording(content.path)
+    if silence_problems := silent_segments(recording):
+        raise UnusableFileError(content.path, recording_layout.KIND, silence_problems)
+    return f"recording, {describe_recording(recording)}"
 
 
-def describe_recording(found: Recording) -> str:
+def describe_recording(recording: Recording) -> str:
     """Duration and channels of a recording, in words."""
     parts = [
-        f"{found.response.duration_s:g} s at {found.sample_rate_hz:g} Hz",
-        _count(len(found.command.channels), "command"),
-        _count(len(found.response.channels), "response"),
+        f"{recording.response.duration_s:g} s at {recording.sample_rate_hz:g} Hz",
+        _count(len(recording.command.channels), "command"),
+        _count(len(recording.response.channels), "response"),
     ]
-    if found.position is not None:
-        parts.append(_count(len(found.position.channels), "position"))
-    if found.condition is not None:
-        parts.append(_count(len(found.condition.channels), "condition"))
-    if found.segments:
-        parts.append(_count(len(found.segments), "segment"))
+    if recording.position is not None:
+        parts.append(_count(len(recording.position.channels), "position"))
+    if recording.condition is not None:
+        parts.append(_count(len(recording.condition.channels), "condition"))
+    if recording.segments:
+        parts.append(_count(len(recording.segments), "segment"))
     return ", ".join(parts)
 
 
@@ -76,12 +76,12 @@ def recognise_identified_model(content: FileContent) -> str | None:
     """An identified model in HDF5, by its format attribute."""
     if content.hdf5_format != identified_model_file.FORMAT:
         return None
-    found = read_identified_model(content.path)
-    stable = "stable" if found.spectral_radius < 1 else f"unstable (spectral radius {found.spectral_radius:.6g})"
+    model = read_identified_model(content.path)
+    stable = "stable" if model.spectral_radius < 1 else f"unstable (spectral radius {model.spectral_radius:.6g})"
     return (
-        f"identified model of order {found.order}, {found.band_hz[0]:g} to {found.band_hz[1]:g} Hz at "
-        f"{found.sample_rate_hz:g} Hz, {_count(len(found.input_channels), 'input')}, "
-        f"{_count(len(found.output_channels), 'output')}, {stable}, {quality_brief(found.quality)}"
+        f"identified model of order {model.order}, {model.band_hz[0]:g} to {model.band_hz[1]:g} Hz at "
+        f"{model.sample_rate_hz:g} Hz, {_count(len(model.input_channels), 'input')}, "
+        f"{_count(len(model.output_channels), 'output')}, {stable}, {quality_brief(model.quality)}"
     )
 
 
@@ -89,10 +89,10 @@ def recognise_calibration(content: FileContent) -> str | None:
     """A calibration of a linkage in HDF5, by its format attribute."""
     if content.hdf5_format != calibration_file.FORMAT:
         return None
-    found = read_calibration(content.path)
+    calibration = read_calibration(content.path)
     return (
-        f"calibration of the linkage of {found.device}, {_count(len(found.position_m), 'position')}, "
-        f"{int(found.filled.sum())} of them filled in, mirrored inertia within {found.asymmetry.max():.1%}"
+        f"calibration of the linkage of {calibration.device}, {_count(len(calibration.position_m), 'position')}, "
+        f"{int(calibration.filled.sum())} of them filled in, mirrored inertia within {calibration.asymmetry.max():.1%}"
     )
 
 
@@ -100,11 +100,11 @@ def recognise_mechanical_model(content: FileContent) -> str | None:
     """A mechanical model in TOML, by any of its top-level keys."""
     if content.toml is None or not content.toml.keys() & {"model", "sensor", "actuator", "effect", "tolerance"}:
         return None
-    found = read_mechanical_model(content.path)
-    effects = ", ".join(effect.kind for effect in found.effects) or "no effects"
+    model = read_mechanical_model(content.path)
+    effects = ", ".join(effect.kind for effect in model.effects) or "no effects"
     return (
-        f"mechanical model '{found.name}', {_count(found.coordinates, 'coordinate')}, {_count(found.inputs, 'input')}, "
-        f"{_count(found.outputs, 'output')} ({found.quantity}), {effects}"
+        f"mechanical model '{model.name}', {_count(model.coordinates, 'coordinate')}, {_count(model.inputs, 'input')}, "
+        f"{_count(model.outputs, 'output')} ({model.quantity}), {effects}"
     )
 
 
@@ -112,11 +112,14 @@ def recognise_import_map(content: FileContent) -> str | None:
     """An import map in TOML. Raises UnusableFileError also for unknown units."""
     if content.toml is None or not is_map(content.toml):
         return None
-    found = parse_map(content.text or "", content.path)
-    channels: list[ChannelMap | ComputedMap] = [*found.channel, *found.computed]
+    import_map = parse_map(content.text or "", content.path)
+    channels: list[ChannelMap | ComputedMap] = [*import_map.channel, *import_map.computed]
     if problems := tuple(problem for channel in channels if (problem := _unit_problem(channel))):
         raise UnusableFileError(content.path, MAP_KIND, problems)
-    return f"import map for {found.device}: {_count(len(channels), 'channel')}, {_count(len(found.clock), 'clock')}"
+    return (
+        f"import map for {import_map.device}: {_count(len(channels), 'channel')}, "
+        f"{_count(len(import_map.clock), 'clock')}"
+    )
 
 
 def _unit_problem(channel: ChannelMap | ComputedMap) -> str:
@@ -137,37 +140,37 @@ def recognise_protocol(content: FileContent) -> str | None:
     if not (content.toml or {}).keys() & _PROTOCOL_KEYS:
         return None
     try:
-        found, _ = load_in_language(content.text or "", content.path.name, content.path.parent)
+        protocol, _ = load_in_language(content.text or "", content.path.name, content.path.parent)
     except ProtocolError as error:
         raise UnusableFileError(content.path, "protocol", tuple(str(problem) for problem in error.problems)) from error
-    kind = "recording" if isinstance(found, RecordingProtocol) else "study"
-    return f"{kind} protocol '{found.name}': {found.title}"
+    kind = "recording" if isinstance(protocol, RecordingProtocol) else "study"
+    return f"{kind} protocol '{protocol.name}': {protocol.title}"
 
 
 def recognise_diagnosis(content: FileContent) -> str | None:
     """A diagnosis in JSON, by its `format` entry."""
     if content.json_format != DIAGNOSIS_FORMAT:
         return None
-    found = read_diagnosis(content.path)
-    return f"diagnosis, {found.verdict}: {', '.join(effect.effect for effect in found.effects) or 'no effects'}"
+    diagnosis = read_diagnosis(content.path)
+    return f"diagnosis, {diagnosis.verdict}: {', '.join(effect.effect for effect in diagnosis.effects) or 'no effects'}"
 
 
 def recognise_daily_check(content: FileContent) -> str | None:
     """A daily check of a device in JSON, by its `format` entry."""
     if content.json_format != DAILY_CHECK_FORMAT:
         return None
-    found = read_daily_check(content.path)
-    return f"daily check of {found.device} at {found.utc}: {'passed' if found.passed else 'something changed'}"
+    check = read_daily_check(content.path)
+    return f"daily check of {check.device} at {check.utc}: {'passed' if check.passed else 'something changed'}"
 
 
 def recognise_repeats(content: FileContent) -> str | None:
     """The JSON document that accompanies a table of forces from repeated playback, by its `format` entry."""
     if content.json_format != REPEATS_FORMAT:
         return None
-    found = read_repeats(content.path)
+    repeats = read_repeats(content.path)
     return (
-        f"repeats, {_count(len(found.errors), 'play')}, error {found.errors[0]:.2%} to {found.errors[found.kept]:.2%}, "
-        f"noise {found.noise_floor:.2%}"
+        f"repeats, {_count(len(repeats.errors), 'play')}, error {repeats.errors[0]:.2%} to "
+        f"{repeats.errors[repeats.kept]:.2%}, noise {repeats.noise_floor:.2%}"
     )
 
 
@@ -175,47 +178,50 @@ def recognise_real_answer(content: FileContent) -> str | None:
     """The diagnosis of a real recording in JSON, by its `format` entry."""
     if content.json_format != REAL_ANSWER_FORMAT:
         return None
-    found = read_real_answer(content.path)
-    return f"answer to the real recording {found.recording} of {found.folder}: {found.verdict.replace('_', ' ')}"
+    answer = read_real_answer(content.path)
+    return f"answer to the real recording {answer.recording} of {answer.folder}: {answer.verdict.replace('_', ' ')}"
 
 
 def recognise_reproduction(content: FileContent) -> str | None:
     """A reproduction of the published figures in JSON, by its `format` entry."""
     if content.json_format != REPRODUCTION_FORMAT:
         return None
-    found = read_reproduction(content.path)
-    return f"reproduction of {_count(len(found.figures), 'figure')} on the {found.device}, seed {found.seed}"
+    reproduction = read_reproduction(content.path)
+    return (
+        f"reproduction of {_count(len(reproduction.figures), 'figure')} on the {reproduction.device}, "
+        f"seed {reproduction.seed}"
+    )
 
 
 def recognise_trajectory(content: FileContent) -> str | None:
     """A CSV table of a trajectory, forces or a transient, by the first column of its header."""
     if content.header[:1] != TRAJECTORY.header[:1]:
         return None
-    found = read_trajectory(content.path)
-    signal = found.signal
-    return f"{found.kind.name}, {signal.duration_s:g} s at {signal.sample_rate_hz:g} Hz ({found.kind.unit})"
+    trajectory = read_trajectory(content.path)
+    signal = trajectory.signal
+    return f"{trajectory.kind.name}, {signal.duration_s:g} s at {signal.sample_rate_hz:g} Hz ({trajectory.kind.unit})"
 
 
 def recognise_trials(content: FileContent) -> str | None:
     """A CSV table of trials, by the first two columns of its header."""
     # A header with an error in one column is still recognised, so that `read_trials` reports the error. Two columns are
     # compared, because tables of thresholds also begin with the subject.
-    if content.header[:2] != TRIALS_HEADER[:2] and header_problem(content.header, TRIALS_HEADER):
+    if content.header[:2] != TRIALS_HEADER[:2] and find_header_problem(content.header, TRIALS_HEADER):
         return None
     return f"table of {_count(len(read_trials(content.path)), 'trial')}"
 
 
 def recognise_thresholds(content: FileContent) -> str | None:
     """A CSV table of thresholds, by the first two columns of its header."""
-    if content.header[:2] != THRESHOLDS_HEADER[:2] and header_problem(content.header, THRESHOLDS_HEADER):
+    if content.header[:2] != THRESHOLDS_HEADER[:2] and find_header_problem(content.header, THRESHOLDS_HEADER):
         return None
-    what = "detection threshold" if content.path.name == DETECTION_NAME else "threshold"
-    return f"table of {_count(len(read_thresholds(content.path)), what)}"
+    noun = "detection threshold" if content.path.name == DETECTION_NAME else "threshold"
+    return f"table of {_count(len(read_thresholds(content.path)), noun)}"
 
 
-def _count(number: int, what: str) -> str:
+def _count(number: int, noun: str) -> str:
     """Number and noun, in the plural unless the number is 1."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 RECOGNISERS: tuple[Recogniser, ...] = (

@@ -23,10 +23,10 @@ from study.store.sessions.live_file import LIVE_FORMAT
 from study.store.sessions.log_seal import SEAL_FORMAT, SEAL_NAME, read_seal
 from study.store.sessions.request_inbox import REQUEST_FORMAT
 from study.store.sessions.session_summary import SUMMARY_FORMAT, SUMMARY_VERSION
-from study.store.sessions.withdrawal_files import TOMBSTONE_FORMAT, WITHDRAWAL_FORMAT, how_to_finish
+from study.store.sessions.withdrawal_files import TOMBSTONE_FORMAT, WITHDRAWAL_FORMAT, describe_unfinished
 from study.workflows.files.file_content import FileContent
 from study.workflows.results.fold_session import FoldedSession, fold_session
-from study.workflows.results.session_results import result_problems
+from study.workflows.results.session_results import find_result_problems
 
 KIND = "session"
 """Name of a session folder or log in messages."""
@@ -58,7 +58,7 @@ def recognise_session(content: FileContent) -> str | None:
 
 def _describe_withdrawn(folder: SessionFolder, path: Path) -> str:
     """Kind of a withdrawn session. Raises UnusableFileError where erasing is not finished."""
-    if finish := how_to_finish(folder):
+    if finish := describe_unfinished(folder):
         raise UnusableFileError(path, "withdrawn session", ("the erasing is not finished", finish))
     return "withdrawn session; only its tombstone remains"
 
@@ -68,14 +68,14 @@ def recognise_document(content: FileContent) -> str | None:
     a withdrawal whose erasing is not finished."""
     if content.json_format not in DOCUMENTS:
         return None
-    kind, needed = DOCUMENTS[content.json_format]
+    kind, required_keys = DOCUMENTS[content.json_format]
     if content.json_format == WITHDRAWAL_FORMAT:
         finish = "the erasing is not finished; `hapteq withdraw` continues it"
         raise UnusableFileError(content.path, kind, (finish,))
     if content.json_format == SEAL_FORMAT:
         read_seal(content.path)
     document = read_json(content.path, content.json_format, SUMMARY_VERSION)
-    missing = [key for key in needed if key not in document]
+    missing = [key for key in required_keys if key not in document]
     if missing:
         raise UnusableFileError(content.path, kind, (f"it lacks {', '.join(missing)}",))
     return kind
@@ -95,34 +95,34 @@ def recognise_lock(content: FileContent) -> str | None:
 def _check_session(folder: SessionFolder, path: Path) -> str:
     """Description of a session folder whose recordings have the logged SHA-256 and whose tables agree with the log.
     Raises UnusableFileError otherwise."""
-    folded = _fold(folder, path)
+    folded_session = _fold(folder, path)
     problems = [
-        *_check_recording_file(folder, folded),
-        *_result_problems(folder, folded),
+        *_check_recording_file(folder, folded_session),
+        *_result_problems(folder, folded_session),
     ]
     if problems:
         raise UnusableFileError(path, KIND, tuple(problems))
-    return _describe(folded)
+    return _describe(folded_session)
 
 
 def _fold(folder: SessionFolder, path: Path) -> FoldedSession:
     """The session, replayed from its log. Raises UnusableFileError for any damage, an incomplete last line included."""
     try:
-        folded = fold_session(folder)
+        folded_session = fold_session(folder)
     except UnusableFileError:
         raise
     except StudyError as error:
         raise UnusableFileError(path, KIND, (error.happened.rstrip("."),)) from error
-    if folded.contents.torn_bytes:
-        torn = f"its last line is torn ({folded.contents.torn_bytes} bytes); hapteq resume mends it"
-        raise UnusableFileError(path, KIND, (torn,))
-    return folded
+    if folded_session.log_contents.torn_bytes:
+        torn_line = f"its last line is torn ({folded_session.log_contents.torn_bytes} bytes); hapteq resume mends it"
+        raise UnusableFileError(path, KIND, (torn_line,))
+    return folded_session
 
 
-def _check_recording_file(folder: SessionFolder, folded: FoldedSession) -> list[str]:
+def _check_recording_file(folder: SessionFolder, folded_session: FoldedSession) -> list[str]:
     """Recordings of trials that are missing or differ from the SHA-256 in the log."""
     problems = []
-    for event in folded.contents.events:
+    for event in folded_session.log_contents.events:
         if not isinstance(event, TrialMeasured) or event.recording is None:
             continue
         path = folder.path / event.recording
@@ -133,27 +133,27 @@ def _check_recording_file(folder: SessionFolder, folded: FoldedSession) -> list[
     return problems
 
 
-def _result_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
+def _result_problems(folder: SessionFolder, folded_session: FoldedSession) -> list[str]:
     """Result files that contradict the log, and a missing seal. A missing table is not an error, because it can
     be written from the log."""
-    texts = [f"{SEAL_NAME} is missing; hapteq resume writes it"] if folded.seal_due else []
-    for result in result_problems(folder, folded.state):
+    texts = [f"{SEAL_NAME} is missing; hapteq resume writes it"] if folded_session.seal_due else []
+    for result in find_result_problems(folder, folded_session.state):
         if not result.missing:
             texts += [f"{result.file} {problem}; the log alone is read" for problem in result.problems]
     return texts
 
 
-def _describe(folded: FoldedSession) -> str:
+def _describe(folded_session: FoldedSession) -> str:
     """Participant, protocol, number of answers, end, state of checksums and seal, and steps of the clock, in words."""
-    state = folded.state
-    who = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
-    end = state.sitting.turned_away or ("finished" if state.closed else "not finished")
+    state = folded_session.state
+    participant = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
+    end = state.sitting.ineligibility or ("finished" if state.closed else "not finished")
     steps = "".join(
         f". Before {local_time(step.utc, machine_zone)}: {step.sentence}" for step in state.sitting.clock_steps
     ).rstrip(".")
-    sealed = f", sealed to line {folded.sealed_lines}" if folded.sealed_lines else ""
-    kind = f"session {state.opened.session} of {who}, {state.protocol.name}, {state.answers} answers, {end}"
-    return f"{kind}; log {folded.contents.chain.in_words()}{sealed}{steps}"
+    sealed = f", sealed to line {folded_session.sealed_lines}" if folded_session.sealed_lines else ""
+    kind = f"session {state.opened.session} of {participant}, {state.protocol.name}, {state.answers} answers, {end}"
+    return f"{kind}; log {folded_session.log_contents.chain.in_words()}{sealed}{steps}"
 
 
 SESSION_RECOGNISERS = (recognise_session, recognise_document, recognise_lock)

@@ -24,7 +24,7 @@ from study.workflows.files.file_content import FileContent, open_content
 from study.workflows.files.recognisers import RECOGNISERS, Recogniser, describe_recording
 from study.workflows.files.session_recognisers import SESSION_RECOGNISERS
 
-KNOWN = (
+KNOWN_KINDS = (
     "known are recordings, identified models and calibrations (HDF5), mechanical models, protocols and import maps "
     "(TOML), trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and "
     "version, and session folders"
@@ -47,21 +47,23 @@ class Validation:
 
 def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECOGNISERS + RECOGNISERS) -> Validation:
     """Validate one file or session folder. Wrong content and a missing file are reported as problems, never raised."""
-    found = _validate(path, recognisers)
+    validation = _validate(path, recognisers)
     folders = (path, path.absolute().parent) if FOLDER.fullmatch(path.absolute().name) else (path,)
     warnings = (privacy_warning(folder) for folder in folders if _is_folder(folder))
-    return replace(found, notes=(*found.notes, *filter(None, warnings), *_notes(found)))
+    return replace(validation, notes=(*validation.notes, *filter(None, warnings), *_find_idle_commands(validation)))
 
 
-def _notes(found: Validation) -> tuple[str, ...]:
-    """Remark on a valid recording: commands that are zero or missing in every sample."""
-    if found.problems or not found.kind.startswith("recording, "):
+def _find_idle_commands(validation: Validation) -> tuple[str, ...]:
+    """Remark on the commands of a valid recording that are zero or missing in every sample; empty without any."""
+    if validation.problems or not validation.kind.startswith("recording, "):
         return ()
-    command = read_recording(found.path).command
-    idle = [
-        name for name, each in zip(command.channels, command.samples.T, strict=True) if not np.nan_to_num(each).any()
+    command = read_recording(validation.path).command
+    idle_commands = [
+        name
+        for name, samples in zip(command.channels, command.samples.T, strict=True)
+        if not np.nan_to_num(samples).any()
     ]
-    return (f"No command drives {', '.join(idle)}.",) if idle else ()
+    return (f"No command drives {', '.join(idle_commands)}.",) if idle_commands else ()
 
 
 def _is_folder(path: Path) -> bool:
@@ -73,7 +75,7 @@ def _is_folder(path: Path) -> bool:
 
 
 def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
-    """Validation by the recognisers, then as a foreign recording; without remarks on access rights and axes."""
+    """Validation by the recognisers, then as a foreign recording; without remarks on access rights and commands."""
     if _is_foreign(path):
         return _validate_foreign(path)
     try:
@@ -110,12 +112,12 @@ def _validate_foreign(path: Path, kind: str = "", unknown: tuple[str, ...] = ())
     from study.workflows.recording.import_recording import read_foreign
 
     try:
-        found = read_foreign((path,), None)
+        imported = read_foreign((path,), None)
     except StudyError as refused:
         problem = f"{refused.title}: {refused.happened}"
         return Validation(path, kind or "recording of others", (*unknown, problem))
-    text = f"recording of others, {describe_recording(found.recording)}"
-    return Validation(path, text, tuple(silent_segments(found.recording)), found.notes)
+    text = f"recording of others, {describe_recording(imported.recording)}"
+    return Validation(path, text, tuple(silent_segments(imported.recording)), imported.notes)
 
 
 def _describe_unknown(content: FileContent) -> tuple[str, str]:
@@ -126,18 +128,18 @@ def _describe_unknown(content: FileContent) -> tuple[str, str]:
         sentence = f"calls itself '{content.hdf5_format}'" if content.hdf5_format else "has no attribute 'format'"
         return "HDF5 file", f"it {sentence}; known formats are hapteq-recording, hapteq-model and hapteq-calibration"
     if not (content.text or "").strip():
-        return "empty file", f"it holds nothing; {KNOWN}"
+        return "empty file", f"it holds nothing; {KNOWN_KINDS}"
     match content.path.suffix.lower():
         case ".json":
-            return "JSON document", _json_problem(content)
+            return "JSON document", _explain_json(content)
         case ".toml":
-            return "TOML file", _toml_problem(content)
+            return "TOML file", _explain_toml(content)
         case ".csv":
-            return "table", f"its header, '{','.join(content.header)}', is not known; {KNOWN}"
-    return "unknown file", f"nothing here knows this file; {KNOWN}"
+            return "table", f"its header, '{','.join(content.header)}', is not known; {KNOWN_KINDS}"
+    return "unknown file", f"nothing here knows this file; {KNOWN_KINDS}"
 
 
-def _json_problem(content: FileContent) -> str:
+def _explain_json(content: FileContent) -> str:
     """Why a JSON document is not recognised."""
     try:
         load_json((content.text or "")[: DOCUMENT_BYTES + 1])
@@ -148,7 +150,7 @@ def _json_problem(content: FileContent) -> str:
     return f"its format, '{content.json_format}', is not known here"
 
 
-def _toml_problem(content: FileContent) -> str:
+def _explain_toml(content: FileContent) -> str:
     """Why a TOML file is not recognised."""
     text = content.text or ""
     if len(text) > TOML_BYTES:

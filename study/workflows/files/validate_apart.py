@@ -71,6 +71,6 @@ def _kill(worker: ProcessPoolExecutor) -> None:
     worker.shutdown(wait=False, cancel_futures=True)
 
 
-def _damage_report(path: Path, how: str) -> Validation:
-    """Validation of a file on which the worker crashed or did not end. how: what happened, as a clause."""
-    return Validation(path, "damaged file", (f"The file is damaged: {how}. Restore it from a copy.",))
+def _damage_report(path: Path, failure: str) -> Validation:
+    """Validation of a file on which the worker crashed or did not end. failure: what happened, as a clause."""
+    return Validation(path, "damaged file", (f"The file is damaged: {failure}. Restore it from a copy.",))

@@ -14,24 +14,29 @@ from study.store.formats.recording_file import read_recording
 from study.workflows.files.validate import Validation
 
 
-def check_together(found: Sequence[Validation]) -> tuple[Validation, ...]:
+def check_together(validations: Sequence[Validation]) -> tuple[Validation, ...]:
     """The validations, with further problems of each mechanical model whose effects do not fit a recording. Only valid
     files are compared, and only a model and a recording with the same numbers of commands and responses."""
-    recordings = [(each.path, read_recording(each.path)) for each in _valid_of_kind(found, "recording, ")]
+    recordings = [
+        (validation.path, read_recording(validation.path)) for validation in _valid_of_kind(validations, "recording, ")
+    ]
     if not recordings:
-        return tuple(found)
-    models = {each.path: read_mechanical_model(each.path) for each in _valid_of_kind(found, "mechanical model ")}
+        return tuple(validations)
+    models = {
+        validation.path: read_mechanical_model(validation.path)
+        for validation in _valid_of_kind(validations, "mechanical model ")
+    }
     return tuple(
-        replace(each, problems=(*each.problems, *_problems(models[each.path], recordings)))
-        if each.path in models
-        else each
-        for each in found
+        replace(validation, problems=(*validation.problems, *_problems(models[validation.path], recordings)))
+        if validation.path in models
+        else validation
+        for validation in validations
     )
 
 
-def _valid_of_kind(found: Sequence[Validation], kind: str) -> Iterator[Validation]:
+def _valid_of_kind(validations: Sequence[Validation], kind: str) -> Iterator[Validation]:
     """Validations without problems whose kind begins with `kind`."""
-    return (each for each in found if each.kind.startswith(kind) and not each.problems)
+    return (validation for validation in validations if validation.kind.startswith(kind) and not validation.problems)
 
 
 def _problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording]]) -> Iterator[str]:

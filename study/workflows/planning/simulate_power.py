@@ -27,7 +27,7 @@ from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.json_document import write_json
 from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import read_text, write_text
-from study.workflows.run_on_executor import run_pieces
+from study.workflows.run_on_executor import run_tasks
 
 CHUNK = 10
 """Number of studies in a piece of work: it takes some seconds, so that little is lost when a worker process dies."""
@@ -60,17 +60,18 @@ class PowerPlan:
         return find_judged_pair(self.crowd.frequencies_hz, self.contrast_hz)
 
 
-Piece = tuple[int, int]
+StudyChunk = tuple[int, int]
 """Sample size, and number of the first study of a chunk."""
 
 
 def simulate_power(
-    plan: PowerPlan, out: Path, executor: Executor, on_finished: Callable[[int], None]
+    plan: PowerPlan, folder: Path, executor: Executor, on_finished: Callable[[int], None]
 ) -> tuple[PowerPoint, ...]:
-    """Simulate and test all studies; write power.json and figures/power into `out`. on_finished: called with the number
-    of finished studies. The same seed gives the same results on any executor; `out` may hold an interrupted run.
+    """Simulate and test all studies; write power.json and figures/power into `folder`. on_finished: called with the
+    number of finished studies. The same seed gives the same results on any executor; `folder` may hold an interrupted
+    run.
 
-    Raises WrongUseError for a trial limit, StudyError where `out` belongs to another plan, and CannotWriteError.
+    Raises WrongUseError for a trial limit, StudyError where `folder` belongs to another plan, and CannotWriteError.
     """
     if plan.rule.trial_limit and not plan.rule.is_bayesian:
         raise WrongUseError(
@@ -78,21 +79,23 @@ def simulate_power(
             "Runs that it stops have no threshold, and the published analysis cannot be judged without them.",
             "Set staircase.trial_limit to 0 in the protocol.",
         )
-    path = out / FINISHED_NAME
+    path = folder / FINISHED_NAME
     done = _read_finished(path, plan)
-    todo = [(n, first) for n in plan.people for first in range(0, plan.studies, CHUNK) if (n, first) not in done]
+    remaining_chunks = [
+        (n, first) for n in plan.people for first in range(0, plan.studies, CHUNK) if (n, first) not in done
+    ]
     finished = sum(len(verdicts) for (people, _), verdicts in done.items() if people in plan.people)
     on_finished(finished)
-    for piece, verdicts in run_pieces(executor, judge_piece, ((piece, (plan, piece)) for piece in todo)):
-        done[piece] = verdicts
-        _append(path, {"piece": piece, "verdicts": [asdict(v) for v in verdicts]})
+    for chunk, verdicts in run_tasks(executor, judge_chunk, ((chunk, (plan, chunk)) for chunk in remaining_chunks)):
+        done[chunk] = verdicts
+        _append(path, {"piece": chunk, "verdicts": [asdict(v) for v in verdicts]})
         finished += len(verdicts)
         on_finished(finished)
     # In the order of the plan, not in the order of finishing, so that rounding of sums is the same in every run.
     points = tuple(power_point([v for key in sorted(done) if key[0] == n for v in done[key]]) for n in plan.people)
     payload = {"plan": _plan_facts(plan), "judged_hz": plan.pair_hz, "points": [asdict(point) for point in points]}
-    write_json(out / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
-    _write_figure(out / "figures", plan, points)
+    write_json(folder / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
+    _write_figure(folder / "figures", plan, points)
     return points
 
 
@@ -106,9 +109,9 @@ def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -
     write_pictures(folder, (power_picture(points, effect_db, plan.pair_hz, means),))
 
 
-def judge_piece(plan: PowerPlan, piece: Piece) -> list[StudyVerdict]:
+def judge_chunk(plan: PowerPlan, chunk: StudyChunk) -> list[StudyVerdict]:
     """Simulate and test the studies of one chunk. Runs in a worker process."""
-    people, first = piece
+    people, first = chunk
     last = min(first + CHUNK, plan.studies)
     return [
         judge_study(plan.crowd, plan.rule, people, (plan.seed, people, number), plan.contrast_hz)
@@ -127,16 +130,16 @@ def _plan_facts(plan: PowerPlan) -> dict[str, object]:
             del crowd[habit]
     facts = {"crowd": crowd, "rule": rule, "studies": plan.studies, "seed": plan.seed}
     # The default pair is not stored, so that a folder from a version without a choice of the pair can be continued.
-    usual = plan.pair_hz == find_judged_pair(plan.crowd.frequencies_hz, ())
-    return facts if usual else {**facts, "contrast_hz": list(plan.pair_hz)}
+    is_default_pair = plan.pair_hz == find_judged_pair(plan.crowd.frequencies_hz, ())
+    return facts if is_default_pair else {**facts, "contrast_hz": list(plan.pair_hz)}
 
 
-def _read_finished(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict]]:
+def _read_finished(path: Path, plan: PowerPlan) -> dict[StudyChunk, list[StudyVerdict]]:
     """Results of an interrupted run of the same plan, by piece. An incomplete line is ignored; where the first line,
     the plan, is missing or incomplete, the file is begun anew. Raises StudyError for another plan."""
     text = read_text(path) if path.exists() else ""
     if _first_row(plan).startswith(text):
-        _begin(path, plan)
+        _create_progress_file(path, plan)
         return {}
     rows = []
     for line in text.splitlines():
@@ -159,7 +162,7 @@ def _first_row(plan: PowerPlan) -> str:
     return json.dumps({"plan": _plan_facts(plan)})
 
 
-def _begin(path: Path, plan: PowerPlan) -> None:
+def _create_progress_file(path: Path, plan: PowerPlan) -> None:
     """Create the folder and the file of finished studies with the plan. Raises CannotWriteError."""
     try:
         make_folder(path.parent)

@@ -15,10 +15,10 @@ from equalizer.linkage.calibration import (
     check_reading,
     difference_problems,
 )
-from equalizer.linkage.grid import STEP_M, arm_azimuths, beside, difference_error, symmetric_grid
-from equalizer.linkage.mirror_lines import asymmetry_words, fill_in, line_asymmetry
+from equalizer.linkage.grid import STEP_M, arm_azimuths, difference_error, difference_positions, symmetric_grid
+from equalizer.linkage.mirror_lines import asymmetry_words, complete_by_symmetry, line_asymmetry
 from equalizer.signals.signal import FloatArray
-from study.devices.opening import linkage_of
+from study.devices.opening import open_linkage
 from study.errors import DeviceError, WrongUseError
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.calibration_file import write_calibration
@@ -32,7 +32,7 @@ TITLE = "The linkage was not calibrated"
 SAVED = "Nothing moved and nothing was written."
 LARGEST_M = 0.2
 """Largest radius and depth of the grid (m). By hand."""
-SHOWN = 3
+MAX_LISTED = 3
 """Number of problems that an error lists; the others are counted."""
 
 
@@ -72,32 +72,32 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
             saved=SAVED,
         )
     try:
-        with linkage_of(plan.device) as linkage:
+        with open_linkage(plan.device) as linkage:
             linkage.check_frame()
-            written = _read_grid(linkage, plan, on_progress)
+            result = _read_grid(linkage, plan, on_progress)
     except CalibrationError as error:
         raise _refusal(plan.device, error.problems) from error
     except DeviceError as error:
         error.saved = SAVED
         raise
-    write_calibration(plan.out, written.calibration)
+    write_calibration(plan.out, result.calibration)
     on_progress(1.0)
-    return written
+    return result
 
 
-def calibration_summary(written: WrittenCalibration) -> dict[str, Any]:
+def calibration_summary(result: WrittenCalibration) -> dict[str, Any]:
     """The calibration as plain values, for one JSON document."""
-    calibration = written.calibration
+    calibration = result.calibration
     centre = int(np.argmin(np.linalg.norm(calibration.position_m, axis=1)))
     masses = np.linalg.eigvalsh(calibration.inertia_kg)
     return {
-        "calibration": str(written.plan.out),
+        "calibration": str(result.plan.out),
         "device": calibration.device,
         "details": calibration.details,
         "positions": {
             "read": int((calibration.filled == 0).sum()),
             "filled": int(calibration.filled.sum()),
-            "unknown": written.unknown,
+            "unknown": result.unknown,
         },
         "centre": {
             "inertia_kg": calibration.inertia_kg[centre].tolist(),
@@ -109,24 +109,24 @@ def calibration_summary(written: WrittenCalibration) -> dict[str, Any]:
             for azimuth, share in zip(calibration.line_deg, calibration.asymmetry, strict=True)
         ],
         "difference": calibration.difference,
-        "warnings": list(written.warnings),
+        "warnings": list(result.warnings),
     }
 
 
-def calibration_lines(written: WrittenCalibration) -> tuple[str, ...]:
+def calibration_lines(result: WrittenCalibration) -> tuple[str, ...]:
     """Lines for the terminal."""
-    found = calibration_summary(written)
-    positions, (least, most) = found["positions"], found["mass_kg"]
-    along = ", ".join(f"{found['centre']['inertia_kg'][axis][axis]:.3g}" for axis in range(3))
-    held = ", ".join(f"{each:.2g}" for each in found["centre"]["gravity_n"])
+    values = calibration_summary(result)
+    positions, (least_kg, most_kg) = values["positions"], values["mass_kg"]
+    inertia_text = ", ".join(f"{values['centre']['inertia_kg'][axis][axis]:.3g}" for axis in range(3))
+    gravity_text = ", ".join(f"{force_n:.2g}" for force_n in values["centre"]["gravity_n"])
     return (
-        f"{found['device']}, {found['details']}: {positions['read']} positions read, {positions['filled']} filled in "
+        f"{values['device']}, {values['details']}: {positions['read']} positions read, {positions['filled']} filled in "
         f"by mirror lines, {positions['unknown']} unknown",
-        f"Inertia at the centre along x, y, z: {along} kg; {least:.3g} to {most:.3g} kg over all positions and "
-        f"directions; held against gravity by {held} N",
+        f"Inertia at the centre along x, y, z: {inertia_text} kg; {least_kg:.3g} to {most_kg:.3g} kg over all "
+        f"positions and directions; held against gravity by {gravity_text} N",
         "Mirror lines, largest difference of inertia: "
-        + "; ".join(f"{line['azimuth_deg']:.0f} degrees {line['asymmetry']:.2%}" for line in found["lines"]),
-        f"Jacobian against finite differences of its own positions: {found['difference']:.2%}",
+        + "; ".join(f"{line['azimuth_deg']:.0f} degrees {line['asymmetry']:.2%}" for line in values["lines"]),
+        f"Jacobian against finite differences of its own positions: {values['difference']:.2%}",
     )
 
 
@@ -150,21 +150,21 @@ def _read_grid(
         on_progress(number / len(grid))
     if problems:
         raise CalibrationError(tuple(problems))
-    filled, unknown = fill_in(readings, azimuths, np.array(unread).reshape(-1, 3))
-    asymmetry, where_m = line_asymmetry(readings, azimuths)
+    filled_readings, unknown = complete_by_symmetry(readings, azimuths, np.array(unread).reshape(-1, 3))
+    asymmetry, worst_position_m = line_asymmetry(readings, azimuths)
     line_deg = np.degrees(azimuths)
     calibration = LinkageCalibration(
         device=linkage.info.name,
         details=linkage.info.details,
         read_on=datetime.now(UTC).date().isoformat(),
-        **_arrays([*readings, *filled]),
-        filled=np.array([0.0] * len(readings) + [1.0] * len(filled)),
+        **_arrays([*readings, *filled_readings]),
+        filled=np.array([0.0] * len(readings) + [1.0] * len(filled_readings)),
         line_deg=line_deg,
         asymmetry=asymmetry,
         difference=worst,
         provenance=gather_provenance().as_dict(),
     )
-    return WrittenCalibration(plan, calibration, asymmetry_words(asymmetry, where_m, line_deg), len(unknown))
+    return WrittenCalibration(plan, calibration, asymmetry_words(asymmetry, worst_position_m, line_deg), len(unknown))
 
 
 def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
@@ -182,7 +182,7 @@ def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
 def _difference_error(linkage: "LinkageSource", reading: LinkageReading) -> float:
     """Difference between the device's Jacobian and finite differences of its own joint angles, relative to the
     Jacobian. 0 where a neighbour is out of reach, or where a value is no number, which `check_reading` refuses."""
-    positions = beside(reading.position_m)
+    positions = difference_positions(reading.position_m)
     rows = [angle for position in positions if (angle := linkage.angles_at(position)) is not None]
     angles = np.array(rows)
     if len(rows) < len(positions) or not np.isfinite(angles).all() or not np.isfinite(reading.jacobian).all():
@@ -197,10 +197,10 @@ def _arrays(readings: list[LinkageReading]) -> dict[str, Any]:
 
 
 def _refusal(name: str, problems: tuple[str, ...]) -> DeviceError:
-    more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
+    remainder_text = f"; and {len(problems) - MAX_LISTED} more" if len(problems) > MAX_LISTED else ""
     return DeviceError(
         TITLE,
-        f"The linkage that {name} reports is inconsistent: {'; '.join(problems[:SHOWN])}{more}.",
+        f"The linkage that {name} reports is inconsistent: {'; '.join(problems[:MAX_LISTED])}{remainder_text}.",
         f"Calibrate its handle anew (`hapteq doctor --device {name} --calibrate`), try a smaller grid (--radius, "
         "--depth) and the vendor's newest SDK; if the report stays the same, do without: no other command needs it.",
         saved=SAVED,

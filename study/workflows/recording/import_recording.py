@@ -27,7 +27,7 @@ from study.importing.map_format.map_errors import (
 )
 from study.importing.map_library import NO_DATA, MapFile, find_map, map_by_header, map_of_files, read_map
 from study.importing.map_skeleton import map_skeleton
-from study.store.disk.hdf5_file import format_of, is_hdf5
+from study.store.disk.hdf5_file import is_hdf5, read_format
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import read_recording, write_recording
 from study.store.formats.recording_layout import FORMAT
@@ -60,9 +60,9 @@ class Imported:
     """What was assumed, changed or left out, as sentences."""
 
 
-def check_free(out: Path) -> None:
-    """Raise StudyError if `out` exists already, or its folder does not."""
-    require_free(out, title="Nothing was imported", kind="recordings")
+def check_free(out_path: Path) -> None:
+    """Raise StudyError if `out_path` exists already, or its folder does not."""
+    require_free(out_path, title="Nothing was imported", kind="recordings")
 
 
 def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: None) -> Imported:
@@ -100,24 +100,30 @@ def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progr
         return _import_by_map(source, _expand_folders(files, source.map), on_progress)
     if len(files) == 1 and files[0].is_dir():
         return _import_by_found_map(files[0], on_progress)
-    if all(is_hdf5(path) and format_of(path) == FORMAT for path in files):
-        return _read_own(files)
+    if all(is_hdf5(path) and read_format(path) == FORMAT for path in files):
+        return _read_hapteq_recordings(files)
     return _import_by_header(files, on_progress)
 
 
-def _expand_folders(files: Sequence[Path], wanted: ImportMap) -> tuple[Path, ...]:
+def _expand_folders(files: Sequence[Path], import_map: ImportMap) -> tuple[Path, ...]:
     """The files, with a folder replaced by the files in it that the map applies to, except maps and notes. Raises
     ImportRefusedError where none is left."""
-    found: list[Path] = []
+    data_files: list[Path] = []
     for path in files:
-        beside = sorted(path.iterdir()) if path.is_dir() else ()
-        fitting = [file for file in beside if any(fnmatchcase(file.name, pattern) for pattern in wanted.files)]
-        found += [file for file in fitting if file.is_file() and file.suffix not in NO_DATA] if beside else [path]
-    if not found:
-        raise ImportRefusedError(
-            files[0].name, f"none of its files is one of {', '.join(wanted.files)}", "Give the files, or another map."
+        folder_files = sorted(path.iterdir()) if path.is_dir() else ()
+        fitting = [
+            file for file in folder_files if any(fnmatchcase(file.name, pattern) for pattern in import_map.files)
+        ]
+        data_files += (
+            [file for file in fitting if file.is_file() and file.suffix not in NO_DATA] if folder_files else [path]
         )
-    return tuple(found)
+    if not data_files:
+        raise ImportRefusedError(
+            files[0].name,
+            f"none of its files is one of {', '.join(import_map.files)}",
+            "Give the files, or another map.",
+        )
+    return tuple(data_files)
 
 
 def _import_by_map(source: MapFile, files: Sequence[Path], on_progress: Progress) -> Foreign:
@@ -130,31 +136,33 @@ def _import_by_map(source: MapFile, files: Sequence[Path], on_progress: Progress
 def _import_by_found_map(folder: Path, on_progress: Progress) -> Foreign:
     """Import a folder: by the only map that fits it, else by the files' headers. Raises WrongUseError where its maps
     make several recordings."""
-    found = find_map(folder)
-    if len(found) == 1:
-        return _import_by_map(found[0].source, found[0].files, on_progress)
-    if not found:
+    matching_maps = find_map(folder)
+    if len(matching_maps) == 1:
+        return _import_by_map(matching_maps[0].source, matching_maps[0].files, on_progress)
+    if not matching_maps:
         by_header = map_by_header(folder)
         arrays = read_without_map(by_header.files[0])
         return _with_header(by_header.source.map, arrays, by_header.files, on_progress)
-    listed = "; ".join(f"{entry.source.name} for {', '.join(path.name for path in entry.files)}" for entry in found)
+    listed = "; ".join(
+        f"{entry.source.name} for {', '.join(path.name for path in entry.files)}" for entry in matching_maps
+    )
     raise WrongUseError(
         "Which recording is meant?",
-        f"The folder {folder.name} makes {len(found)} recordings: {listed}.",
+        f"The folder {folder.name} makes {len(matching_maps)} recordings: {listed}.",
         "Give the files, and the map with --map.",
         saved=NOTHING_WRITTEN,
     )
 
 
-def _read_own(files: Sequence[Path]) -> Foreign:
+def _read_hapteq_recordings(files: Sequence[Path]) -> Foreign:
     """Read recordings in hapteq's own format; several are joined one after another. Raises ImportRefusedError where
     their device, sample rate or hold differ."""
     recordings = [read_recording(path) for path in files]
     if len(recordings) == 1:
         return Foreign(recordings[0], tuple(files), "recording", "", ())
-    facts = [{"file": path.name, **found.meta} for path, found in zip(files, recordings, strict=True)]
+    facts = [{"file": path.name, **recording.meta} for path, recording in zip(files, recordings, strict=True)]
     try:
-        joined = join(recordings, {"parts": facts})
+        joined_recording = join(recordings, {"parts": facts})
     except ValueError as error:
         raise ImportRefusedError(
             files[0].name, str(error), "Import recordings of one device, rate and hold."
@@ -162,30 +170,32 @@ def _read_own(files: Sequence[Path]) -> Foreign:
     notes = [f"{len(files)} recordings were put one after another; time stamps were left out."]
     if missing := signals_left_out(recordings):
         notes.append(f"Left out, because not every recording has it: {', '.join(missing)}.")
-    return Foreign(joined, tuple(files), "recording", "", tuple(notes))
+    return Foreign(joined_recording, tuple(files), "recording", "", tuple(notes))
 
 
 def _import_by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
     """Import files by the header of the first file, else by the only shipped map that fits them. Raises MapNeededError
     with a draft of a map where neither suffices."""
     arrays = read_without_map(files[0])
-    wanted = header_map(arrays)
-    if wanted is None and (shipped := map_of_files(files)) is not None:
-        found = _import_by_map(shipped, files, on_progress)
-        return replace(found, notes=(f"Imported by our map '{shipped.name}', which fits these files.", *found.notes))
-    if wanted is None:
+    import_map = header_map(arrays)
+    if import_map is None and (shipped := map_of_files(files)) is not None:
+        imported = _import_by_map(shipped, files, on_progress)
+        return replace(
+            imported, notes=(f"Imported by our map '{shipped.name}', which fits these files.", *imported.notes)
+        )
+    if import_map is None:
         raise MapNeededError(files[0].name, "; ".join(header_problems(arrays)), map_skeleton(arrays))
-    return _with_header(wanted, arrays, files, on_progress)
+    return _with_header(import_map, arrays, files, on_progress)
 
 
-def _with_header(wanted: ImportMap, arrays: Arrays, files: Sequence[Path], on_progress: Progress) -> Foreign:
+def _with_header(import_map: ImportMap, arrays: Arrays, files: Sequence[Path], on_progress: Progress) -> Foreign:
     """Import files by a map derived from headers. arrays: those of the first file. Raises MapNeededError, with a draft
     of a map, for a problem that only a written map can solve."""
     try:
-        built = build_recording(wanted, files, on_progress)
+        built = build_recording(import_map, files, on_progress)
     except ImportRefusedError as refused:
         if not isinstance(refused.__cause__, ImportProblemError):
             raise
         raise MapNeededError(files[0].name, refused.happened, map_skeleton(arrays)) from refused
-    notes = (*header_notes(arrays, wanted), *built.notes)
+    notes = (*header_notes(arrays, import_map), *built.notes)
     return Foreign(built.recording, tuple(files), "header", "", notes)

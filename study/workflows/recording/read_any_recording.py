@@ -5,14 +5,14 @@ from pathlib import Path
 
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
-from study.store.disk.hdf5_file import format_of, is_hdf5
+from study.store.disk.hdf5_file import is_hdf5, read_format
 from study.store.formats.recording_file import read_recording
 
 
 def read_any_recording(path: Path) -> tuple[Recording, tuple[str, ...]]:
     """The recording in a file, and remarks on its import (empty for a hapteq recording). Raises StudyError where the
     file cannot be read, or where it can only be imported with an import map."""
-    if path.is_file() and is_hdf5(path) and format_of(path):
+    if path.is_file() and is_hdf5(path) and read_format(path):
         return read_recording(path), ()
     # Imported here, because loading the import takes longer than reading a hapteq recording.
     from study.importing.arrays.arrays import FOREIGN
@@ -22,7 +22,7 @@ def read_any_recording(path: Path) -> tuple[Recording, tuple[str, ...]]:
     if path.suffix.lower() not in FOREIGN and not (path.is_file() and is_hdf5(path)):
         return read_recording(path), ()
     try:
-        found = read_foreign((path,), None)
+        imported = read_foreign((path,), None)
     except MapNeededError as needed:
         raise StudyError(
             needed.title,
@@ -30,4 +30,4 @@ def read_any_recording(path: Path) -> tuple[Recording, tuple[str, ...]]:
             f"hapteq import {path} --out REC.h5 > MAP.toml prints one: complete it, import with --map MAP.toml, and "
             "give REC.h5.",
         ) from needed
-    return found.recording, (f"{path.name} is no hapteq recording: it was imported in memory.", *found.notes)
+    return imported.recording, (f"{path.name} is no hapteq recording: it was imported in memory.", *imported.notes)

@@ -17,14 +17,14 @@ from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, UserInterruptError
-from study.session.stimulus.limits import limits_of_recording
-from study.session.stimulus.recording_pieces import pieces
+from study.session.stimulus.limits import make_recording_limits
+from study.session.stimulus.recording_pieces import make_pieces
 from study.session.views.handle_notice import BeforeMoving, handle_notice, refuse_unannounced
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import write_recording
 from study.workflows.free_name import require_free
-from study.workflows.recording.play_pieces import PlayedPiece, play_pieces
-from study.workflows.recording.take_facts import segment_facts, spring_facts, warnings_of
+from study.workflows.recording.play_pieces import RecordedTake, play_pieces
+from study.workflows.recording.recording_metadata import describe_segment, describe_spring, list_warnings
 
 NOMINAL_RATE_HZ = 1000.0
 """Sample rate (Hz) with which durations are computed before a device is open."""
@@ -47,7 +47,7 @@ class RecordingPlan:
     @property
     def total_s(self) -> float:
         """Duration (s) of all pieces, each played once, at the nominal rate, without repeats and pauses."""
-        return sum(piece.commands.duration_s for piece in pieces(self.protocol, NOMINAL_RATE_HZ))
+        return sum(piece.commands.duration_s for piece in make_pieces(self.protocol, NOMINAL_RATE_HZ))
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,81 +64,84 @@ def record_device(
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
     """Record the whole protocol. `on_progress(seconds)` receives the recorded time, which decreases when a piece is
-    repeated. `before_moving(notice)` is called before a real device moves, with the notice for the people around it; an
-    exception from it keeps the device still. The default refuses every real device.
+    repeated. `before_moving(notice)` is called before a real device moves, with the notice for the people around it;
+    an exception from it keeps the device still. The default refuses every real device.
 
     Raises StudyError before anything moves if `out` exists already; UserInterruptError after KeyboardInterrupt, and
     DeviceError if the device fails, both after the complete pieces were written.
     """
-    check_free(plan.out)
+    require_free_output(plan.out)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
     with contextlib.closing(open_device(plan.device, make_recording_settings(plan), clock, plan.seed)) as device:
-        return record_on(device, plan, on_progress, before_moving)
+        return record_on_device(device, plan, on_progress, before_moving)
 
 
-def record_on(
+def record_on_device(
     device: Device,
     plan: RecordingPlan,
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
     """Record on an open device, whose settings are those of `make_recording_settings`. Arguments and errors are as for
-    `record_device`, but `check_free` is left to the caller."""
-    done: list[PlayedPiece] = []
+    `record_device`, but `require_free_output` is left to the caller."""
+    takes: list[RecordedTake] = []
     try:
         if not device.info.simulated:
             before_moving(handle_notice(plan.protocol, device.info.name, plan.total_s))
-        play_pieces(plan.protocol, device, done, on_progress)
+        play_pieces(plan.protocol, device, takes, on_progress)
     except KeyboardInterrupt as interruption:
-        _write_whole_pieces(plan, device, done)
+        _write_complete_takes(plan, device, takes)
         if device.fault() is Fault.FORCE_LEFT:  # more important to say than the interruption
-            raise _force_left_error(plan, len(done)) from interruption
-        raise _make_interrupted_error(plan, len(done)) from interruption
+            raise _make_force_left_error(plan, len(takes)) from interruption
+        raise _make_interrupted_error(plan, len(takes)) from interruption
     except DeviceError as error:
-        _write_whole_pieces(plan, device, done)
-        error.saved = _describe_saved(plan, len(done))
+        _write_complete_takes(plan, device, takes)
+        error.saved = _describe_saved(plan, len(takes))
         raise
-    return _write(plan, device, done, interrupted=False)
+    return _write_takes(plan, device, takes, interrupted=False)
 
 
-def check_free(out: Path) -> None:
+def require_free_output(out_path: Path) -> None:
     """Raise StudyError if a file of this name exists, or its folder does not."""
-    require_free(out, title="The recording was not started", kind="recordings", saved="Nothing moved.")
+    require_free(out_path, title="The recording was not started", kind="recordings", saved="Nothing moved.")
 
 
-def _make_interrupted_error(plan: RecordingPlan, done: int) -> UserInterruptError:
-    """Error after an interruption with the force released. done: number of complete pieces."""
-    all_pieces = len(pieces(plan.protocol, NOMINAL_RATE_HZ))
+def _make_interrupted_error(plan: RecordingPlan, take_count: int) -> UserInterruptError:
+    """Error after an interruption with the force released. take_count: number of complete pieces."""
+    piece_count = len(make_pieces(plan.protocol, NOMINAL_RATE_HZ))
     return UserInterruptError(
         "Interrupted",
-        f"{done} of {all_pieces} pieces were recorded; the force was released.",
+        f"{take_count} of {piece_count} pieces were recorded; the force was released.",
         "Record again under another name for the whole protocol.",
-        saved=_describe_saved(plan, done),
+        saved=_describe_saved(plan, take_count),
     )
 
 
-def _force_left_error(plan: RecordingPlan, done: int) -> DeviceError:
-    """Error where the device may still exert a force. done: number of complete pieces."""
+def _make_force_left_error(plan: RecordingPlan, take_count: int) -> DeviceError:
+    """Error where the device may still exert a force. take_count: number of complete pieces."""
     return DeviceError(
-        "The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=_describe_saved(plan, done)
+        "The force may still be on",
+        Fault.FORCE_LEFT.sentence,
+        "Then record again.",
+        saved=_describe_saved(plan, take_count),
     )
 
 
-def _describe_saved(plan: RecordingPlan, done: int) -> str:
-    """Sentence on what was written. done: number of complete pieces."""
-    return f"The {done} whole pieces are in {plan.out}." if done else "Nothing was written."
+def _describe_saved(plan: RecordingPlan, take_count: int) -> str:
+    """Sentence on what was written. take_count: number of complete pieces."""
+    return f"The {take_count} whole pieces are in {plan.out}." if take_count else "Nothing was written."
 
 
-def _write_whole_pieces(plan: RecordingPlan, device: Device, done: list[PlayedPiece]) -> None:
+def _write_complete_takes(plan: RecordingPlan, device: Device, takes: list[RecordedTake]) -> None:
     """Write the complete pieces of an interrupted recording, if there are any."""
-    if done:
-        _write(plan, device, done, interrupted=True)
+    if takes:
+        _write_takes(plan, device, takes, interrupted=True)
 
 
 def make_recording_settings(plan: RecordingPlan) -> DeviceSettings:
     """Settings with which the device is opened: force limits, virtual spring, and place of the handle."""
     return DeviceSettings(
-        limits=limits_of_recording(plan.protocol),
+        limits=make_recording_limits(plan.protocol),
         spring_frequency_hz=plan.protocol.spring.natural_frequency_hz,
         spring_damping_n_s_per_m=plan.protocol.spring.damping_n_s_per_m,
         keep_s=1.0,
@@ -147,25 +150,25 @@ def make_recording_settings(plan: RecordingPlan) -> DeviceSettings:
     )
 
 
-def _write(plan: RecordingPlan, device: Device, done: list[PlayedPiece], interrupted: bool) -> WrittenRecording:
+def _write_takes(plan: RecordingPlan, device: Device, takes: list[RecordedTake], interrupted: bool) -> WrittenRecording:
     """Join the pieces into one recording with a segment each, and write it."""
-    parts = [replace(played.recording, segments=(played.piece.segment,)) for played in done]
-    write_recording(plan.out, join(parts, _meta(plan, device, done, interrupted)))
-    return WrittenRecording(plan.out, tuple(warning for played in done for warning in warnings_of(played)))
+    parts = [replace(take.recording, segments=(take.piece.segment,)) for take in takes]
+    write_recording(plan.out, join(parts, _make_metadata(plan, device, takes, interrupted)))
+    return WrittenRecording(plan.out, tuple(warning for take in takes for warning in list_warnings(take)))
 
 
-def _meta(plan: RecordingPlan, device: Device, done: list[PlayedPiece], interrupted: bool) -> dict[str, Any]:
+def _make_metadata(plan: RecordingPlan, device: Device, takes: list[RecordedTake], interrupted: bool) -> dict[str, Any]:
     """Metadata of the recording's file: protocol, place, spring, facts on each segment, provenance."""
     protocol = plan.protocol
     return {
         "protocol": protocol.name,
         "place_m": list(plan.place_m),
         "hand": protocol.hand,
-        "feedback": spring_facts(protocol.spring, device.info.effective_mass_kg),
+        "feedback": describe_spring(protocol.spring, device.info.effective_mass_kg),
         # Nominal mounting: the actual misalignment within its tolerance is not known when it is recorded.
         "sensor": {"frame_to_device": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]},
         "interrupted": interrupted,
-        "segments": [segment_facts(played) for played in done],
+        "segments": [describe_segment(take) for take in takes],
         "provenance": gather_provenance(
             protocol_hash=protocol_hash(protocol), seeds={"device": plan.seed}, parents=()
         ).as_dict(),

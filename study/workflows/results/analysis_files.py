@@ -24,22 +24,22 @@ OUR_FILES = (THRESHOLDS_NAME, DETECTION_NAME, STATISTICS_NAME, PAGE_NAME)
 """Files of an analysis other than its figures; the report, `PAGE_NAME`, is written last."""
 
 
-def is_analysis_of(out: Path, log: Path) -> bool:
-    """Whether the analysis in `out` is complete (its report is written last) and was made from the present content of
-    `log`, by the SHA-256 in its provenance. Never raises for damaged files."""
-    if not (out / PAGE_NAME).is_file():
+def is_analysis_of(folder: Path, log: Path) -> bool:
+    """Whether the analysis in `folder` is complete (its report is written last) and was made from the present content
+    of `log`, by the SHA-256 in its provenance. Never raises for damaged files."""
+    if not (folder / PAGE_NAME).is_file():
         return False
     try:
-        origin = read_json(out / STATISTICS_NAME, "hapteq-anova", 1).get("provenance")
+        origin = read_json(folder / STATISTICS_NAME, "hapteq-anova", 1).get("provenance")
         parents = origin.get("parents") if isinstance(origin, dict) else None
         return isinstance(parents, list) and {"file": log.name, "sha256": sha256_of(log)} in parents
     except StudyError:
         return False
 
 
-def analysis_outputs(out: Path) -> tuple[Path, ...]:
-    """Existing files in `out` that an analysis writes; none behind a link to another folder."""
-    figures = out / "figures"
-    drawn = [path for name in OURS for kind in ("svg", "png") for path in figures.glob(f"{name}.{kind}")]
-    tables = [out / name for name in OUR_FILES if (out / name).is_file()]
-    return (*tables, *(drawn if is_real_folder(figures) else ()))
+def analysis_outputs(folder: Path) -> tuple[Path, ...]:
+    """Existing files in `folder` that an analysis writes; none behind a link to another folder."""
+    figures = folder / "figures"
+    figure_files = [path for name in OURS for kind in ("svg", "png") for path in figures.glob(f"{name}.{kind}")]
+    tables = [folder / name for name in OUR_FILES if (folder / name).is_file()]
+    return (*tables, *(figure_files if is_real_folder(figures) else ()))

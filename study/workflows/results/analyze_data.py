@@ -10,7 +10,7 @@ from pathlib import Path
 from analysis.figures.picture import Picture
 from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids, sensor_frame
-from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, anova_document
+from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, make_anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.reports.declared_section import describe_declared
 from analysis.reports.primary_tables import interval_words, limit_words
@@ -24,7 +24,7 @@ from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
 from study.store.formats.recording_file import read_recording
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
-from study.store.sessions.written_elsewhere import note_written
+from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.picture_files import write_pictures
 from study.workflows.results.analysis_files import PAGE_NAME, analysis_outputs
 from study.workflows.results.collect_sessions import collect_sessions
@@ -34,14 +34,14 @@ from study.workflows.results.written_analysis import WrittenAnalysis
 
 
 def analyze_data(
-    data: Path | str, out: Path | str, ellipsoid: Path | str | None = None, protocol_name: str | None = None
+    data: Path | str, out_folder: Path | str, ellipsoid: Path | str | None = None, protocol_name: str | None = None
 ) -> WrittenAnalysis:
-    """Analyse all sessions in `data`; an earlier analysis in `out` is replaced. data: folder of sessions, a single
-    session, or an exported dataset. ellipsoid: recording whose acceleration ellipses the report shows. protocol_name:
-    protocol to analyse where there are several. Raises StudyError where there is nothing to analyse, where rows
-    contradict their protocol, or where files cannot be written.
+    """Analyse all sessions in `data`; an earlier analysis in `out_folder` is replaced. data: folder of sessions, a
+    single session, or an exported dataset. ellipsoid: recording whose acceleration ellipses the report shows.
+    protocol_name: protocol to analyse where there are several. Raises StudyError where there is nothing to analyse,
+    where rows contradict their protocol, or where files cannot be written.
     """
-    data, out, ellipsoid = Path(data), Path(out), None if ellipsoid is None else Path(ellipsoid)
+    data, out_folder, ellipsoid = Path(data), Path(out_folder), None if ellipsoid is None else Path(ellipsoid)
     collected = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
     try:
         analysis = analyse_study(collected.trials, collected.protocol, collected.left_out)
@@ -57,14 +57,14 @@ def analyze_data(
         parents=parents,
     )
     pictures = study_pictures(analysis, found_ellipsoids)
-    _make_private(out, data)
-    note_written(data, out)
-    _write(out, analysis, pictures, found_ellipsoids, provenance, collected)
+    _make_private(out_folder, data)
+    note_written_folder(data, out_folder)
+    _write(out_folder, analysis, pictures, found_ellipsoids, provenance, collected)
     return WrittenAnalysis(
         thresholds=analysis.thresholds,
         table=tuple(text_table(analysis)),
         warnings=(*collected.finished, *collected.left_out, *analysis.warnings),
-        report=out / PAGE_NAME,
+        report=out_folder / PAGE_NAME,
     )
 
 
@@ -120,21 +120,21 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
         ) from problem
 
 
-def _make_private(out: Path, data: Path) -> None:
+def _make_private(folder: Path, data: Path) -> None:
     """Create an output folder inside the folder of sessions, readable only by this account. An output folder elsewhere
     is left to `_write`. Raises CannotWriteError."""
-    if not out.resolve().is_relative_to(data.resolve()):
+    if not folder.resolve().is_relative_to(data.resolve()):
         return
     try:
-        make_folder(out, private=True)
+        make_folder(folder, private=True)
     except OSError as problem:
-        raise CannotWriteError(out, problem) from problem
-    if out.resolve() != data.resolve():
-        close_to_others(out, inside=True)
+        raise CannotWriteError(folder, problem) from problem
+    if folder.resolve() != data.resolve():
+        close_to_others(folder, recursive=True)
 
 
 def _write(
-    out: Path,
+    folder: Path,
     analysis: StudyAnalysis,
     pictures: tuple[Picture, ...],
     found_ellipsoids: tuple[EllipsoidResult, ...],
@@ -142,27 +142,27 @@ def _write(
     collected: CollectedTrials,
 ) -> None:
     """Remove figures and report of an earlier analysis, then write all files. Raises CannotWriteError."""
-    figures = out / "figures"
+    figures = folder / "figures"
     try:
         make_folder(figures)
         if figures.is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, "it is a link, which is not followed")
         # The report is removed first and written last: while it is missing, the other files may be of different runs.
-        for stale in analysis_outputs(out):
+        for stale in analysis_outputs(folder):
             if stale.parent == figures or stale.name in (DETECTION_NAME, PAGE_NAME):
                 stale.unlink()
     except OSError as problem:
         raise CannotWriteError(figures, problem) from problem
-    write_thresholds(out / THRESHOLDS_NAME, analysis.thresholds)
+    write_thresholds(folder / THRESHOLDS_NAME, analysis.thresholds)
     if analysis.detection:
-        write_thresholds(out / DETECTION_NAME, analysis.detection)
-    document = anova_document(analysis)
+        write_thresholds(folder / DETECTION_NAME, analysis.detection)
+    document = make_anova_document(analysis)
     format_name, version = document.pop("format"), document.pop("version")
-    write_json(out / "anova.json", format_name, version, document, provenance, overwrite=True)
+    write_json(folder / "anova.json", format_name, version, document, provenance, overwrite=True)
     write_pictures(figures, pictures)
     origin = _origin_entries(provenance, collected)
     page = render_study_report(analysis, pictures, origin, local_now(), found_ellipsoids, collected.qualities)
-    write_text(out / PAGE_NAME, page, overwrite=True)
+    write_text(folder / PAGE_NAME, page, overwrite=True)
 
 
 def _origin_entries(provenance: Provenance, collected: CollectedTrials) -> dict[str, str]:

@@ -14,9 +14,9 @@ from protocols.definition.study_protocol import StudyProtocol
 from study.errors import StudyError, WrongUseError
 from study.session.facts.events import FormFilled
 from study.session.state.state import SessionState
-from study.session.views.archive_views import TURNED_AWAY
-from study.store.formats.answer_table import ASKED, FilledForm
-from study.store.sessions.archive import SessionFolder, session_folders
+from study.session.views.archive_views import INELIGIBILITY_REASONS
+from study.store.formats.answer_table import FORM_NAMES, FilledForm
+from study.store.sessions.archive import SessionFolder, list_session_folders
 from study.store.sessions.event_log import LOG_NAME
 from study.workflows.results.collected import CollectedTrials
 from study.workflows.results.fold_session import FoldedSession, fold_session
@@ -28,23 +28,23 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedT
     or first 12 digits of its hash); else, of those with test or detection runs, the one with the most sessions. Of
     several populations: the first in the order of `Population`. Raises StudyError where there is nothing to analyse."""
     folders = _folders(data)
-    whole, left_out = _fold_all(folders)
-    folded = [(folder, session.state) for folder, session in whole]
-    chosen_hash = _choose_protocol(folded, protocol_name, data)
-    chosen = [(folder, state) for folder, state in folded if state.opened.protocol_hash == chosen_hash]
-    left_out += [
+    usable_sessions, exclusions = _fold_all(folders)
+    session_states = [(folder, session.state) for folder, session in usable_sessions]
+    chosen_hash = _choose_protocol(session_states, protocol_name, data)
+    chosen = [(folder, state) for folder, state in session_states if state.opened.protocol_hash == chosen_hash]
+    exclusions += [
         f"{folder.name} follows another protocol ('{state.protocol.name}')."
-        for folder, state in folded
+        for folder, state in session_states
         if state.opened.protocol_hash != chosen_hash
     ]
     parts = split_by_population([trial for _, state in chosen for trial in state.trials])
-    kind = next((kind for kind in Population if kind in parts), None)
-    left_out += [
-        f"{len(parts[other])} trials of {other.value} are not analysed together with {kind.value}."
-        for other in parts
-        if kind is not None and other is not kind
+    selected = next((selected for selected in Population if selected in parts), None)
+    exclusions += [
+        f"{len(parts[population])} trials of {population.value} are not analysed together with {selected.value}."
+        for population in parts
+        if selected is not None and population is not selected
     ]
-    trials = parts[kind] if kind is not None else ()
+    trials = parts[selected] if selected is not None else ()
     names = {trial.session for trial in trials}
     entering = [(folder, state) for folder, state in chosen if folder.name in names]
     return CollectedTrials(
@@ -55,12 +55,12 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedT
         seeds=tuple(state.opened.seed for _, state in entering),
         devices=tuple(dict.fromkeys(state.opened.device.name for _, state in entering)),
         observers=tuple(dict.fromkeys(state.opened.observer for _, state in entering if state.opened.observer)),
-        left_out=tuple(left_out),
+        left_out=tuple(exclusions),
         qualities=_qualities(entering),
         locked=_lock_words([state for _, state in entering]),
-        finished=_finish(whole),
+        finished=_finish(usable_sessions),
         parents=tuple(folder.log for folder, _ in entering),
-        forms=_collect_filled_forms([(folder, session) for folder, session in whole if folder.name in names]),
+        forms=_collect_filled_forms([(folder, session) for folder, session in usable_sessions if folder.name in names]),
     )
 
 
@@ -69,8 +69,8 @@ def _collect_filled_forms(sessions: Sequence[tuple[SessionFolder, FoldedSession]
     return tuple(
         FilledForm(folder.subject, folder.name, event.form, event.answers)
         for folder, session in sessions
-        for event in session.contents.events
-        if isinstance(event, FormFilled) and event.form in ASKED.values()
+        for event in session.log_contents.events
+        if isinstance(event, FormFilled) and event.form in FORM_NAMES.values()
     )
 
 
@@ -96,7 +96,7 @@ def _folders(data: Path) -> tuple[SessionFolder, ...]:
     """Session folders in `data`, or `data` itself if it is a session. Raises WrongUseError where there are none."""
     if (data / LOG_NAME).exists():
         return (SessionFolder(data.resolve()),)
-    folders = session_folders(data)
+    folders = list_session_folders(data)
     if not folders:
         raise WrongUseError(
             "There is nothing to analyse",
@@ -110,62 +110,64 @@ def _folders(data: Path) -> tuple[SessionFolder, ...]:
 def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolder, FoldedSession]], list[str]]:
     """Usable sessions, replayed from their logs, and sentences on the others. Raises StudyError where none is
     usable."""
-    folded: list[tuple[SessionFolder, FoldedSession]] = []
-    left_out: list[str] = []
+    usable_sessions: list[tuple[SessionFolder, FoldedSession]] = []
+    exclusions: list[str] = []
     for folder in folders:
         if folder.withdrawn:
-            left_out.append(f"{folder.name} was withdrawn by the participant.")
+            exclusions.append(f"{folder.name} was withdrawn by the participant.")
             continue
         try:
             session = fold_session(folder)
         except StudyError as problem:
-            left_out.append(f"{folder.name} cannot be used. {problem.happened}")
+            exclusions.append(f"{folder.name} cannot be used. {problem.happened}")
             continue
-        if turned_away := session.state.sitting.turned_away:
-            left_out.append(f"{folder.name} does not take part: {TURNED_AWAY[turned_away]}.")
+        if reason := session.state.sitting.ineligibility:
+            exclusions.append(f"{folder.name} does not take part: {INELIGIBILITY_REASONS[reason]}.")
         else:
-            folded.append((folder, session))
-    if not folded:
-        raise StudyError("There is nothing to analyse", " ".join(left_out), "Record new sessions.")
-    return folded, left_out
+            usable_sessions.append((folder, session))
+    if not usable_sessions:
+        raise StudyError("There is nothing to analyse", " ".join(exclusions), "Record new sessions.")
+    return usable_sessions, exclusions
 
 
-def _finish(folded: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[str, ...]:
+def _finish(sessions: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[str, ...]:
     """Write tables and seals that are missing or out of date; returns sentences on what was written. Problems are only
     reported, because the analysis uses the logs alone."""
     texts = []
-    for folder, session in folded:
+    for folder, session in sessions:
         try:
-            written = finish_tables(folder, session)
+            written_files = finish_tables(folder, session)
         except StudyError as problem:
             texts.append(f"{folder.name}: its results are not whole and could not be written. {problem.happened}")
             continue
-        if written:
+        if written_files:
             texts.append(
-                f"{folder.name}: written now from its log, because missing or out of date: {', '.join(written)}."
+                f"{folder.name}: written now from its log, because missing or out of date: {', '.join(written_files)}."
             )
     return tuple(texts)
 
 
 def _choose_protocol(
-    folded: Sequence[tuple[SessionFolder, SessionState]], protocol_name: str | None, data: Path
+    session_states: Sequence[tuple[SessionFolder, SessionState]], protocol_name: str | None, data: Path
 ) -> str:
     """Hash of the protocol to analyse. Raises WrongUseError where no session follows the named protocol."""
-    counted: dict[str, list[SessionState]] = {}
-    for _, state in folded:
-        counted.setdefault(state.opened.protocol_hash, []).append(state)
-    named = {
-        key: states for key, states in counted.items() if protocol_name in (None, states[0].protocol.name, key[:12])
+    states_by_hash: dict[str, list[SessionState]] = {}
+    for _, state in session_states:
+        states_by_hash.setdefault(state.opened.protocol_hash, []).append(state)
+    candidates = {
+        key: states
+        for key, states in states_by_hash.items()
+        if protocol_name in (None, states[0].protocol.name, key[:12])
     }
-    if not named:
-        there = ", ".join(f"{states[0].protocol.name} ({key[:12]})" for key, states in counted.items())
+    if not candidates:
+        available = ", ".join(f"{states[0].protocol.name} ({key[:12]})" for key, states in states_by_hash.items())
         raise WrongUseError(
             "No session follows that protocol",
-            f"'{protocol_name}' was asked for; {data} holds sessions of {there}.",
+            f"'{protocol_name}' was asked for; {data} holds sessions of {available}.",
             "Give one of these names, or the first twelve digits of its hash.",
         )
     # A protocol with training runs only has no thresholds; it is chosen only if there is no other.
-    return max(named, key=lambda key: (_measures(named[key][0].protocol), len(named[key])))
+    return max(candidates, key=lambda key: (_measures(candidates[key][0].protocol), len(candidates[key])))
 
 
 def _measures(protocol: StudyProtocol) -> bool:

@@ -32,10 +32,10 @@ from study.store.formats.psych_ds import (
 )
 from study.store.formats.trials_mat import write_trials_mat
 from study.store.sessions.archive import SessionFolder
-from study.store.sessions.written_elsewhere import note_written
+from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.results.collected import CollectedTrials
 
-MOST_LEFT_OUT = 10_000
+MAX_LEFT_OUT = 10_000
 """Largest plausible number of excluded items in a dataset; a larger one is ignored as an error of editing."""
 EXPORT_AGAIN = "Export the study again, or restore the file from a copy."
 """Remedy for a damaged or edited dataset, for messages."""
@@ -51,8 +51,8 @@ WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Exported:
-    """Result of an export: its folder, files and number of trials."""
+class ExportResult:
+    """Result of an export."""
 
     out: Path
     files: tuple[str, ...]
@@ -62,21 +62,23 @@ class Exported:
     """Sentences on what was excluded, and why."""
 
 
-def export_study(collected: CollectedTrials, data: Path, out: Path, form: Form, free_text: bool = False) -> Exported:
-    """Write the dataset atomically into the new folder `out`. collected: the sessions of `data` that belong together.
-    free_text: include answers that participants wrote in their own words. Raises StudyError."""
-    require_new_folder(out)
-    facts, answers = _facts(collected), answer_table(collected.protocol, collected.forms, free_text)
-    with new_folder(out) as folder:
+def export_study(
+    collected: CollectedTrials, data: Path, out_folder: Path, form: Form, free_text: bool = False
+) -> ExportResult:
+    """Write the dataset atomically into the new folder `out_folder`. collected: the sessions of `data` that belong
+    together. free_text: include answers that participants wrote in their own words. Raises StudyError."""
+    require_new_folder(out_folder)
+    facts, answers = _gather_metadata(collected), answer_table(collected.protocol, collected.forms, free_text)
+    with new_folder(out_folder) as folder:
         files = WRITERS[form](
             folder, collected.protocol.name, collected.trials, dump_protocol(collected.protocol), facts, answers
         )
         names = tuple(path.relative_to(folder).as_posix() for path in files)
-    note_written(data, out, always=True)
-    return Exported(out, names, len(collected.trials), collected.left_out)
+    note_written_folder(data, out_folder, always=True)
+    return ExportResult(out_folder, names, len(collected.trials), collected.left_out)
 
 
-def _facts(collected: CollectedTrials) -> dict[str, Any]:
+def _gather_metadata(collected: CollectedTrials) -> dict[str, Any]:
     """Metadata of the dataset: provenance, seeds, devices, and quality of the models."""
     names = [folder.name for folder in collected.sessions]
     return {
@@ -88,7 +90,7 @@ def _facts(collected: CollectedTrials) -> dict[str, Any]:
         "locked": collected.locked,
         # Only the number: the sentences would name sessions of people who withdrew.
         "left_out_count": len(collected.left_out),
-        "model_qualities": [list(each) for each in collected.qualities],
+        "model_qualities": [list(quality) for quality in collected.qualities],
     }
 
 
@@ -106,36 +108,36 @@ def _check_rows(folder: Path, trials: Sequence[Trial], kind: str) -> None:
         raise UnusableFileError(folder, kind, tuple(twice))
 
 
-def _left_out(facts: Mapping[str, Any]) -> tuple[str, ...]:
+def _write_exclusion_sentences(facts: Mapping[str, Any]) -> tuple[str, ...]:
     """A sentence for each item that was excluded before the export; empty where the metadata do not state the
     number."""
     count = facts.get("left_out_count", 0)
-    if not isinstance(count, int) or not 0 <= count <= MOST_LEFT_OUT:
+    if not isinstance(count, int) or not 0 <= count <= MAX_LEFT_OUT:
         return ()
     return tuple(f"Before the export, {number} of {count} was left out." for number in range(1, count + 1))
 
 
-def _qualities(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+def _read_qualities(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """(sessions, sentence) on the quality of each model; malformed entries are ignored."""
-    found = facts.get("model_qualities", [])
-    rows = found if isinstance(found, list) else []
+    entries = facts.get("model_qualities", [])
+    rows = entries if isinstance(entries, list) else []
     return tuple((str(row[0]), str(row[1])) for row in rows if isinstance(row, list) and len(row) == 2)
 
 
-def _seeds(facts: Mapping[str, Any], path: Path, kind: str) -> dict[str, int]:
+def _read_seeds(facts: Mapping[str, Any], path: Path, kind: str) -> dict[str, int]:
     """Seeds by session; empty where the metadata state none. Raises UnusableFileError for values that are no seeds."""
-    found = facts.get("seeds", {})
-    if not isinstance(found, dict) or any(type(seed) is not int for seed in found.values()):
+    seeds = facts.get("seeds", {})
+    if not isinstance(seeds, dict) or any(type(seed) is not int for seed in seeds.values()):
         raise UnusableFileError(path, kind, ("its seeds are no whole numbers by session",), EXPORT_AGAIN)
-    return found
+    return seeds
 
 
-def _names(facts: Mapping[str, Any], key: str, path: Path, kind: str) -> tuple[str, ...]:
+def _read_names(facts: Mapping[str, Any], key: str, path: Path, kind: str) -> tuple[str, ...]:
     """Texts under a key of the metadata; empty without that key. Raises UnusableFileError for another type."""
-    found = facts.get(key, [])
-    if not isinstance(found, list) or not all(isinstance(name, str) for name in found):
+    names = facts.get(key, [])
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise UnusableFileError(path, kind, (f"its {key} are no list of texts",), EXPORT_AGAIN)
-    return tuple(found)
+    return tuple(names)
 
 
 def is_exported(folder: Path) -> bool:
@@ -147,33 +149,33 @@ def collect_exported(folder: Path) -> CollectedTrials:
     """Read a dataset that `export_study` wrote as Psych-DS or tidy CSV. Raises StudyError, for example where the
     protocol was changed after the export."""
     psych_ds = is_psych_ds(folder)
-    found = read_psych_ds(folder) if psych_ds else tidy_csv.read_tidy_csv(folder)
+    dataset = read_psych_ds(folder) if psych_ds else tidy_csv.read_tidy_csv(folder)
     path, kind = folder / (PROTOCOL_NAME if psych_ds else tidy_csv.PROTOCOL_NAME), KIND if psych_ds else tidy_csv.KIND
     facts_path = folder / (DESCRIPTION_NAME if psych_ds else tidy_csv.FACTS_NAME)
     try:
-        protocol = load_protocol(found.protocol_text, path.name)
+        protocol = load_protocol(dataset.protocol_text, path.name)
     except ProtocolError as error:
-        raise UnusableFileError(path, kind, tuple(str(each) for each in error.problems)) from error
+        raise UnusableFileError(path, kind, tuple(str(problem) for problem in error.problems)) from error
     if not isinstance(protocol, StudyProtocol):
         raise UnusableFileError(path, kind, ("it is no protocol of a study",))
-    if found.facts.get("protocol_hash", protocol_hash(protocol)) != protocol_hash(protocol):
+    if dataset.facts.get("protocol_hash", protocol_hash(protocol)) != protocol_hash(protocol):
         raise UnusableFileError(
             path, kind, (f"it was changed since the export: its hash is not that of {facts_path.name}",), EXPORT_AGAIN
         )
-    _check_rows(folder, found.trials, kind)
-    seeds = _seeds(found.facts, facts_path, kind)
-    sessions = tuple(dict.fromkeys(trial.session for trial in found.trials))
+    _check_rows(folder, dataset.trials, kind)
+    seeds = _read_seeds(dataset.facts, facts_path, kind)
+    sessions = tuple(dict.fromkeys(trial.session for trial in dataset.trials))
     return CollectedTrials(
         protocol=protocol,
         protocol_hash=protocol_hash(protocol),
-        trials=found.trials,
+        trials=dataset.trials,
         sessions=tuple(SessionFolder(folder / name) for name in sessions),
         seeds=tuple(seeds.get(name, 0) for name in sessions),
-        devices=_names(found.facts, "devices", facts_path, kind),
-        observers=_names(found.facts, "observers", facts_path, kind),
-        left_out=_left_out(found.facts),
-        qualities=_qualities(found.facts),
-        locked=str(found.facts.get("locked", "not known")),
+        devices=_read_names(dataset.facts, "devices", facts_path, kind),
+        observers=_read_names(dataset.facts, "observers", facts_path, kind),
+        left_out=_write_exclusion_sentences(dataset.facts),
+        qualities=_read_qualities(dataset.facts),
+        locked=str(dataset.facts.get("locked", "not known")),
         finished=(),
-        parents=(*found.files, path),
+        parents=(*dataset.files, path),
     )

@@ -12,7 +12,7 @@ from protocols.document.loading import ProtocolError, load_protocol
 from study.errors import StudyError
 from study.session.facts.events import SessionOpened
 from study.session.state.draw_check import LogContradiction
-from study.session.state.fold import apply
+from study.session.state.fold import apply_event
 from study.session.state.state import SessionState, begin_session
 from study.store.sessions.archive import SessionFolder, SessionWithdrawnError
 from study.store.sessions.event_log import LogContents, read_log
@@ -25,7 +25,7 @@ class FoldedSession:
     """A session read from its log: its state and the log's content."""
 
     state: SessionState
-    contents: LogContents
+    log_contents: LogContents
     sealed_lines: int
     """Number of lines of the log that a seal covers; 0 without a seal."""
 
@@ -33,7 +33,7 @@ class FoldedSession:
     def seal_due(self) -> bool:
         """Whether the session is closed, but the program ended before the seal was written. A log without checksums is
         never sealed, because its content cannot be verified."""
-        return self.state.closed and bool(self.contents.chain.since) and not self.sealed_lines
+        return self.state.closed and bool(self.log_contents.chain.since) and not self.sealed_lines
 
 
 def fold_session(folder: SessionFolder) -> FoldedSession:
@@ -41,27 +41,27 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
     contradicts the rules, and for a withdrawn session."""
     if folder.withdrawn:
         raise SessionWithdrawnError(folder)
-    contents = read_log(folder.log)
-    if not contents.events or not isinstance(contents.events[0], SessionOpened):
+    log_contents = read_log(folder.log)
+    if not log_contents.events or not isinstance(log_contents.events[0], SessionOpened):
         raise StudyError(
             "This session never began",
             f"The log of {folder.name} has no opening line; the program died while it was made.",
             "Start a new session; the folder holds no answers and may be deleted.",
         )
-    opened = contents.events[0]
-    if (opened.session, opened.subject) != (folder.name, folder.subject):
+    session_opened = log_contents.events[0]
+    if (session_opened.session, session_opened.subject) != (folder.name, folder.subject):
         raise StudyError(
             "This log belongs to another session",
-            f"{folder.name} holds the log of {opened.session}: the folder was copied or renamed.",
+            f"{folder.name} holds the log of {session_opened.session}: the folder was copied or renamed.",
             "Give the folder its own name back, or take the copy away.",
             saved="Nothing was changed.",
         )
     number = 1
     try:
-        state = begin_session(opened, protocol_of(opened, folder))
-        for event in contents.events[1:]:
+        state = begin_session(session_opened, load_logged_protocol(session_opened, folder))
+        for event in log_contents.events[1:]:
             number += 1
-            state = apply(state, event)
+            state = apply_event(state, event)
     except (LogContradiction, ArithmeticError) as problem:
         raise StudyError(
             "The session log contradicts the rules",
@@ -69,37 +69,37 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
             "If the log was edited, restore it from a copy; if not, use the hapteq that began it (first line).",
             saved="Nothing was changed; every answer is still in the log.",
         ) from problem
-    sealed_lines = check_seals(folder.path, contents)
+    sealed_lines = check_seals(folder.path, log_contents)
     if not state.closed:
-        _check_end(state, folder)
-    return FoldedSession(state, contents, sealed_lines)
+        _require_complete_log(state, folder)
+    return FoldedSession(state, log_contents, sealed_lines)
 
 
-def _check_end(state: SessionState, folder: SessionFolder) -> None:
+def _require_complete_log(state: SessionState, folder: SessionFolder) -> None:
     """Raise StudyError where the stored results cover more than the log, whose end was lost. Such a log otherwise looks
     like that of an interrupted session."""
-    closed, presentations = read_closed_and_presentations(read_summary(folder.path))
-    if closed or presentations > len(state.trials):
-        what = "a finished session" if closed else f"{presentations} presentations"
+    is_closed, presentations = read_closed_and_presentations(read_summary(folder.path))
+    if is_closed or presentations > len(state.trials):
+        covered = "a finished session" if is_closed else f"{presentations} presentations"
         raise StudyError(
             "The end of this session's log is missing",
-            f"{SUMMARY_NAME} of {folder.name} was made from {what}; the log ends before that, after "
+            f"{SUMMARY_NAME} of {folder.name} was made from {covered}; the log ends before that, after "
             f"{len(state.trials)} presentations.",
             "Restore events.jsonl from a copy.",
             saved="Nothing was changed.",
         )
 
 
-def protocol_of(opened: SessionOpened, folder: SessionFolder) -> StudyProtocol:
+def load_logged_protocol(session_opened: SessionOpened, folder: SessionFolder) -> StudyProtocol:
     """The protocol stored in a log. Raises StudyError if it cannot be read, is not of a study, or does not match its
     hash."""
     try:
-        protocol = load_protocol(opened.protocol_text, f"the log of {folder.name}")
+        protocol = load_protocol(session_opened.protocol_text, f"the log of {folder.name}")
     except ProtocolError as problem:
-        begun_by = opened.versions.get("hapteq", "another version")
+        writer_version = session_opened.versions.get("hapteq", "another version")
         raise StudyError(
             "The protocol in the log cannot be read",
-            f"{problem} The session was begun by hapteq {begun_by}.",
+            f"{problem} The session was begun by hapteq {writer_version}.",
             "Use that version, or restore events.jsonl from a copy.",
             saved="Nothing was changed.",
         ) from problem
@@ -107,7 +107,7 @@ def protocol_of(opened: SessionOpened, folder: SessionFolder) -> StudyProtocol:
         raise StudyError(
             "This is no study session", f"The protocol in the log of {folder.name} is a recording.", "Check the folder."
         )
-    if protocol_hash(protocol) != opened.protocol_hash:
+    if protocol_hash(protocol) != session_opened.protocol_hash:
         raise StudyError(
             "The protocol in the log was changed",
             f"The protocol text of {folder.name} does not match the hash written beside it.",

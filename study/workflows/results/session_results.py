@@ -1,7 +1,7 @@
 """Results that are derived from a session's log: seal, tables of trials and thresholds, and summary.
 
-The log is the only source: each result can be computed from it again, and `result_problems` compares the files with
-what the log gives.
+The log is the only source: each result can be computed from it again, and `find_result_problems` compares the files
+with what the log gives.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from analysis.psychophysics.detection import detection_thresholds
 from analysis.psychophysics.thresholds import Threshold, thresholds
 from protocols.trial import Trial
 from study.session.state.state import SessionState
-from study.store.disk.csv_rows import Row, as_written_in
+from study.store.disk.csv_rows import Row, drop_absent_columns
 from study.store.disk.file_errors import CannotReadError, UnusableFileError
 from study.store.disk.json_document import write_json
 from study.store.disk.provenance import gather_provenance
@@ -45,10 +45,10 @@ class ResultProblem:
 def write_tables(folder: SessionFolder) -> SessionState:
     """Write the seal of a closed session if it is due, trials.csv, thresholds.csv, detection.csv (for detection runs)
     and session.json. Returns the state that the log gives. Raises StudyError."""
-    folded = fold_session(folder)
-    state = folded.state
-    if folded.seal_due:
-        write_seal(folder.path, folded.contents)
+    folded_session = fold_session(folder)
+    state = folded_session.state
+    if folded_session.seal_due:
+        write_seal(folder.path, folded_session.log_contents)
     write_trials(folder.path / TRIALS_NAME, state.trials)
     for name, rows in _compute_tables(state).items():
         write_thresholds(folder.path / name, rows)
@@ -56,35 +56,39 @@ def write_tables(folder: SessionFolder) -> SessionState:
     return state
 
 
-def due_results(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
+def list_due_results(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
     """Names of the results of a closed session that are missing or do not agree with the log, for example because the
     program was killed before it wrote them. Empty for a session that is not closed."""
-    if not folded.state.closed:
+    if not folded_session.state.closed:
         return ()
-    seal = (SEAL_NAME,) if folded.seal_due else ()
-    return (*seal, *(problem.file for problem in result_problems(folder, folded.state)))
+    seal = (SEAL_NAME,) if folded_session.seal_due else ()
+    return (*seal, *(problem.file for problem in find_result_problems(folder, folded_session.state)))
 
 
-def finish_tables(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
+def finish_tables(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
     """Write all results under the session's lock if any is due. Returns the names of those due. Raises StudyError."""
-    due = due_results(folder, folded)
-    if due:
+    due_files = list_due_results(folder, folded_session)
+    if due_files:
         with hold_session_lock(folder.path):
             write_tables(folder)
-    return due
+    return due_files
 
 
-def result_problems(folder: SessionFolder, state: SessionState) -> tuple[ResultProblem, ...]:
+def find_result_problems(folder: SessionFolder, state: SessionState) -> tuple[ResultProblem, ...]:
     """Tables and summary that are missing, damaged, or differ from the log."""
-    found = [_compare(folder, TRIALS_NAME, lambda path: read_trials(path) == _as_in(path, state.trials, Trial))]
+    problems = [
+        _check_file(
+            folder, TRIALS_NAME, lambda path: read_trials(path) == _drop_absent_columns(path, state.trials, Trial)
+        )
+    ]
     for name, rows in _compute_tables(state).items():
-        agrees = partial(_thresholds_agree, rows)
-        found.append(_compare(folder, name, agrees))
-    found.append(_compare(folder, SUMMARY_NAME, lambda path: _summary_agrees(folder, state)))
-    return tuple(problem for problem in found if problem is not None)
+        agrees = partial(_is_same_thresholds, rows)
+        problems.append(_check_file(folder, name, agrees))
+    problems.append(_check_file(folder, SUMMARY_NAME, lambda path: _is_same_summary(folder, state)))
+    return tuple(problem for problem in problems if problem is not None)
 
 
-def _compare(folder: SessionFolder, name: str, agrees: Callable[[Path], bool]) -> ResultProblem | None:
+def _check_file(folder: SessionFolder, name: str, agrees: Callable[[Path], bool]) -> ResultProblem | None:
     """The problem of one file; None where it can be read and `agrees` is true of its path."""
     path = folder.path / name
     if not path.exists():
@@ -97,14 +101,14 @@ def _compare(folder: SessionFolder, name: str, agrees: Callable[[Path], bool]) -
         return ResultProblem(name, False, (error.happened.rstrip("."),))
 
 
-def _thresholds_agree(rows: tuple[Threshold, ...], path: Path) -> bool:
+def _is_same_thresholds(rows: tuple[Threshold, ...], path: Path) -> bool:
     """Whether the file contains these thresholds."""
-    return read_thresholds(path) == _as_in(path, rows, Threshold)
+    return read_thresholds(path) == _drop_absent_columns(path, rows, Threshold)
 
 
-def _as_in(path: Path, rows: tuple[Row, ...], row_type: type[Row]) -> tuple[Row, ...]:
-    """The rows as the file can state them: a column that a file of an older version lacks has its default."""
-    return as_written_in(read_text(path), rows, row_type)
+def _drop_absent_columns(path: Path, rows: tuple[Row, ...], row_type: type[Row]) -> tuple[Row, ...]:
+    """The rows as the file can state them: columns that a file of an older version lacks have their defaults."""
+    return drop_absent_columns(read_text(path), rows, row_type)
 
 
 def _compute_tables(state: SessionState) -> dict[str, tuple[Threshold, ...]]:
@@ -115,31 +119,35 @@ def _compute_tables(state: SessionState) -> dict[str, tuple[Threshold, ...]]:
     return tables
 
 
-def _summary_agrees(folder: SessionFolder, state: SessionState) -> bool:
+def _is_same_summary(folder: SessionFolder, state: SessionState) -> bool:
     """Whether the summary on the disk agrees with the log in all keys that both have; a later version may add keys."""
-    written, due = read_summary(folder.path), _summary(state)
-    if written is None or "session" not in written:
+    stored, expected = read_summary(folder.path), _make_summary(state)
+    if stored is None or "session" not in stored:
         return False
-    return all(written[key] == due[key] for key in written.keys() & due.keys())
+    return all(stored[key] == expected[key] for key in stored.keys() & expected.keys())
 
 
-def _summary(state: SessionState) -> dict[str, Any]:
+def _make_summary(state: SessionState) -> dict[str, Any]:
     """Content of session.json as JSON values, without format, version and provenance."""
-    opened = state.opened
+    session_opened = state.opened
     return {
-        "session": opened.session,
-        "subject": opened.subject,
-        "observer": opened.observer,
-        "participant_number": opened.participant_number if state.takes_part else None,
-        "protocol": {"name": state.protocol.name, "hash": opened.protocol_hash, "locked": opened.protocol_locked},
-        "device": asdict(opened.device),
-        "equalizer": opened.equalizer,
-        "begun_utc": opened.utc,
+        "session": session_opened.session,
+        "subject": session_opened.subject,
+        "observer": session_opened.observer,
+        "participant_number": session_opened.participant_number if state.has_final_place else None,
+        "protocol": {
+            "name": state.protocol.name,
+            "hash": session_opened.protocol_hash,
+            "locked": session_opened.protocol_locked,
+        },
+        "device": asdict(session_opened.device),
+        "equalizer": session_opened.equalizer,
+        "begun_utc": session_opened.utc,
         "closed": state.closed,
-        "outcome": state.sitting.turned_away or ("completed" if state.closed else "unfinished"),
+        "outcome": state.sitting.ineligibility or ("completed" if state.closed else "unfinished"),
         "runs": [
-            {"index": r.index, "phase": r.phase.value, "frequency_hz": r.frequency_hz, "practice": r.practice}
-            for r in state.runs
+            {"index": run.index, "phase": run.phase.value, "frequency_hz": run.frequency_hz, "practice": run.practice}
+            for run in state.runs
         ],
         "answers": state.answers,
         "presentations": len(state.trials),
@@ -151,4 +159,6 @@ def _write_summary(folder: SessionFolder, state: SessionState) -> None:
     provenance = gather_provenance(
         protocol_hash=state.opened.protocol_hash, seeds={"session": state.opened.seed}, parents=[folder.log]
     )
-    write_json(folder.path / SUMMARY_NAME, SUMMARY_FORMAT, SUMMARY_VERSION, _summary(state), provenance, overwrite=True)
+    write_json(
+        folder.path / SUMMARY_NAME, SUMMARY_FORMAT, SUMMARY_VERSION, _make_summary(state), provenance, overwrite=True
+    )

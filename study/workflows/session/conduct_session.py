@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import Clock
 from study.devices.device import Device, DeviceInfo, Fault
-from study.devices.opening import onset_line, open_device
+from study.devices.opening import find_onset_line, open_device
 from study.errors import DeviceError
 from study.session.state.state import SessionState
 from study.store.sessions.archive import SessionFolder
@@ -33,7 +33,14 @@ from study.workflows.trial.display import Display, Hand
 from study.workflows.trial.masking import open_masking_sound
 from study.workflows.trial.requests_port import ManyRequests, QueuedRequests, Requests
 from study.workflows.trial.session_supervisor import SessionSupervisor
-from study.workflows.trial.sitting import Pulse, Sitting, Sound, no_pulse, notify_experimenter, report_clock_steps
+from study.workflows.trial.sitting import (
+    Pulse,
+    Sitting,
+    SoundOutput,
+    notify_experimenter,
+    report_clock_steps,
+    send_no_pulse,
+)
 
 
 def _ignore_opened(folder: SessionFolder, device: Device) -> None:
@@ -49,7 +56,7 @@ class Participant:
     clock: Clock
     requests: Requests = field(default_factory=QueuedRequests)
     """Requests from within this program: notes typed at the display, a stop from another screen."""
-    on_opened: Callable[[SessionFolder, Device], None] = _ignore_opened
+    on_session_opened: Callable[[SessionFolder, Device], None] = _ignore_opened
     """Called once with the session, now locked, and the device, which may be stopped from any thread."""
 
 
@@ -61,11 +68,11 @@ class ConductedSitting:
     device_name: str
     """As `open_device` takes it."""
     state: SessionState
-    left: str
+    end_reason: str
     """Why the sitting ended before the session was finished; empty if it is finished."""
     fault: Fault
     """The device fault, if that was why."""
-    why: str = ""
+    fault_text: str = ""
     """The driver's words about it, where there are any."""
     withdrawn: bool = False
     """The participant withdrew consent: the caller erases the data."""
@@ -82,8 +89,8 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
     ):
         _check_sensor(plan.protocol, device.info)
         equalized = equalize_stimuli(plan.protocol, plan.model, device.info)
-        with open_session(plan, device.info, equalized, participant.clock) as opened:
-            return _run(opened, Equipment(device_name, device, equalized, pulse, sound), participant)
+        with open_session(plan, device.info, equalized, participant.clock) as opened_session:
+            return _run(opened_session, Equipment(device_name, device, equalized, pulse, sound), participant)
 
 
 def conduct_resumed(folder: SessionFolder, device_name: str, participant: Participant) -> ConductedSitting:
@@ -99,9 +106,11 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
     ):
         _check_sensor(state.protocol, device.info)
         equalized = reload_equalizer(folder, state, device.info)
-        with resume_session(folder, device.info, participant.clock) as opened:
+        with resume_session(folder, device.info, participant.clock) as opened_session:
             known_steps = len(state.sitting.clock_steps)
-            return _run(opened, Equipment(device_name, device, equalized, pulse, sound), participant, known_steps)
+            return _run(
+                opened_session, Equipment(device_name, device, equalized, pulse, sound), participant, known_steps
+            )
 
 
 def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
@@ -117,9 +126,9 @@ def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
 @contextlib.contextmanager
 def _pulses(clock: Clock) -> Iterator[Callable[[], Pulse | None]]:
     """Trigger line of the lab; none in virtual time, which passes faster than a recorder's."""
-    line = None if clock.virtual else onset_line()
+    line = None if clock.virtual else find_onset_line()
     try:
-        yield no_pulse if line is None else line.pulse
+        yield send_no_pulse if line is None else line.pulse
     finally:
         if line is not None:
             line.close()
@@ -134,15 +143,15 @@ class Equipment:
     device: Device
     equalized: Equalized
     pulse: Callable[[], Pulse | None]
-    sound: Sound | None
+    sound: SoundOutput | None
 
 
 def _run(
-    opened: OpenedSession, equipment: Equipment, participant: Participant, known_steps: int = 0
+    opened_session: OpenedSession, equipment: Equipment, participant: Participant, known_steps: int = 0
 ) -> ConductedSitting:
     """Run the session. known_steps: clock steps before this sitting; only new ones are reported."""
-    folder, protocol, device = opened.folder, opened.state.protocol, equipment.device
-    participant.on_opened(folder, device)
+    folder, protocol, device = opened_session.folder, opened_session.state.protocol, equipment.device
+    participant.on_session_opened(folder, device)
     place_m = device_settings(protocol).place_m
     inbox = RequestInbox(folder.path)
     supervisor = SessionSupervisor(
@@ -155,7 +164,7 @@ def _run(
     )
     sitting = Sitting(
         folder=folder,
-        log=opened.log,
+        log=opened_session.log,
         clock=participant.clock,
         device=device,
         equalizer=equipment.equalized.equalizer,
@@ -164,12 +173,14 @@ def _run(
         supervisor=supervisor,
         place_m=place_m,
         pulse=equipment.pulse,
-        sound=equipment.sound,
+        masking_noise=equipment.sound,
     )
-    report_clock_steps(opened.state.sitting.clock_steps[known_steps:], sitting)
-    for name in opened.state.sitting.not_counted:
+    report_clock_steps(opened_session.state.sitting.clock_steps[known_steps:], sitting)
+    for name in opened_session.state.sitting.unread_sessions:
         notify_experimenter(
             f"{name} cannot be read: what the hand got in it is not in the vibration dose of today.", sitting
         )
-    end = run_session(opened.state, sitting)
-    return ConductedSitting(folder, equipment.device_name, end.state, end.left, end.fault, end.why, end.withdrawn)
+    end = run_session(opened_session.state, sitting)
+    return ConductedSitting(
+        folder, equipment.device_name, end.state, end.end_reason, end.fault, end.fault_text, end.withdrawn
+    )

@@ -14,7 +14,7 @@ from study.store.sessions.archive import SessionFolder
 from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.results.analysis_files import ANALYSIS_NAME, is_analysis_of
 from study.workflows.results.fold_session import FoldedSession
-from study.workflows.results.session_results import REPORT_NAME, due_results, finish_tables, write_tables
+from study.workflows.results.session_results import REPORT_NAME, finish_tables, list_due_results, write_tables
 from study.workflows.results.write_results import write_results
 from study.workflows.results.written_analysis import WrittenAnalysis
 from study.workflows.session.conduct_session import ConductedSitting
@@ -34,28 +34,30 @@ def end_sitting(end: ConductedSitting, utc: str) -> WrittenAnalysis:
     participant who does not take part, and for an unfinished session, with the command to continue."""
     if end.withdrawn:
         raise _erase_withdrawn(end, utc)
-    if end.state.turned_away_for_good:
+    if end.state.is_finally_ineligible:
         write_tables(end.folder)
         raise does_not_take_part(end.state)
-    if end.left:
+    if end.end_reason:
         raise _not_finished(end)
     return write_results(end.folder)
 
 
-def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalysis:
+def finish_closed(folder: SessionFolder, folded_session: FoldedSession) -> WrittenAnalysis:
     """Write the results of a closed session that are missing or out of date, for example because the program was killed
     after the last run. Raises StudyError where none is, or where they cannot be written."""
-    if folded.state.turned_away_for_good:
-        finish_tables(folder, folded)
-        raise does_not_take_part(folded.state)
+    if folded_session.state.is_finally_ineligible:
+        finish_tables(folder, folded_session)
+        raise does_not_take_part(folded_session.state)
     report = () if is_analysis_of(folder.path / ANALYSIS_NAME, folder.log) else (REPORT_NAME,)
-    due = (*due_results(folder, folded), *report)
-    if not due:
-        raise already_finished(folded.state, folder)
+    due_files = (*list_due_results(folder, folded_session), *report)
+    if not due_files:
+        raise already_finished(folded_session.state, folder)
     with hold_session_lock(folder.path):
-        written = write_results(folder)
-    text = f"{folder.name} had all its runs already; written now, because missing or out of date: {', '.join(due)}."
-    return replace(written, warnings=(text, *written.warnings))
+        analysis = write_results(folder)
+    text = (
+        f"{folder.name} had all its runs already; written now, because missing or out of date: {', '.join(due_files)}."
+    )
+    return replace(analysis, warnings=(text, *analysis.warnings))
 
 
 def _not_finished(end: ConductedSitting) -> StudyError:
@@ -65,12 +67,13 @@ def _not_finished(end: ConductedSitting) -> StudyError:
         f"Run hapteq doctor --device {end.device_name}, which says what is wrong with it, and correct that. "
     )
     advice = device_advice if end.fault in DEVICE_FAULTS else ""
-    if end.left.startswith(TOO_BUSY):
+    if end.end_reason.startswith(TOO_BUSY):
         advice = BUSY_ADVICE
     option = "" if end.device_name == SIMULATED else f" --device {end.device_name}"
     return kind(
         "The session is not finished",
-        f"The sitting ended: {end.left}.{f' {end.why[0].upper()}{end.why[1:]}.' if end.why else ''}",
+        f"The sitting ended: {end.end_reason}."
+        f"{f' {end.fault_text[0].upper()}{end.fault_text[1:]}.' if end.fault_text else ''}",
         f"{advice}Continue with: hapteq resume {end.folder.path}{option}",
         saved=f"{answers_are(end.state.answers)} on disk.",
     )
@@ -79,10 +82,10 @@ def _not_finished(end: ConductedSitting) -> StudyError:
 def _erase_withdrawn(end: ConductedSitting, utc: str) -> StudyError:
     """Erase everything recorded of the participant; returns the error to raise, which lists the erased sessions."""
     data, plan = end.folder.path.parent, plan_withdrawal(end.folder)
-    elsewhere = copies_elsewhere(data, plan)
+    external_copies = copies_elsewhere(data, plan)
     withdraw(data, plan, utc)
     return UserInterruptError(
         "The participant withdrew",
         f"Everything recorded of {plan.subject} was erased: {', '.join(plan.sessions)}.",
-        " ".join((*plan.doubtful, *elsewhere)),
+        " ".join((*plan.doubtful, *external_copies)),
     )

@@ -22,8 +22,8 @@ from study.errors import StudyError
 from study.regular_file import read_regular
 from study.session.facts.level_scale import EqualizedFacts, LevelScale
 from study.session.state.state import SessionState
-from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, highest_level_n, limits_of_study
-from study.session.stimulus.stimulus import direction_vector, held_stimulus
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, highest_level_n, make_study_limits
+from study.session.stimulus.stimulus import direction_vector, make_held_stimulus
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.provenance import sha256_of
 from study.store.formats.identified_model_file import read_identified_model
@@ -140,9 +140,9 @@ def _hardest(
 ) -> float:
     """Level (N) for 1 m/s^2: the peak force or, if the slew limit is reached before the cap, the level that makes the
     stimulus reach both together: (slew rate of the force / slew limit without the spring's share) x highest level."""
-    limits = limits_of_study(protocol)
+    limits = make_study_limits(protocol)
     vector = direction_vector(protocol.directions, direction)
-    stimulus = held_stimulus(protocol.stimulus, vector, frequency_hz, 1.0, equalizer, rate_hz)
+    stimulus = make_held_stimulus(protocol.stimulus, vector, frequency_hz, 1.0, equalizer, rate_hz)
     forces = stimulus.played_once_then_loop
     steps = np.diff(np.concatenate([np.zeros((1, 3)), forces, stimulus.loop.samples[:1]]), axis=0)
     slewing_n = _largest(steps) * rate_hz / (limits.slew_n_per_s - SPRING_SLEW_N_PER_S) * highest_level_n(protocol)
@@ -165,8 +165,8 @@ def _equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: DeviceInfo
             "Identify it from recordings of this device.",
         )
     stiffness = info.effective_mass_kg * (2 * math.pi * protocol.spring.natural_frequency_hz) ** 2
-    acting = VirtualSpring(stiffness, protocol.spring.damping_n_s_per_m)
-    return ModelEqualizer(model, spring_outside_model(model, acting))
+    spring = VirtualSpring(stiffness, protocol.spring.damping_n_s_per_m)
+    return ModelEqualizer(model, spring_outside_model(model, spring))
 
 
 def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
@@ -199,10 +199,11 @@ def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
 def _check_axes(model: IdentifiedModel, path: Path) -> None:
     """Raise StudyError for the channel names of `AXES` in another order, with which forces would act along wrong axes.
     Other names are accepted."""
-    for names, ours in zip((model.input_channels, model.output_channels), AXES, strict=True):
-        if set(names) == set(ours) and names != ours:
+    for names, required in zip((model.input_channels, model.output_channels), AXES, strict=True):
+        if set(names) == set(required) and names != required:
             raise _refusal(
-                f"The channels of {path} are {', '.join(names)}; a stimulus has them in the order {', '.join(ours)}.",
+                f"The channels of {path} are {', '.join(names)}; a stimulus has them in the order "
+                f"{', '.join(required)}.",
                 "Identify a model from a recording whose channels are in that order.",
             )
 
@@ -214,18 +215,18 @@ def _check_reach(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
     from equalizer.tracking.feedforward.periodic_inverse import inverse_response
 
     frequency_hz = np.array(protocol.all_frequencies_hz)
-    wanted = np.stack([direction_vector(protocol.directions, direction) for direction in (1, 2)], axis=1)
+    unit_vectors = np.stack([direction_vector(protocol.directions, direction) for direction in (1, 2)], axis=1)
     with np.errstate(all="ignore"):
-        reached = model_response(model, frequency_hz) @ inverse_response(model, frequency_hz) @ wanted
-        left_out = np.linalg.norm(reached - wanted, axis=1).max(axis=1)
-    beyond = [f"{f:g}" for f, share in zip(frequency_hz, left_out, strict=True) if not share <= LARGEST_ERROR]
-    if beyond:
+        predicted = model_response(model, frequency_hz) @ inverse_response(model, frequency_hz) @ unit_vectors
+        errors = np.linalg.norm(predicted - unit_vectors, axis=1).max(axis=1)
+    unreachable = [f"{f:g}" for f, error in zip(frequency_hz, errors, strict=True) if not error <= LARGEST_ERROR]
+    if unreachable:
         raise _refusal(
-            f"According to {path}, no reasonable force gives the wanted acceleration at {', '.join(beyond)} Hz.",
+            f"According to {path}, no reasonable force gives the wanted acceleration at {', '.join(unreachable)} Hz.",
             "Check units and axes of the recording it was made from, and identify it again.",
         )
 
 
-def _refusal(happened: str, do_now: str) -> StudyError:
+def _refusal(explanation: str, advice: str) -> StudyError:
     """Error for a model that cannot equalize the study, raised before anything moves."""
-    return StudyError("This model cannot equalize the study", happened, do_now, saved="Nothing moved.")
+    return StudyError("This model cannot equalize the study", explanation, advice, saved="Nothing moved.")

@@ -16,7 +16,7 @@ from study.devices.device import DeviceInfo
 from study.session.facts.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
 from study.session.state.rules import LATEST
 from study.session.state.state import SessionState, begin_session
-from study.store.disk.provenance import versions
+from study.store.disk.provenance import list_versions
 from study.store.sessions.archive import SessionFolder, new_session_folder
 from study.store.sessions.event_log import EventLog
 from study.store.sessions.session_lock import hold_session_lock
@@ -52,8 +52,8 @@ class OpenedSession:
     state: SessionState
 
 
-def fresh_seed() -> int:
-    """A random seed of 32 bits, from the operating system."""
+def draw_seed() -> int:
+    """Draw a random seed of 32 bits from the operating system."""
     return secrets.randbits(32)
 
 
@@ -66,7 +66,7 @@ def open_session(plan: SessionPlan, device: DeviceInfo, equalized: Equalized, cl
         number = participant_number(plan.data, plan.subject, plan.protocol.name, plan.observer is not None)
     folder = new_session_folder(plan.data, plan.subject)
     utc = clock.utc()
-    opened = SessionOpened(
+    session_opened = SessionOpened(
         utc=utc,
         format=SESSION_FORMAT,
         version=SESSION_VERSION,
@@ -78,9 +78,9 @@ def open_session(plan: SessionPlan, device: DeviceInfo, equalized: Equalized, cl
         protocol_hash=protocol_hash(plan.protocol),
         protocol_locked=plan.protocol_locked,
         seed=plan.seed,
-        device=device_facts(device),
+        device=collect_device_facts(device),
         equalizer=equalized.equalizer.name,
-        versions=versions(),
+        versions=list_versions(),
         equalized=equalized.facts,
         monotonic_s=clock.now_s(),
         dose_elsewhere=dose_before(folder, plan.observer, device.simulated, utc),
@@ -90,13 +90,13 @@ def open_session(plan: SessionPlan, device: DeviceInfo, equalized: Equalized, cl
         keep_model(equalized, folder)
         log = EventLog.create(folder.log)
         try:
-            log.append(opened)
-            yield OpenedSession(folder, log, begin_session(opened, plan.protocol))
+            log.append(session_opened)
+            yield OpenedSession(folder, log, begin_session(session_opened, plan.protocol))
         finally:
             log.close()
 
 
-def device_facts(info: DeviceInfo) -> DeviceFacts:
+def collect_device_facts(info: DeviceInfo) -> DeviceFacts:
     """Facts about the device, as the log keeps them when a session is opened or resumed."""
     return DeviceFacts(
         name=info.name, simulated=info.simulated, sample_rate_hz=info.sample_rate_hz, details=info.details

@@ -2,14 +2,14 @@
 
 from study.errors import StudyError
 from study.session.facts.sitting_events import DoseElsewhere
-from study.session.state.daily_dose import dose_elsewhere
+from study.session.state.daily_dose import find_dose_elsewhere
 from study.session.state.sitting_state import SittingState
-from study.store.sessions.archive import SessionFolder, session_folders
+from study.store.sessions.archive import SessionFolder, list_session_folders
 from study.workflows.results.fold_session import fold_session
 
 
 def dose_before(folder: SessionFolder, observer: str | None, simulated: bool, utc: str) -> DoseElsewhere | None:
-    """Dose from this participant's other sessions since the last rest of a night's length (see `dose_elsewhere`).
+    """Dose from this participant's other sessions since the last rest of a night's length (see `find_dose_elsewhere`).
 
     Only sessions on the same kind of device (real or simulated) count. An unreadable session is named in the result and
     not counted. None for a simulated participant, and where no other session counts and all were read.
@@ -18,16 +18,16 @@ def dose_before(folder: SessionFolder, observer: str | None, simulated: bool, ut
         return None
     sittings: dict[str, SittingState] = {}
     unread: list[str] = []
-    for other in session_folders(folder.path.parent):
-        if other.subject != folder.subject:
+    for other_folder in list_session_folders(folder.path.parent):
+        if other_folder.subject != folder.subject:
             continue
         try:
-            if other.withdrawn or not other.log.exists():
+            if other_folder.withdrawn or not other_folder.log.exists():
                 continue
-            state = fold_session(other).state
+            state = fold_session(other_folder).state
         except (StudyError, OSError):
-            unread.append(other.name)
+            unread.append(other_folder.name)
             continue
         if state.opened.observer is None and state.opened.device.simulated == simulated:
-            sittings[other.name] = state.sitting
-    return dose_elsewhere(sittings, folder.name, utc, tuple(unread))
+            sittings[other_folder.name] = state.sitting
+    return find_dose_elsewhere(sittings, folder.name, utc, tuple(unread))

@@ -12,15 +12,15 @@ from study.errors import StudyError
 from study.regular_file import read_regular
 from study.session.facts.events import PlaceTaken, SessionOpened, parse_event
 from study.session.facts.log_chain import Chain, read_chained
-from study.session.state.rules import place_comes_later
+from study.session.state.rules import is_place_assigned_later
 from study.session.state.state import SessionState
-from study.store.sessions.archive import SessionFolder, session_folders
+from study.store.sessions.archive import SessionFolder, list_session_folders
 from study.store.sessions.event_log import read_opening
 from study.store.sessions.session_lock import hold_places_lock
-from study.store.sessions.withdrawal_files import SessionParticipant, read_begun, read_intent
-from study.workflows.trial.sitting import Sitting, record
+from study.store.sessions.withdrawal_files import SessionParticipant, read_intent, read_participant
+from study.workflows.trial.sitting import Sitting, log_and_apply
 
-PLACED = b'"event":"place_taken"'
+PLACE_TAKEN = b'"event":"place_taken"'
 """Bytes of a log line whose event assigns the participant number."""
 NUMBER = re.compile(rb'"participant_number":(\d{1,6})\b')
 """Participant number in a log: in the first line, or in the event that replaces it. The last occurrence counts."""
@@ -40,13 +40,17 @@ def participant_number(data: Path, subject: str, protocol: str, simulated: bool)
     stay taken, so that no row of the balanced order is assigned twice.
     """
     numbers = []
-    for folder in session_folders(data):
-        begun = read_begun_participant(folder)
-        if begun is None or begun.number is None or (begun.protocol, begun.simulated) != (protocol, simulated):
+    for folder in list_session_folders(data):
+        participant = read_begun_participant(folder)
+        if (
+            participant is None
+            or participant.number is None
+            or (participant.protocol, participant.simulated) != (protocol, simulated)
+        ):
             continue
         if folder.subject == subject and not folder.withdrawn:
-            return begun.number
-        numbers.append(begun.number)
+            return participant.number
+        numbers.append(participant.number)
     return max(numbers, default=-1) + 1
 
 
@@ -54,18 +58,18 @@ def read_begun_participant(folder: SessionFolder) -> SessionParticipant | None:
     """Protocol, kind and number of a session's participant, from its tombstone, a withdrawal that was begun, or its
     log. None if no session was begun or nothing can be read."""
     if folder.tombstone.exists():
-        return read_begun(folder)
+        return read_participant(folder)
     intent = read_intent(folder.path.parent, folder.subject)
     if intent is not None and folder.name in intent.sessions:
         return intent.sessions[folder.name]
     try:
-        opening = read_opening(folder.log)
-        if not isinstance(opening, SessionOpened):
+        session_opened = read_opening(folder.log)
+        if not isinstance(session_opened, SessionOpened):
             return None
-        name = tomllib.loads(opening.protocol_text).get("name", "")
+        name = tomllib.loads(session_opened.protocol_text).get("name", "")
     except (StudyError, OSError, TypeError, ValueError, RecursionError):
         return _begun_in_damaged(folder)
-    return SessionParticipant(name, opening.observer is not None, _read_place(folder, opening))
+    return SessionParticipant(name, session_opened.observer is not None, _read_place(folder, session_opened))
 
 
 def _begun_in_damaged(folder: SessionFolder) -> SessionParticipant | None:
@@ -75,39 +79,39 @@ def _begun_in_damaged(folder: SessionFolder) -> SessionParticipant | None:
         content = read_regular(folder.log)
     except OSError:
         return None
-    opening = content.partition(b"\n")[0]
-    name, numbers = PROTOCOL_NAME.search(opening), NUMBER.findall(content)
+    first_line = content.partition(b"\n")[0]
+    name, numbers = PROTOCOL_NAME.search(first_line), NUMBER.findall(content)
     if name is None or not numbers:
         return None
-    return SessionParticipant(name[1].decode(errors="replace"), OF_A_PERSON not in opening, int(numbers[-1]))
+    return SessionParticipant(name[1].decode(errors="replace"), OF_A_PERSON not in first_line, int(numbers[-1]))
 
 
-def _read_place(folder: SessionFolder, opening: SessionOpened) -> int | None:
+def _read_place(folder: SessionFolder, session_opened: SessionOpened) -> int | None:
     """Participant number from the lines before the first trial, so that the rest of a long log is not parsed. None if
     it was not assigned yet, or the log cannot be read."""
-    if not place_comes_later(opening):
-        return opening.participant_number
+    if not is_place_assigned_later(session_opened):
+        return session_opened.participant_number
     chain = Chain()
     try:
         for line in read_regular(folder.log).split(b"\n")[:-1]:
             if PRESENTED in line:
-                return opening.participant_number
+                return session_opened.participant_number
             chain, event = read_chained(chain, line)
-            if PLACED in line and isinstance(place := parse_event(event), PlaceTaken):
+            if PLACE_TAKEN in line and isinstance(place := parse_event(event), PlaceTaken):
                 return place.participant_number
     except OSError:
         return None
     except ValueError:  # damaged before the first trial: the number expected at the opening was most likely assigned
-        return opening.participant_number
+        return session_opened.participant_number
     return None
 
 
 def take_place(state: SessionState, sitting: Sitting) -> SessionState:
     """Assign the participant number and log it, once, after the preparation was passed; otherwise the state is
     unchanged. A lock of the data folder prevents that two programs assign the same number. Raises StudyError."""
-    if not place_comes_later(state.opened) or state.takes_part:
+    if not is_place_assigned_later(state.opened) or state.has_final_place:
         return state
     data = sitting.folder.path.parent
     with hold_places_lock(data):
         number = participant_number(data, state.opened.subject, state.protocol.name, simulated=False)
-        return record(state, PlaceTaken(utc=sitting.clock.utc(), participant_number=number), sitting)
+        return log_and_apply(state, PlaceTaken(utc=sitting.clock.utc(), participant_number=number), sitting)

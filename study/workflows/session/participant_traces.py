@@ -63,9 +63,9 @@ def find_traces(data: Path, subject: str, proved: Collection[str] = ()) -> Trace
         elif path.is_symlink() and path.name == ANALYSIS_NAME:
             doubtful.append(f"{path.name} is a link; what it leads to was not looked at.")
     for folder in (data, *(p for p in sorted(data.iterdir()) if _may_hold_analysis(p))):
-        found, unclear = _analysis_traces(folder, subject, alone=folder != data)
-        derived += [path.relative_to(data).as_posix() for path in found]
-        doubtful += [f"{path.relative_to(data)} does not say whose numbers it holds." for path in unclear]
+        proved_paths, doubtful_paths = _analysis_traces(folder, subject, is_separate=folder != data)
+        derived += [path.relative_to(data).as_posix() for path in proved_paths]
+        doubtful += [f"{path.relative_to(data)} does not say whose numbers it holds." for path in doubtful_paths]
     doubtful += [
         f"{path.name} names {subject}."
         for path in sorted(data.iterdir())
@@ -79,8 +79,8 @@ def is_session_of(path: Path, subject: str) -> bool:
     if not is_real_folder(path):
         return False
     folder = SessionFolder(path)
-    if (opening := _read_opening(folder)) is not None:
-        return opening == (path.name, subject)
+    if (identity := _read_opening(folder)) is not None:
+        return identity == (path.name, subject)
     return is_real_file(folder.tombstone) and read_tombstone(folder).get("session") == path.name
 
 
@@ -89,20 +89,20 @@ def _was_session(path: Path) -> bool:
     tombstone, and unfinished files."""
     if not is_real_folder(path):
         return False
-    names = {inner.name for inner in path.iterdir() if PART.fullmatch(inner.name) is None}
+    names = {entry.name for entry in path.iterdir() if PART.fullmatch(entry.name) is None}
     return names <= {LOCK_NAME, TOMBSTONE_NAME}
 
 
 def analysis_names(folder: Path, subject: str) -> bool | None:
     """Whether the analysis in this folder contains this subject; None if that cannot be determined."""
-    found = [_rows_name(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
-    found.append(_statistics_name(folder / "anova.json", subject))
-    if any(found):
+    results = [_rows_name(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
+    results.append(_statistics_name(folder / "anova.json", subject))
+    if any(results):
         return True
     figure = re.compile(rf"(staircases|psychometric)-\d+-{re.escape(subject)}\.(svg|png)")
     if any(figure.fullmatch(path.name) for path in analysis_outputs(folder)):
         return True
-    return None if all(each is None for each in found) else False
+    return None if all(result is None for result in results) else False
 
 
 def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:
@@ -111,10 +111,10 @@ def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:
         return None
     try:
         with open_regular(folder.log) as file:
-            opening = json.loads(file.readline(LONGEST_LINE))
+            first_event = json.loads(file.readline(LONGEST_LINE))
     except (OSError, ValueError, RecursionError):
         return None
-    return (opening.get("session"), opening.get("subject")) if isinstance(opening, dict) else None
+    return (first_event.get("session"), first_event.get("subject")) if isinstance(first_event, dict) else None
 
 
 def _no_session(path: Path, subject: str) -> str:
@@ -126,8 +126,8 @@ def _no_session(path: Path, subject: str) -> str:
 
 def _strange_folder(path: Path, subject: str) -> Iterator[str]:
     """Sentence on a folder with another name that holds a log or a diagnosis of the subject."""
-    opening = _read_opening(SessionFolder(path))
-    if opening is not None and opening[1] == subject:
+    identity = _read_opening(SessionFolder(path))
+    if identity is not None and identity[1] == subject:
         yield f"{path.name} holds a log of {subject} under another name: it was copied or renamed."
     elif _names(path / "diagnosis.json", subject):
         yield f"{path.name} holds a diagnosis that names {subject}."
@@ -138,21 +138,24 @@ def _may_hold_analysis(path: Path) -> bool:
     return is_real_folder(path) and FOLDER.fullmatch(path.name) is None and PART.fullmatch(path.name) is None
 
 
-def _analysis_traces(folder: Path, subject: str, alone: bool) -> tuple[list[Path], list[Path]]:
-    """Proved and doubtful paths among the files of the analysis in `folder` and its unfinished files. alone: `folder`
-    is not the data folder itself, so that its unfinished files belong to the analysis."""
+def _analysis_traces(folder: Path, subject: str, is_separate: bool) -> tuple[list[Path], list[Path]]:
+    """Proved and doubtful paths among the files of the analysis in `folder` and its unfinished files. is_separate:
+    `folder` is not the data folder itself, so that its unfinished files belong to the analysis."""
     files = list(analysis_outputs(folder))
-    whose = analysis_names(folder, subject) if files else False
-    found, unclear = (files if whose else []), (files if whose is None and folder.name == ANALYSIS_NAME else [])
+    names_subject = analysis_names(folder, subject) if files else False
+    proved_paths, doubtful_paths = (
+        (files if names_subject else []),
+        (files if names_subject is None and folder.name == ANALYSIS_NAME else []),
+    )
     places = [folder, *([folder / "figures"] if is_real_folder(folder / "figures") else [])]
     for path in (path for place in places for path in sorted(place.iterdir())):
         if PART.fullmatch(path.name) is None or path.is_symlink():
             continue
-        if (whose and alone) or _names(path, subject):
-            found.append(path)
+        if (names_subject and is_separate) or _names(path, subject):
+            proved_paths.append(path)
         else:
-            unclear.append(path)
-    return found, unclear
+            doubtful_paths.append(path)
+    return proved_paths, doubtful_paths
 
 
 def _rows_name(table: Path, subject: str) -> bool | None:
@@ -195,7 +198,7 @@ def _names(path: Path, subject: str) -> bool:
     if session.search(path.name):
         return True
     if is_real_folder(path):
-        return any(_names(inner, subject) for inner in sorted(path.iterdir()))
+        return any(_names(entry, subject) for entry in sorted(path.iterdir()))
     return path.suffix in TEXTS and session.search(_text(path) or "") is not None
 
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from study.errors import StudyError, WrongUseError
 from study.store.disk.privacy import data_folder_warning
 from study.store.formats.protocol_files import read_study_protocol
-from study.store.sessions.archive import SessionFolder, check_subject, session_folders
+from study.store.sessions.archive import SessionFolder, check_subject, list_session_folders
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.equalize_stimuli import check_playable
-from study.workflows.session.open_session import SessionPlan, fresh_seed
+from study.workflows.session.open_session import SessionPlan, draw_seed
 from study.workflows.session.participant_number import read_begun_participant
 
 
@@ -26,33 +26,35 @@ def check_code(data: Path, subject: str, simulated: bool) -> None:
                 f"The participant of {folder.name} withdrew, and {folder.erased_words}.",
                 "Use a new code: this one is not given again.",
             )
-        begun = read_begun_participant(folder)
-        if begun is not None and begun.simulated != simulated:
-            whose, other = ("a person", "simulated") if simulated else ("a simulated participant", "a person's")
+        participant = read_begun_participant(folder)
+        if participant is not None and participant.simulated != simulated:
+            existing_kind, new_kind = (
+                ("a person", "simulated") if simulated else ("a simulated participant", "a person's")
+            )
             raise WrongUseError(
-                f"{subject} is the code of {whose}",
-                f"{folder.name} holds sessions of {whose}; {other} answers must not be filed under it.",
+                f"{subject} is the code of {existing_kind}",
+                f"{folder.name} holds sessions of {existing_kind}; {new_kind} answers must not be filed under it.",
                 "Use another code (--subject), or another data folder (--data).",
             )
 
 
 def find_unfinished_sessions(data: Path, subject: str, protocol: str) -> tuple[SessionFolder, ...]:
     """Sessions of this participant and protocol that can be resumed."""
-    return tuple(folder for folder in _folders(data, subject) if _can_go_on(folder, protocol))
+    return tuple(folder for folder in _folders(data, subject) if _is_resumable(folder, protocol))
 
 
 def _folders(data: Path, subject: str) -> tuple[SessionFolder, ...]:
     """Session folders of a participant code."""
-    return tuple(folder for folder in session_folders(data) if folder.subject == subject)
+    return tuple(folder for folder in list_session_folders(data) if folder.subject == subject)
 
 
-def _can_go_on(folder: SessionFolder, protocol: str) -> bool:
+def _is_resumable(folder: SessionFolder, protocol: str) -> bool:
     """Whether the session can be read, follows this protocol, and is neither closed nor refused."""
     try:
         state = fold_session(folder).state
     except StudyError:
         return False
-    return not state.closed and not state.sitting.turned_away and state.protocol.name == protocol
+    return not state.closed and not state.sitting.ineligibility and state.protocol.name == protocol
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +78,7 @@ def plan_sitting(
         protocol_locked=source.locked,
         subject=check_subject(subject),
         observer=observer,
-        seed=fresh_seed() if seed is None else seed,
+        seed=draw_seed() if seed is None else seed,
         data=data,
         model=model,
     )

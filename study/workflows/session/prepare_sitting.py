@@ -8,29 +8,29 @@ from dataclasses import replace
 
 from study.errors import StudyError
 from study.session.facts.events import DeviceChecked, FormFilled, SessionClosed
-from study.session.state.machine import CheckDevice, FillIn, Leave, next_preparation
+from study.session.state.machine import CheckDevice, EndSitting, FillIn, next_preparation
 from study.session.state.state import SessionState
-from study.session.views.archive_views import TURNED_AWAY
+from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.views.form_views import Form, FormKind
-from study.session.views.forms import confirmation_of, is_confirmed, judge_form, words_of
+from study.session.views.forms import is_confirmed, judge_form, make_confirmation, make_words
 from study.session.views.views import DeviceFinding
 from study.session.watching.requests import NoteAsked
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_timing import check_computer
 from study.workflows.checks.computer_load import load_per_processor
 from study.workflows.checks.daily_check import last_check
-from study.workflows.trial.sitting import Sitting, record, write_notes
+from study.workflows.trial.sitting import Sitting, log_and_apply, write_notes
 
 
 def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState, str]:
     """Run all steps of the preparation that are due. Returns the new state, and the reason why the sitting ends before
     the first trial; empty if it continues."""
-    while (due := next_preparation(state)) is not None:
-        match due:
-            case Leave(reason=reason):
+    while (due_step := next_preparation(state)) is not None:
+        match due_step:
+            case EndSitting(reason=reason):
                 return state, reason
             case FillIn(form=form):
-                state = fill_in(state, form, sitting)
+                state = present_form(state, form, sitting)
             case CheckDevice():
                 state = _check_device(state, sitting)
         state = write_notes(state, sitting)
@@ -39,16 +39,16 @@ def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState
     return state, ""
 
 
-def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
+def present_form(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
     """Present a form, and log the outcome. A failed form must be confirmed, and is presented again if it is not. Raises
     ValueError for the form on the handle, which is not logged as a form."""
     if form.kind is FormKind.HANDLE:
         raise ValueError("whether the handle is free is logged with the reference, not as a form")
-    sitting.supervisor.begin("form")
+    sitting.supervisor.start_activity("form")
     reply = sitting.display.fill_in(form)
     outcome = judge_form(state.protocol, form, reply)
     if not outcome.passed:
-        confirmation = confirmation_of(form, reply, words_of(state.protocol))
+        confirmation = make_confirmation(form, reply, make_words(state.protocol))
         if not is_confirmed(confirmation, sitting.display.fill_in(confirmation)):
             # The answer may have been a slip: the form is presented once more and the second answer counts. The first
             # is not stored.
@@ -61,7 +61,7 @@ def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
         passed=outcome.passed,
         answers=outcome.kept,
     )
-    state = record(state, event, sitting)
+    state = log_and_apply(state, event, sitting)
     if outcome.reminder:
         sitting.display.trouble(outcome.reminder)
         sitting.supervisor.note(NoteAsked("program", outcome.reminder))
@@ -71,15 +71,15 @@ def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
 def turn_away(state: SessionState, sitting: Sitting) -> SessionState:
     """Close the session of a participant who refused or was excluded; pending notes and the outcome are logged."""
     state = write_notes(state, sitting)
-    outcome = state.sitting.turned_away or "refused"
-    return record(state, SessionClosed(utc=sitting.clock.utc(), outcome=outcome), sitting)
+    outcome = state.sitting.ineligibility or "refused"
+    return log_and_apply(state, SessionClosed(utc=sitting.clock.utc(), outcome=outcome), sitting)
 
 
 def does_not_take_part(state: SessionState) -> StudyError:
     """The error at the end of the sitting of a person who refused or was excluded, and on an attempt to resume it."""
     return StudyError(
         "This person does not take part",
-        f"{state.opened.session} is over: {TURNED_AWAY[state.sitting.turned_away or 'refused']}.",
+        f"{state.opened.session} is over: {INELIGIBILITY_REASONS[state.sitting.ineligibility or 'refused']}.",
         "Begin a session for the next participant.",
         saved="Nothing was played. Only this outcome is kept, and no place in the order of conditions was taken.",
     )
@@ -88,7 +88,7 @@ def does_not_take_part(state: SessionState) -> StudyError:
 def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     """Check device and computer once, and log the findings and whether the experimenter continues. The preparation
     repeats the check until the experimenter does."""
-    sitting.supervisor.begin("preparing")
+    sitting.supervisor.start_activity("preparing")
     device, clock = sitting.device, sitting.clock
     safety = state.protocol.safety
     report = check_device(device, clock, sitting.place_m, safety.total_cap_n, safety)
@@ -97,9 +97,9 @@ def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     computer = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load)
     daily = () if device.info.simulated else (last_check(device.info, state.protocol.setup.daily_check_needed),)
     report = replace(report, findings=(*report.findings, *computer, *daily))
-    go_on = sitting.display.device_checked(report)
+    is_accepted = sitting.display.device_checked(report)
     findings = tuple(f"{finding.name}: {finding.value}{_finding_text(finding)}" for finding in report.findings)
-    return record(state, DeviceChecked(utc=sitting.clock.utc(), passed=go_on, findings=findings), sitting)
+    return log_and_apply(state, DeviceChecked(utc=sitting.clock.utc(), passed=is_accepted, findings=findings), sitting)
 
 
 def _finding_text(finding: DeviceFinding) -> str:

@@ -15,15 +15,15 @@ from study.devices.clock import VirtualClock
 from study.errors import StudyError, resumable
 from study.participants.observer import Observer
 from study.participants.observers import find_observer
-from study.participants.population import KINDS, member
+from study.participants.population import KINDS, make_member
 from study.store.disk.folder_contents import Files, read_file, read_files, write_files
 from study.store.disk.new_folder import new_folder
 from study.store.disk.privacy import make_folder
 from study.store.disk.provenance import sha256_of
-from study.store.sessions.archive import SessionFolder, session_folders
+from study.store.sessions.archive import SessionFolder, list_session_folders
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import finish_tables, write_tables
-from study.workflows.run_on_executor import run_pieces
+from study.workflows.run_on_executor import run_tasks
 from study.workflows.session.conduct_session import ConductedSitting, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_participant import create_participant
@@ -35,7 +35,7 @@ DEVICE = "simulated"
 
 @dataclass(frozen=True, slots=True)
 class Rehearsal:
-    """Order of `rehearse_study`: protocol, number of participants, seed and output folder."""
+    """Settings of `rehearse_study`."""
 
     protocol: StudyProtocol
     protocol_text: str
@@ -43,7 +43,9 @@ class Rehearsal:
     subjects: int
     """Number of participants."""
     seed: int
+    """Seed of the population and of all draws."""
     data: Path
+    """Folder of the sessions."""
     model: Path | None = None
     """Identified model that equalizes the stimuli."""
     observer: str = "person"
@@ -56,7 +58,7 @@ def make_rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
     """The observer of participant `number` (from 0). Raises StudyError for an unknown name."""
     kind = rehearsal.observer.replace("-", "_")
     if kind in KINDS:
-        return member(kind, number + 1, rehearsal.seed)
+        return make_member(kind, number + 1, rehearsal.seed)
     return find_observer(kind, rehearsal.seed)
 
 
@@ -69,47 +71,53 @@ def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: C
     Raises StudyError where the folder holds a rehearsal of another protocol, seed, observer or model, or where a
     simulated participant did not finish.
     """
-    _check_same(rehearsal)
-    kept = "begun so far" if isinstance(workers, int) else "finished so far"
-    with resumable("The rehearsal is not finished.", f"All sessions {kept} are in {rehearsal.data}."):
+    _require_same_rehearsal(rehearsal)
+    saved_text = "begun so far" if isinstance(workers, int) else "finished so far"
+    with resumable("The rehearsal is not finished.", f"All sessions {saved_text} are in {rehearsal.data}."):
         if isinstance(workers, Executor):
-            _rehearse_elsewhere(rehearsal, workers, on_finished)
+            _rehearse_on_executor(rehearsal, workers, on_finished)
             return
-        every = ((number, (rehearsal, number)) for number in range(rehearsal.subjects))
+        tasks = ((number, (rehearsal, number)) for number in range(rehearsal.subjects))
         with worker_processes(workers) as pool:
-            for done, _ in enumerate(run_pieces(pool, _rehearse_sitting, every), start=1):
-                on_finished(done)
+            for finished_count, _ in enumerate(run_tasks(pool, _rehearse_sitting, tasks), start=1):
+                on_finished(finished_count)
 
 
-def _rehearse_elsewhere(rehearsal: Rehearsal, executor: Executor, on_finished: Callable[[int], None]) -> None:
+def _rehearse_on_executor(rehearsal: Rehearsal, executor: Executor, on_finished: Callable[[int], None]) -> None:
     """Run the sessions on an executor. Sessions that were begun in the folder are finished in this process first."""
-    held = session_folders(rehearsal.data)
-    begun = {number for number in range(rehearsal.subjects) if any(f.subject == subject_code(number) for f in held)}
+    folders = list_session_folders(rehearsal.data)
+    begun_numbers = {
+        number
+        for number in range(rehearsal.subjects)
+        if any(folder.subject == make_subject_code(number) for folder in folders)
+    }
     model = {} if rehearsal.model is None else read_file(rehearsal.model)
-    left = [number for number in range(rehearsal.subjects) if number not in begun]
-    for done, number in enumerate(sorted(begun), start=1):
+    remaining = [number for number in range(rehearsal.subjects) if number not in begun_numbers]
+    for finished_count, number in enumerate(sorted(begun_numbers), start=1):
         _rehearse_sitting(rehearsal, number)
-        on_finished(done)
-    played = run_pieces(executor, play_apart, ((each, (rehearsal, model, each)) for each in left))
-    for done, (_, (session, files, why)) in enumerate(played, start=len(begun) + 1):
+        on_finished(finished_count)
+    results = run_tasks(
+        executor, play_on_worker, ((participant, (rehearsal, model, participant)) for participant in remaining)
+    )
+    for finished_count, (_, (session, files, end_reason)) in enumerate(results, start=len(begun_numbers) + 1):
         make_folder(rehearsal.data, private=True)
-        with new_folder(rehearsal.data / session) as part:
-            write_files(part, files)
-        _require_finished(session, why)
-        on_finished(done)
+        with new_folder(rehearsal.data / session) as new_session_folder:
+            write_files(new_session_folder, files)
+        _require_finished(session, end_reason)
+        on_finished(finished_count)
 
 
-def subject_code(number: int) -> str:
+def make_subject_code(number: int) -> str:
     """Participant code of a simulated participant; `number` counts from 0, the code from S001."""
     return f"S{number + 1:03d}"
 
 
-def codes(subjects: int) -> set[str]:
+def list_subject_codes(subjects: int) -> set[str]:
     """Participant codes of the first `subjects` simulated participants."""
-    return {subject_code(number) for number in range(subjects)}
+    return {make_subject_code(number) for number in range(subjects)}
 
 
-def subject_seed(seed: int, number: int) -> int:
+def derive_subject_seed(seed: int, number: int) -> int:
     """Seed of one participant: a hash of the rehearsal's seed and the number, so that rehearsals with consecutive seeds
     have no participant in common."""
     from numpy.random import SeedSequence
@@ -121,41 +129,45 @@ def _rehearse_sitting(rehearsal: Rehearsal, number: int) -> None:
     """Run or resume the session of one participant and write its tables; nothing is done for a withdrawn participant.
     Raises StudyError where it does not finish."""
     observer = make_rehearsed_observer(rehearsal, number)
-    seed = subject_seed(rehearsal.seed, number)
-    if any(f.withdrawn for f in session_folders(rehearsal.data) if f.subject == subject_code(number)):
+    seed = derive_subject_seed(rehearsal.seed, number)
+    if any(
+        folder.withdrawn
+        for folder in list_session_folders(rehearsal.data)
+        if folder.subject == make_subject_code(number)
+    ):
         return
-    begun = _find_begun(rehearsal.data, subject_code(number))
-    if begun is None:
-        conducted = _play_new(rehearsal, number)
-    elif (folded := fold_session(begun)).state.closed:
-        finish_tables(begun, folded)
+    begun_session = _find_begun_session(rehearsal.data, make_subject_code(number))
+    if begun_session is None:
+        conducted = _play_new_session(rehearsal, number)
+    elif (folded_session := fold_session(begun_session)).state.closed:
+        finish_tables(begun_session, folded_session)
         return
     else:
-        clock = VirtualClock.not_before(folded.state.sitting.last.utc)
-        conducted = conduct_resumed(begun, DEVICE, create_participant(observer, seed, clock))
+        clock = VirtualClock.resume_at(folded_session.state.sitting.last.utc)
+        conducted = conduct_resumed(begun_session, DEVICE, create_participant(observer, seed, clock))
     write_tables(conducted.folder)
-    _require_finished(conducted.folder.name, conducted.left)
+    _require_finished(conducted.folder.name, conducted.end_reason)
 
 
-def play_apart(rehearsal: Rehearsal, model: Files, number: int) -> tuple[str, Files, str]:
+def play_on_worker(rehearsal: Rehearsal, model: Files, number: int) -> tuple[str, Files, str]:
     """Run a new session in a temporary folder of a worker. model: content of the model's file, by name. Returns the
     name of the session, its files, and why it ended early (empty if it finished)."""
-    with TemporaryDirectory() as place:
-        write_files(Path(place), model)
-        path = None if rehearsal.model is None else Path(place) / rehearsal.model.name
-        conducted = _play_new(replace(rehearsal, data=Path(place) / "data", model=path), number)
+    with TemporaryDirectory() as temporary_folder:
+        write_files(Path(temporary_folder), model)
+        path = None if rehearsal.model is None else Path(temporary_folder) / rehearsal.model.name
+        conducted = _play_new_session(replace(rehearsal, data=Path(temporary_folder) / "data", model=path), number)
         write_tables(conducted.folder)
-        return conducted.folder.name, read_files(conducted.folder.path), conducted.left
+        return conducted.folder.name, read_files(conducted.folder.path), conducted.end_reason
 
 
-def _play_new(rehearsal: Rehearsal, number: int) -> ConductedSitting:
+def _play_new_session(rehearsal: Rehearsal, number: int) -> ConductedSitting:
     """Run a new session of participant `number` (from 0) on the simulated device. Raises StudyError."""
-    observer, seed = make_rehearsed_observer(rehearsal, number), subject_seed(rehearsal.seed, number)
+    observer, seed = make_rehearsed_observer(rehearsal, number), derive_subject_seed(rehearsal.seed, number)
     plan = SessionPlan(
         protocol=rehearsal.protocol,
         protocol_text=rehearsal.protocol_text,
         protocol_locked=rehearsal.locked,
-        subject=subject_code(number),
+        subject=make_subject_code(number),
         observer=observer.name,
         seed=seed,
         data=rehearsal.data,
@@ -165,39 +177,47 @@ def _play_new(rehearsal: Rehearsal, number: int) -> ConductedSitting:
     return conduct_new(plan, DEVICE, create_participant(observer, seed, VirtualClock()))
 
 
-def _require_finished(session: str, why: str) -> None:
-    """Raise StudyError for a session that ended early. why: empty if it finished."""
-    if why:
+def _require_finished(session: str, end_reason: str) -> None:
+    """Raise StudyError for a session that ended early. end_reason: empty if it finished."""
+    if end_reason:
         raise StudyError(
             "A simulated participant did not finish",
-            f"{session}: {why}.",
+            f"{session}: {end_reason}.",
             "Change what stops it in the protocol, and rehearse in another folder.",
             saved="Everything so far is in the folder.",
         )
 
 
-def _find_begun(data: Path, subject: str) -> SessionFolder | None:
+def _find_begun_session(data: Path, subject: str) -> SessionFolder | None:
     """The participant's last session whose log is not empty: a crash at the start leaves an empty log or none."""
-    folders = [f for f in session_folders(data) if f.subject == subject and f.log.exists() and f.log.stat().st_size]
+    folders = [
+        folder
+        for folder in list_session_folders(data)
+        if folder.subject == subject and folder.log.exists() and folder.log.stat().st_size
+    ]
     return folders[-1] if folders else None
 
 
-def _check_same(rehearsal: Rehearsal) -> None:
-    more = [f.name for f in session_folders(rehearsal.data) if f.subject not in codes(rehearsal.subjects)]
-    if more:
+def _require_same_rehearsal(rehearsal: Rehearsal) -> None:
+    """Raise StudyError where the folder holds other participants, or sessions with another model, observer, seed or
+    protocol."""
+    subject_codes = list_subject_codes(rehearsal.subjects)
+    foreign_sessions = [f.name for f in list_session_folders(rehearsal.data) if f.subject not in subject_codes]
+    if foreign_sessions:
         raise StudyError(
             "This folder holds other sessions",
-            f"In addition to this rehearsal's participants there is {', '.join(more[:5])} in {rehearsal.data}.",
+            f"In addition to this rehearsal's participants there is {', '.join(foreign_sessions[:5])} in "
+            f"{rehearsal.data}.",
             "Choose another folder with --out, or at least as many --subjects as were begun.",
             saved="Nothing was changed.",
         )
-    model = sha256_of(rehearsal.model) if rehearsal.model is not None and rehearsal.model.is_file() else None
+    model_sha256 = sha256_of(rehearsal.model) if rehearsal.model is not None and rehearsal.model.is_file() else None
     for number in range(rehearsal.subjects):
-        folder = _find_begun(rehearsal.data, subject_code(number))
+        folder = _find_begun_session(rehearsal.data, make_subject_code(number))
         if folder is None:
             continue
         opened = fold_session(folder).state.opened
-        if opened.equalized is not None and opened.equalized.sha256 != model:
+        if opened.equalized is not None and opened.equalized.sha256 != model_sha256:
             raise StudyError(
                 "This folder holds another rehearsal",
                 f"{folder.name} in {rehearsal.data} was begun with another --model.",
@@ -211,7 +231,8 @@ def _check_same(rehearsal: Rehearsal) -> None:
                 "Choose another folder with --out, or the same --observer and --seed to continue.",
                 saved="Nothing was changed.",
             )
-        if opened.seed != subject_seed(rehearsal.seed, number) or opened.protocol_text != rehearsal.protocol_text:
+        is_same_seed = opened.seed == derive_subject_seed(rehearsal.seed, number)
+        if not is_same_seed or opened.protocol_text != rehearsal.protocol_text:
             raise StudyError(
                 "This folder holds another rehearsal",
                 f"{folder.name} in {rehearsal.data} was begun with another seed or protocol.",

@@ -22,26 +22,26 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.facts.sensor_facts import SensorFacts
-from study.session.state.fold import apply
+from study.session.state.fold import apply_event
 from study.session.state.state import SessionState
 from study.session.stimulus.delivered import measure_delivered
 from study.session.stimulus.stimulus import vector_at_angle
 from study.session.views.count_text import answers_are
 from study.store.disk.privacy import close_data_folder, close_to_others
-from study.store.disk.provenance import versions
+from study.store.disk.provenance import list_versions
 from study.store.sessions.archive import SessionFolder
-from study.store.sessions.event_log import EventLog, mend
+from study.store.sessions.event_log import EventLog, remove_incomplete_line
 from study.store.sessions.live_file import remove_live
 from study.store.sessions.request_inbox import RequestInbox
 from study.store.sessions.session_lock import hold_session_lock
 from study.store.sessions.trial_recordings import find_trial_recording, recording_name
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import write_tables
-from study.workflows.session.open_session import OpenedSession, device_facts
+from study.workflows.session.open_session import OpenedSession, collect_device_facts
 from study.workflows.session.other_sessions import dose_before
 from study.workflows.session.prepare_sitting import does_not_take_part
 from study.workflows.trial.judge_trial import Judgement, judge
-from study.workflows.trial.trial_facts import health_from_log
+from study.workflows.trial.trial_facts import restore_health
 
 RECORDING_LOST = "its recording was lost when the program ended"
 """Remark on a trial that counts without one, or reason why it is void."""
@@ -52,7 +52,7 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
     """An existing session, repaired, and locked while the context lasts. Raises StudyError where it cannot be resumed:
     a damaged log, a finished session, another kind of device, a participant who does not take part."""
     close_data_folder(folder.path.parent)
-    close_to_others(folder.path, inside=True)  # earlier versions wrote files that other accounts could read
+    close_to_others(folder.path, recursive=True)  # earlier versions wrote files that other accounts could read
     with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
         # A stop request of the interrupted sitting must not end this sitting, and its live state is outdated. Requests
@@ -60,36 +60,36 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
         RequestInbox(folder.path).clear()
         remove_live(folder.path)
         try:
-            folded = fold_session(folder)
-            if folded.state.turned_away_for_good:
-                _close_as_turned_away(folded, folder, log, clock)
-                raise does_not_take_part(folded.state)
-            _check_resumable(folded.state, device, folder)
-            mend(folder.log, folded.contents)
-            utc, observer = clock.utc(), folded.state.opened.observer
+            folded_session = fold_session(folder)
+            if folded_session.state.is_finally_ineligible:
+                _close_as_turned_away(folded_session, folder, log, clock)
+                raise does_not_take_part(folded_session.state)
+            _check_resumable(folded_session.state, device, folder)
+            remove_incomplete_line(folder.log, folded_session.log_contents)
+            utc, observer = clock.utc(), folded_session.state.opened.observer
             resumed = SessionResumed(
                 utc=utc,
-                device=device_facts(device),
-                versions=versions(),
-                mended=folded.contents.torn,
+                device=collect_device_facts(device),
+                versions=list_versions(),
+                mended=folded_session.log_contents.torn,
                 dose_elsewhere=dose_before(folder, observer, device.simulated, utc),
                 monotonic_s=clock.now_s(),
             )
             log.append(resumed)
             # An interruption by Ctrl-C, which a participant may press too, has another cause than a crash.
-            interrupted = isinstance(folded.contents.events[-1], SessionInterrupted)
-            state = _close_open_trial(apply(folded.state, resumed), folder, log, clock, interrupted)
+            interrupted = isinstance(folded_session.log_contents.events[-1], SessionInterrupted)
+            state = _close_open_trial(apply_event(folded_session.state, resumed), folder, log, clock, interrupted)
             yield OpenedSession(folder, log, state)
         finally:
             log.close()
 
 
-def _close_as_turned_away(folded: FoldedSession, folder: SessionFolder, log: EventLog, clock: Clock) -> None:
+def _close_as_turned_away(folded_session: FoldedSession, folder: SessionFolder, log: EventLog, clock: Clock) -> None:
     """Close the session of a participant who refused or was excluded: last event, seal and tables, if a crash prevented
     them."""
-    if not folded.state.closed:
-        mend(folder.log, folded.contents)
-        outcome = folded.state.sitting.turned_away or "refused"
+    if not folded_session.state.closed:
+        remove_incomplete_line(folder.log, folded_session.log_contents)
+        outcome = folded_session.state.sitting.ineligibility or "refused"
         log.append(SessionClosed(utc=clock.utc(), outcome=outcome, monotonic_s=clock.now_s()))
     write_tables(folder)
 
@@ -139,7 +139,7 @@ def _close_open_trial(
     else:
         event = _judge_late(state, presented, folder, clock)
     log.append(event)
-    return apply(state, event)
+    return apply_event(state, event)
 
 
 def _judge_late(
@@ -162,22 +162,22 @@ def _judge_late(
 def _without_recording(state: SessionState, presented: TrialPresented, clock: Clock) -> TrialMeasured | TrialSpoiled:
     """Event of an answered trial without a recording, judged by the counters that were logged with the answer."""
     logged = state.answered.health if state.answered is not None else None
-    health = health_from_log(logged) if logged is not None else None
+    health = restore_health(logged) if logged is not None else None
     verdict = Judgement("", ())
     if health is not None and logged is not None:
         verdict = judge(health, state.protocol.measurement, logged.felt_whole)
-    if state.protocol.measurement.accelerometer_needed and not verdict.spoiled:
+    if state.protocol.measurement.accelerometer_needed and not verdict.void_reason:
         verdict = Judgement(RECORDING_LOST, (), VoidCause.NO_ACCELERATION)
     missed_ticks = health.missed_ticks if health is not None else None
     late_ticks, latest_s = (logged.late_ticks, logged.latest_s) if logged is not None else (None, None)
     vibrated_s = health.ticks / state.opened.device.sample_rate_hz if health is not None else None
-    if verdict.spoiled:
+    if verdict.void_reason:
         return TrialSpoiled(
             utc=clock.utc(),
             run=presented.run,
             trial=presented.trial,
             attempt=presented.attempt,
-            reason=verdict.spoiled,
+            reason=verdict.void_reason,
             missed_ticks=missed_ticks,
             late_ticks=late_ticks,
             latest_s=latest_s,
@@ -205,10 +205,10 @@ def _from_recording(
 ) -> TrialMeasured | None:
     """Event of an answered trial, measured from its recording; None if there is none. Raises StudyError or ValueError
     if the recording cannot be used."""
-    found = find_trial_recording(folder, recording_name(presented.run, presented.trial, presented.attempt))
-    if found is None:
+    trial_recording = find_trial_recording(folder, recording_name(presented.run, presented.trial, presented.attempt))
+    if trial_recording is None:
         return None
-    saved, recording = found
+    saved, recording = trial_recording
     logged = state.answered.health if state.answered is not None else None
     # The angle that was played: of a detection trial, `direction` is the number of the interval.
     vector = vector_at_angle(state.protocol.directions, presented.angle_deg)

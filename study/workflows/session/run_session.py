@@ -3,30 +3,30 @@
 import contextlib
 from dataclasses import dataclass, replace
 
-from protocols.procedure.practice import add_answer, practice_passed, right_of_last
+from protocols.procedure.practice import add_answer, count_right_of_last, is_practice_passed
 from protocols.trial import Phase
 from study.devices.device import Fault
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.facts.events import RestTaken, SessionClosed, SessionInterrupted
-from study.session.facts.void_reasons import busy_sentence, why_too_many
-from study.session.state.due_trial import Present, labels_are_swapped
-from study.session.state.machine import Action, Demonstrate, FillIn, Finish, Leave, Rest, next_action
+from study.session.facts.void_reasons import describe_busy_voids, explain_many_voids
+from study.session.state.due_trial import PresentTrial, has_swapped_labels
+from study.session.state.machine import Action, Demonstrate, EndSitting, FillIn, Finish, TakeRest, next_action
 from study.session.state.probe_state import Probe, Reference
-from study.session.state.progress import progress
-from study.session.state.state import SessionState, felt
-from study.session.views.archive_views import TURNED_AWAY
+from study.session.state.progress import estimate_progress
+from study.session.state.state import SessionState, is_felt_by_person
+from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.views.count_text import answers_are
-from study.session.views.views import Goodbye, PracticeResult, RestNotice, Welcome, picture_of
+from study.session.views.views import Goodbye, PracticeResult, RestNotice, Welcome, make_direction_picture
 from study.store.sessions.log_seal import seal_log
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.participant_number import take_place
-from study.workflows.session.prepare_sitting import fill_in, prepare_sitting, turn_away
+from study.workflows.session.prepare_sitting import prepare_sitting, present_form, turn_away
 from study.workflows.trial.after_trial import AfterTrial
 from study.workflows.trial.demonstrate import demonstrate
 from study.workflows.trial.masking import check_masking, start_masking, stop_masking
 from study.workflows.trial.play_probe import play_probe, play_reference
 from study.workflows.trial.present_trial import present_trial
-from study.workflows.trial.sitting import Sitting, notify_experimenter, record, write_notes
+from study.workflows.trial.sitting import Sitting, log_and_apply, notify_experimenter, write_notes
 from study.workflows.trial.take_pause import take_pause
 
 VOID_TRIALS_IN_A_ROW = 3
@@ -39,11 +39,11 @@ class SessionEnd:
     """State at the end of a sitting, and why it ended."""
 
     state: SessionState
-    left: str
+    end_reason: str
     """Why the sitting ended before the session was finished; empty if it is finished."""
     fault: Fault = Fault.NONE
     """The device fault, if that was why."""
-    why: str = ""
+    fault_text: str = ""
     """The driver's words about it, where there are any."""
     withdrawn: bool = False
     """The participant withdrew consent: the data are to be erased."""
@@ -68,8 +68,8 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
         raise
     # The session is over: Ctrl-C only ends the goodbye.
     with contextlib.suppress(KeyboardInterrupt):
-        outcome = end.state.sitting.turned_away if end.state.closed else ""
-        sitting.display.goodbye(Goodbye(not end.left, end.state.answers, end.left, outcome))
+        outcome = end.state.sitting.ineligibility if end.state.closed else ""
+        sitting.display.goodbye(Goodbye(not end.end_reason, end.state.answers, end.end_reason, outcome))
     # Notes that were taken while the log was open are written before it is sealed.
     end = replace(end, state=write_notes(end.state, sitting))
     if end.state.closed:
@@ -79,12 +79,12 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
 
 def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
     state, refused = prepare_sitting(state, sitting)
-    if state.turned_away_for_good:
+    if state.is_finally_ineligible:
         return SessionEnd(turn_away(state, sitting), refused)
     if refused:
-        return _end_sitting(AfterTrial(state, leave=refused), sitting)
+        return _end_sitting(AfterTrial(state, end_reason=refused), sitting)
     state = start_masking(take_place(state, sitting), sitting)
-    sitting.supervisor.begin("instructions")
+    sitting.supervisor.start_activity("instructions")
     sitting.display.welcome(_welcome(state, sitting))
     return _run_actions(state, sitting)
 
@@ -92,12 +92,12 @@ def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
 def _end_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
     """End after an interruption. The log decides: a session whose last line was written is finished."""
     state = fold_session(sitting.folder).state
-    still_on = sitting.device.fault() is Fault.FORCE_LEFT
-    if state.turned_away_for_good:  # nothing was played; its last line may be missing
+    is_force_left = sitting.device.fault() is Fault.FORCE_LEFT
+    if state.is_finally_ineligible:  # nothing was played; its last line may be missing
         state = state if state.closed else turn_away(state, sitting)
-        return SessionEnd(state, TURNED_AWAY[state.sitting.turned_away or "refused"])
-    if state.closed and not still_on:
-        return SessionEnd(state, left="")
+        return SessionEnd(state, INELIGIBILITY_REASONS[state.sitting.ineligibility or "refused"])
+    if state.closed and not is_force_left:
+        return SessionEnd(state, end_reason="")
     # A full disk must not hide why the sitting ended.
     with contextlib.suppress(StudyError):
         sitting.log.append(
@@ -107,18 +107,20 @@ def _end_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Sessi
                 monotonic_s=sitting.clock.now_s(),
             )
         )
-    way_back = f"Continue with: hapteq resume {sitting.folder.path}"
+    resume_advice = f"Continue with: hapteq resume {sitting.folder.path}"
     saved = f"{answers_are(state.answers)} on disk."
-    if still_on:
-        raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, way_back, saved) from interruption
-    raise UserInterruptError("Interrupted", "The force was released.", way_back, saved) from interruption
+    if is_force_left:
+        raise DeviceError(
+            "The force may still be on", Fault.FORCE_LEFT.sentence, resume_advice, saved
+        ) from interruption
+    raise UserInterruptError("Interrupted", "The force was released.", resume_advice, saved) from interruption
 
 
 def _say_how_to_resume(error: StudyError, sitting: Sitting) -> StudyError:
     """The same error with what is saved and how to continue."""
     with contextlib.suppress(StudyError):
         state = fold_session(sitting.folder).state
-        if not state.turned_away_for_good:
+        if not state.is_finally_ineligible:
             error.saved = f"{answers_are(state.answers)} on disk."
             error.do_now = f"{error.do_now} Then continue with: hapteq resume {sitting.folder.path}"
     return error
@@ -130,107 +132,109 @@ def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
         state = write_notes(state, sitting)
         action = next_action(state, sitting.clock.utc(), sitting.clock.now_s())
         if isinstance(action, Finish):
-            state = stop_masking(_say_busy(state, sitting), sitting)
-            closed = SessionClosed(utc=sitting.clock.utc(), outcome="completed")
-            state = record(state, closed, sitting)
+            state = stop_masking(_report_busy(state, sitting), sitting)
+            closing_event = SessionClosed(utc=sitting.clock.utc(), outcome="completed")
+            state = log_and_apply(state, closing_event, sitting)
             seal_log(sitting.folder.log)
-            return SessionEnd(state, left="")
-        after = _act(state, action, sitting)
+            return SessionEnd(state, end_reason="")
+        outcome = _act(state, action, sitting)
         if not isinstance(action, Probe | Reference):  # these neither void anything nor end a row of void trials
-            voids = (*voids, after.void) if after.void else ()
+            voids = (*voids, outcome.void) if outcome.void else ()
         if len(voids) >= VOID_TRIALS_IN_A_ROW:
-            after = replace(after, leave=after.leave or why_too_many(voids))
-        pause = _pause_wanted(after, sitting)
-        if pause and not after.leave:
-            broken = take_pause(stop_masking(after.state, sitting), pause, sitting)
-            goes_on = not broken.leave and not sitting.supervisor.stop_asked
-            state = start_masking(broken.state, sitting) if goes_on else broken.state
-            after = replace(after, state=state, leave=broken.leave)
-            if broken.withdrawn:
-                return replace(_end_sitting(after, sitting), withdrawn=True)
-        if stopped := sitting.supervisor.stop_asked:
-            after = replace(after, leave=after.leave or f"the {stopped} stopped the session")
-        if after.leave:
-            return _end_sitting(after, sitting)
-        state = after.state
+            outcome = replace(outcome, end_reason=outcome.end_reason or explain_many_voids(voids))
+        pause = _pause_reason(outcome, sitting)
+        if pause and not outcome.end_reason:
+            pause_outcome = take_pause(stop_masking(outcome.state, sitting), pause, sitting)
+            continues = not pause_outcome.end_reason and not sitting.supervisor.stop_asked
+            state = start_masking(pause_outcome.state, sitting) if continues else pause_outcome.state
+            outcome = replace(outcome, state=state, end_reason=pause_outcome.end_reason)
+            if pause_outcome.withdrawn:
+                return replace(_end_sitting(outcome, sitting), withdrawn=True)
+        if requester := sitting.supervisor.stop_asked:
+            outcome = replace(outcome, end_reason=outcome.end_reason or f"the {requester} stopped the session")
+        if outcome.end_reason:
+            return _end_sitting(outcome, sitting)
+        state = outcome.state
 
 
 def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
     match action:
-        case Leave(reason=reason):
-            return AfterTrial(state, leave=reason)
-        case Rest(seconds=seconds):
-            return AfterTrial(_take_rest(state, seconds, sitting))
+        case EndSitting(reason=reason):
+            return AfterTrial(state, end_reason=reason)
+        case TakeRest(seconds=seconds):
+            return AfterTrial(_run_rest(state, seconds, sitting))
         case FillIn(form=form):
-            return AfterTrial(fill_in(state, form, sitting))
+            return AfterTrial(present_form(state, form, sitting))
         case Demonstrate():
             return demonstrate(state, sitting)
-        case Present() as present:
-            after = present_trial(check_masking(state, sitting), present, sitting)
-            if not after.leave:
-                _finish_trial(after, present, state, sitting)
-            return after
+        case PresentTrial() as due_trial:
+            outcome = present_trial(check_masking(state, sitting), due_trial, sitting)
+            if not outcome.end_reason:
+                _finish_trial(outcome, due_trial, state, sitting)
+            return outcome
         case Probe():
-            after = play_probe(state, action, sitting)
+            outcome = play_probe(state, action, sitting)
             sitting.clock.sleep(state.protocol.trial.pause_between_s)
-            return after
+            return outcome
         case Reference():
             return play_reference(state, sitting)
         case Finish():
             return AfterTrial(state)
 
 
-def _end_sitting(after: AfterTrial, sitting: Sitting) -> SessionEnd:
-    state = stop_masking(_say_busy(write_notes(after.state, sitting), sitting), sitting)
-    left = SessionInterrupted(utc=sitting.clock.utc(), reason=after.leave)
-    why = sitting.device.health().why if after.fault is not Fault.NONE else ""
-    return SessionEnd(record(state, left, sitting), after.leave, after.fault, why)
+def _end_sitting(outcome: AfterTrial, sitting: Sitting) -> SessionEnd:
+    state = stop_masking(_report_busy(write_notes(outcome.state, sitting), sitting), sitting)
+    ending_event = SessionInterrupted(utc=sitting.clock.utc(), reason=outcome.end_reason)
+    fault_text = sitting.device.health().why if outcome.fault is not Fault.NONE else ""
+    return SessionEnd(log_and_apply(state, ending_event, sitting), outcome.end_reason, outcome.fault, fault_text)
 
 
-def _say_busy(state: SessionState, sitting: Sitting) -> SessionState:
+def _report_busy(state: SessionState, sitting: Sitting) -> SessionState:
     """Report void trials of a busy computer at the end of a sitting, on the screen and in the log."""
     if not state.sitting.busy_voids:
         return state
-    notify_experimenter(busy_sentence(state.sitting.busy_voids), sitting)
+    notify_experimenter(describe_busy_voids(state.sitting.busy_voids), sitting)
     return write_notes(state, sitting)
 
 
-def _pause_wanted(after: AfterTrial, sitting: Sitting) -> str:
+def _pause_reason(outcome: AfterTrial, sitting: Sitting) -> str:
     sitting.supervisor.listen()
-    who = sitting.supervisor.pause_asked
-    return after.pause or (f"the {who} asked for a pause" if who else "")
+    requester = sitting.supervisor.pause_asked
+    return outcome.pause or (f"the {requester} asked for a pause" if requester else "")
 
 
-def _finish_trial(after: AfterTrial, present: Present, before: SessionState, sitting: Sitting) -> None:
-    if after.void:
-        sitting.display.await_return(after.void)
-    if after.correct is not None:
-        if _feedback_wanted(before, present):
-            sitting.display.feedback(after.correct)
-        if before.runs[present.run].practice and after.state.run > before.run:
-            sitting.display.practice_over(_practice_result(before, after.correct))
-    sitting.clock.sleep(before.protocol.trial.pause_between_s)
+def _finish_trial(outcome: AfterTrial, due_trial: PresentTrial, previous_state: SessionState, sitting: Sitting) -> None:
+    if outcome.void:
+        sitting.display.await_return(outcome.void)
+    if outcome.correct is not None:
+        if _feedback_wanted(previous_state, due_trial):
+            sitting.display.feedback(outcome.correct)
+        if previous_state.runs[due_trial.run].practice and outcome.state.run > previous_state.run:
+            sitting.display.practice_over(_practice_result(previous_state, outcome.correct))
+    sitting.clock.sleep(previous_state.protocol.trial.pause_between_s)
 
 
-def _practice_result(before: SessionState, correct: bool) -> PracticeResult:
-    settings, done = before.protocol.practice, add_answer(before.practice, correct)
-    asked = min(settings.of_last, len(done.correct))
-    return PracticeResult(practice_passed(settings, done), right_of_last(settings, done), asked)
+def _practice_result(previous_state: SessionState, correct: bool) -> PracticeResult:
+    settings, practice = previous_state.protocol.practice, add_answer(previous_state.practice, correct)
+    question_count = min(settings.of_last, len(practice.correct))
+    return PracticeResult(
+        is_practice_passed(settings, practice), count_right_of_last(settings, practice), question_count
+    )
 
 
-def _take_rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
+def _run_rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
     """A rest cut short by a pause or stop does not count and is due again."""
-    sitting.supervisor.begin("rest")
-    notice = RestNotice(seconds, len(state.runs) - state.run, progress(state))
-    rested_s = max(0.0, sitting.display.rest(notice, sitting.supervisor.glance))
+    sitting.supervisor.start_activity("rest")
+    notice = RestNotice(seconds, len(state.runs) - state.run, estimate_progress(state))
+    rested_s = max(0.0, sitting.display.rest(notice, sitting.supervisor.sign_of_life))
     if rested_s < seconds and (sitting.supervisor.stop_asked or sitting.supervisor.pause_asked):
         return state
     event = RestTaken(utc=sitting.clock.utc(), run=state.run, trial=state.trial, rested_s=rested_s)
-    return record(state, event, sitting)
+    return log_and_apply(state, event, sitting)
 
 
-def _feedback_wanted(state: SessionState, present: Present) -> bool:
-    protocol, run = state.protocol, state.runs[present.run]
+def _feedback_wanted(state: SessionState, due_trial: PresentTrial) -> bool:
+    protocol, run = state.protocol, state.runs[due_trial.run]
     if run.practice:
         return protocol.practice.feedback == "after_answer"
     settings = protocol.training if run.phase is Phase.TRAINING else protocol.trial
@@ -241,10 +245,10 @@ def _welcome(state: SessionState, sitting: Sitting) -> Welcome:
     training = sum(run.phase is Phase.TRAINING for run in state.runs)
     return Welcome(
         title=state.protocol.title,
-        picture=picture_of(state.protocol.directions, labels_are_swapped(state.protocol, state.opened)),
+        picture=make_direction_picture(state.protocol.directions, has_swapped_labels(state.protocol, state.opened)),
         runs=len(state.runs) - training,
         training_runs=training,
         device=sitting.device.info.name,
-        felt=felt(state.opened) is not False,
+        device_moves=is_felt_by_person(state.opened) is not False,
         resumed_after=state.answers,
     )

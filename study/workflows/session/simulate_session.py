@@ -42,10 +42,10 @@ def simulate_session(
     )
     conducted = conduct_new(plan, "simulated", make_simulated_participant(observer, seed, VirtualClock()))
     write_tables(conducted.folder)
-    if conducted.left:
+    if conducted.end_reason:
         raise StudyError(
             "The simulated participant did not finish",
-            f"{conducted.folder.name}: {conducted.left}.",
+            f"{conducted.folder.name}: {conducted.end_reason}.",
             "Change what stops it in the protocol, and simulate another session.",
             saved="Everything until then is in the folder.",
         )

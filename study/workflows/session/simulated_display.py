@@ -10,7 +10,7 @@ from dataclasses import replace
 from protocols.trial import Phase, VoidCause
 from study.devices.clock import Clock
 from study.participants.observer import Observer, PerceivedStimulus
-from study.session.state.due_trial import Present
+from study.session.state.due_trial import PresentTrial
 from study.session.views.form_views import Form, FormField, FormReply
 from study.session.views.views import (
     AfterPause,
@@ -33,14 +33,14 @@ from study.session.views.views import (
 from study.workflows.session.simulated_touch import SimulatedTouch
 from study.workflows.trial.display import SignOfLife
 
-GLANCE_S = 0.1
-"""Interval (s) of the signs of life to the device while waiting."""
+KEEPALIVE_INTERVAL_S = 0.1
+"""Interval (s) between two calls of `sign_of_life`, the keep-alive call of the device, while waiting."""
 
-PATIENCE_S = 60.0
+LONGEST_HANDLE_WAIT_S = 60.0
 """Longest wait (s) for the handle to return to its place: no person moves the handle of a simulated participant."""
 
-CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
-"""Reply where the sign of life returned False, which ends the wait."""
+ENDED_EARLY = Unanswered("the stimulus ended early", ends_sitting=False)
+"""Reply where `sign_of_life` returned False, which ends the wait."""
 
 
 class SimulatedDisplay:
@@ -61,13 +61,13 @@ class SimulatedDisplay:
         self._clock = clock
         self._on_question = on_question
         self._touch = touch
-        self._felt: PerceivedStimulus | None = None
-        self._stimulus: Present | None = None
+        self._perceived: PerceivedStimulus | None = None
+        self._stimulus: PresentTrial | None = None
 
-    def feel(self, stimulus: Present, answers_before: int) -> None:
+    def feel(self, stimulus: PresentTrial, answers_before: int) -> None:
         """Store the stimulus, for the answer and for `SimulatedTouch`."""
         self._stimulus = stimulus
-        self._felt = PerceivedStimulus(
+        self._perceived = PerceivedStimulus(
             run=stimulus.run,
             trial=stimulus.trial,
             attempt=stimulus.attempt,
@@ -81,7 +81,7 @@ class SimulatedDisplay:
 
     def fill_in(self, form: Form) -> FormReply:
         """Fill each field with the first answer that it allows; a participant who takes part gives this answer."""
-        return FormReply({field.key: _first_answer(field) for field in form.fields})
+        return FormReply({field.key: _choose_first_answer(field) for field in form.fields})
 
     def device_checked(self, report: DeviceReport) -> bool:
         return True
@@ -93,16 +93,16 @@ class SimulatedDisplay:
         return DemoDone()
 
     def show_playing(self, notice: PlayingNotice, sign_of_life: SignOfLife) -> Unanswered | None:
-        return None if self._wait(notice.seconds, sign_of_life) else CUT_SHORT
+        return None if self._wait(notice.seconds, sign_of_life) else ENDED_EARLY
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        """Wait until the handle is at its place; ends the sitting after `PATIENCE_S`."""
-        until_s = self._clock.now_s() + PATIENCE_S
+        """Wait until the handle is at its place; ends the sitting after `LONGEST_HANDLE_WAIT_S`."""
+        until_s = self._clock.now_s() + LONGEST_HANDLE_WAIT_S
         while not look().ready:
             if self._clock.now_s() > until_s:
-                return Unanswered("the handle did not come back", leave=True)
-            if not self._wait(GLANCE_S, sign_of_life):
-                return CUT_SHORT
+                return Unanswered("the handle did not come back", ends_sitting=True)
+            if not self._wait(KEEPALIVE_INTERVAL_S, sign_of_life):
+                return ENDED_EARLY
         return None
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
@@ -110,34 +110,34 @@ class SimulatedDisplay:
         observer asks for a repetition that is allowed. Raises RuntimeError before the first stimulus."""
         if self._on_question is not None:
             self._on_question(question)
-        if self._felt is None:
+        if self._perceived is None:
             raise RuntimeError("a simulated participant was asked before anything was felt")
         # The response time depends on the trial's random numbers alone; the answer may depend on what was delivered.
-        seconds = self._observer.reply(self._felt, self._seed).response_time_s
+        seconds = self._observer.reply(self._perceived, self._seed).response_time_s
         too_slow = 0 < question.time_limit_s < seconds
-        felt = self._wait_and_feel(self._felt, question.time_limit_s if too_slow else seconds, sign_of_life)
-        if felt is None:
-            return CUT_SHORT
+        perceived = self._wait_and_feel(self._perceived, question.time_limit_s if too_slow else seconds, sign_of_life)
+        if perceived is None:
+            return ENDED_EARLY
         if too_slow:
-            return Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
-        reply = self._observer.reply(felt, self._seed)
+            return Unanswered("no answer within the time limit", ends_sitting=False, cause=VoidCause.LATE)
+        reply = self._observer.reply(perceived, self._seed)
         if reply.ask_again and question.repeats_left != 0:
-            return Unanswered("asked to repeat", leave=False, asked=True)
+            return Unanswered("asked to repeat", ends_sitting=False, repeat_requested=True)
         return Answered(reply.answer, self._clock.now_s())
 
     def _wait_and_feel(
-        self, felt: PerceivedStimulus, seconds: float, sign_of_life: SignOfLife
+        self, perceived: PerceivedStimulus, seconds: float, sign_of_life: SignOfLife
     ) -> PerceivedStimulus | None:
         """Wait for `seconds`; returns the stimulus, with the delivered acceleration of its last periods where there is
-        a touch. None where the sign of life ended the wait. In a detection trial the stimulus ended before the
+        a `SimulatedTouch`. None where `sign_of_life` ended the wait. In a detection trial the stimulus ended before the
         question."""
         touch, stimulus = self._touch, self._stimulus
-        if touch is None or stimulus is None or felt.phase is Phase.DETECTION:
-            return felt if self._wait(seconds, sign_of_life) else None
+        if touch is None or stimulus is None or perceived.phase is Phase.DETECTION:
+            return perceived if self._wait(seconds, sign_of_life) else None
         if not self._wait(max(0.0, seconds - touch.seconds(stimulus)), sign_of_life):
             return None
         delivered = touch.feel(stimulus, sign_of_life)
-        return replace(felt, delivered=delivered) if sign_of_life() else None
+        return replace(perceived, delivered=delivered) if sign_of_life() else None
 
     def feedback(self, correct: bool) -> None:
         return None
@@ -151,7 +151,7 @@ class SimulatedDisplay:
         return self._clock.now_s() - started_s
 
     def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
-        return AfterPause.GO_ON
+        return AfterPause.CONTINUE_SITTING
 
     def goodbye(self, notice: Goodbye) -> None:
         return None
@@ -163,16 +163,17 @@ class SimulatedDisplay:
         return None
 
     def _wait(self, seconds: float, sign_of_life: SignOfLife) -> bool:
-        """Wait for `seconds` on the clock, with a sign of life every `GLANCE_S`; False if it ended the wait."""
+        """Wait for `seconds` on the clock, calling `sign_of_life` every `KEEPALIVE_INTERVAL_S`; False if that ended
+        the wait."""
         until_s = self._clock.now_s() + seconds
-        while (left_s := until_s - self._clock.now_s()) > 1e-9:
-            self._clock.sleep(min(GLANCE_S, left_s))
+        while (remaining_s := until_s - self._clock.now_s()) > 1e-9:
+            self._clock.sleep(min(KEEPALIVE_INTERVAL_S, remaining_s))
             if not sign_of_life():
                 return False
         return True
 
 
-def _first_answer(field: FormField) -> str:
+def _choose_first_answer(field: FormField) -> str:
     """First choice, lowest number, or a placeholder text where an answer is required."""
     if field.choices:
         return field.choices[0]

@@ -33,4 +33,4 @@ def create_participant(
         return Participant(display=display, hand=display, clock=clock)
     touch = SimulatedTouch(clock)
     display = SimulatedDisplay(observer, seed, clock, on_question, touch)
-    return Participant(display=display, hand=display, clock=clock, on_opened=touch.on_opened)
+    return Participant(display=display, hand=display, clock=clock, on_session_opened=touch.on_session_opened)

@@ -12,7 +12,7 @@ from equalizer.signals.signal import Signal
 from protocols.definition.apparatus import TestDirections
 from study.devices.clock import Clock
 from study.devices.device import Device
-from study.session.state.due_trial import Present
+from study.session.state.due_trial import PresentTrial
 from study.session.stimulus.delivered import Delivered, measure_delivered
 from study.session.stimulus.stimulus import direction_vector
 from study.store.sessions.archive import SessionFolder
@@ -27,22 +27,22 @@ TICKS_PER_SIGN = 50
 
 
 class SimulatedTouch:
-    """Samples the accelerometer while the participant waits. Measures nothing until `on_opened` is called."""
+    """Samples the accelerometer while the participant waits. Measures nothing until `on_session_opened` is called."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._device: Device | None = None
         self._directions: TestDirections | None = None
 
-    def on_opened(self, folder: SessionFolder, device: Device) -> None:
+    def on_session_opened(self, folder: SessionFolder, device: Device) -> None:
         """Take the device of the opened session, and the directions of its protocol."""
         self._device, self._directions = device, fold_session(folder).state.protocol.directions
 
-    def seconds(self, stimulus: Present) -> float:
+    def seconds(self, stimulus: PresentTrial) -> float:
         """Duration of the measurement (s): `PERIODS` periods of the stimulus."""
         return PERIODS / stimulus.frequency_hz
 
-    def feel(self, stimulus: Present, sign_of_life: SignOfLife) -> Delivered | None:
+    def feel(self, stimulus: PresentTrial, sign_of_life: SignOfLife) -> Delivered | None:
         """Sample the held stimulus for `seconds(stimulus)` and return the delivered acceleration. None without a
         device, where the sign of life ended the wait, or where less than a period was measured."""
         if self._device is None or self._directions is None:
@@ -54,11 +54,11 @@ class SimulatedTouch:
             if tick % TICKS_PER_SIGN == 0 and not sign_of_life():
                 return None
             rows.append(self._device.look().acceleration_mps2 or (np.nan, np.nan, np.nan))
-        felt = np.array(rows, dtype=np.float64)
-        if not covers_a_period(int(np.isfinite(felt).all(axis=1).sum()), rate_hz, stimulus.frequency_hz):
+        acceleration = np.array(rows, dtype=np.float64)
+        if not covers_a_period(int(np.isfinite(acceleration).all(axis=1).sum()), rate_hz, stimulus.frequency_hz):
             return None
         vector = direction_vector(self._directions, stimulus.direction)
         # A recording needs a command; its values do not enter the measurement.
-        force = Signal(np.zeros_like(felt), rate_hz, "force", "N", ("fx", "fy", "fz"))
-        response = Signal(felt, rate_hz, "acceleration", "m/s^2", ("ax", "ay", "az"))
+        force = Signal(np.zeros_like(acceleration), rate_hz, "force", "N", ("fx", "fy", "fz"))
+        response = Signal(acceleration, rate_hz, "acceleration", "m/s^2", ("ax", "ay", "az"))
         return measure_delivered(Recording(self._device.info.name, force, response), vector, stimulus.frequency_hz)

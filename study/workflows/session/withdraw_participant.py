@@ -17,11 +17,11 @@ from study.store.sessions.archive import FOLDER, TOMBSTONE_NAME, SessionFolder, 
 from study.store.sessions.event_log import LOG_NAME, hold_log_lock
 from study.store.sessions.session_lock import LOCK_NAME, hold_session_lock
 from study.store.sessions.withdrawal_files import WithdrawalIntent, read_intent, write_intent, write_tombstone
-from study.store.sessions.written_elsewhere import folders_written_elsewhere
+from study.store.sessions.written_elsewhere import read_written_folders
 from study.workflows.session.participant_number import read_begun_participant
 from study.workflows.session.participant_traces import analysis_names, find_traces
 
-ELSEWHERE = "Analyses written elsewhere with --out, and copies, still hold the numbers: erase them."
+COPIES_REMINDER = "Analyses written elsewhere with --out, and copies, still hold the numbers: erase them."
 """Reminder of copies that the program cannot find, for messages."""
 
 
@@ -55,8 +55,8 @@ def session_to_withdraw(session: str, data: Path) -> SessionFolder:
             "Give the session's real folder.",
             saved="Nothing was changed.",
         )
-    named = FOLDER.fullmatch(folder.name) is not None
-    if not named or not (is_real_folder(folder.path) or is_real_file(folder.withdrawal)):
+    has_session_name = FOLDER.fullmatch(folder.name) is not None
+    if not has_session_name or not (is_real_folder(folder.path) or is_real_file(folder.withdrawal)):
         raise WrongUseError(
             "There is no such session", f"'{session}' was not found in {data}.", "Give its folder, or --data."
         )
@@ -68,10 +68,10 @@ def plan_withdrawal(session: SessionFolder) -> Withdrawal:
     changed. Raises StudyError where nothing is proved to be the participant's.
     """
     data, subject = session.path.parent.resolve(), session.subject
-    begun = read_intent(data, subject)
-    traces = find_traces(data, subject, begun.sessions if begun else ())
-    derived = (*traces.derived, *(begun.derived if begun else ()))
-    if not traces.sessions and begun is None:
+    intent = read_intent(data, subject)
+    traces = find_traces(data, subject, intent.sessions if intent else ())
+    derived = (*traces.derived, *(intent.derived if intent else ()))
+    if not traces.sessions and intent is None:
         raise StudyError(
             "Nothing was erased",
             f"No folder in {data} is proved to hold a session of {subject}. {' '.join(traces.doubtful)}".rstrip(),
@@ -87,21 +87,21 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
     data, subject = data.resolve(), withdrawal.subject
     folders = tuple(SessionFolder(data / name) for name in withdrawal.sessions)
     try:
-        with ExitStack() as held, open_folder(data) as place:
+        with ExitStack() as locks, open_folder(data) as data_folder:
             for folder in folders:
-                _lock_for_erasing(folder, held)
-            earlier = read_intent(data, subject)
-            begun = {folder.name: read_begun_participant(folder) for folder in folders}
-            since = earlier.withdrawn_utc if earlier else utc
-            write_intent(data, WithdrawalIntent(subject, since, begun, withdrawal.derived))
+                _lock_for_erasing(folder, locks)
+            intent = read_intent(data, subject)
+            participants = {folder.name: read_begun_participant(folder) for folder in folders}
+            withdrawn_utc = intent.withdrawn_utc if intent else utc
+            write_intent(data, WithdrawalIntent(subject, withdrawn_utc, participants, withdrawal.derived))
             for name in withdrawal.derived:
-                _erase_derived(place, name)
+                _erase_derived(data_folder, name)
             for folder in folders:
-                _erase_session(place, folder)
-                write_tombstone(folder, since, begun[folder.name])
-            place.sync()
-            place.erase(withdrawal_file(data, subject).name)
-            place.sync()
+                _erase_session(data_folder, folder)
+                write_tombstone(folder, withdrawn_utc, participants[folder.name])
+            data_folder.sync()
+            data_folder.erase(withdrawal_file(data, subject).name)
+            data_folder.sync()
     except OSError as problem:
         raise _not_everything(data, withdrawal, problem) from problem
 
@@ -109,34 +109,34 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
 def copies_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
     """Sentences on analyses and exports outside the data folder, noted when they were written, that name or may name
     the participant."""
-    noted = [path for path in folders_written_elsewhere(data) if path.exists()]
-    named = [path for path in noted if analysis_names(path, withdrawal.subject) is not False]
-    return (*(f"Written with --out, and not erased: {path}" for path in named), ELSEWHERE)
+    noted_paths = [path for path in read_written_folders(data) if path.exists()]
+    naming_paths = [path for path in noted_paths if analysis_names(path, withdrawal.subject) is not False]
+    return (*(f"Written with --out, and not erased: {path}" for path in naming_paths), COPIES_REMINDER)
 
 
-def _lock_for_erasing(folder: SessionFolder, held: ExitStack) -> None:
-    """Lock session and log until `held` is closed. Raises OSError if a link or file is at the folder's path, and
+def _lock_for_erasing(folder: SessionFolder, locks: ExitStack) -> None:
+    """Lock session and log until `locks` is closed. Raises OSError if a link or file is at the folder's path, and
     StudyError if the session is running."""
     if not is_real_folder(folder.path):
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)
     lock = folder.path / LOCK_NAME
     if lock.is_symlink():
         lock.unlink()
-    held.enter_context(hold_session_lock(folder.path))
+    locks.enter_context(hold_session_lock(folder.path))
     if is_real_file(folder.log):
-        held.enter_context(hold_log_lock(folder.log))
+        locks.enter_context(hold_log_lock(folder.log))
 
 
 def _erase_session(data: RealFolder, folder: SessionFolder) -> None:
     """Erase all files of the session but its lock and tombstone; the log last, after the rest was synced to the
     disk."""
-    with open_folder(data, folder.name) as place:
-        for name in place.names():
+    with open_folder(data, folder.name) as session_folder:
+        for name in session_folder.names():
             if name not in (TOMBSTONE_NAME, LOCK_NAME, LOG_NAME):
-                place.erase(name)
-        place.sync()
-        place.erase(LOG_NAME)
-        place.sync()
+                session_folder.erase(name)
+        session_folder.sync()
+        session_folder.erase(LOG_NAME)
+        session_folder.sync()
 
 
 def _erase_derived(data: RealFolder, name: str) -> None:
@@ -144,24 +144,24 @@ def _erase_derived(data: RealFolder, name: str) -> None:
     relative to the data folder."""
     *parents, last = PurePosixPath(name).parts
     try:
-        with open_folder(data, *parents) as place:
-            place.erase(last)
-            place.sync()
+        with open_folder(data, *parents) as parent_folder:
+            parent_folder.erase(last)
+            parent_folder.sync()
     except (FileNotFoundError, NotADirectoryError):
         return  # already erased, or a folder was replaced by a link: links are not followed
     while parents:
         *parents, last = parents
-        with open_folder(data, *parents) as place:
-            place.erase_if_empty(last)
+        with open_folder(data, *parents) as parent_folder:
+            parent_folder.erase_if_empty(last)
 
 
 def _not_everything(data: Path, withdrawal: Withdrawal, problem: OSError) -> StudyError:
     """Error for a withdrawal that the system did not allow to complete, with the command that continues it."""
-    where = f" ({problem.filename})" if problem.filename else ""
+    file_text = f" ({problem.filename})" if problem.filename else ""
     first = withdrawal.sessions[0] if withdrawal.sessions else f"{withdrawal.subject}_001"
     return StudyError(
         "Not everything could be erased",
-        f"Of {withdrawal.subject}: {problem.strerror or problem}{where}.",
+        f"Of {withdrawal.subject}: {problem.strerror or problem}{file_text}.",
         f"Correct the permissions and continue with: hapteq withdraw {first} --data {data}",
         saved="What remains is no longer used as data once erasing has begun.",
     )

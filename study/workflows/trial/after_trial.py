@@ -20,7 +20,7 @@ class AfterTrial:
     state: SessionState
     correct: bool | None = None
     """Whether the answer was right; None for a void trial, and where there was no question."""
-    leave: str = ""
+    end_reason: str = ""
     """Why the sitting ends here; empty if it continues."""
     void: str = ""
     """Why the trial is void; empty if it counts, or if the participant asked for its repetition."""
@@ -30,21 +30,25 @@ class AfterTrial:
     """Fault of the device during the trial."""
 
 
-def cut_short(state: SessionState, reply: Unanswered) -> AfterTrial:
+def early_end_result(state: SessionState, reply: Unanswered) -> AfterTrial:
     """Result of a wait or stimulus that ended without an answer. reply: why it ended (leaving, a pause, another
     reason)."""
-    if reply.leave:
-        return AfterTrial(state, leave=reply.reason)
+    if reply.ends_sitting:
+        return AfterTrial(state, end_reason=reply.reason)
     if reply.pause:
         return AfterTrial(state, pause=reply.reason)
-    return AfterTrial(state, void="" if reply.asked else reply.reason)
+    return AfterTrial(state, void="" if reply.repeat_requested else reply.reason)
 
 
 def check_end_request(state: SessionState, sitting: Sitting) -> AfterTrial | None:
     """Result of a stop or pause that was requested while no stimulus was played; None without a request."""
     sitting.supervisor.listen()
-    reply = sitting.supervisor.resolve(Unanswered("", leave=False, asked=True))
-    return cut_short(state, reply) if isinstance(reply, Unanswered) and (reply.leave or reply.pause) else None
+    reply = sitting.supervisor.resolve(Unanswered("", ends_sitting=False, repeat_requested=True))
+    return (
+        early_end_result(state, reply)
+        if isinstance(reply, Unanswered) and (reply.ends_sitting or reply.pause)
+        else None
+    )
 
 
 def reason_to_leave(fault: Fault) -> str:

@@ -7,12 +7,12 @@ trial it is played in one of two intervals (two-interval forced choice, 2IFC), a
 from dataclasses import dataclass
 
 from protocols.trial import Phase, VoidCause
-from study.devices.device import Fault, Health, Played
+from study.devices.device import Fault, Health, PlaybackResult
 from study.session.facts.level_scale import equalizer_amplitude
-from study.session.state.due_trial import Present
+from study.session.state.due_trial import PresentTrial
 from study.session.state.state import SessionState
 from study.session.stimulus.held_stimulus import HeldStimulus
-from study.session.stimulus.stimulus import direction_vector, held_stimulus
+from study.session.stimulus.stimulus import direction_vector, make_held_stimulus
 from study.session.views.views import Answered, PlayingNotice, Question, Reply, Unanswered
 from study.workflows.trial.sitting import Pulse, Sitting, release_device
 
@@ -27,7 +27,7 @@ class StimulusReply:
     felt_whole: bool
     """Whether the device had no fault until the answer. A later fault, for example during a slow disk write, does not
     make the trial void."""
-    played: Played | None
+    play_result: PlaybackResult | None
     """Result of a stimulus that was released before the question; None if it is still held or never began."""
     holding: bool
     """Whether the stimulus is still held and has to be released."""
@@ -37,83 +37,87 @@ class StimulusReply:
     """Pulse on the trigger line at the onset of the force; None without such a line, or if the force did not begin."""
 
 
-def ask_participant(state: SessionState, present: Present, question: Question, sitting: Sitting) -> StimulusReply:
+def ask_participant(
+    state: SessionState, due_trial: PresentTrial, question: Question, sitting: Sitting
+) -> StimulusReply:
     """Play the stimulus, ask the question, and return the reply. In a direction trial the stimulus is still held
     then."""
-    sitting.supervisor.begin("trial")
-    if present.phase is Phase.DETECTION:
-        return _in_one_of_two_intervals(state, present, question, sitting)
-    sitting.device.hold(_stimulus(state, present, sitting))
+    sitting.supervisor.start_activity("trial")
+    if due_trial.phase is Phase.DETECTION:
+        return _in_one_of_two_intervals(state, due_trial, question, sitting)
+    sitting.device.hold(_stimulus(state, due_trial, sitting))
     # Read before the pulse is sent: the attempt to send a pulse may take time, which belongs to the response time.
     started_s = sitting.clock.now_s()
     pulse = sitting.pulse()
-    sitting.hand.feel(present, state.answers)
+    sitting.hand.feel(due_trial, state.answers)
     reply = _reply_to(question, sitting)
     sitting.device.keep_alive()
     health = sitting.device.health()
-    whole = health.fault is Fault.NONE
-    return StimulusReply(reply, started_s, whole, played=None, holding=True, health=health, pulse=pulse)
+    is_complete = health.fault is Fault.NONE
+    return StimulusReply(reply, started_s, is_complete, play_result=None, holding=True, health=health, pulse=pulse)
 
 
 def _in_one_of_two_intervals(
-    state: SessionState, present: Present, question: Question, sitting: Sitting
+    state: SessionState, due_trial: PresentTrial, question: Question, sitting: Sitting
 ) -> StimulusReply:
-    """Play the stimulus in interval 1 or 2 (`present.label`) and nothing in the other one, then ask for the
+    """Play the stimulus in interval 1 or 2 (`due_trial.label`) and nothing in the other one, then ask for the
     interval."""
-    played: Played | None = None
+    play_result: PlaybackResult | None = None
     pulse: Pulse | None = None
-    sitting.hand.feel(present, state.answers)
+    sitting.hand.feel(due_trial, state.answers)
     for interval in (1, 2):
-        holding = interval == present.label
+        holding = interval == due_trial.label
         if holding:
-            sitting.device.hold(_stimulus(state, present, sitting))
+            sitting.device.hold(_stimulus(state, due_trial, sitting))
             pulse = sitting.pulse()
-        cut = _wait(f"Interval {interval}", interval, state.protocol.detection.interval_s, sitting)
-        if cut is not None:
-            return StimulusReply(cut, sitting.clock.now_s(), False, played, holding, pulse=pulse)
+        early_reply = _wait(f"Interval {interval}", interval, state.protocol.detection.interval_s, sitting)
+        if early_reply is not None:
+            return StimulusReply(early_reply, sitting.clock.now_s(), False, play_result, holding, pulse=pulse)
         if holding:
-            played = release_device(sitting)
-        cut = _wait("", 0, state.protocol.detection.gap_s, sitting) if interval == 1 else None
-        if cut is not None:
-            return StimulusReply(cut, sitting.clock.now_s(), False, played, holding=False, pulse=pulse)
+            play_result = release_device(sitting)
+        early_reply = _wait("", 0, state.protocol.detection.gap_s, sitting) if interval == 1 else None
+        if early_reply is not None:
+            return StimulusReply(early_reply, sitting.clock.now_s(), False, play_result, holding=False, pulse=pulse)
     started_s = sitting.clock.now_s()
     reply = _reply_to(question, sitting)
-    health = played.health if played is not None else None
-    whole = health is not None and health.fault is Fault.NONE
-    return StimulusReply(reply, started_s, whole, played, holding=False, health=health, pulse=pulse)
+    health = play_result.health if play_result is not None else None
+    is_complete = health is not None and health.fault is Fault.NONE
+    return StimulusReply(reply, started_s, is_complete, play_result, holding=False, health=health, pulse=pulse)
 
 
 def _reply_to(question: Question, sitting: Sitting) -> Reply:
     """Reply to the question. A request to repeat the trial beyond the allowed number is ignored: the question is asked
     again."""
     while True:
-        reply = sitting.supervisor.resolve(sitting.display.ask(question, sitting.supervisor.glance))
-        repeat = isinstance(reply, Unanswered) and reply.asked and not (reply.pause or reply.leave)
-        if not repeat or question.repeats_left != 0 or not sitting.supervisor.glance():
+        reply = sitting.supervisor.resolve(sitting.display.ask(question, sitting.supervisor.sign_of_life))
+        repeat = isinstance(reply, Unanswered) and reply.repeat_requested and not (reply.pause or reply.ends_sitting)
+        if not repeat or question.repeats_left != 0 or not sitting.supervisor.sign_of_life():
             return reply
 
 
 def _wait(title: str, number: int, seconds: float, sitting: Sitting) -> Unanswered | None:
     """Wait `seconds` during an interval or gap. None when they have passed; else why the wait ended: a button pressed
     too early makes the trial void (`VoidCause.EARLY`)."""
-    reply = sitting.display.show_playing(PlayingNotice(title, number, seconds, picture=None), sitting.supervisor.glance)
-    if reply is None and sitting.supervisor.glance():
+    reply = sitting.display.show_playing(
+        PlayingNotice(title, number, seconds, picture=None), sitting.supervisor.sign_of_life
+    )
+    if reply is None and sitting.supervisor.sign_of_life():
         return None
-    resolved = sitting.supervisor.resolve(reply or Unanswered("the stimulus ended early", leave=False))
+    resolved = sitting.supervisor.resolve(reply or Unanswered("the stimulus ended early", ends_sitting=False))
     return (
-        Unanswered("answered before both intervals", leave=False, cause=VoidCause.EARLY)
+        Unanswered("answered before both intervals", ends_sitting=False, cause=VoidCause.EARLY)
         if isinstance(resolved, Answered)
         else resolved
     )
 
 
-def _stimulus(state: SessionState, present: Present, sitting: Sitting) -> HeldStimulus:
+def _stimulus(state: SessionState, due_trial: PresentTrial, sitting: Sitting) -> HeldStimulus:
     """The stimulus of a trial, with its level converted to the quantity of the equalizer (N or m/s²)."""
-    return held_stimulus(
+    return make_held_stimulus(
         state.protocol.stimulus,
-        direction_vector(state.protocol.directions, present.direction),
-        present.frequency_hz,
-        present.polarity * equalizer_amplitude(state.opened.equalized, present.level_n, present.frequency_hz),
+        direction_vector(state.protocol.directions, due_trial.direction),
+        due_trial.frequency_hz,
+        due_trial.polarity * equalizer_amplitude(state.opened.equalized, due_trial.level_n, due_trial.frequency_hz),
         sitting.equalizer,
         sitting.device.info.sample_rate_hz,
     )

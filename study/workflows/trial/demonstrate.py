@@ -1,49 +1,49 @@
 """Labelled demonstration before the trials: the participant chooses a direction and a frequency and feels the stimulus,
 as often as wanted. Every stimulus is logged before it is played."""
 
-from protocols.procedure.schedule import demo_level_n, label_of
+from protocols.procedure.schedule import demo_level_n, label_direction
 from study.devices.device import Fault
 from study.session.facts.events import DemoFinished, DemoPlayed
 from study.session.facts.level_scale import equalizer_amplitude
-from study.session.state.due_trial import labels_are_swapped
-from study.session.state.state import SessionState, felt
-from study.session.stimulus.stimulus import direction_angle_deg, direction_vector, held_stimulus
-from study.session.views.views import DemoDone, DemoMenu, PlayDemo, PlayingNotice, Unanswered, picture_of
-from study.workflows.trial.after_trial import AfterTrial, check_end_request, cut_short, reason_to_leave
-from study.workflows.trial.sitting import Sitting, record
+from study.session.state.due_trial import has_swapped_labels
+from study.session.state.state import SessionState, is_felt_by_person
+from study.session.stimulus.stimulus import direction_angle_deg, direction_vector, make_held_stimulus
+from study.session.views.views import DemoDone, DemoMenu, PlayDemo, PlayingNotice, Unanswered, make_direction_picture
+from study.workflows.trial.after_trial import AfterTrial, check_end_request, early_end_result, reason_to_leave
+from study.workflows.trial.sitting import Sitting, log_and_apply
 
 
 def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
     """Run the demonstration until the participant ends it, leaves, or a pause is requested. It can be run again."""
-    felt_so_far: tuple[tuple[int, int], ...] = ()
+    felt_stimuli: tuple[tuple[int, int], ...] = ()
     vibration = 1
     while True:
-        sitting.supervisor.begin("demo")
-        choice = sitting.display.choose_demo(_menu(state, felt_so_far, vibration), sitting.supervisor.glance)
+        sitting.supervisor.start_activity("demo")
+        choice = sitting.display.choose_demo(_menu(state, felt_stimuli, vibration), sitting.supervisor.sign_of_life)
         ended = check_end_request(state, sitting)
         if ended is not None:
             return ended
         if isinstance(choice, DemoDone):
-            return AfterTrial(record(state, DemoFinished(utc=sitting.clock.utc()), sitting))
+            return AfterTrial(log_and_apply(state, DemoFinished(utc=sitting.clock.utc()), sitting))
         vibration = choice.vibration
-        after = _play_demonstration(state, choice, sitting)
-        state = after.state
-        if after.leave or after.pause:
-            return after
-        if after.void:
-            sitting.display.trouble(f"That was cut short: {after.void}.")
+        outcome = _play_demonstration(state, choice, sitting)
+        state = outcome.state
+        if outcome.end_reason or outcome.pause:
+            return outcome
+        if outcome.void:
+            sitting.display.trouble(f"That was cut short: {outcome.void}.")
         else:
-            felt_so_far = (*felt_so_far, (choice.vibration, choice.number))
+            felt_stimuli = (*felt_stimuli, (choice.vibration, choice.number))
 
 
-def _menu(state: SessionState, felt_so_far: tuple[tuple[int, int], ...], vibration: int) -> DemoMenu:
-    """The menu. felt_so_far: (vibration, direction number) of stimuli already played; vibration: the last chosen."""
+def _menu(state: SessionState, felt_stimuli: tuple[tuple[int, int], ...], vibration: int) -> DemoMenu:
+    """The menu. felt_stimuli: (vibration, direction number) of stimuli already played; vibration: the last chosen."""
     return DemoMenu(
-        picture=picture_of(state.protocol.directions, labels_are_swapped(state.protocol, state.opened)),
+        picture=make_direction_picture(state.protocol.directions, has_swapped_labels(state.protocol, state.opened)),
         vibrations=len(state.protocol.all_frequencies_hz),
         vibration=vibration,
-        felt=felt_so_far,
-        handle_moves=felt(state.opened) is not False,
+        played_pairs=felt_stimuli,
+        handle_moves=is_felt_by_person(state.opened) is not False,
     )
 
 
@@ -52,8 +52,8 @@ def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting)
     protocol = state.protocol
     frequency_hz = protocol.all_frequencies_hz[choice.vibration - 1]
     level_n = demo_level_n(protocol.demo, state.opened.seed, state.sitting.demos)
-    direction = label_of(choice.number, labels_are_swapped(protocol, state.opened))
-    played = DemoPlayed(
+    direction = label_direction(choice.number, has_swapped_labels(protocol, state.opened))
+    demo_played = DemoPlayed(
         utc=sitting.clock.utc(),
         frequency_hz=frequency_hz,
         level_n=level_n,
@@ -61,9 +61,9 @@ def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting)
         angle_deg=direction_angle_deg(protocol.directions, direction),
         seconds=protocol.demo.seconds,
     )
-    state = record(state, played, sitting)
+    state = log_and_apply(state, demo_played, sitting)
     sitting.device.hold(
-        held_stimulus(
+        make_held_stimulus(
             protocol.stimulus,
             direction_vector(protocol.directions, direction),
             frequency_hz,
@@ -72,14 +72,16 @@ def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting)
             sitting.device.info.sample_rate_hz,
         )
     )
-    picture = picture_of(protocol.directions, labels_are_swapped(protocol, state.opened))
+    picture = make_direction_picture(protocol.directions, has_swapped_labels(protocol, state.opened))
     notice = PlayingNotice(f"Direction {choice.number}", choice.number, protocol.demo.seconds, picture)
-    reply = sitting.display.show_playing(notice, sitting.supervisor.glance)
+    reply = sitting.display.show_playing(notice, sitting.supervisor.sign_of_life)
     fault = sitting.device.release().health.fault
-    if leave := reason_to_leave(fault):
-        return AfterTrial(state, leave=leave, fault=fault)
-    resolved = sitting.supervisor.resolve(reply or Unanswered("", leave=False, asked=True))
+    if end_reason := reason_to_leave(fault):
+        return AfterTrial(state, end_reason=end_reason, fault=fault)
+    resolved = sitting.supervisor.resolve(reply or Unanswered("", ends_sitting=False, repeat_requested=True))
     if isinstance(resolved, Unanswered):
-        after = cut_short(state, resolved)
-        return after if fault is Fault.NONE or after.leave else AfterTrial(state, void=fault.value, fault=fault)
+        outcome = early_end_result(state, resolved)
+        return (
+            outcome if fault is Fault.NONE or outcome.end_reason else AfterTrial(state, void=fault.value, fault=fault)
+        )
     return AfterTrial(state)

@@ -28,12 +28,12 @@ from study.session.views.views import (
 )
 
 if TYPE_CHECKING:
-    from study.session.state.due_trial import Present
+    from study.session.state.due_trial import PresentTrial
 
 SignOfLife = Callable[[], bool]
-"""Function that a display calls at least every 100 ms while it waits: it resets the device's watchdog and takes
-requests to stop or pause. Where it returns False (a fault, a request, a device button), the display returns at once,
-with any reply."""
+"""Keep-alive callback that a display calls at least every 100 ms while it waits: it resets the device's watchdog and
+takes requests to stop or pause. Where it returns False (a fault, a request, a device button), the display returns
+at once, with any reply."""
 
 
 class Display(Protocol):
@@ -82,8 +82,8 @@ class Display(Protocol):
         ...
 
     def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
-        """Show a pause, during which nothing is played, and return how the participant continues. `AfterPause.LEAVE`
-        where `sign_of_life` ended the wait."""
+        """Show a pause, during which nothing is played, and return how the participant continues.
+        `AfterPause.END_SITTING` where `sign_of_life` ended the wait."""
         ...
 
     def await_return(self, reason: str) -> None:
@@ -100,9 +100,9 @@ class Display(Protocol):
 
 
 class Hand(Protocol):
-    """Interface of the hand on the handle. A person feels the device; a simulated hand is told the stimulus."""
+    """Interface of the hand on the handle. A person feels the device; a simulated hand receives the stimulus."""
 
-    def feel(self, stimulus: Present, answers_before: int) -> None:
+    def feel(self, stimulus: PresentTrial, answers_before: int) -> None:
         """Receive the stimulus: called as soon as it is held; in a detection trial before the first interval.
         answers_before: number of answers of the session so far, training included."""
         ...
@@ -111,5 +111,5 @@ class Hand(Protocol):
 class PersonsHand:
     """Hand of a person, who feels the device: `feel` does nothing."""
 
-    def feel(self, stimulus: Present, answers_before: int) -> None:
+    def feel(self, stimulus: PresentTrial, answers_before: int) -> None:
         return None

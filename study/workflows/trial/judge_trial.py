@@ -17,7 +17,7 @@ from study.session.facts.void_reasons import ACCELERATION_MISSING, TICK_HELD, TI
 class Judgement:
     """Verdict on an answered trial: whether it counts, and remarks on it."""
 
-    spoiled: str
+    void_reason: str
     """Why the trial is void; empty if it counts."""
     flags: tuple[str, ...]
     """Remarks on a trial that counts, in words."""

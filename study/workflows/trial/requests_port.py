@@ -25,12 +25,12 @@ class QueuedRequests:
         self._queue.put(request)
 
     def take(self) -> tuple[Request, ...]:
-        taken = []
+        requests = []
         while True:
             try:
-                taken.append(self._queue.get_nowait())
+                requests.append(self._queue.get_nowait())
             except Empty:
-                return tuple(taken)
+                return tuple(requests)
 
 
 class ManyRequests:

@@ -7,7 +7,7 @@ from study.devices.clock import Clock
 from study.devices.device import Device, Fault, Look
 from study.session.views.views import Answered, Reply, Unanswered
 from study.session.watching.live import Activity, Live
-from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked, Who
+from study.session.watching.requests import NoteAsked, PauseAsked, RequestSource, StopAsked
 from study.workflows.trial.requests_port import Requests
 
 LIVE_EVERY_S = 0.25
@@ -18,7 +18,7 @@ PLAYING = ("trial", "demo", "probe", "reference")
 
 
 class SessionSupervisor:
-    """One per sitting. `glance` is the sign of life of every wait; `resolve` returns afterwards what ended it."""
+    """One per sitting. `sign_of_life` is the sign of life of every wait; `resolve` returns afterwards what ended it."""
 
     def __init__(
         self,
@@ -36,26 +36,26 @@ class SessionSupervisor:
         self._buttons = buttons
         self._place_m = place_m
         self._buttons_up = False
-        self._told_s = float("-inf")
+        self._published_s = float("-inf")
         self._activity: Activity = "preparing"
         self._since_utc = clock.utc()
         self._handle_ready = True
         self._notes: list[NoteAsked] = []
         self._answer: Answered | None = None
-        self.stop_asked: Who | None = None
-        self.pause_asked: Who | None = None
+        self.stop_asked: RequestSource | None = None
+        self.pause_asked: RequestSource | None = None
 
-    def begin(self, activity: Activity) -> None:
+    def start_activity(self, activity: Activity) -> None:
         """Start a new wait: a button still held from the last one does not answer it."""
         self._activity, self._since_utc = activity, self._clock.utc()
         self._buttons_up = False
         self._answer = None
         self._handle_ready = True
-        self._told_s = float("-inf")
+        self._published_s = float("-inf")
         self.listen()
         self._report()
 
-    def glance(self) -> bool:
+    def sign_of_life(self) -> bool:
         """The sign of life. False where the wait is over: a fault, a request, a button."""
         self._device.keep_alive()
         self.listen()
@@ -82,13 +82,15 @@ class SessionSupervisor:
     def resolve(self, reply: Reply) -> Reply:
         """The reply of a wait: what ended it, where the display only knows that it ended."""
         if self.stop_asked is not None:
-            return Unanswered(f"the {self.stop_asked} stopped the session", leave=True)
+            return Unanswered(f"the {self.stop_asked} stopped the session", ends_sitting=True)
         if isinstance(reply, Answered):
             return reply
         if self._answer is not None:
             return self._answer
         if self.pause_asked is not None:
-            return Unanswered(f"the {self.pause_asked} asked for a pause", leave=False, asked=True, pause=True)
+            return Unanswered(
+                f"the {self.pause_asked} asked for a pause", ends_sitting=False, repeat_requested=True, pause=True
+            )
         return reply
 
     def note(self, note: NoteAsked) -> None:
@@ -101,26 +103,26 @@ class SessionSupervisor:
         return notes
 
     def handle_is(self, ready: bool) -> None:
-        """Whether the handle is at its place: shown to viewers, until the next `begin`."""
+        """Whether the handle is at its place: shown to viewers, until the next `start_activity`."""
         self._handle_ready = ready
 
     def _report(self) -> None:
         now_s = self._clock.now_s()
-        due = not self._clock.virtual and now_s - self._told_s >= LIVE_EVERY_S
-        if not due and not self._buttons:
+        is_due = not self._clock.virtual and now_s - self._published_s >= LIVE_EVERY_S
+        if not is_due and not self._buttons:
             return
         look = self._device.look()
         self._press(look, now_s)
-        if due:
-            self._told_s = now_s
+        if is_due:
+            self._published_s = now_s
             self._publish(self._live_state(look))
 
     def _press(self, look: Look, now_s: float) -> None:
-        down = [number for number in self._buttons if number in look.buttons]
-        if not down:
+        pressed = [number for number in self._buttons if number in look.buttons]
+        if not pressed:
             self._buttons_up = True
-        elif self._buttons_up and len(down) == 1 and self._activity == "trial" and self._answer is None:
-            self._answer = Answered(1 + self._buttons.index(down[0]), now_s)
+        elif self._buttons_up and len(pressed) == 1 and self._activity == "trial" and self._answer is None:
+            self._answer = Answered(1 + self._buttons.index(pressed[0]), now_s)
 
     def offset_m(self, look: Look) -> tuple[float, float, float] | None:
         """Offset of the handle from its place; None without a reading."""

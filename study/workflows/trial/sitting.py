@@ -1,4 +1,5 @@
-"""The ports of one sitting, and how facts enter its state: only through the log."""
+"""The ports of one sitting (device, display, log, ...). The state of a session changes only by events that are logged:
+`log_and_apply`."""
 
 import contextlib
 from collections.abc import Callable
@@ -7,10 +8,10 @@ from typing import Protocol
 
 from equalizer.tracking.feedforward.equalizer import Equalizer
 from study.devices.clock import Clock
-from study.devices.device import Device, Fault, Played
+from study.devices.device import Device, Fault, PlaybackResult
 from study.session.facts.events import Event, NoteTaken
 from study.session.facts.log_time import ClockStep
-from study.session.state.fold import apply
+from study.session.state.fold import apply_event
 from study.session.state.state import SessionState
 from study.session.watching.requests import NoteAsked
 from study.store.sessions.archive import SessionFolder
@@ -34,11 +35,11 @@ class Pulse(Protocol):
 
     @property
     def trouble(self) -> str:
-        """Why it was lost; empty where it was not."""
+        """Why the pulse was lost; empty where it was sent."""
         ...
 
 
-class Sound(Protocol):
+class SoundOutput(Protocol):
     """Masking noise, as `study.devices.masking_sound` plays it. `start` and `check` raise `DeviceError`."""
 
     @property
@@ -51,16 +52,16 @@ class Sound(Protocol):
         ...
 
     def check(self) -> None:
-        """Raises where the noise is not heard."""
+        """Raise DeviceError where the noise is not played."""
         ...
 
     def stop(self) -> bool:
-        """Stop the noise. Whether it was heard until then."""
+        """Stop the noise. Returns whether it was played until then."""
         ...
 
 
-def no_pulse() -> None:
-    """Pulse of a lab that has no line for it: does nothing."""
+def send_no_pulse() -> None:
+    """Default of `Sitting.pulse`, for a lab without a trigger line: does nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,48 +78,48 @@ class Sitting:
     supervisor: SessionSupervisor
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Centre of the spring, where the handle belongs."""
-    pulse: Callable[[], Pulse | None] = no_pulse
+    pulse: Callable[[], Pulse | None] = send_no_pulse
     """Sends a pulse on the lab's trigger line, right after the device has begun a trial's force. Never raises."""
-    sound: Sound | None = None
+    masking_noise: SoundOutput | None = None
 
 
-def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
-    """Fold the event, which rejects contradictions; then log it to the disk. Only the returned state may be acted
-    on."""
+def log_and_apply(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
+    """Apply the event to the state, which rejects contradictions, and append it to the log. Returns the new state, from
+    which the caller continues; its events are on disk. Raises LogContradiction."""
     event = replace(event, monotonic_s=sitting.clock.now_s())
-    after = apply(state, event)
+    updated_state = apply_event(state, event)
     sitting.log.append(event)
-    report_clock_steps(after.sitting.clock_steps[len(state.sitting.clock_steps) :], sitting)
-    return after
+    report_clock_steps(updated_state.sitting.clock_steps[len(state.sitting.clock_steps) :], sitting)
+    return updated_state
 
 
 def report_clock_steps(steps: tuple[ClockStep, ...], sitting: Sitting) -> None:
-    """Tell the experimenter of each step of the wall clock, see `tell`."""
+    """Notify the experimenter of each step of the wall clock, see `notify_experimenter`."""
     for step in steps:
         notify_experimenter(step.sentence, sitting)
 
 
 def notify_experimenter(sentence: str, sitting: Sitting) -> None:
-    """Tell the experimenter: on the screen now, and in the log with the next notes."""
+    """Notify the experimenter: on the screen now, and in the log with the next notes."""
     sitting.display.trouble(sentence)
     sitting.supervisor.note(NoteAsked("program", sentence))
 
 
 def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
-    """Log the notes taken meanwhile. Takes pending requests first."""
+    """Read pending requests, then log all notes since the last call."""
     sitting.supervisor.listen()
     for note in sitting.supervisor.take_notes():
         event = NoteTaken(utc=sitting.clock.utc(), who=note.who, text=note.text, adverse=note.adverse)
-        state = record(state, event, sitting)
+        state = log_and_apply(state, event, sitting)
     return state
 
 
-def release_device(sitting: Sitting) -> Played:
+def release_device(sitting: Sitting) -> PlaybackResult:
     """Release the stimulus, and report at once if the force could not be removed, before any disk access."""
-    played = sitting.device.release()
-    if played.health.fault is Fault.FORCE_LEFT:
+    play_result = sitting.device.release()
+    if play_result.health.fault is Fault.FORCE_LEFT:
         with contextlib.suppress(OSError):
-            sitting.display.trouble(played.health.fault.value)
-    if played.health.why:
-        sitting.supervisor.note(NoteAsked("program", f"The device: {played.health.why}."))
-    return played
+            sitting.display.trouble(play_result.health.fault.value)
+    if play_result.health.why:
+        sitting.supervisor.note(NoteAsked("program", f"The device: {play_result.health.why}."))
+    return play_result

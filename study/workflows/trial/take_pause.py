@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from study.session.facts.events import PauseTaken
 from study.session.state.state import SessionState
 from study.session.views.views import AfterPause, PauseNotice
-from study.workflows.trial.sitting import Sitting, record, write_notes
+from study.workflows.trial.sitting import Sitting, log_and_apply, write_notes
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,13 +13,13 @@ class PauseOutcome:
     """State of the session after a pause, and whether the sitting continues."""
 
     state: SessionState
-    leave: str
+    end_reason: str
     """Why the sitting ends here; empty if it continues."""
     withdrawn: bool
     """Whether the participant withdrew, so that all data are to be erased."""
 
 
-LEAVE = {AfterPause.LEAVE: "the participant left", AfterPause.WITHDRAW: "the participant withdrew"}
+END_REASONS = {AfterPause.END_SITTING: "the participant left", AfterPause.WITHDRAW: "the participant withdrew"}
 """Why a sitting ends after a pause, by the participant's decision; decisions to continue are not listed."""
 
 
@@ -27,22 +27,22 @@ def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutco
     """Show the pause until the participant decides, and log it with its duration (s). Notes that are taken during the
     pause are logged at once. reason: shown to the participant."""
     supervisor = sitting.supervisor
-    who = supervisor.pause_asked or "participant"
-    supervisor.begin("pause")
+    requester = supervisor.pause_asked or "participant"
+    supervisor.start_activity("pause")
     started_s = sitting.clock.now_s()
 
-    def glance() -> bool:
+    def sign_of_life() -> bool:
         """Sign of life of the pause, which also writes new notes to the disk: a pause may be long."""
         nonlocal state
         state = write_notes(state, sitting)
-        return supervisor.glance()
+        return supervisor.sign_of_life()
 
-    decision = sitting.display.pause(PauseNotice(reason, state.answers), glance)
+    decision = sitting.display.pause(PauseNotice(reason, state.answers), sign_of_life)
     state = write_notes(state, sitting)
     # Cleared after the pause, so that a request made during the pause does not start another one.
     supervisor.pause_asked = None
     paused_s = sitting.clock.now_s() - started_s
-    state = record(state, PauseTaken(utc=sitting.clock.utc(), who=who, paused_s=paused_s), sitting)
+    state = log_and_apply(state, PauseTaken(utc=sitting.clock.utc(), who=requester, paused_s=paused_s), sitting)
     if supervisor.stop_asked is not None:
         return PauseOutcome(state, f"the {supervisor.stop_asked} stopped the session", withdrawn=False)
-    return PauseOutcome(state, LEAVE.get(decision, ""), withdrawn=decision is AfterPause.WITHDRAW)
+    return PauseOutcome(state, END_REASONS.get(decision, ""), withdrawn=decision is AfterPause.WITHDRAW)

@@ -1,4 +1,4 @@
-"""Events of one trial for the session log (presented, measured, void), and the metadata of its recording.
+"""Make the events of a trial for the session log (presented, measured, void), and save its recording.
 
 Units: levels in N, accelerations in m/s², times in s; displacement and offset in mm.
 """
@@ -10,13 +10,13 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from protocols.trial import VoidCause
-from study.devices.device import Fault, Health, Played
+from study.devices.device import Fault, Health, PlaybackResult
 from study.session.facts.answer_given import AnswerHealth
 from study.session.facts.events import TrialMeasured, TrialPresented, TrialSpoiled
-from study.session.state.due_trial import Present
+from study.session.state.due_trial import PresentTrial
 from study.session.state.state import SessionState
 from study.session.stimulus.delivered import Delivered
-from study.store.disk.provenance import versions
+from study.store.disk.provenance import list_versions
 from study.store.sessions.trial_recordings import recording_name, save_trial_recording
 from study.workflows.trial.sitting import Sitting
 
@@ -25,7 +25,7 @@ from study.workflows.trial.sitting import Sitting
 class Outcome:
     """Result of an answered trial that counts: what the device played and what was measured."""
 
-    played: Played
+    play_result: PlaybackResult
     values: Delivered | None
     """Delivered amplitudes; None where too little of the steady part was recorded."""
     flags: tuple[str, ...]
@@ -36,26 +36,26 @@ class Outcome:
     """Whether the acceleration of the recording can be trusted."""
 
 
-def trial_presented(present: Present, sitting: Sitting) -> TrialPresented:
-    """Event that is logged before the stimulus is played."""
+def make_presented_event(due_trial: PresentTrial, sitting: Sitting) -> TrialPresented:
+    """Event of a trial that is presented; logged before the stimulus is played."""
     return TrialPresented(
         utc=sitting.clock.utc(),
-        run=present.run,
-        trial=present.trial,
-        attempt=present.attempt,
-        phase=present.phase,
-        frequency_hz=present.frequency_hz,
-        level_db=present.level_db,
-        level_n=present.level_n,
-        direction=1 if present.label == 1 else 2,
-        angle_deg=present.angle_deg,
-        polarity=1 if present.polarity > 0 else -1,
-        wanted_mps2=present.wanted_mps2,
-        nominal_n=present.nominal_n,
+        run=due_trial.run,
+        trial=due_trial.trial,
+        attempt=due_trial.attempt,
+        phase=due_trial.phase,
+        frequency_hz=due_trial.frequency_hz,
+        level_db=due_trial.level_db,
+        level_n=due_trial.level_n,
+        direction=1 if due_trial.label == 1 else 2,
+        angle_deg=due_trial.angle_deg,
+        polarity=1 if due_trial.polarity > 0 else -1,
+        wanted_mps2=due_trial.wanted_mps2,
+        nominal_n=due_trial.nominal_n,
     )
 
 
-def answer_health(health: Health, felt_whole: bool) -> AnswerHealth:
+def make_answer_health(health: Health, felt_whole: bool) -> AnswerHealth:
     """Counters of the device, as they are logged with the answer."""
     return AnswerHealth(
         fault=health.fault.name,
@@ -72,7 +72,7 @@ def answer_health(health: Health, felt_whole: bool) -> AnswerHealth:
     )
 
 
-def health_from_log(logged: AnswerHealth) -> Health:
+def restore_health(logged: AnswerHealth) -> Health:
     """Counters of the device from the log, without those that are not logged (feedback, sensor). An unknown name of a
     fault, for example of a later version, counts as a fault."""
     return Health(
@@ -89,39 +89,43 @@ def health_from_log(logged: AnswerHealth) -> Health:
     )
 
 
-def trial_spoiled(
-    present: Present, why: tuple[str, VoidCause], health: Health | None, sitting: Sitting
+def make_void_event(
+    due_trial: PresentTrial, reason_and_cause: tuple[str, VoidCause], health: Health | None, sitting: Sitting
 ) -> TrialSpoiled:
-    """Event of a void trial. why: the reason in words, and its cause. health: None if nothing was played."""
-    reason, cause = why
+    """Event of a void trial. reason_and_cause: the reason in words, and its cause. health: None if nothing was
+    played."""
+    reason, cause = reason_and_cause
     return TrialSpoiled(
         utc=sitting.clock.utc(),
-        run=present.run,
-        trial=present.trial,
-        attempt=present.attempt,
+        run=due_trial.run,
+        trial=due_trial.trial,
+        attempt=due_trial.attempt,
         reason=reason,
         missed_ticks=health.missed_ticks if health else None,
         late_ticks=health.late_ticks if health else None,
         latest_s=health.latest_s if health else None,
-        vibrated_s=_seconds(health, sitting) if health else 0.0,
+        vibrated_s=_compute_vibration_s(health, sitting) if health else 0.0,
         cause=cause,
         sensor=health.sensor if health else None,
     )
 
 
-def trial_measured(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> TrialMeasured:
-    """Event of a trial that counts. The recording is saved first, because the event contains its name and SHA-256."""
+def record_measured_trial(
+    due_trial: PresentTrial, outcome: Outcome, state: SessionState, sitting: Sitting
+) -> TrialMeasured:
+    """Save the recording of a trial that counts, and return its event, which contains the recording's name and
+    SHA-256."""
     saved = None
-    if outcome.played.recording is not None:
-        conditions = _conditions(present, outcome, state, sitting)
-        name = recording_name(present.run, present.trial, present.attempt)
-        saved = save_trial_recording(sitting.folder, name, outcome.played.recording, conditions)
+    if outcome.play_result.recording is not None:
+        conditions = _make_recording_metadata(due_trial, outcome, state, sitting)
+        name = recording_name(due_trial.run, due_trial.trial, due_trial.attempt)
+        saved = save_trial_recording(sitting.folder, name, outcome.play_result.recording, conditions)
     values = outcome.values
     return TrialMeasured(
         utc=sitting.clock.utc(),
-        run=present.run,
-        trial=present.trial,
-        attempt=present.attempt,
+        run=due_trial.run,
+        trial=due_trial.trial,
+        attempt=due_trial.attempt,
         # A quick answer comes before the steady part of the stimulus: nothing can be measured then, which is no fault.
         status="flagged" if outcome.flags else "unmeasured" if values is None else "ok",
         flags=outcome.flags,
@@ -131,48 +135,50 @@ def trial_measured(present: Present, outcome: Outcome, state: SessionState, sitt
         off_axis_mps2=values.off_axis_mps2 if values else None,
         displacement_mm=values.displacement_mm if values else None,
         harmonics_mps2=values.harmonics_mps2 if values else None,
-        missed_ticks=outcome.played.health.missed_ticks,
-        late_ticks=outcome.played.health.late_ticks,
-        latest_s=outcome.played.health.latest_s,
-        vibrated_s=_seconds(outcome.played.health, sitting),
-        offset_mm=_farthest_mm(outcome.played, sitting),
-        sensor=outcome.played.health.sensor,
+        missed_ticks=outcome.play_result.health.missed_ticks,
+        late_ticks=outcome.play_result.health.late_ticks,
+        latest_s=outcome.play_result.health.latest_s,
+        vibrated_s=_compute_vibration_s(outcome.play_result.health, sitting),
+        offset_mm=_compute_largest_offset_mm(outcome.play_result, sitting),
+        sensor=outcome.play_result.health.sensor,
     )
 
 
-def _seconds(health: Health, sitting: Sitting) -> float:
+def _compute_vibration_s(health: Health, sitting: Sitting) -> float:
     """Duration of the vibration (s) from onset to rest, fades included: it counts for the vibration dose."""
     return health.ticks / sitting.device.info.sample_rate_hz
 
 
-def _farthest_mm(played: Played, sitting: Sitting) -> float | None:
+def _compute_largest_offset_mm(play_result: PlaybackResult, sitting: Sitting) -> float | None:
     """Largest distance (mm) of the handle from its place during the recording; None without position data."""
-    if played.recording is None or played.recording.position is None:
+    if play_result.recording is None or play_result.recording.position is None:
         return None
-    offset_m = np.linalg.norm(played.recording.position.samples - np.asarray(sitting.place_m), axis=1)
+    offset_m = np.linalg.norm(play_result.recording.position.samples - np.asarray(sitting.place_m), axis=1)
     return 1000.0 * float(np.nanmax(offset_m)) if np.isfinite(offset_m).any() else None
 
 
-def _conditions(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> dict[str, Any]:
+def _make_recording_metadata(
+    due_trial: PresentTrial, outcome: Outcome, state: SessionState, sitting: Sitting
+) -> dict[str, Any]:
     """Metadata of the recording file: what was played, counters of the device, and provenance."""
     return {
         "session": sitting.folder.name,
-        "trial": {"run": present.run, "trial": present.trial, "attempt": present.attempt},
-        "frequency_hz": present.frequency_hz,
-        "level_n": present.level_n,
-        "wanted_mps2": present.wanted_mps2,
+        "trial": {"run": due_trial.run, "trial": due_trial.trial, "attempt": due_trial.attempt},
+        "frequency_hz": due_trial.frequency_hz,
+        "level_n": due_trial.level_n,
+        "wanted_mps2": due_trial.wanted_mps2,
         "unit_vector": [float(v) for v in outcome.vector],
         "hand": "held",
-        "missed_ticks": outcome.played.health.missed_ticks,
-        "late_ticks": outcome.played.health.late_ticks,
-        "latest_s": outcome.played.health.latest_s,
+        "missed_ticks": outcome.play_result.health.missed_ticks,
+        "late_ticks": outcome.play_result.health.late_ticks,
+        "latest_s": outcome.play_result.health.latest_s,
         "flags": list(outcome.flags),
         "acceleration_trusted": outcome.measured,
-        "sensor": None if outcome.played.health.sensor is None else asdict(outcome.played.health.sensor),
+        "sensor": None if outcome.play_result.health.sensor is None else asdict(outcome.play_result.health.sensor),
         "equalizer": sitting.equalizer.name,
         "provenance": {
             "protocol_hash": state.opened.protocol_hash,
             "seed": state.opened.seed,
-            "versions": versions(),
+            "versions": list_versions(),
         },
     }

@@ -1,4 +1,4 @@
-"""Outlets of the lab streaming layer (LSL) for the markers and signals of a session.
+"""Outlets of the lab streaming layer (LSL) for the markers and signals of a session, used by `hapteq stream`.
 
 The optional library pylsl is imported only when an outlet is made. Times of samples are on LSL's own clock, in s.
 """
@@ -12,7 +12,7 @@ from equalizer.signals.signal import FloatArray
 from study.errors import StudyError
 from study.regular_file import open_regular
 
-LONGEST_FIRST_BYTES = 2**20
+LONGEST_FIRST_LINE_BYTES = 2**20
 """Largest part (bytes) of the first line of a log that is read; its hash identifies the session."""
 
 
@@ -39,10 +39,10 @@ class MarkerOutlet:
     read."""
 
     def __init__(self, log: Path) -> None:
-        self._library = _library()
-        self._source = source_id(log)
-        described = ("hapteq markers", "Markers", 1, self._library.IRREGULAR_RATE, "string", self._source)
-        self._outlet = self._library.StreamOutlet(self._library.StreamInfo(*described))
+        self._library = _import_pylsl()
+        self._source = make_source_id(log)
+        stream_fields = ("hapteq markers", "Markers", 1, self._library.IRREGULAR_RATE, "string", self._source)
+        self._outlet = self._library.StreamOutlet(self._library.StreamInfo(*stream_fields))
 
     def clock_s(self) -> float:
         """Time by LSL's clock (s)."""
@@ -54,10 +54,10 @@ class MarkerOutlet:
 
     def signal_outlet(self, stream: StreamDescription, rate_hz: float) -> SignalOutlet:
         """Outlet for a stream of signals of the same session. rate_hz: its nominal sample rate."""
-        return _Signals(self._library, f"{self._source} {stream.name}", stream, rate_hz)
+        return _PylslSignalOutlet(self._library, f"{self._source} {stream.name}", stream, rate_hz)
 
 
-class _Signals:
+class _PylslSignalOutlet:
     """A `SignalOutlet` of pylsl for samples in double precision, with label, unit and type of each channel."""
 
     def __init__(self, library: Any, source: str, stream: StreamDescription, rate_hz: float) -> None:
@@ -73,18 +73,18 @@ class _Signals:
         self._outlet.push_chunk(samples, at_s.tolist())
 
 
-def source_id(log: Path) -> str:
+def make_source_id(log: Path) -> str:
     """Identifier by which a recorder finds the stream again after a restart: 64 bits of the SHA-256 of the log's first
     line. It does not depend on the folder and reveals nothing about the session. Raises StudyError."""
     try:
         with open_regular(log) as file:
-            first = file.readline(LONGEST_FIRST_BYTES)
+            first_line = file.readline(LONGEST_FIRST_LINE_BYTES)
     except OSError as problem:
-        raise not_followed_error(log, problem) from problem
-    return f"hapteq {hashlib.sha256(first).hexdigest()[:16]}"
+        raise make_unreadable_log_error(log, problem) from problem
+    return f"hapteq {hashlib.sha256(first_line).hexdigest()[:16]}"
 
 
-def not_followed_error(log: Path, problem: Exception) -> StudyError:
+def make_unreadable_log_error(log: Path, problem: Exception) -> StudyError:
     """Error for a log that cannot be read while a session is followed."""
     return StudyError(
         "The session's log cannot be followed",
@@ -94,7 +94,7 @@ def not_followed_error(log: Path, problem: Exception) -> StudyError:
     )
 
 
-def _library() -> Any:
+def _import_pylsl() -> Any:
     """The module pylsl. Raises StudyError where it, or its C library, is not installed."""
     try:
         import pylsl

@@ -17,9 +17,9 @@ from protocols.procedure.study_plan import Cell, Participant, Progress, StudyPla
 from study.errors import StudyError, WrongUseError
 from study.session.facts.events import SessionOpened
 from study.session.views.archive_views import SessionLine
-from study.session.views.participant_codes import next_code
+from study.session.views.participant_codes import suggest_code
 from study.store.formats.protocol_files import read_study_protocol
-from study.store.sessions.archive import SessionFolder, session_folders
+from study.store.sessions.archive import SessionFolder, list_session_folders
 from study.store.sessions.event_log import read_opening
 from study.workflows.session.participant_number import participant_number, read_begun_participant
 from study.workflows.views.session_line import session_line
@@ -42,7 +42,7 @@ class PlannedStudy:
 
 
 @dataclass(frozen=True, slots=True)
-class _Begun:
+class _StartedSession:
     """A session that a participant has begun."""
 
     folder: SessionFolder
@@ -59,81 +59,95 @@ def list_planned_studies(data: Path, protocol: str | None, simulated: bool) -> t
     """The plans of studies in a data folder. protocol: name or file of a protocol; None = all protocols with sessions
     in `data`. simulated: plan for simulated participants, who are counted separately from people. Raises StudyError
     where the protocol cannot be read, or there is no session."""
-    begun = _find_begun(data, simulated)
+    started_sessions = _find_started_sessions(data, simulated)
     if protocol is not None:
         chosen = read_study_protocol(protocol, data).protocol
-        return (_plan_from_sessions(data, chosen, [each for each in begun if each.protocol == chosen.name], simulated),)
-    found = []
-    for name, sessions in groupby(sorted(begun, key=lambda each: each.protocol), key=lambda each: each.protocol):
-        kept = list(sessions)
-        found.append(_plan_from_sessions(data, _latest_protocol(name, kept), kept, simulated))
-    if not found:
+        return (
+            _plan_from_sessions(
+                data, chosen, [session for session in started_sessions if session.protocol == chosen.name], simulated
+            ),
+        )
+    studies = []
+    for name, sessions in groupby(
+        sorted(started_sessions, key=lambda session: session.protocol), key=lambda session: session.protocol
+    ):
+        protocol_sessions = list(sessions)
+        studies.append(
+            _plan_from_sessions(data, _latest_protocol(name, protocol_sessions), protocol_sessions, simulated)
+        )
+    if not studies:
         raise WrongUseError(
             "There is no study to plan",
             f"{data} holds no session of {'simulated participants' if simulated else 'people'}.",
             "Name the protocol with --protocol, or the folder of the sessions.",
         )
-    return tuple(found)
+    return tuple(studies)
 
 
-def _find_begun(data: Path, simulated: bool) -> list[_Begun]:
+def _find_started_sessions(data: Path, simulated: bool) -> list[_StartedSession]:
     """All sessions of simulated participants, or of people, whose protocol is known."""
-    found = []
-    for folder in session_folders(data):
-        begun = read_begun_participant(folder)
-        if begun is not None and begun.protocol and begun.simulated == simulated:
-            found.append(_Begun(folder, begun.protocol, begun.number, session_line(folder), _protocol_text(folder)))
-    return found
+    started_sessions = []
+    for folder in list_session_folders(data):
+        participant = read_begun_participant(folder)
+        if participant is not None and participant.protocol and participant.simulated == simulated:
+            started_sessions.append(
+                _StartedSession(
+                    folder, participant.protocol, participant.number, session_line(folder), _protocol_text(folder)
+                )
+            )
+    return started_sessions
 
 
 def _protocol_text(folder: SessionFolder) -> str | None:
     """Text of the protocol from a session's log; None where it cannot be read."""
     try:
-        opening = read_opening(folder.log)
+        session_opened = read_opening(folder.log)
     except (StudyError, OSError, ValueError):
         return None
-    return opening.protocol_text if isinstance(opening, SessionOpened) else None
+    return session_opened.protocol_text if isinstance(session_opened, SessionOpened) else None
 
 
-def _plan_from_sessions(data: Path, protocol: StudyProtocol, begun: Sequence[_Begun], simulated: bool) -> PlannedStudy:
+def _plan_from_sessions(
+    data: Path, protocol: StudyProtocol, started_sessions: Sequence[_StartedSession], simulated: bool
+) -> PlannedStudy:
     """The plan of one study from its sessions."""
-    people: dict[str, list[_Begun]] = {}
-    for each in sorted(begun, key=_by_number):
-        people.setdefault(each.folder.subject, []).append(each)
+    people: dict[str, list[_StartedSession]] = {}
+    for session in sorted(started_sessions, key=_by_number):
+        people.setdefault(session.folder.subject, []).append(session)
     # The number that a new participant would receive: the empty code belongs to no session folder.
     number = participant_number(data, "", protocol.name, simulated)
     plan = plan_study(protocol, [_participant(code, sessions) for code, sessions in people.items()], number)
-    return PlannedStudy(plan, _free_code(data, tuple(reversed(people))), _remarks(begun))
+    return PlannedStudy(plan, _free_code(data, tuple(reversed(people))), _remarks(started_sessions))
 
 
-def _free_code(data: Path, own: tuple[str, ...]) -> str:
-    """An unused code that continues those of this study. own: codes of this study, the latest first."""
-    others = tuple(folder.subject for folder in session_folders(data))
-    return next_code((*own, *others)) if own or "P01" in others else next_code(())
+def _free_code(data: Path, study_codes: tuple[str, ...]) -> str:
+    """An unused code that continues those of this study. study_codes: codes of this study, the latest first."""
+    used_codes = tuple(folder.subject for folder in list_session_folders(data))
+    return suggest_code((*study_codes, *used_codes)) if study_codes or "P01" in used_codes else suggest_code(())
 
 
-def _by_number(each: _Begun) -> tuple[float, str]:
+def _by_number(session: _StartedSession) -> tuple[float, str]:
     """Sorting key of sessions: by number, then by name of the folder; those without a number last. The time of the
     start cannot be used, because it is erased from a withdrawn session."""
-    return (float("inf") if each.number is None else each.number, each.folder.name)
+    return (float("inf") if session.number is None else session.number, session.folder.name)
 
 
-def _participant(code: str, sessions: Sequence[_Begun]) -> Participant:
+def _participant(code: str, sessions: Sequence[_StartedSession]) -> Participant:
     """The participant, with the progress of the best session."""
-    standings = [each.line.standing for each in sessions]
-    numbers = [each.number for each in sessions if each.number is not None]
+    standings = [session.line.standing for session in sessions]
+    numbers = [session.number for session in sessions if session.number is not None]
     best = next((standing for standing in BEST_FIRST if standing in standings), standings[-1])
     progress = PROGRESS.get(best, "left out")
     return Participant(code, numbers[0] if numbers else None, progress, "" if best in PROGRESS else best)
 
 
-def _latest_protocol(name: str, begun: Sequence[_Begun]) -> StudyProtocol:
+def _latest_protocol(name: str, sessions: Sequence[_StartedSession]) -> StudyProtocol:
     """Protocol of the latest session whose log can be read. Raises WrongUseError where there is none."""
-    for each in sorted(begun, key=lambda each: each.line.begun_utc, reverse=True):
-        if each.protocol_text is None:
+    for session in sorted(sessions, key=lambda session: session.line.begun_utc, reverse=True):
+        if session.protocol_text is None:
             continue
         try:
-            protocol = load_protocol(each.protocol_text, "the log")
+            protocol = load_protocol(session.protocol_text, "the log")
         except ProtocolError:
             continue
         if isinstance(protocol, StudyProtocol):
@@ -145,10 +159,10 @@ def _latest_protocol(name: str, begun: Sequence[_Begun]) -> StudyProtocol:
     )
 
 
-def _remarks(begun: Sequence[_Begun]) -> tuple[str, ...]:
+def _remarks(sessions: Sequence[_StartedSession]) -> tuple[str, ...]:
     """Warning if sessions of this protocol used different texts of it: their orders would be counted together although
     they may differ."""
-    texts = {each.protocol_text for each in begun if each.protocol_text is not None}
+    texts = {session.protocol_text for session in sessions if session.protocol_text is not None}
     if len(texts) < 2:
         return ()
     return (f"{len(texts)} different texts of this protocol were used. Lock it: hapteq protocol lock.",)
@@ -159,30 +173,39 @@ def document(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
     return {
         "studies": [
             {
-                "protocol": each.plan.protocol,
-                "planned": each.plan.planned,
-                "done": each.plan.count("done"),
-                "begun": each.plan.count("begun"),
-                "left_out": each.plan.count("left out"),
+                "protocol": study.plan.protocol,
+                "planned": study.plan.planned,
+                "done": study.plan.count("done"),
+                "begun": study.plan.count("begun"),
+                "left_out": study.plan.count("left out"),
                 "participants": [
-                    {"code": who.code, "number": who.number, "progress": who.progress.replace(" ", "_"), "why": who.why}
-                    for who in each.plan.participants
+                    {
+                        "code": participant.code,
+                        "number": participant.number,
+                        "progress": participant.progress.replace(" ", "_"),
+                        "why": participant.reason,
+                    }
+                    for participant in study.plan.participants
                 ],
                 "orders": [
                     {
                         "frequencies_hz": list(cell.frequencies_hz),
                         "swapped": cell.swapped,
-                        "wanted": cell.wanted,
+                        "wanted": cell.required,
                         "done": cell.done,
                         "begun": cell.begun,
                         "needed": cell.needed,
                     }
-                    for cell in each.plan.cells
+                    for cell in study.plan.cells
                 ],
-                "next": {"code": each.next_code, "number": each.plan.next_number, **_next_order(each.plan.next_cell)},
-                "remarks": list(each.remarks),
+                "next": {
+                    "code": study.next_code,
+                    "number": study.plan.next_number,
+                    **_next_order(study.plan.next_cell),
+                },
+                "remarks": list(study.remarks),
             }
-            for each in studies
+            for study in studies
         ]
     }
 
@@ -196,27 +219,36 @@ def lines(study: PlannedStudy) -> list[str]:
     """Lines of text for the terminal: progress, participants to resume or left out, cells that lack participants, next
     participant, warnings."""
     plan = study.plan
-    done, begun, out = (plan.count(each) for each in ("done", "begun", "left out"))
+    done, begun_count, left_out_count = (plan.count(progress) for progress in ("done", "begun", "left out"))
     size = f" of {plan.planned} planned" if plan.planned else ""
-    found = [f"{plan.protocol}: {done} done{size}, {begun} begun, {out} left out"]
-    found += _list_with_title("to resume", [who.code for who in plan.participants if who.progress == "begun"])
-    found += _list_with_title(
-        "left out", [f"{who.code} ({who.why})" for who in plan.participants if who.progress == "left out"]
+    lines_of_text = [f"{plan.protocol}: {done} done{size}, {begun_count} begun, {left_out_count} left out"]
+    lines_of_text += _list_with_title(
+        "to resume", [participant.code for participant in plan.participants if participant.progress == "begun"]
     )
-    if plan.planned and plan.planned % plan.balanced_sizes:
-        found.append(
-            f"{plan.planned} participants do not balance the orders: multiples of {plan.balanced_sizes} would."
+    lines_of_text += _list_with_title(
+        "left out",
+        [
+            f"{participant.code} ({participant.reason})"
+            for participant in plan.participants
+            if participant.progress == "left out"
+        ],
+    )
+    if plan.planned and plan.planned % plan.cycle_length:
+        lines_of_text.append(
+            f"{plan.planned} participants do not balance the orders: multiples of {plan.cycle_length} would."
         )
     if not plan.planned:
-        found.append("No sample size is declared: analysis.participants in the protocol says how many are planned.")
+        lines_of_text.append(
+            "No sample size is declared: analysis.participants in the protocol says how many are planned."
+        )
     if not plan.cells:
-        found.append("No orders have to be balanced: they are drawn by lot, or the same for all.")
+        lines_of_text.append("No orders have to be balanced: they are drawn by lot, or the same for all.")
     else:
-        short = [place for place, cell in enumerate(plan.cells) if cell.needed]
-        places = ", ".join(f"{place + 1}" for place in short)
-        found.append(f"orders still needed: {places}" if short else "orders still needed: none")
-    found.append(f"next: {study.next_code}{_progress_text(plan)}")
-    return [*found, *study.remarks]
+        incomplete_cells = [place for place, cell in enumerate(plan.cells) if cell.needed]
+        places = ", ".join(f"{place + 1}" for place in incomplete_cells)
+        lines_of_text.append(f"orders still needed: {places}" if incomplete_cells else "orders still needed: none")
+    lines_of_text.append(f"next: {study.next_code}{_progress_text(plan)}")
+    return [*lines_of_text, *study.remarks]
 
 
 def _list_with_title(title: str, codes: Sequence[str]) -> list[str]:

@@ -5,7 +5,7 @@ They are taken from the session's verified log (`FoldedSession`). Empty values a
 
 from equalizer.plant.model_quality import NOT_STORED
 from study.session.facts.events import FormFilled, SessionClosed, SessionOpened, SessionResumed, TrialSpoiled
-from study.session.facts.void_reasons import computer_too_busy
+from study.session.facts.void_reasons import is_computer_busy
 from study.session.state.state import SessionState
 from study.session.views.local_time import Zone, local_time
 from study.workflows.results.fold_session import FoldedSession
@@ -14,104 +14,106 @@ _HASH_DIGITS = 12
 """Digits of the protocol's hash that are shown."""
 
 
-def session_facts(folded: FoldedSession, zone: Zone) -> tuple[tuple[str, str], ...]:
+def session_facts(folded_session: FoldedSession, zone: Zone) -> tuple[tuple[str, str], ...]:
     """Pairs (name, value) in display order. zone: time zone of the displayed times."""
-    state, events = folded.state, folded.contents.events
-    opened = state.opened
-    who = f"simulated ({opened.observer})" if opened.observer else "a person"
-    lock = "locked" if opened.protocol_locked else "not locked"
+    state, events = folded_session.state, folded_session.log_contents.events
+    session_opened = state.opened
+    participant = f"simulated ({session_opened.observer})" if session_opened.observer else "a person"
+    lock = "locked" if session_opened.protocol_locked else "not locked"
     # A simulated participant runs faster than real time, so that the log may end in the future.
-    ahead = ", in simulated time, which runs ahead of the clock" if opened.observer else ""
+    time_remark = ", in simulated time, which runs ahead of the clock" if session_opened.observer else ""
     facts = [
-        ("participant", f"{opened.subject}, {who}, {_number(state)}"),
-        ("protocol", f"{state.protocol.name} ({opened.protocol_hash[:_HASH_DIGITS]}, {lock})"),
+        ("participant", f"{session_opened.subject}, {participant}, {_number(state)}"),
+        ("protocol", f"{state.protocol.name} ({session_opened.protocol_hash[:_HASH_DIGITS]}, {lock})"),
         ("title", state.protocol.title),
-        ("device", _device(opened)),
-        ("equalizer", opened.equalizer),
-        ("its quality", _quality(opened)),
-        ("within reach", _reach_text(opened)),
-        ("begun", local_time(opened.utc, zone, "seconds")),
-        (_end_text(state), local_time(_last_utc(folded), zone, "seconds") + ahead),
+        ("device", _device(session_opened)),
+        ("equalizer", session_opened.equalizer),
+        ("its quality", _quality(session_opened)),
+        ("within reach", _reach_text(session_opened)),
+        ("begun", local_time(session_opened.utc, zone, "seconds")),
+        (_end_text(state), local_time(_last_utc(folded_session), zone, "seconds") + time_remark),
         ("sittings", str(1 + sum(isinstance(event, SessionResumed) for event in events))),
         ("runs", f"{state.run} of {len(state.runs)}"),
-        ("answers", _answers(folded)),
-        *_forms(folded),
-        ("log", _log(folded)),
-        ("seed", str(opened.seed)),
-        ("versions", ", ".join(f"{name} {version}" for name, version in opened.versions.items())),
+        ("answers", _answers(folded_session)),
+        *_forms(folded_session),
+        ("log", _log(folded_session)),
+        ("seed", str(session_opened.seed)),
+        ("versions", ", ".join(f"{name} {version}" for name, version in session_opened.versions.items())),
     ]
-    return tuple((what, value) for what, value in facts if value)
+    return tuple((label, value) for label, value in facts if value)
 
 
 def _end_text(state: SessionState) -> str:
     """Name of the time of the log's end: a participant turned away, a finished session, or one under way."""
-    if state.sitting.turned_away:
+    if state.sitting.ineligibility:
         return "ended"
     return "finished" if state.closed else "last entry"
 
 
 def _number(state: SessionState) -> str:
     """The participant's place in the counterbalanced order of the protocol, from 1."""
-    if not state.takes_part:
+    if not state.has_final_place:
         return "without a place in the order of this protocol"
     return f"number {state.opened.participant_number + 1} of this protocol"
 
 
-def _quality(opened: SessionOpened) -> str:
+def _quality(session_opened: SessionOpened) -> str:
     """Quality of the model that equalizes the stimuli; empty without an equalizer."""
-    return "" if opened.equalized is None else opened.equalized.quality or NOT_STORED
+    return "" if session_opened.equalized is None else session_opened.equalized.quality or NOT_STORED
 
 
-def _reach_text(opened: SessionOpened) -> str:
+def _reach_text(session_opened: SessionOpened) -> str:
     """Acceleration (m/s²) that both directions reach at the force cap, by frequency; empty without an equalizer."""
-    if opened.equalized is None:
+    if session_opened.equalized is None:
         return ""
-    return ", ".join(f"{s.reachable_mps2:.1f} m/s² at {s.frequency_hz:g} Hz" for s in opened.equalized.levels)
+    return ", ".join(f"{s.reachable_mps2:.1f} m/s² at {s.frequency_hz:g} Hz" for s in session_opened.equalized.levels)
 
 
-def _device(opened: SessionOpened) -> str:
-    device = opened.device
+def _device(session_opened: SessionOpened) -> str:
+    device = session_opened.device
     moves = ", simulated: nothing moves" if device.simulated else ""
     return f"{device.name}{moves}, {device.sample_rate_hz:g} Hz"
 
 
-def _answers(folded: FoldedSession) -> str:
+def _answers(folded_session: FoldedSession) -> str:
     """Number of answers and of void presentations; a presentation that still waits for its answer is not void."""
-    state = folded.state
+    state = folded_session.state
     void = len(state.trials) - state.answers - (state.presented is not None and state.answered is None)
     if not void:
         return str(state.answers)
-    reasons = [event.reason for event in folded.contents.events if isinstance(event, TrialSpoiled)]
-    busy = sum(map(computer_too_busy, reasons))
+    reasons = [event.reason for event in folded_session.log_contents.events if isinstance(event, TrialSpoiled)]
+    busy = sum(map(is_computer_busy, reasons))
     because = f", {busy} of them because the computer was too busy" if busy else ""
     return f"{state.answers}, and {void} void presentations{because}"
 
 
-def _last_utc(folded: FoldedSession) -> str:
+def _last_utc(folded_session: FoldedSession) -> str:
     """UTC time of the session's end, or else of the last event."""
-    closed = next((event.utc for event in folded.contents.events if isinstance(event, SessionClosed)), "")
-    return closed or folded.contents.events[-1].utc
+    closing_utc = next(
+        (event.utc for event in folded_session.log_contents.events if isinstance(event, SessionClosed)), ""
+    )
+    return closing_utc or folded_session.log_contents.events[-1].utc
 
 
-def _log(folded: FoldedSession) -> str:
+def _log(folded_session: FoldedSession) -> str:
     """Number of lines of the log, and the evidence that it is unchanged: checksums and seals."""
-    lines = f"{folded.contents.chain.lines} lines"
-    sealed = f", sealed to line {folded.sealed_lines}" if folded.sealed_lines else ""
-    return f"{lines}, {folded.contents.chain.in_words()}{sealed}"
+    lines = f"{folded_session.log_contents.chain.lines} lines"
+    sealed = f", sealed to line {folded_session.sealed_lines}" if folded_session.sealed_lines else ""
+    return f"{lines}, {folded_session.log_contents.chain.in_words()}{sealed}"
 
 
-def _forms(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
+def _forms(folded_session: FoldedSession) -> tuple[tuple[str, str], ...]:
     """Consent and answers to questions. Free text is not shown, because it may concern health."""
-    protocol = folded.state.protocol
-    asked = {"questionnaire": protocol.before, "debrief": protocol.debrief}
+    protocol = folded_session.state.protocol
+    questions_by_form = {"questionnaire": protocol.before, "debrief": protocol.debrief}
     facts = []
-    for event in folded.contents.events:
+    for event in folded_session.log_contents.events:
         if isinstance(event, FormFilled) and event.form == "consent":
             facts.append(("consent", f"{'given' if event.passed else 'not given'}, version {event.version}"))
-        if isinstance(event, FormFilled) and event.form in asked:
+        if isinstance(event, FormFilled) and event.form in questions_by_form:
             facts += [
                 ("said", f"{question.question} {event.answers[question.key]}")
-                for question in asked[event.form]
+                for question in questions_by_form[event.form]
                 if question.key in event.answers and not question.is_free_text
             ]
     return tuple(facts)

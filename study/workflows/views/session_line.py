@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.loading import ProtocolError, load_protocol
-from protocols.procedure.schedule import runs
+from protocols.procedure.schedule import schedule_runs
 from study.errors import StudyError
 from study.regular_file import read_regular
 from study.session.facts.events import SessionOpened
@@ -18,10 +18,10 @@ from study.session.state.state import SessionState
 from study.session.views.archive_views import SessionLine
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import read_opening
-from study.store.sessions.log_seal import is_sealed, seal_paths
+from study.store.sessions.log_seal import find_seals, is_sealed
 from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.session_summary import SUMMARY_NAME
-from study.store.sessions.withdrawal_files import how_to_finish, read_intent, read_tombstone
+from study.store.sessions.withdrawal_files import describe_unfinished, read_intent, read_tombstone
 from study.workflows.results.fold_session import fold_session
 
 MEASURED = b',"event":"trial_measured",'
@@ -52,50 +52,52 @@ def with_writer(line: SessionLine, folder: SessionFolder) -> SessionLine:
 
 def line_of(state: SessionState, folder: SessionFolder) -> SessionLine:
     """The session as a line of a list, from its folded log; never `running`, see `with_writer`."""
-    opened = state.opened
+    session_opened = state.opened
     return SessionLine(
         name=folder.name,
         path=str(folder.path),
         subject=folder.subject,
         protocol=state.protocol.name,
-        begun_utc=opened.utc,
-        observer=opened.observer,
+        begun_utc=session_opened.utc,
+        observer=session_opened.observer,
         answers=state.answers,
         runs_done=state.run,
         runs=len(state.runs),
-        standing=state.sitting.turned_away or ("finished" if state.closed else "unfinished"),
+        standing=state.sitting.ineligibility or ("finished" if state.closed else "unfinished"),
     )
 
 
-def unreadable(folder: SessionFolder, why: str) -> SessionLine:
+def unreadable(folder: SessionFolder, remark: str) -> SessionLine:
     """Line of an unreadable session; its start is unknown, so it is sorted by the last change of its folder."""
     try:
         changed_utc = datetime.fromtimestamp(folder.path.stat().st_mtime, UTC).isoformat(timespec="seconds")
     except OSError:
         changed_utc = ""
-    return SessionLine(folder.name, str(folder.path), folder.subject, "", changed_utc, None, 0, 0, 0, "unreadable", why)
+    return SessionLine(
+        folder.name, str(folder.path), folder.subject, "", changed_utc, None, 0, 0, 0, "unreadable", remark
+    )
 
 
 def _withdrawn_line(folder: SessionFolder) -> SessionLine:
-    left = read_tombstone(folder)  # its existence is information enough
+    tombstone = read_tombstone(folder)  # its existence is information enough
     intent = read_intent(folder.path.parent, folder.subject)
-    when = str(left.get("withdrawn_utc", intent.withdrawn_utc if intent else ""))
-    begun = left.get("begun")
-    if begun is None and intent is not None and (promised := intent.sessions.get(folder.name)):
-        begun = {"protocol": promised.protocol}
-    protocol = str(begun.get("protocol", "")) if isinstance(begun, dict) else ""
+    withdrawn_utc = str(tombstone.get("withdrawn_utc", intent.withdrawn_utc if intent else ""))
+    begun_facts = tombstone.get("begun")
+    if begun_facts is None and intent is not None and (promised := intent.sessions.get(folder.name)):
+        begun_facts = {"protocol": promised.protocol}
+    protocol = str(begun_facts.get("protocol", "")) if isinstance(begun_facts, dict) else ""
     remark = "The participant withdrew; the data were erased."
-    if finish := how_to_finish(folder):
+    if finish := describe_unfinished(folder):
         remark = f"The participant withdrew, and not everything is erased. {finish}"
     return SessionLine(
-        folder.name, str(folder.path), folder.subject, protocol, when, None, 0, 0, 0, "withdrawn", remark
+        folder.name, str(folder.path), folder.subject, protocol, withdrawn_utc, None, 0, 0, 0, "withdrawn", remark
     )
 
 
 def _stamp(folder: SessionFolder) -> tuple[tuple[str, int, int, int], ...]:
     """Times and sizes of all files that determine the line. Raises OSError if there is no log."""
-    beside = (path for path in (*seal_paths(folder.path).values(), folder.path / SUMMARY_NAME) if path.exists())
-    stats = ((path.name, path.stat()) for path in (folder.log, *beside))
+    result_files = (path for path in (*find_seals(folder.path).values(), folder.path / SUMMARY_NAME) if path.exists())
+    stats = ((path.name, path.stat()) for path in (folder.log, *result_files))
     return tuple((name, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size) for name, stat in stats)
 
 
@@ -103,11 +105,19 @@ def _stamp(folder: SessionFolder) -> tuple[tuple[str, int, int, int], ...]:
 def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -> SessionLine:
     """The line; depends only on the files that `stamp` represents (cached). Raises StudyError, OSError."""
     content = read_regular(folder.log)
-    opened = read_opening(folder.log)
-    is_own = isinstance(opened, SessionOpened) and opened.session == folder.name and is_sealed(folder.path, content)
-    is_own = is_own and MEASURED in content  # a person who does not take part left a short log
-    planned = _protocol_and_runs(opened.protocol_text) if is_own and isinstance(opened, SessionOpened) else None
-    if planned is None or not isinstance(opened, SessionOpened):
+    session_opened = read_opening(folder.log)
+    is_trusted = (
+        isinstance(session_opened, SessionOpened)
+        and session_opened.session == folder.name
+        and is_sealed(folder.path, content)
+    )
+    is_trusted = is_trusted and MEASURED in content  # a person who does not take part left a short log
+    planned = (
+        _protocol_and_runs(session_opened.protocol_text)
+        if is_trusted and isinstance(session_opened, SessionOpened)
+        else None
+    )
+    if planned is None or not isinstance(session_opened, SessionOpened):
         return line_of(fold_session(folder).state, folder)
     protocol, run_count = planned
     return SessionLine(
@@ -115,8 +125,8 @@ def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -
         path=str(folder.path),
         subject=folder.subject,
         protocol=protocol,
-        begun_utc=opened.utc,
-        observer=opened.observer,
+        begun_utc=session_opened.utc,
+        observer=session_opened.observer,
         answers=content.count(MEASURED),
         runs_done=run_count,
         runs=run_count,
@@ -132,4 +142,4 @@ def _protocol_and_runs(protocol_text: str) -> tuple[str, int] | None:
     except ProtocolError:
         return None
     # How many there are depends on neither seed nor participant: only their order does.
-    return (protocol.name, len(runs(protocol, 0, 0))) if isinstance(protocol, StudyProtocol) else None
+    return (protocol.name, len(schedule_runs(protocol, 0, 0))) if isinstance(protocol, StudyProtocol) else None

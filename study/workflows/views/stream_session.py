@@ -2,7 +2,7 @@
 
 A separate program follows the log, so that streaming cannot delay or end the session. Every event in the log carries
 the time t by the session's monotonic clock; its marker gets the time t + offset on LSL's clock. The offset between the
-two clocks is measured every `OFFSET_EVERY_S` and is streamed as a marker too.
+two clocks is measured every `OFFSET_INTERVAL_S` and is streamed as a marker too.
 """
 
 import json
@@ -15,29 +15,29 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from study.regular_file import TABLE_BYTES, open_regular
-from study.workflows.views.lsl_outlets import not_followed_error
+from study.workflows.views.lsl_outlets import make_unreadable_log_error
 
-EVERY_S = 0.02
+POLL_INTERVAL_S = 0.02
 """Interval (s) between two readings of the log: markers are sent up to this much later, with correct times."""
-OFFSET_EVERY_S = 10.0
+OFFSET_INTERVAL_S = 10.0
 """Interval at which the offset of the two clocks is measured (s)."""
 OFFSET_TRIES = 10
 """Number of pairs of clock readings in a measurement of the offset. The pair read in the shortest time is used: longer
 ones were interrupted between the readings."""
-NOTED_S = 0.001
+REPORTED_CHANGE_S = 0.001
 """Smallest change of the offset (s) for which `SideTasks.on_offset` is called again."""
-FRESH_S = 5.0
+LARGEST_EVENT_AGE_S = 5.0
 """Largest age (s) of an event by this computer's monotonic clock. An event outside 0 to this age is on another clock
 (of a simulated session, or before a restart of the computer): its marker gets the time of sending and states so."""
 
-TOLD = (
+STREAMED_FIELDS = (
     "event", "run", "trial", "attempt", "phase", "frequency_hz", "level_n", "direction", "angle_deg", "polarity",
     "answer", "response_time_s", "status", "cause", "missed_ticks", "late_ticks", "latest_s", "delivered_mps2",
     "outcome",
 )  # fmt: skip
 """Fields of an event that are streamed: no information about the person, no notes, no forms."""
 
-LAST = "session_closed"
+LAST_EVENT = "session_closed"
 """Last event of a session: streaming ends after it."""
 
 
@@ -58,13 +58,14 @@ class SideTasks:
     """Tasks between two readings of the log."""
 
     on_offset: Callable[[float], None]
-    """Called with the offset, LSL's clock minus the session's (s), at first and when it has changed by `NOTED_S`."""
+    """Called with the offset, LSL's clock minus the session's (s), at first and when it has changed by
+    `REPORTED_CHANGE_S`."""
     push_signals: Callable[[float], int]
     """Called with the offset (s) at every reading: sends the new signals of the device's loop, and returns the number
     of ticks that were lost."""
 
 
-NOTHING_BESIDE = SideTasks(lambda offset_s: None, lambda offset_s: 0)
+NO_SIDE_TASKS = SideTasks(lambda offset_s: None, lambda offset_s: 0)
 """No other tasks: no signals are sent, and no ticks are lost."""
 
 
@@ -79,13 +80,15 @@ class LogFollower:
         """New complete lines; an incomplete last line is returned once it is complete. Raises OSError, and ValueError
         where the log became shorter or grew by more than `TABLE_BYTES`."""
         with open_regular(self._log) as file:
-            fresh = os.fstat(file.fileno()).st_size - self._offset
-            if not 0 <= fresh <= TABLE_BYTES:
-                raise ValueError("it became shorter" if fresh < 0 else f"it grew by {fresh} bytes at once")
+            new_byte_count = os.fstat(file.fileno()).st_size - self._offset
+            if not 0 <= new_byte_count <= TABLE_BYTES:
+                raise ValueError(
+                    "it became shorter" if new_byte_count < 0 else f"it grew by {new_byte_count} bytes at once"
+                )
             file.seek(self._offset)
-            whole = file.read(fresh).split(b"\n")[:-1]
-        self._offset += sum(len(line) + 1 for line in whole)
-        return whole
+            complete_lines = file.read(new_byte_count).split(b"\n")[:-1]
+        self._offset += sum(len(line) + 1 for line in complete_lines)
+        return complete_lines
 
 
 def stream_session(
@@ -94,34 +97,36 @@ def stream_session(
     on_marker: Callable[[str], None],
     now_s: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
-    beside: SideTasks = NOTHING_BESIDE,
+    side_tasks: SideTasks = NO_SIDE_TASKS,
 ) -> int:
     """Follow the log until the session is closed, and send the events that are logged after the start. Of a session
     that is already closed nothing is sent. Returns the number of events sent. Raises StudyError where the log cannot be
     read."""
-    noted_s = math.inf
+    reported_offset_s = math.inf
     try:
-        follower, sent, offset_s, next_offset_s = LogFollower(log), 0, 0.0, now_s()
-        if any(LAST.encode() in line and _fact(line).get("event") == LAST for line in follower.lines()):
+        follower, sent_count, offset_s, next_offset_s = LogFollower(log), 0, 0.0, now_s()
+        if any(
+            LAST_EVENT.encode() in line and _parse_event(line).get("event") == LAST_EVENT for line in follower.lines()
+        ):
             return 0
         while True:
             if now_s() >= next_offset_s:
-                offset_s, next_offset_s = measure_offset_s(outlet, now_s), now_s() + OFFSET_EVERY_S
-                outlet.push(_text({"event": "clock", "lsl_minus_monotonic_s": offset_s}), outlet.clock_s())
-                if not abs(offset_s - noted_s) < NOTED_S:
-                    noted_s = offset_s
-                    beside.on_offset(offset_s)
-            if lost := beside.push_signals(offset_s):
-                outlet.push(_text({"event": "signals_lost", "ticks": lost}), outlet.clock_s())
+                offset_s, next_offset_s = measure_offset_s(outlet, now_s), now_s() + OFFSET_INTERVAL_S
+                outlet.push(_format_marker({"event": "clock", "lsl_minus_monotonic_s": offset_s}), outlet.clock_s())
+                if not abs(offset_s - reported_offset_s) < REPORTED_CHANGE_S:
+                    reported_offset_s = offset_s
+                    side_tasks.on_offset(offset_s)
+            if lost_ticks := side_tasks.push_signals(offset_s):
+                outlet.push(_format_marker({"event": "signals_lost", "ticks": lost_ticks}), outlet.clock_s())
             for line in follower.lines():
-                fact = _fact(line)
-                _send_fact(fact, outlet, offset_s, now_s(), on_marker)
-                sent += 1
-                if fact.get("event") == LAST:
-                    return sent
-            sleep(EVERY_S)
+                event = _parse_event(line)
+                _send_event(event, outlet, offset_s, now_s(), on_marker)
+                sent_count += 1
+                if event.get("event") == LAST_EVENT:
+                    return sent_count
+            sleep(POLL_INTERVAL_S)
     except (OSError, ValueError, RecursionError) as problem:
-        raise not_followed_error(log, problem) from problem
+        raise make_unreadable_log_error(log, problem) from problem
 
 
 def measure_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
@@ -130,36 +135,36 @@ def measure_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
     pairs = []
     for _ in range(OFFSET_TRIES):
         before_s = now_s()
-        theirs_s = outlet.clock_s()
+        lsl_s = outlet.clock_s()
         after_s = now_s()
-        pairs.append((after_s - before_s, theirs_s - (before_s + after_s) / 2))
+        pairs.append((after_s - before_s, lsl_s - (before_s + after_s) / 2))
     return min(pairs)[1]
 
 
-def _fact(line: bytes) -> dict[str, Any]:
+def _parse_event(line: bytes) -> dict[str, Any]:
     """The event in a line of the log. Raises ValueError where it is not a JSON object."""
-    fact = json.loads(line)
-    if not isinstance(fact, dict):
+    event = json.loads(line)
+    if not isinstance(event, dict):
         raise ValueError(f"a line of it is no fact: {line[:40]!r}")
-    return fact
+    return event
 
 
-def _send_fact(
-    fact: dict[str, Any], outlet: Outlet, offset_s: float, now_s: float, on_marker: Callable[[str], None]
+def _send_event(
+    event: dict[str, Any], outlet: Outlet, offset_s: float, now_s: float, on_marker: Callable[[str], None]
 ) -> None:
     """Send the streamed fields of an event, with the time of the event if it is recent, else the time of sending."""
-    fields = {name: fact[name] for name in TOLD if fact.get(name) is not None}
-    happened_s = fact.get("monotonic_s")
-    if isinstance(happened_s, float) and 0 <= now_s - happened_s <= FRESH_S:
-        stamped_s = happened_s + offset_s
+    fields = {name: event[name] for name in STREAMED_FIELDS if event.get(name) is not None}
+    event_s = event.get("monotonic_s")
+    if isinstance(event_s, float) and 0 <= now_s - event_s <= LARGEST_EVENT_AGE_S:
+        marker_s = event_s + offset_s
     else:
         fields["stamped"] = "when it was sent"
-        stamped_s = outlet.clock_s()
-    marker = _text(fields)
-    outlet.push(marker, stamped_s)
+        marker_s = outlet.clock_s()
+    marker = _format_marker(fields)
+    outlet.push(marker, marker_s)
     on_marker(marker)
 
 
-def _text(fields: dict[str, Any]) -> str:
+def _format_marker(fields: dict[str, Any]) -> str:
     """A marker: the fields as compact JSON."""
     return json.dumps(fields, separators=(",", ":"))

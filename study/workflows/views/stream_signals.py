@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from study.devices.opening import telemetry_of
+from study.devices.opening import open_telemetry
 from study.errors import StudyError
 from study.store.sessions.live_file import read_live
 from study.workflows.views.lsl_outlets import SignalOutlet, StreamDescription
@@ -34,7 +34,7 @@ STREAMS = (
     StreamDescription("hapteq motion", "Motion", (*_three("position"), *_three("velocity")), ("m",) * 3 + ("m/s",) * 3),
     StreamDescription("hapteq loop", "Status", ("tick", "phase", "fault", "missed_ticks"), ("",) * 4),
 )
-"""Name, kind, channels and units of each stream, in the order in which `_push_new` sends the signals."""
+"""Name, kind, channels and units of each stream, in the order in which `_push_new_rows` sends the signals."""
 
 
 class SignalStreams:
@@ -53,26 +53,26 @@ class SignalStreams:
     def push(self, offset_s: float) -> int:
         """Send the ticks since the last call. offset_s: LSL's clock minus the session's, s. Returns the number of ticks
         that were overwritten in the ring before they could be read."""
-        lost = self._push_new(offset_s)
+        lost = self._push_new_rows(offset_s)
         if self._calls % LOOK_EVERY == 0:
-            self._push_new_rows()
+            self._switch_ring()
         self._calls += 1
         return lost
 
-    def _push_new_rows(self) -> None:
+    def _switch_ring(self) -> None:
         """Change to the session's present ring, and open the outlets when a ring is found for the first time."""
         live = read_live(self._folder)
         if live is None or live.telemetry == self._path:
             return
         try:
-            self._reader = telemetry_of(live.telemetry) if live.telemetry else None
+            self._reader = open_telemetry(live.telemetry) if live.telemetry else None
             self._path = live.telemetry
         except StudyError:  # this sitting has ended, or its ring cannot be opened yet: the next check tries again
             self._reader, self._path = None, ""
         if self._reader is not None and not self._outlets:
             self._outlets = tuple(self._open_outlet(stream, self._reader.rate_hz) for stream in STREAMS)
 
-    def _push_new(self, offset_s: float) -> int:
+    def _push_new_rows(self, offset_s: float) -> int:
         """Send the rows that the ring has gained; returns the number of rows that were lost."""
         if self._reader is None:
             return 0

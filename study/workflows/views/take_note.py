@@ -8,9 +8,9 @@ from study.devices.clock import Clock
 from study.errors import StudyError
 from study.session.facts.events import NoteTaken
 from study.session.watching.requests import NoteAsked
-from study.store.disk.provenance import as_text
+from study.store.disk.provenance import replace_invalid_bytes
 from study.store.sessions.archive import SessionFolder
-from study.store.sessions.event_log import EventLog, mend
+from study.store.sessions.event_log import EventLog, remove_incomplete_line
 from study.store.sessions.log_seal import seal_log
 from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.session_lock import hold_session_lock
@@ -26,7 +26,7 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
     """
     if not note.text.strip():
         raise StudyError("There is nothing to note", "The text is empty.", "Give a sentence.")
-    if note.text != as_text(note.text):
+    if note.text != replace_invalid_bytes(note.text):
         raise StudyError(
             "This note cannot be written",
             "Its text holds bytes that are not UTF-8.",
@@ -38,13 +38,13 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
     with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
         try:
-            folded = fold_session(folder)
-            contents = folded.contents
-            if contents.torn:
-                mend(folder.log, contents)
-                log.append(_of_the_program(f"a torn last line was cut off: {contents.torn}", clock))
+            folded_session = fold_session(folder)
+            log_contents = folded_session.log_contents
+            if log_contents.torn:
+                remove_incomplete_line(folder.log, log_contents)
+                log.append(_of_the_program(f"a torn last line was cut off: {log_contents.torn}", clock))
             log.append(NoteTaken(utc=clock.utc(), who=note.who, text=note.text, adverse=note.adverse))
-            if folded.state.closed:
+            if folded_session.state.closed:
                 seal_log(folder.log)
         finally:
             log.close()

@@ -6,13 +6,13 @@ from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.result.candidate_wording import Device, candidate_sentences
 from analysis.diagnosis.result.wording import (
-    effect_sentence,
-    inseparable_sentence,
-    remainder_sentence,
-    rival_sentences,
-    verdict_sentence,
+    describe_effect,
+    describe_equivalents,
+    describe_remainder,
+    describe_rivals,
+    describe_verdict,
 )
-from analysis.wording import NONE, conjoin, p_value
+from analysis.wording import MISSING, conjoin, format_p
 from study.errors import StudyError
 from study.session.views.archive_views import DiagnosisView
 from study.session.views.printable import printable
@@ -34,9 +34,9 @@ def diagnosis_view(path: Path) -> DiagnosisView:
     report = path.parent / "report.html"
     view = DiagnosisView(
         path=str(path),
-        verdict=verdict_sentence(diagnosis, device=device),
+        verdict=describe_verdict(diagnosis, device=device),
         sentences=tuple(sentence for effect in diagnosis.effects for sentence in _effect(effect)),
-        rivals=tuple(sentence for effect in diagnosis.effects for sentence in rival_sentences(effect)),
+        rivals=tuple(sentence for effect in diagnosis.effects for sentence in describe_rivals(effect)),
         mismatch=_mismatches(diagnosis.mismatch),
         fit=(FIT_HEADER, _errors("fit", diagnosis.fit.fit), _errors("test", diagnosis.fit.test)),
         remainder=_mismatches(diagnosis.remainder),
@@ -61,10 +61,10 @@ def _device(path: Path) -> Device | None:
 def _effect(effect: NamedEffect) -> tuple[str, ...]:
     """Sentences on a named effect, and on effects that the recording cannot distinguish from it."""
     text = (
-        f"{effect_sentence(effect)} It explains {_percent(effect.share)} of the mismatch that remains after re-tuning "
+        f"{describe_effect(effect)} It explains {_percent(effect.share)} of the mismatch that remains after re-tuning "
         f"(probability {_probability(effect.probability)})."
     )
-    return tuple(filter(None, (text, inseparable_sentence(effect))))
+    return tuple(filter(None, (text, describe_equivalents(effect))))
 
 
 def _mismatches(mismatches: tuple[Mismatch, ...]) -> tuple[tuple[str, ...], ...]:
@@ -81,32 +81,32 @@ def _mismatch(mismatch: Mismatch) -> tuple[str, ...]:
         "all" if mismatch.amplitude is None else f"{mismatch.amplitude:g}",
         mismatch.state or "",
         _percent(mismatch.share),
-        p_value(mismatch.p_value),
+        format_p(mismatch.p_value),
     )
 
 
 def _errors(record: str, errors: Errors) -> tuple[str, ...]:
     """A row of the table of errors. record: the set of samples."""
     values = (errors.before, errors.retuned, errors.after, errors.noise)
-    return (record, *(NONE if value is None else f"{value:.4f}" for value in values))
+    return (record, *(MISSING if value is None else f"{value:.4f}" for value in values))
 
 
 def _next_experiment_text(diagnosis: Diagnosis) -> str:
     """Command, reason and discriminated effects of the proposed next experiment; empty without a proposal."""
-    following = diagnosis.next_experiment
-    if following is None:
+    experiment = diagnosis.next_experiment
+    if experiment is None:
         return ""
-    named, *rivals = (noun_of(name) for name in following.splits) if following.splits else ("",)
-    splits = f" This distinguishes {named} from {conjoin(rivals)}." if rivals else ""
-    return f"{following.command}\n{following.why}{splits}"
+    proposed_effect, *rivals = (noun_of(name) for name in experiment.splits) if experiment.splits else ("",)
+    splits = f" This distinguishes {proposed_effect} from {conjoin(rivals)}." if rivals else ""
+    return f"{experiment.command}\n{experiment.why}{splits}"
 
 
 def _notes(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Sentences on the error measure, the re-tuned parameters, and the remaining mismatch."""
     retuned = (f"Re-tuned: {conjoin(list(diagnosis.retuned))}.",) if diagnosis.retuned else ()
-    left = (remainder_sentence(diagnosis),) if diagnosis.verdict in ("explained", "partly_explained") else ()
+    remainder = (describe_remainder(diagnosis),) if diagnosis.verdict in ("explained", "partly_explained") else ()
     measured = f"Errors are normalised root-mean-square over the channels, measured by {diagnosis.error}."
-    return (measured, *retuned, *left)
+    return (measured, *retuned, *remainder)
 
 
 def _percent(share: float) -> str:

@@ -7,20 +7,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from analysis.psychophysics.thresholds import RunEnd, Threshold
-from analysis.wording import NONE, number
+from analysis.wording import MISSING, format_number
 from protocols.procedure.schedule import Run
 from protocols.trial import Phase
 from study.errors import StudyError
-from study.session.facts.event_words import log_in_words
+from study.session.facts.event_words import describe_log
 from study.session.state.state import SessionState
 from study.session.views.archive_views import SessionLine, SessionView, Staircase
 from study.session.views.local_time import Zone, in_utc, local_time
 from study.session.views.printable import printable
 from study.store.sessions.archive import SessionFolder
-from study.store.sessions.event_log import readable_events
+from study.store.sessions.event_log import read_valid_events
 from study.workflows.results.analysis_files import ANALYSIS_NAME
 from study.workflows.results.fold_session import FoldedSession, fold_session
-from study.workflows.results.session_results import due_results
+from study.workflows.results.session_results import list_due_results
 from study.workflows.views.session_facts import session_facts
 from study.workflows.views.session_line import line_of, session_line, with_writer
 
@@ -37,41 +37,45 @@ def session_view(path: Path, zone: Zone = in_utc) -> SessionView:
     """
     folder = SessionFolder(path.absolute())
     try:
-        folded = None if folder.withdrawn else fold_session(folder)
+        folded_session = None if folder.withdrawn else fold_session(folder)
     except StudyError as problem:
         return printable(_view_damaged(folder, problem, zone))
-    return printable(_bare_view(folder, session_line(folder)) if folded is None else _full_view(folder, folded, zone))
+    return printable(
+        _minimal_view(folder, session_line(folder))
+        if folded_session is None
+        else _full_view(folder, folded_session, zone)
+    )
 
 
-def _full_view(folder: SessionFolder, folded: FoldedSession, zone: Zone) -> SessionView:
+def _full_view(folder: SessionFolder, folded_session: FoldedSession, zone: Zone) -> SessionView:
     """View of a session whose log was read without damage."""
-    state = folded.state
+    state = folded_session.state
     analysis, problem = _analysis(state)
     clock = (f"Before {local_time(step.utc, zone)}: {step.sentence}" for step in state.sitting.clock_steps)
     return SessionView(
         line=with_writer(line_of(state, folder), folder),
-        facts=session_facts(folded, zone),
+        facts=session_facts(folded_session, zone),
         thresholds=_threshold_rows(state, analysis),
-        warnings=(*_log_remarks(folder, folded), *clock, *problem, *(analysis.warnings if analysis else ())),
+        warnings=(*_log_remarks(folder, folded_session), *clock, *problem, *(analysis.warnings if analysis else ())),
         staircases=_staircases(state, analysis),
-        events=log_in_words(folded.contents.events, zone),
+        events=describe_log(folded_session.log_contents.events, zone),
         report=_report(folder),
         figures=_figures(folder),
     )
 
 
-def _log_remarks(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
+def _log_remarks(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
     """Sentences on an incomplete last line, results that are missing or out of date, and missing checksums."""
-    due = ", ".join(due_results(folder, folded))
+    due_files = ", ".join(list_due_results(folder, folded_session))
     remarks = (
         (
-            folded.contents.torn_bytes,
+            folded_session.log_contents.torn_bytes,
             "A crash left the last line of the log incomplete; it is removed when the session is resumed.",
         ),
-        (due, f"Missing or not as the log gives it: {due}. hapteq resume writes it."),
-        (not folded.contents.chain.since, "The log contains no checksums: an older version wrote it."),
+        (due_files, f"Missing or not as the log gives it: {due_files}. hapteq resume writes it."),
+        (not folded_session.log_contents.chain.since, "The log contains no checksums: an older version wrote it."),
     )
-    return tuple(text for holds, text in remarks if holds)
+    return tuple(text for applies, text in remarks if applies)
 
 
 def _view_damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> SessionView:
@@ -83,11 +87,11 @@ def _view_damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> Ses
             line.answers, 0, line.runs, "unreadable", problem.happened,
         )  # fmt: skip
     sentences = tuple(part for part in (problem.happened, problem.saved, problem.do_now) if part)
-    events = log_in_words(readable_events(folder.log), zone)
-    return _bare_view(folder, line, warnings=(f"{problem.title}.", *sentences), events=events)
+    events = describe_log(read_valid_events(folder.log), zone)
+    return _minimal_view(folder, line, warnings=(f"{problem.title}.", *sentences), events=events)
 
 
-def _bare_view(
+def _minimal_view(
     folder: SessionFolder, line: SessionLine, warnings: tuple[str, ...] = (), events: tuple[str, ...] = ()
 ) -> SessionView:
     """View of a withdrawn or damaged session, without thresholds and staircases."""
@@ -120,16 +124,16 @@ def _threshold_row(row: Threshold, run: Run) -> tuple[str, ...]:
     remark = "cut by the cap" if row.censored else ""
     if not row.complete:
         remark = "trial limit" if row.ended is RunEnd.TRIAL_LIMIT else "not complete"
-    threshold = f"{number(row.threshold_n, 3)} N" if row.complete else NONE
+    threshold = f"{format_number(row.threshold_n, 3)} N" if row.complete else MISSING
     return (
         str(row.run + 1),
         run.phase.value,
         f"{row.frequency_hz:g} Hz",
         threshold,
-        NONE if row.threshold_mps2 is None else f"{row.threshold_mps2:.2f} m/s²",
+        MISSING if row.threshold_mps2 is None else f"{row.threshold_mps2:.2f} m/s²",
         str(row.reversals),
         str(row.trials),
-        NONE if row.percent_correct is None else f"{row.percent_correct:.0f} %",
+        MISSING if row.percent_correct is None else f"{row.percent_correct:.0f} %",
         remark,
     )
 
@@ -137,20 +141,21 @@ def _threshold_row(row: Threshold, run: Run) -> tuple[str, ...]:
 def _staircases(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[Staircase, ...]:
     """Staircases of all runs with counted trials, except practice."""
     rows = {row.run: row for row in (*analysis.thresholds, *analysis.detection)} if analysis else {}
-    begun = (run for run in state.runs if not run.practice)
-    drawn = (_staircase(state, run, rows.get(run.index)) for run in begun)
-    return tuple(staircase for staircase in drawn if staircase.levels_n)
+    shown_runs = (run for run in state.runs if not run.practice)
+    staircases = (_staircase(state, run, rows.get(run.index)) for run in shown_runs)
+    return tuple(staircase for staircase in staircases if staircase.levels_n)
 
 
 def _staircase(state: SessionState, run: Run, row: Threshold | None) -> Staircase:
     """Levels (N), answers and reversals of the counted trials of a run, without catch trials."""
-    counted = [t for t in state.trials if t.run == run.index and t.counts and t.phase is not Phase.CATCH]
-    over = run.index < state.run
+    counted_trials = [t for t in state.trials if t.run == run.index and t.counts and t.phase is not Phase.CATCH]
+    is_complete = run.index < state.run
     return Staircase(
-        title=f"Run {run.index + 1}: {run.frequency_hz:g} Hz, {run.phase.value}{'' if over else ', not complete'}",
-        levels_n=tuple(trial.staircase_n for trial in counted),
-        correct=tuple(bool(trial.correct) for trial in counted),
-        reversals=tuple(trial.reversal for trial in counted),
+        title=f"Run {run.index + 1}: {run.frequency_hz:g} Hz, {run.phase.value}"
+        f"{'' if is_complete else ', not complete'}",
+        levels_n=tuple(trial.staircase_n for trial in counted_trials),
+        correct=tuple(bool(trial.correct) for trial in counted_trials),
+        reversals=tuple(trial.reversal for trial in counted_trials),
         threshold_n=row.threshold_n if row is not None else None,
         cap_n=state.protocol.staircase.cap_n,
     )

@@ -15,18 +15,18 @@ from study.session.facts.log_chain import Chain, ChainBrokenError, read_chained
 from study.session.facts.log_time import seconds_between
 from study.session.state.draw_check import LogContradiction
 from study.session.watching.followed_session import FollowedSession, begin_watching
-from study.session.watching.followed_session import follow as after
+from study.session.watching.followed_session import apply_followed_event as after
 from study.session.watching.live import Live
-from study.session.watching.make_watch_view import LiveInfo, watch_view
+from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from study.session.watching.requests import Request
 from study.session.watching.watch_alarms import SILENT_AFTER_S
 from study.session.watching.watch_view import DriftLine, WatchView
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import read_live
-from study.store.sessions.log_seal import read_seal, seal_paths
+from study.store.sessions.log_seal import find_seals, read_seal
 from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
-from study.workflows.results.fold_session import protocol_of
+from study.workflows.results.fold_session import load_logged_protocol
 
 if TYPE_CHECKING:
     from study.workflows.results.session_drift import DriftReader
@@ -65,12 +65,12 @@ class Follower:
     def look(self, now_utc: str) -> WatchView | None:
         """The view at the time now_utc (ISO 8601); None while the log has no first line. Raises StudyError where the
         first line is invalid. Later damage is reported in the view."""
-        self._take_in_what_is_new()
+        self._read_new_lines()
         if self._watched is None:
             return None
         live = read_live(self._folder.path)
-        beside = LiveInfo(live, self._is_written(live, now_utc), self._problem, self._look_for_drifts(self._watched))
-        self._view = watch_view(self._watched, beside, now_utc, self._view)
+        live_info = LiveInfo(live, self._has_writer(live, now_utc), self._problem, self._look_for_drifts(self._watched))
+        self._view = make_watch_view(self._watched, live_info, now_utc, self._view)
         return self._view
 
     def _look_for_drifts(self, watched: FollowedSession) -> tuple[DriftLine, ...]:
@@ -83,7 +83,7 @@ class Follower:
             self._drifts = DriftReader(self._folder)
         return self._drifts.look(watched.probes)
 
-    def _take_in_what_is_new(self) -> None:
+    def _read_new_lines(self) -> None:
         """Read the new part of the log and apply its complete lines. A problem stops at its line, which is read again
         at the next look. Raises StudyError where the session cannot be followed at all."""
         sealed_bytes = (
@@ -93,7 +93,7 @@ class Follower:
             with open_regular(self._folder.log) as file:
                 self._begin_again_if_rewritten(file)
                 file.seek(self._read_bytes)
-                fresh = file.read(TABLE_BYTES)
+                new_bytes = file.read(TABLE_BYTES)
         except OSError as problem:
             self._problem, self._missing = f"{problem.strerror or problem}.", isinstance(problem, FileNotFoundError)
             if self._watched is None and not self._missing:
@@ -101,8 +101,8 @@ class Follower:
             return
         self._problem, self._missing = "", False
         # Bytes after the last line end belong to a line that is being written, or that a crash left incomplete.
-        for line in (whole + b"\n" for whole in fresh.split(b"\n")[:-1]):
-            self._problem = self._take_in(line)
+        for line in (complete_line + b"\n" for complete_line in new_bytes.split(b"\n")[:-1]):
+            self._problem = self._apply_line(line)
             if self._problem:
                 return
             self._read_bytes += len(line)
@@ -115,7 +115,7 @@ class Follower:
     def _count_sealed_bytes(self) -> int | None:
         """Length of the log (bytes) that its seals cover; 0 without a seal, None if a seal cannot be read."""
         try:
-            return max((read_seal(path).bytes for path in seal_paths(self._folder.path).values()), default=0)
+            return max((read_seal(path).bytes for path in find_seals(self._folder.path).values()), default=0)
         except StudyError:
             return None
 
@@ -126,7 +126,7 @@ class Follower:
         if file.read(len(self._last_line)) != self._last_line:
             self._watched, self._read_bytes, self._last_line, self._chain = None, 0, b"", Chain()
 
-    def _take_in(self, line: bytes) -> str:
+    def _apply_line(self, line: bytes) -> str:
         """Apply one line of the log; returns its problem as a clause, empty if there is none. Raises StudyError for an
         invalid first line."""
         try:
@@ -142,7 +142,7 @@ class Follower:
             if not isinstance(event, SessionOpened):
                 raise _not_ours(_FIRST.format(self._folder.name))
             try:
-                self._watched = begin_watching(event, protocol_of(event, self._folder))
+                self._watched = begin_watching(event, load_logged_protocol(event, self._folder))
             except LogContradiction:
                 raise _not_ours(_FIRST.format(self._folder.name)) from None
             self._chain = chain
@@ -155,7 +155,7 @@ class Follower:
         self._chain = chain
         return ""
 
-    def _is_written(self, live: Live | None, now_utc: str) -> bool | None:
+    def _has_writer(self, live: Live | None, now_utc: str) -> bool | None:
         """Whether a program has the log open for writing; None while a recent live state makes the check
         unnecessary."""
         if self._missing:
@@ -172,10 +172,10 @@ _FIRST = "The first line of the log of {} is none that this version knows."
 """Why a session cannot be followed, for messages; the placeholder is the session's name."""
 
 
-def _not_ours(why: str) -> StudyError:
+def _not_ours(problem: str) -> StudyError:
     """Error for a session that this version cannot follow."""
     return StudyError(
         "This session cannot be followed",
-        why,
+        problem,
         "Use the hapteq that runs the session; hapteq validate says more.",
     )

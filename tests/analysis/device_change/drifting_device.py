@@ -81,5 +81,5 @@ def _recording(rows) -> Recording:
     )
 
 
-def changed(**changes) -> Truth:
+def make_truth(**changes) -> Truth:
     return replace(Truth(), **changes)

@@ -6,10 +6,10 @@ import pytest
 from analysis.device_change import probe_lines as spectra
 from analysis.device_change.probe_lines import friction_shapes, probe_lines
 from protocols.definition.probes import ProbeSettings
-from study.session.stimulus.probe_stimulus import probe_wave
+from study.session.stimulus.probe_stimulus import make_probe_wave
 
 LEVEL_N, RATE_HZ = 0.8, 1000.0
-WAVE = probe_wave(ProbeSettings(levels_n=(LEVEL_N,)), RATE_HZ)
+WAVE = make_probe_wave(ProbeSettings(levels_n=(LEVEL_N,)), RATE_HZ)
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def bare_device(drifting_device, monkeypatch):
 
 
 def test_what_mass_and_spring_leave_of_the_command_is_the_friction(bare_device):
-    truth = bare_device.changed(hand_kg=0.0, hand_n_s_per_m=2.0, hand_n_per_m=110.0)
+    truth = bare_device.make_truth(hand_kg=0.0, hand_n_s_per_m=2.0, hand_n_per_m=110.0)
     (played,) = bare_device.play(WAVE, [truth], (LEVEL_N,), seed=1)
     lines = probe_lines(played, 1.0)
     friction = truth.friction_n * friction_shapes((lines,), int(RATE_HZ))[0, 0]

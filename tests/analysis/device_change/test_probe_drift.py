@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.device_change.probe_drift import TimedProbe, drifts
+from analysis.device_change.probe_drift import TimedProbe, find_drifts
 from analysis.device_change.probe_lines import apparent_mass_kg, probe_lines
 from protocols.definition.probes import ProbeSettings
-from study.session.stimulus.probe_stimulus import probe_wave
+from study.session.stimulus.probe_stimulus import make_probe_wave
 
 LEVELS_N = (0.2, 0.4, 0.8)
-WAVE = probe_wave(ProbeSettings(levels_n=LEVELS_N), 1000.0)
+WAVE = make_probe_wave(ProbeSettings(levels_n=LEVELS_N), 1000.0)
 
 
 def with_response(recording, samples):
@@ -24,7 +24,7 @@ def session(drifting_device):
 
     def probes(seed: int, **changes: float) -> list[TimedProbe]:
         device = drifting_device
-        truths = [device.Truth()] * 6 + [device.changed(**changes)] * 3
+        truths = [device.Truth()] * 6 + [device.make_truth(**changes)] * 3
         played = device.play(WAVE, truths, LEVELS_N * 3, seed)
         return [TimedProbe(60.0 * k, LEVELS_N[k % 3], probe_lines(each, 1.0)) for k, each in enumerate(played)]
 
@@ -33,16 +33,16 @@ def session(drifting_device):
 
 @pytest.mark.parametrize("seed", [1, 2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 21))])
 def test_where_nothing_changes_nothing_is_named(session, seed):
-    assert drifts(session(seed), 1000) == ()
+    assert find_drifts(session(seed), 1000) == ()
 
 
 def test_more_friction_is_named_on_every_axis_with_its_number_and_time(session):
-    found = drifts(session(1, friction_n=0.2), 1000)
+    found = find_drifts(session(1, friction_n=0.2), 1000)
     assert {(each.cause, each.axis) for each in found} == {("friction", axis) for axis in "xyz"}
     for each in found:
-        assert each.at_s == 480.0
+        assert each.time_s == 480.0
         assert each.change == pytest.approx(0.08, abs=0.03)
-        assert each.before == pytest.approx(0.12, abs=0.03)
+        assert each.initial_value == pytest.approx(0.12, abs=0.03)
         assert each.rivals == ()
 
 
@@ -51,45 +51,45 @@ def test_the_level_of_friction_is_right_between_the_lengths_that_are_tried(
     session, drifting_device, monkeypatch, break_away_m
 ):
     monkeypatch.setattr(drifting_device, "BRISTLE_M", break_away_m)
-    found = drifts(session(1, friction_n=0.2), 1000)
+    found = find_drifts(session(1, friction_n=0.2), 1000)
     assert {(each.cause, each.axis) for each in found} == {("friction", axis) for axis in "xyz"}
     assert np.mean([each.change for each in found]) == pytest.approx(0.08, abs=0.015)
-    assert np.mean([each.before for each in found]) == pytest.approx(0.12, abs=0.02)
+    assert np.mean([each.initial_value for each in found]) == pytest.approx(0.12, abs=0.02)
 
 
 def test_a_weaker_motor_is_a_gain_or_not_told_from_a_grip_and_says_so(session):
-    found = drifts(session(1, gain=0.9), 1000)
+    found = find_drifts(session(1, gain=0.9), 1000)
     assert [(each.cause, each.axis) for each in found] == [("gain", axis) for axis in "xyz"]
     assert all(each.change == pytest.approx(-0.1, abs=0.02) for each in found)
     assert all(each.rivals in ((), ("grip",)) for each in found)
 
 
 def test_a_millisecond_of_delay_is_a_delay_and_nothing_else(session):
-    (found,) = drifts(session(1, delay_ticks=1), 1000)
+    (found,) = find_drifts(session(1, delay_ticks=1), 1000)
     assert found.cause == "delay"
     assert found.change == pytest.approx(1e-3, abs=1e-4)
 
 
 def test_a_lighter_grip_is_named_by_its_mass(session):
-    found = drifts(session(1, hand_kg=0.045, hand_n_s_per_m=2.0, hand_n_per_m=60.0), 1000)
+    found = find_drifts(session(1, hand_kg=0.045, hand_n_s_per_m=2.0, hand_n_per_m=60.0), 1000)
     masses = {each.axis: each.change for each in found if each.number == "mass"}
     assert {each.cause for each in found} == {"grip"}
     assert masses == pytest.approx({axis: -0.045 for axis in "xyz"}, abs=0.01)
 
 
 def test_a_firmer_grip_is_named_or_not_told_from_a_gain_and_says_so(session):
-    found = drifts(session(1, hand_kg=0.135, hand_n_s_per_m=6.0, hand_n_per_m=180.0), 1000)
+    found = find_drifts(session(1, hand_kg=0.135, hand_n_s_per_m=6.0, hand_n_per_m=180.0), 1000)
     assert found
     assert all(each.cause == "grip" or "grip" in each.rivals for each in found)
 
 
 def test_two_of_each_level_are_the_yardstick_and_name_nothing_by_themselves(session):
-    assert drifts(session(1, friction_n=0.5)[:6], 1000) == ()
-    assert drifts([], 1000) == ()
+    assert find_drifts(session(1, friction_n=0.5)[:6], 1000) == ()
+    assert find_drifts([], 1000) == ()
 
 
 def test_a_hand_adds_to_the_mass_that_the_handle_seems_to_have(drifting_device):
-    free = drifting_device.changed(hand_kg=0.0, hand_n_s_per_m=0.0, hand_n_per_m=0.0)
+    free = drifting_device.make_truth(hand_kg=0.0, hand_n_s_per_m=0.0, hand_n_per_m=0.0)
     played = drifting_device.play(WAVE, [free, drifting_device.Truth()], (0.8, 0.8), seed=1)
     masses = [apparent_mass_kg(probe_lines(each, 1.0)) for each in played]
     assert masses[1] - masses[0] == pytest.approx(0.09, abs=0.02)

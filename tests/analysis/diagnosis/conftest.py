@@ -90,7 +90,7 @@ def device() -> Callable[..., InventedDevice]:
 
 
 @pytest.fixture(scope="session")
-def arena_of(diagnosed) -> Callable[..., Any]:
+def make_context(diagnosed) -> Callable[..., Any]:
     """What the engine's parts share, over the recording of a small simulated device; see `tests/diagnosed.py`. Imported
     late: it compiles."""
     from analysis.diagnosis.errors.choose_measure import measure_of
@@ -107,17 +107,17 @@ def arena_of(diagnosed) -> Callable[..., Any]:
 
 
 @pytest.fixture(scope="session")
-def standing_at() -> Callable[..., Any]:
+def make_candidate() -> Callable[..., Any]:
     """A candidate with invented errors, in units of the noise; names: effects of the catalogue, the last is the new
     one."""
     from analysis.diagnosis.errors.fit_score import FitScore
-    from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, combine, hypothesis_of_claim
+    from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine, hypothesis_of_claim
     from analysis.diagnosis.errors.output_error import Fitted
     from analysis.diagnosis.search.search_context import FittedCandidate
     from equalizer.effects.catalogue import EFFECTS
 
     def candidate(seen, *names, test=None, sites=(0,)):
-        whole = NOTHING
+        whole = NO_EFFECTS
         for name in names:
             effect = EFFECTS[name]
             values = {p.name: min(max(1.0, p.lower), p.upper) for p in effect.parameters}

@@ -22,7 +22,7 @@ MODEL = MechanicalModel(
 )  # fmt: skip
 
 
-def recording(seed: int, scale: float = 1.0, channel: str = "x") -> Recording:
+def record_cart(seed: int, scale: float = 1.0, channel: str = "x") -> Recording:
     random = np.random.default_rng(seed)
     force = random.standard_normal((4000, 1))
     position = scale * np.cumsum(np.cumsum(force, axis=0), axis=0) / RATE_HZ**2
@@ -33,19 +33,19 @@ def recording(seed: int, scale: float = 1.0, channel: str = "x") -> Recording:
 
 def test_a_recording_without_motion_has_no_verdict():
     with pytest.raises(NothingToDiagnose):
-        module.diagnose_values(recording(1, scale=0.0), MODEL)
+        module.diagnose_values(record_cart(1, scale=0.0), MODEL)
 
 
 def test_recordings_that_are_not_alike_are_refused_clean_ones_too():
     with pytest.raises(NothingToDiagnose):
-        module.diagnose_values([recording(1), recording(2, channel="y")], MODEL)
+        module.diagnose_values([record_cart(1), record_cart(2, channel="y")], MODEL)
     with pytest.raises(NothingToDiagnose):
-        module.diagnose_values(recording(1), MODEL, DiagnosisSettings(clean=(recording(2, channel="y"),)))
+        module.diagnose_values(record_cart(1), MODEL, DiagnosisSettings(clean=(record_cart(2, channel="y"),)))
 
 
 def test_the_same_recording_twice_is_refused():
     with pytest.raises(NothingToDiagnose):
-        module.diagnose_values([recording(1), recording(1)], MODEL)
+        module.diagnose_values([record_cart(1), record_cart(1)], MODEL)
 
 
 def test_without_a_model_the_first_one_is_of_the_clean_recordings(monkeypatch):
@@ -62,8 +62,8 @@ def test_without_a_model_the_first_one_is_of_the_clean_recordings(monkeypatch):
     monkeypatch.setattr(module, "fit_first_linear_model", fitted)
     monkeypatch.setattr(module, "diagnose", diagnosed)
     monkeypatch.setattr(module, "replace", lambda found, **new: new if found is FINDINGS else replace(found, **new))
-    clean = recording(2)
-    found = module.diagnose_values(recording(1), settings=DiagnosisSettings(clean=(clean,)))
+    clean = record_cart(2)
+    found = module.diagnose_values(record_cart(1), settings=DiagnosisSettings(clean=(clean,)))
     assert np.array_equal(seen["fitted to"][0].response.samples, clean.response.samples)
     assert (seen["model"], seen["settings"].fitted) == (MODEL, True)
     assert "fitted" in found["remarks"]

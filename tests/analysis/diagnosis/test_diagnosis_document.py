@@ -28,7 +28,7 @@ DOCUMENT = {
 }  # fmt: skip
 
 
-def changed(place, value):
+def change_document(place, value):
     document = copy.deepcopy(DOCUMENT)
     *way, last = place
     inner = document
@@ -49,12 +49,14 @@ def test_the_returned_set_is_the_effect_and_its_inseparable_rivals():
 
 
 def test_an_effect_outside_the_vocabulary_may_be_named():
-    assert diagnosis_from_json(changed(("effects", 0, "effect"), "joint_slip")).effects[0].effect == "joint_slip"
+    assert (
+        diagnosis_from_json(change_document(("effects", 0, "effect"), "joint_slip")).effects[0].effect == "joint_slip"
+    )
 
 
 @pytest.mark.parametrize("error", ["free simulation", "windows of 1 s", "windows of 0.5 s", "predicted force"])
 def test_the_ways_to_measure_errors(error):
-    assert diagnosis_from_json(changed(("error",), error)).error == error
+    assert diagnosis_from_json(change_document(("error",), error)).error == error
 
 
 @pytest.mark.parametrize(
@@ -81,7 +83,7 @@ def test_the_ways_to_measure_errors(error):
 )
 def test_what_is_no_diagnosis_is_refused_by_its_place(place, value, problem):
     with pytest.raises(DiagnosisError) as refused:
-        diagnosis_from_json(changed(place, value))
+        diagnosis_from_json(change_document(place, value))
     assert any(found.startswith(problem) for found in refused.value.problems), refused.value.problems
 
 
@@ -109,7 +111,7 @@ DISCOVERED = {
 
 
 def test_a_law_without_a_name_goes_to_json_and_back():
-    document = changed(("effects",), [DISCOVERED])
+    document = change_document(("effects",), [DISCOVERED])
     assert diagnosis_to_json(diagnosis_from_json(document)) == document
 
 
@@ -128,5 +130,5 @@ def test_a_law_without_a_name_goes_to_json_and_back():
 )
 def test_a_law_that_contradicts_itself_is_refused(effect, problem):
     with pytest.raises(DiagnosisError) as error:
-        diagnosis_from_json(changed(("effects",), [effect]))
+        diagnosis_from_json(change_document(("effects",), [effect]))
     assert problem in str(error.value)

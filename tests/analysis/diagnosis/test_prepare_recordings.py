@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from analysis.diagnosis.prepare_recordings import prepare
+from analysis.diagnosis.prepare_recordings import prepare_recordings
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
 RATE_HZ = 100.0
 
 
-def repeating(seed: int) -> Recording:
+def record_repeats(seed: int) -> Recording:
     push = np.tile(np.random.default_rng(seed).standard_normal(400), 5)
     moved = np.convolve(push, 0.9 ** np.arange(80))[: len(push)]
     return Recording(
@@ -20,5 +20,7 @@ def repeating(seed: int) -> Recording:
 
 
 def test_recordings_are_called_by_their_names_with_any_characters():
-    remarks = prepare((repeating(1), repeating(2)), ("pull 1.5 N", "pull 2.5 N"), plain=False).remarks
+    remarks = prepare_recordings(
+        (record_repeats(1), record_repeats(2)), ("pull 1.5 N", "pull 2.5 N"), without_model=False
+    ).remarks
     assert [remark.split(":")[0] for remark in remarks] == ["pull 1.5 N", "pull 2.5 N"]

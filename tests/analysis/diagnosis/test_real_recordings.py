@@ -14,7 +14,7 @@ from study.workflows.recording.import_recording import read_foreign
 FRICTION = {"coulomb_friction", "asymmetric_friction", "stribeck_friction"}
 
 
-def folder(shared: Path, name: str) -> Path:
+def find_folder(shared: Path, name: str) -> Path:
     if not (found := shared / "recordings" / name).is_dir():
         pytest.skip(f"the recordings of {name} are not beside this checkout")
     return found
@@ -22,7 +22,7 @@ def folder(shared: Path, name: str) -> Path:
 
 @pytest.mark.slow
 def test_a_positioning_axis_rubs_one_way_more_than_the_other(shared: Path) -> None:
-    recording = read_foreign((folder(shared, "emps"),), "emps").recording
+    recording = read_foreign((find_folder(shared, "emps"),), "emps").recording
     model = rigid_model([recording], "fitted")
     findings = diagnose([recording], model, DiagnosisSettings(), map, lambda said, share: None)
     first = findings.diagnosis.effects[0]
@@ -35,7 +35,7 @@ def test_a_positioning_axis_rubs_one_way_more_than_the_other(shared: Path) -> No
 
 
 def test_a_positioning_axis_is_compared_by_forces(shared: Path) -> None:
-    recording = read_foreign((folder(shared, "emps"),), "emps").recording
+    recording = read_foreign((find_folder(shared, "emps"),), "emps").recording
     model = rigid_model([recording], "fitted")
     assert model.mass[0, 0] == pytest.approx(95.1, rel=0.02)
     chosen = measure_of([recording], model)
@@ -46,14 +46,14 @@ def test_a_positioning_axis_is_compared_by_forces(shared: Path) -> None:
 
 
 def test_a_rack_that_was_driven_by_its_speed_is_compared_by_forces(shared: Path) -> None:
-    recording = as_force_driven(read_foreign((folder(shared, "rack_drive"),), "rack_drive").recording)
+    recording = as_force_driven(read_foreign((find_folder(shared, "rack_drive"),), "rack_drive").recording)
     model = rigid_model([recording], "fitted")
     assert model.mass[0, 0] == pytest.approx(24.7, rel=0.15)
     assert measure_of([recording], model).measure.name == "predicted force"
 
 
 def test_steps_of_a_haptic_lever_are_compared_part_by_part(shared: Path) -> None:
-    recording = read_foreign((folder(shared, "haptic_paddle"),), "haptic_paddle_steps").recording
+    recording = read_foreign((find_folder(shared, "haptic_paddle"),), "haptic_paddle_steps").recording
     chosen = measure_of([recording], rigid_model([recording], "fitted"))
     assert chosen.measure.name == "predicted force"
     assert len(chosen.measure.records) == 9

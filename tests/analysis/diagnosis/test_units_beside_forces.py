@@ -4,7 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.search_by_simulation import search_context_of
+from analysis.diagnosis.search_by_simulation import make_search_context
 
 
 def test_units_are_those_of_the_recording_as_it_was_given(diagnosed):
@@ -12,7 +12,7 @@ def test_units_are_those_of_the_recording_as_it_was_given(diagnosed):
     forces = replace(recording, response=replace(recording.response, quantity="force", unit="N"))
     measure = SimpleNamespace(records=(SimpleNamespace(recording=forces),), shorten=lambda: None)
     look = SimpleNamespace(model=diagnosed.device(1), chosen=SimpleNamespace(measure=measure))
-    context = search_context_of(recording, look, DiagnosisSettings(), map)
+    context = make_search_context(recording, look, DiagnosisSettings(), map)
     assert context.tuning.model.units is None
-    wrongly = search_context_of(forces, look, DiagnosisSettings(), map)
+    wrongly = make_search_context(forces, look, DiagnosisSettings(), map)
     assert wrongly.tuning.model.units is not None

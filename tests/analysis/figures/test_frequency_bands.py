@@ -20,14 +20,14 @@ def response() -> FrequencyResponse:
     )
 
 
-def said(figure) -> list[str]:
+def figure_texts(figure) -> list[str]:
     return [text.get_text() for axes in figure.axes for text in axes.texts]
 
 
 def test_device_person_and_methods_stand_below_each_other(response):
     onset = coupling_onset(response)
     figure = draw_frequency_bands(response, onset, frequency_bands(onset.frequency_hz), 35.0)
-    words = said(figure)
+    words = figure_texts(figure)
     for expected in ("25 %", "coupling begins: 12.0 Hz", "axes couple", "directions are felt", "hardly felt"):
         assert expected in words
     assert [word.split("\n")[0] for word in words if "\n" in word] == ["low", "middle", "high"]
@@ -45,14 +45,14 @@ def test_the_mark_lies_where_the_curve_passes_the_threshold(response):
 def test_without_coupling_there_are_two_bands_and_no_mark(response):
     none = CouplingOnset(None, None, False, 0.25, "a rule")
     figure = draw_frequency_bands(response, none, frequency_bands(None), 35.0)
-    words = said(figure)
+    words = figure_texts(figure)
     assert not any(word.startswith(("middle", "coupling begins")) for word in words)
     assert "axes couple" not in words
 
 
 def test_coupled_from_the_start_is_written(response):
     start = CouplingOnset(4.0, None, True, 0.25, "a rule")
-    assert "coupled from the start" in said(draw_frequency_bands(response, start, frequency_bands(4.0), 35.0))
+    assert "coupled from the start" in figure_texts(draw_frequency_bands(response, start, frequency_bands(4.0), 35.0))
 
 
 def test_the_caption_states_the_rule_and_why_each_band_is_driven_so(response):

@@ -23,7 +23,7 @@ def primary() -> PrimaryAnalysis:
     return found
 
 
-def arrows(axes, colour):
+def find_arrows(axes, colour):
     return [
         text for text in axes.texts if text.arrow_patch is not None and text.arrow_patch.get_edgecolor()[:3] == colour
     ]
@@ -35,7 +35,7 @@ def test_medians_below_the_cap_have_their_intervals_and_above_it_an_arrow_from_t
     assert len(bars) == 2
     for place, (bar, median) in enumerate(zip(bars, primary.medians, strict=False)):
         np.testing.assert_allclose(bar, [[place, median.lower_n], [place, median.upper_n]])
-    (arrow,) = arrows(axes, (0.0, 0.0, 0.0))
+    (arrow,) = find_arrows(axes, (0.0, 0.0, 0.0))
     assert arrow.xyann == pytest.approx((2, primary.medians[2].lower_n))
     sizes = [line for line in axes.lines if line.get_marker() == "_" and line.get_markersize() > 20]
     assert [float(line.get_ydata()[0]) for line in sizes] == pytest.approx(
@@ -80,7 +80,7 @@ def test_without_a_bound_the_arrow_begins_at_the_axis_and_without_a_limit_there_
     )
     figure = draw_medians(changed, CAP_N)
     (axes,) = figure.axes
-    (arrow,) = arrows(axes, (0.0, 0.0, 0.0))
+    (arrow,) = find_arrows(axes, (0.0, 0.0, 0.0))
     assert arrow.xyann[1] == pytest.approx(axes.get_ylim()[0])
     assert not any(line.get_marker() == "D" and line.get_markersize() == 8 for line in axes.lines)
     assert not any("limit" in text.get_text() for text in figure.legends[0].get_texts())
@@ -91,7 +91,7 @@ def test_the_arrow_of_a_bound_points_up_within_the_axis_however_high_the_bound_i
     """A bound above the end of the axis drew it downwards, outside."""
     high = replace(primary.medians[2], lower_db=20.0 * np.log10(bound_n))
     axes = draw_medians(replace(primary, medians=(*primary.medians[:2], high)), CAP_N).axes[0]
-    (arrow,) = arrows(axes, (0.0, 0.0, 0.0))
+    (arrow,) = find_arrows(axes, (0.0, 0.0, 0.0))
     begin, end, top = arrow.xyann[1], arrow.xy[1], axes.get_ylim()[1]
     assert begin < end <= top <= 8.0 * CAP_N
     assert begin == pytest.approx(bound_n) or top == 8.0 * CAP_N

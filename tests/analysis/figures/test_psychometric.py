@@ -11,7 +11,7 @@ from analysis.figures.style import PAGE_IN
 from analysis.figures.thresholds_by_unit import draw_thresholds_by_unit
 from analysis.psychophysics.detection import above_detection
 from analysis.psychophysics.hierarchy.answers import count_answers
-from analysis.psychophysics.hierarchy.observed_shares import shares_of_people, shares_of_person
+from analysis.psychophysics.hierarchy.observed_shares import compute_group_shares, compute_person_shares
 from analysis.psychophysics.study_analysis import analyse_study
 from analysis.psychophysics.threshold_table import threshold_table
 
@@ -26,7 +26,7 @@ def answers(analysis):
     return count_answers(analysis.trials, analysis.primary.frequencies_hz)
 
 
-def points(axes) -> list[float]:
+def plotted_percent(axes) -> list[float]:
     return [line.get_ydata()[0] for line in axes.lines if line.get_marker() == "o"]
 
 
@@ -34,7 +34,7 @@ def test_every_frequency_has_its_points_and_its_curve(analysis, answers):
     figure = draw_people_curves(answers, analysis.primary)
     for place, axes in enumerate(figure.axes[:5]):
         np.testing.assert_allclose(
-            points(axes), [100 * s.share for s in shares_of_people(answers, analysis.primary, place)]
+            plotted_percent(axes), [100 * s.share for s in compute_group_shares(answers, analysis.primary, place)]
         )
         curve = max((line.get_ydata() for line in axes.lines), key=len)
         assert np.all(np.diff(curve) > 0)
@@ -46,7 +46,9 @@ def test_a_persons_curve_crosses_its_threshold_line_where_it_is_written(analysis
     figure = draw_person_curves(answers, analysis.primary, 1, 3.0)
     threshold_n = analysis.primary.persons[1].thresholds_n[0]
     assert figure.axes[0].get_title(loc="left") == f"5 Hz: {threshold_n:.2f} N"
-    np.testing.assert_allclose(points(figure.axes[0]), [100 * s.share for s in shares_of_person(answers, 1, 0)])
+    np.testing.assert_allclose(
+        plotted_percent(figure.axes[0]), [100 * s.share for s in compute_person_shares(answers, 1, 0)]
+    )
     assert "above the cap" in figure.axes[4].get_title(loc="left")
 
 
@@ -92,8 +94,8 @@ def test_thresholds_of_zero_are_left_out_of_a_ratio_scale(analysis):
     assert "units" not in [picture.name for picture in study_pictures(replace(analysis, thresholds=still))]
 
 
-def test_above_detection_is_the_ratio_of_both_thresholds_where_both_are(everything, full_protocol):
-    analysis = analyse_study(everything, full_protocol)
+def test_above_detection_is_the_ratio_of_both_thresholds_where_both_are(all_trial_kinds, full_protocol):
+    analysis = analyse_study(all_trial_kinds, full_protocol)
     table = above_detection(analysis.table, analysis.detection_table)
     row, felt = table.values[0], analysis.detection_table.values[0][0]
     assert row[:3] == (None, None, None) and row[4] is None

@@ -11,7 +11,7 @@ from analysis.psychophysics.study_analysis import analyse_study
 
 
 @pytest.fixture(scope="module")
-def draw(protocol):
+def draw_pictures(protocol):
     def pictures(trials) -> dict[str, Picture]:
         return {picture.name: picture for picture in study_pictures(analyse_study(trials, protocol))}
 
@@ -19,51 +19,53 @@ def draw(protocol):
 
 
 @pytest.fixture(scope="module")
-def ten(simulate_study):
+def study_trials(simulate_study):
     """The trials of a study with ten participants."""
     return simulate_study()
 
 
 @pytest.fixture(scope="module")
-def ten_drawn(draw, ten):
-    return draw(ten)
+def study_drawings(draw_pictures, study_trials):
+    return draw_pictures(study_trials)
 
 
 @pytest.fixture(scope="module")
-def one_drawn(draw, simulate_study):
-    return draw(simulate_study(subjects=1))
+def one_person_drawings(draw_pictures, simulate_study):
+    return draw_pictures(simulate_study(subjects=1))
 
 
-def texts(figure: Figure) -> str:
+def figure_text(figure: Figure) -> str:
     figure.canvas.draw()
     return " ".join(artist.get_text() for artist in figure.findobj(lambda artist: hasattr(artist, "get_text")))
 
 
-def markers(figure: Figure) -> list[str]:
+def plotted_markers(figure: Figure) -> list[str]:
     return [str(line.get_marker()) for line in figure.axes[0].lines if line.get_marker() not in ("None", "_", None)]
 
 
-def test_a_study_has_its_figures_in_the_order_of_the_report(draw, simulate_study):
-    assert list(draw(simulate_study(subjects=3))) == [
+def test_a_study_has_its_figures_in_the_order_of_the_report(draw_pictures, simulate_study):
+    assert list(draw_pictures(simulate_study(subjects=3))) == [
         "thresholds", "units", "medians", "psychometric", "psychometric-1-s01", "psychometric-2-s02",
         "psychometric-3-s03", "delivered", "staircases-1-s01", "staircases-2-s02", "staircases-3-s03",
     ]  # fmt: skip
 
 
-def test_every_threshold_keeps_its_participants_marker_and_is_hollow_where_the_cap_cut(ten_drawn, ten, protocol):
-    analysis = analyse_study(ten, protocol)
-    shown = [line for line in ten_drawn["thresholds"].figure.axes[0].lines if line.get_marker() in MARKERS]
+def test_every_threshold_keeps_its_participants_marker_and_is_hollow_where_the_cap_cut(
+    study_drawings, study_trials, protocol
+):
+    analysis = analyse_study(study_trials, protocol)
+    shown = [line for line in study_drawings["thresholds"].figure.axes[0].lines if line.get_marker() in MARKERS]
     assert len(shown) == 50
     # Ten participants, ten markers, five frequencies: also those that the cap cut are distinguished.
     assert Counter(str(line.get_marker()) for line in shown) == Counter(dict.fromkeys(MARKERS, 5))
     hollow = [line for line in shown if line.get_markerfacecolor() == "white"]
     assert len(hollow) == sum(row.censored for row in analysis.thresholds) > 0
-    arrows = [text for text in ten_drawn["thresholds"].figure.axes[0].texts if text.arrow_patch is not None]
+    arrows = [text for text in study_drawings["thresholds"].figure.axes[0].texts if text.arrow_patch is not None]
     assert len(arrows) == len(hollow)
 
 
-def test_each_participant_has_a_line_and_each_mean_stands_over_its_tick(ten_drawn):
-    axes = ten_drawn["thresholds"].figure.axes[0]
+def test_each_participant_has_a_line_and_each_mean_stands_over_its_tick(study_drawings):
+    axes = study_drawings["thresholds"].figure.axes[0]
     lines = [line for line in axes.lines if line.get_linestyle() == "-" and len(line.get_xdata()) == 5]
     assert len(lines) == 10
     assert [float(container.lines[0].get_xdata()[0]) for container in axes.containers] == list(axes.get_xticks())
@@ -76,13 +78,13 @@ def test_a_run_that_the_trial_limit_stopped_is_drawn_and_said(simulate_study, pr
     figure = pictures["thresholds"].figure
     above = [line for line in figure.axes[0].lines if line.get_marker() in MARKERS and line.get_ydata()[0] > 3.0]
     assert [str(line.get_marker()) for line in above] == list(MARKERS[:2])
-    assert "by the trial limit" in texts(figure)
+    assert "by the trial limit" in figure_text(figure)
     titles = [axes.get_title(loc="left") for axes in pictures["staircases-1-s01"].figure.axes]
     assert "45 Hz (stopped by the trial limit)" in titles
 
 
-def test_the_threshold_figure_says_its_units_cap_and_intervals(ten_drawn):
-    said = texts(ten_drawn["thresholds"].figure)
+def test_the_threshold_figure_says_its_units_cap_and_intervals(study_drawings):
+    said = figure_text(study_drawings["thresholds"].figure)
     for words in (
         "Frequency (Hz)",
         "(N)",
@@ -95,46 +97,46 @@ def test_the_threshold_figure_says_its_units_cap_and_intervals(ten_drawn):
         assert words in said
 
 
-def test_means_carry_the_comparison_intervals(ten_drawn, ten, protocol):
-    axes = ten_drawn["thresholds"].figure.axes[0]
+def test_means_carry_the_comparison_intervals(study_drawings, study_trials, protocol):
+    axes = study_drawings["thresholds"].figure.axes[0]
     drawn = [
         (float(segment[0, 1]), float(segment[1, 1]))
         for container in axes.containers
         for bars in container.lines[2]
         for segment in bars.get_segments()
     ]
-    intervals = analyse_study(ten, protocol).comparisons.intervals
+    intervals = analyse_study(study_trials, protocol).comparisons.intervals
     assert drawn == [pytest.approx((interval.lower, interval.upper)) for interval in intervals]
 
 
-def test_one_participant_has_means_without_an_interval(one_drawn):
-    figure = one_drawn["thresholds"].figure
-    assert "comparison interval" not in texts(figure)
+def test_one_participant_has_means_without_an_interval(one_person_drawings):
+    figure = one_person_drawings["thresholds"].figure
+    assert "comparison interval" not in figure_text(figure)
 
 
-def test_a_panel_per_frequency_marks_every_reversal_and_the_threshold(one_drawn):
-    figure = one_drawn["staircases-1-s01"].figure
+def test_a_panel_per_frequency_marks_every_reversal_and_the_threshold(one_person_drawings):
+    figure = one_person_drawings["staircases-1-s01"].figure
     titles = [axes.get_title(loc="left").split(":")[0] for axes in figure.axes]
     assert {*titles} >= {"5 Hz", "15 Hz", "25 Hz", "35 Hz", "45 Hz"}
     *_, all_reversals, averaged, threshold = figure.axes[0].lines
     assert (len(all_reversals.get_xdata()), len(averaged.get_xdata())) == (13, 10)
     assert threshold.get_ydata()[0] == pytest.approx(sum(averaged.get_ydata()) / 10)
     assert f": {threshold.get_ydata()[0]:.2f} N" in figure.axes[0].get_title(loc="left")
-    assert "Level (N)" in texts(figure)
+    assert "Level (N)" in figure_text(figure)
 
 
-def test_a_run_that_was_broken_off_is_drawn_and_said(draw, simulate_study):
+def test_a_run_that_was_broken_off_is_drawn_and_said(draw_pictures, simulate_study):
     trials = [trial for trial in simulate_study(subjects=1) if trial.run == 1 and trial.trial <= 9]
-    pictures = draw(trials)
+    pictures = draw_pictures(trials)
     assert "thresholds" not in pictures
     assert "(not complete)" in pictures["staircases-1-s01"].figure.axes[0].get_title(loc="left")
 
 
-def test_delivered_acceleration_has_its_units_and_both_parts(one_drawn):
-    said = texts(one_drawn["delivered"].figure)
+def test_delivered_acceleration_has_its_units_and_both_parts(one_person_drawings):
+    said = figure_text(one_person_drawings["delivered"].figure)
     for words in ("Measured (m/s²)", "Level (N)", "along the direction", "off the direction"):
         assert words in said
 
 
-def test_nothing_to_show_draws_nothing(draw):
-    assert draw([]) == {}
+def test_nothing_to_show_draws_nothing(draw_pictures):
+    assert draw_pictures([]) == {}

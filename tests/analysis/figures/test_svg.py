@@ -1,10 +1,10 @@
 from xml.etree import ElementTree
 
-from analysis.figures.picture import inline_svg
+from analysis.figures.picture import render_inline_svg
 from analysis.figures.style import new_figure
 
 
-def drawn():
+def make_figure():
     figure = new_figure(3, 2)
     axes = figure.add_subplot()
     axes.plot([1, 2], [1, 2], "o-")
@@ -13,7 +13,7 @@ def drawn():
 
 
 def test_the_element_stands_alone_and_has_a_title():
-    svg = inline_svg(drawn(), "one", "A < B & C")
+    svg = render_inline_svg(make_figure(), "one", "A < B & C")
     root = ElementTree.fromstring(svg)
     assert root.tag.endswith("svg")
     assert root.attrib["role"] == "img"
@@ -22,17 +22,17 @@ def test_the_element_stands_alone_and_has_a_title():
 
 
 def test_text_stays_text():
-    assert "Frequency (Hz)</text>" in inline_svg(drawn(), "one", "x")
+    assert "Frequency (Hz)</text>" in render_inline_svg(make_figure(), "one", "x")
 
 
 def test_the_same_figure_gives_the_same_text():
-    assert inline_svg(drawn(), "one", "x") == inline_svg(drawn(), "one", "x")
+    assert render_inline_svg(make_figure(), "one", "x") == render_inline_svg(make_figure(), "one", "x")
 
 
 def test_two_figures_of_a_page_share_no_id_and_every_reference_is_met():
     ids = []
     for name in ("one", "two"):
-        root = ElementTree.fromstring(inline_svg(drawn(), name, "x"))
+        root = ElementTree.fromstring(render_inline_svg(make_figure(), name, "x"))
         own = {element.attrib["id"] for element in root.iter() if "id" in element.attrib}
         used = {
             value.removeprefix("url(").rstrip(")").removeprefix("#")

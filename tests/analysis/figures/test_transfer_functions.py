@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from analysis.figures.picture import picture_svg
+from analysis.figures.picture import render_picture_svg
 from analysis.figures.style import BLUE, ORANGE, VERMILLION
 from analysis.figures.transfer_functions import ResponseCurve, draw_transfer_functions, transfer_functions_picture
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
@@ -75,7 +75,7 @@ def test_the_caption_says_what_the_estimate_says_of_itself(response):
 
 
 def test_fifteen_thousand_lines_are_no_burden_for_a_page(response):
-    assert len(picture_svg(transfer_functions_picture(response))) < 1_000_000
+    assert len(render_picture_svg(transfer_functions_picture(response))) < 1_000_000
 
 
 def test_no_line_draws_a_sentence(response):

@@ -11,7 +11,7 @@ RATE_HZ = 1000.0
 
 
 @pytest.fixture(scope="session")
-def noise():
+def make_noise():
     """Band-limited, rms 1."""
 
     def make(n=20_000, seed=1, high_hz=80.0):
@@ -23,7 +23,7 @@ def noise():
 
 
 @pytest.fixture(scope="session")
-def moved():
+def simulate_motion():
     """Position, speed and acceleration under a force: 0.2 kg, 2 N s/m, 800 N/m, simulated ten times as fine."""
 
     def make(force):
@@ -37,7 +37,7 @@ def moved():
 
 
 @pytest.fixture(scope="session")
-def recording():
+def make_recording():
     def make(command, response, **others):
         """response: samples, or (samples, quantity, unit)."""
 
@@ -64,12 +64,12 @@ def recording():
 
 
 @pytest.fixture(scope="session")
-def sound(noise, moved, recording):
+def clean_recording(make_noise, simulate_motion, make_recording):
     """A recording with nothing to complain of."""
-    force = noise()
-    place, _, acceleration = moved(force)
+    force = make_noise()
+    place, _, acceleration = simulate_motion(force)
     rng = np.random.default_rng(9)
-    return recording(
+    return make_recording(
         force,
         acceleration + 0.01 * acceleration.std() * rng.standard_normal(len(force)),
         position=place + 1e-4 * place.std() * rng.standard_normal(len(force)),

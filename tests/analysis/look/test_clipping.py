@@ -7,7 +7,7 @@ from analysis.look.clipping import check_clipping, count_clipped_samples
 T = np.arange(20_000) / 1000
 
 
-def signals():
+def make_signals():
     rng = np.random.default_rng(3)
     return {
         "sine": np.sin(2 * np.pi * 7.3 * T),
@@ -19,7 +19,7 @@ def signals():
 @pytest.mark.parametrize("name", ["sine", "multisine", "noise"])
 @pytest.mark.parametrize("step", [0.0, 0.01, 0.05])
 def test_what_was_cut_off_is_found_and_counted(name, step):
-    samples = signals()[name]
+    samples = make_signals()[name]
     limit = 0.7 * samples.max()
     cut = np.minimum(samples, limit)
     cut = np.round(cut / step) * step if step else cut
@@ -30,7 +30,7 @@ def test_what_was_cut_off_is_found_and_counted(name, step):
 @pytest.mark.parametrize("name", ["sine", "multisine", "noise"])
 @pytest.mark.parametrize("step", [0.0, 0.01, 0.05, 0.2])
 def test_a_signal_that_turns_by_itself_is_not_cut_off(name, step):
-    samples = signals()[name]
+    samples = make_signals()[name]
     rounded = np.round(samples / step) * step if step else samples
     assert count_clipped_samples(rounded) == 0
     assert count_clipped_samples(-rounded) == 0
@@ -56,15 +56,15 @@ def test_a_place_where_it_comes_to_rest_is_not_cut_off():
     assert count_clipped_samples(rounded) == count_clipped_samples(-rounded) == 0
 
 
-def test_a_clipped_sensor_is_wrong_and_a_limited_command_is_reported(recording):
-    samples = signals()["noise"]
-    found = check_clipping(channels_of(recording(np.clip(samples, -1, 1), np.clip(samples, -2, 9))))
+def test_a_clipped_sensor_is_wrong_and_a_limited_command_is_reported(make_recording):
+    samples = make_signals()["noise"]
+    found = check_clipping(channels_of(make_recording(np.clip(samples, -1, 1), np.clip(samples, -2, 9))))
     assert [(check.level, check.name) for check in found] == [("notice", "clipping"), ("wrong", "clipping")]
     assert found[0].seen.startswith("command 'f1' is cut off at 1 N and −1 N: ")
     assert found[1].seen.startswith("response 'a1' is cut off at −2 m/s^2: ")
 
 
-def test_a_binary_command_is_meant_so(recording):
-    binary = np.sign(signals()["noise"])
-    found = check_clipping(channels_of(recording(binary, signals()["sine"])))
+def test_a_binary_command_is_meant_so(make_recording):
+    binary = np.sign(make_signals()["noise"])
+    found = check_clipping(channels_of(make_recording(binary, make_signals()["sine"])))
     assert [check.level for check in found] == ["fine"]

@@ -10,16 +10,16 @@ from analysis.look.gain_and_lag import estimate_gain_and_lag
 RATE_HZ = 1000.0
 
 
-def test_the_nyquist_line_counts_once(recording):
+def test_the_nyquist_line_counts_once(make_recording):
     alternating = (-1.0) ** np.arange(4000)
-    spectra = cross_spectra(channels_of(recording(alternating, alternating)), [(0, 4000)], RATE_HZ)
+    spectra = cross_spectra(channels_of(make_recording(alternating, alternating)), [(0, 4000)], RATE_HZ)
     step_hz = spectra.frequency_hz[1] - spectra.frequency_hz[0]
     assert spectra.power(0).sum() * step_hz == pytest.approx(1.0, rel=1e-3)
 
 
-def test_a_lag_in_stretches_of_odd_length_is_that_in_even_ones(recording, noise):
-    first = noise(high_hz=200.0)
-    channels = channels_of(recording(first, np.roll(first, 5)))
+def test_a_lag_in_stretches_of_odd_length_is_that_in_even_ones(make_recording, make_noise):
+    first = make_noise(high_hz=200.0)
+    channels = channels_of(make_recording(first, np.roll(first, 5)))
     lags = {}
     for length in (64, 65):
         stretches = [(start, start + length) for start in range(100, 19_000, 65)]

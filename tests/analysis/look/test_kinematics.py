@@ -11,35 +11,35 @@ RATE_HZ = 1000.0
 
 
 @pytest.fixture(scope="module")
-def motion(noise, moved):
-    force = noise()
-    return (force, *moved(force))
+def motion(make_noise, simulate_motion):
+    force = make_noise()
+    return (force, *simulate_motion(force))
 
 
-def pairs_of(found: Recording):
+def find_pairs(found: Recording):
     return find_kinematic_pairs(channels_of(found), [(0, len(found))], RATE_HZ)
 
 
-def delayed(samples, lag):
+def delay(samples, lag):
     spectrum = np.fft.rfft(samples)
     return np.fft.irfft(spectrum * np.exp(-2j * np.pi * np.fft.rfftfreq(len(samples)) * lag), len(samples))
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.001, -1.0, 57.29578, 1.1, -9.80665])
 @pytest.mark.parametrize("lag", [0.0, 3.4, -1.5])
-def test_factor_sign_and_lag_of_an_acceleration_are_found(recording, motion, factor, lag):
+def test_factor_sign_and_lag_of_an_acceleration_are_found(make_recording, motion, factor, lag):
     force, place, _, acceleration = motion
     noise = 0.02 * acceleration.std() * np.random.default_rng(2).standard_normal(len(force))
-    (pair,) = pairs_of(recording(force, factor * (delayed(acceleration, lag) + noise), position=place))
+    (pair,) = find_pairs(make_recording(force, factor * (delay(acceleration, lag) + noise), position=place))
     assert (pair.place, pair.derivative, pair.order) == ("position 'x1'", "response 'a1'", 2)
     assert pair.agreement.gain == pytest.approx(factor, rel=0.03)
     assert pair.agreement.lag_samples == pytest.approx(lag, abs=0.1)
 
 
 @pytest.mark.parametrize(("factor", "level"), [(1.0, "fine"), (1.1, "notice"), (1000.0, "wrong"), (-1.0, "wrong")])
-def test_a_speed_is_compared_with_the_derivative_of_its_position(recording, motion, factor, level):
+def test_a_speed_is_compared_with_the_derivative_of_its_position(make_recording, motion, factor, level):
     force, place, speed, _ = motion
-    (pair,) = pairs_of(recording(force, (factor * speed, "velocity", "m/s"), position=place))
+    (pair,) = find_pairs(make_recording(force, (factor * speed, "velocity", "m/s"), position=place))
     (check,) = kinematic_checks([pair], RATE_HZ)
     assert (pair.order, check.level) == (1, level)
     assert pair.agreement.gain == pytest.approx(factor, rel=0.01)
@@ -48,59 +48,59 @@ def test_a_speed_is_compared_with_the_derivative_of_its_position(recording, moti
 @pytest.mark.parametrize(
     ("factor", "words"), [(1000.0, "mm taken for m"), (1 / 9.80665, "g for m/s^2"), (1.3, "both.")]
 )
-def test_a_factor_of_two_units_is_named(recording, motion, factor, words):
+def test_a_factor_of_two_units_is_named(make_recording, motion, factor, words):
     force, place, _, acceleration = motion
-    (check,) = kinematic_checks(pairs_of(recording(force, factor * acceleration, position=place)), RATE_HZ)
+    (check,) = kinematic_checks(find_pairs(make_recording(force, factor * acceleration, position=place)), RATE_HZ)
     assert words in check.do
 
 
-def test_a_late_speed_is_reported_in_milliseconds(recording, motion):
+def test_a_late_speed_is_reported_in_milliseconds(make_recording, motion):
     force, place, speed, _ = motion
-    late = (delayed(speed, 2.0), "velocity", "m/s")
-    (check,) = kinematic_checks(pairs_of(recording(force, late, position=place)), RATE_HZ)
+    late = (delay(speed, 2.0), "velocity", "m/s")
+    (check,) = kinematic_checks(find_pairs(make_recording(force, late, position=place)), RATE_HZ)
     assert check.level == "notice"
     assert "2 ms (2 samples) later" in check.seen
 
 
 @pytest.mark.slow
-def test_each_of_three_axes_finds_its_own_position(recording, moved, noise):
-    forces = np.column_stack([noise(seed=k) for k in (1, 2, 3)])
-    motions = [moved(forces[:, k]) for k in range(3)]
+def test_each_of_three_axes_finds_its_own_position(make_recording, simulate_motion, make_noise):
+    forces = np.column_stack([make_noise(seed=k) for k in (1, 2, 3)])
+    motions = [simulate_motion(forces[:, k]) for k in range(3)]
     places = np.column_stack([motions[k][0] for k in (2, 0, 1)])
-    found = pairs_of(recording(forces, np.column_stack([m[2] for m in motions]), position=places))
+    found = find_pairs(make_recording(forces, np.column_stack([m[2] for m in motions]), position=places))
     assert [(pair.derivative, pair.place) for pair in found] == [
         ("response 'a1'", "position 'x2'"), ("response 'a2'", "position 'x3'"), ("response 'a3'", "position 'x1'"),
     ]  # fmt: skip
 
 
-def test_an_acceleration_of_another_motion_is_compared_with_nothing(recording, motion, noise):
-    assert pairs_of(recording(motion[0], noise(seed=8), position=motion[1])) == ()
+def test_an_acceleration_of_another_motion_is_compared_with_nothing(make_recording, motion, make_noise):
+    assert find_pairs(make_recording(motion[0], make_noise(seed=8), position=motion[1])) == ()
 
 
-def test_of_a_rounded_position_the_factor_is_still_found(recording, motion):
+def test_of_a_rounded_position_the_factor_is_still_found(make_recording, motion):
     force, place, speed, _ = motion
     step = place.std() / 50
-    (pair,) = pairs_of(recording(force, (speed, "velocity", "m/s"), position=np.round(place / step) * step))
+    (pair,) = find_pairs(make_recording(force, (speed, "velocity", "m/s"), position=np.round(place / step) * step))
     assert pair.agreement.gain == pytest.approx(1.0, rel=0.05)
 
 
-def lags_of(found: Recording):
+def find_lags(found: Recording):
     channels = channels_of(found)
     spectra = cross_spectra(channels, [(0, len(found))], RATE_HZ)
     assert spectra is not None
     return lag_checks(channels, spectra, RATE_HZ)
 
 
-def test_a_measured_force_that_is_late_is_found(recording, motion):
+def test_a_measured_force_that_is_late_is_found(make_recording, motion):
     force, *_ = motion
-    (check,) = lags_of(recording(force, (0.8 * delayed(force, 4.0), "force", "N")))
+    (check,) = find_lags(make_recording(force, (0.8 * delay(force, 4.0), "force", "N")))
     assert check.level == "notice"
     assert check.seen == "response 'a1' is 0.8 times command 'f1', 4 ms (4 samples) later."
 
 
-def test_a_force_behind_a_resonance_is_no_second_view_of_the_command(recording, motion):
+def test_a_force_behind_a_resonance_is_no_second_view_of_the_command(make_recording, motion):
     force, place, *_ = motion
-    (check,) = lags_of(recording(force, (800 * place, "force", "N")))
+    (check,) = find_lags(make_recording(force, (800 * place, "force", "N")))
     assert (check.level, "No two channels measure the same quantity" in check.seen) == ("fine", True)
 
 

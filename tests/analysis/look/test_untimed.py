@@ -9,15 +9,15 @@ from matplotlib.text import Text
 from analysis.figures.look_pictures import look_pictures
 from analysis.look.clock import CLOCK
 from analysis.look.overview import overview
-from analysis.reports.look_report import brief, render_look_report
-from analysis.wording import write_without_time
+from analysis.reports.look_report import render_look_report, summarise_overview
+from analysis.wording import replace_time_units
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
 TIMED = re.compile(r"\bHz\b|\(s\)|\d s\b")
 
 
-def recording(meta) -> Recording:
+def make_untimed_recording(meta) -> Recording:
     random = np.random.default_rng(1)
     command = np.tile(random.standard_normal(200), 10)[:, None]
     response = np.cumsum(command, axis=0) + 0.01 * random.standard_normal((2000, 1))
@@ -25,24 +25,24 @@ def recording(meta) -> Recording:
     return Recording("rig", force, position, meta=meta)
 
 
-def said(meta) -> list[str]:
-    found = overview("rig", recording(meta))
+def report_texts(meta) -> list[str]:
+    found = overview("rig", make_untimed_recording(meta))
     pictures = look_pictures(found, 1)
     texts = [text.get_text() for each in pictures for text in each.figure.findobj(Text)]
     checks = [f"{check.seen} {check.do}" for check in found.checks if check.name != CLOCK]
-    return [brief(found), *checks, *texts, *(f"{each.caption} {each.alternative}" for each in pictures)]
+    return [summarise_overview(found), *checks, *texts, *(f"{each.caption} {each.alternative}" for each in pictures)]
 
 
 def test_an_untimed_recording_is_described_in_samples():
-    assert [text for text in said({"time": "unknown"}) if TIMED.search(text)] == []
+    assert [text for text in report_texts({"time": "unknown"}) if TIMED.search(text)] == []
 
 
 def test_a_recording_with_known_time_keeps_its_seconds():
-    assert any(TIMED.search(text) for text in said({}))
+    assert any(TIMED.search(text) for text in report_texts({}))
 
 
 def test_its_page_counts_samples():
-    found = overview("rig", recording({"time": "unknown"}))
+    found = overview("rig", make_untimed_recording({"time": "unknown"}))
     page = render_look_report([found], [look_pictures(found, 1)], {}, "now")
     assert "Start (samples)" in page and "Start (s)" not in page
 
@@ -54,4 +54,4 @@ def test_its_page_counts_samples():
      ("unit per √Hz", "unit per √(cycle per sample)"), ("3 steps", "3 steps")],
 )  # fmt: skip
 def test_units_of_time_are_replaced_alone(text, wanted):
-    assert write_without_time(text) == wanted
+    assert replace_time_units(text) == wanted

@@ -6,7 +6,7 @@ import pytest
 from analysis.psychophysics.bias import response_bias
 
 
-def answers(d_prime: float, criterion: float, n: int, seed: int) -> tuple[list[int], list[bool]]:
+def simulate_answers(d_prime: float, criterion: float, n: int, seed: int) -> tuple[list[int], list[bool]]:
     """Equal-variance observer: direction 1 gives evidence around +d'/2, direction 2 around -d'/2."""
     generator = np.random.default_rng(seed)
     shown = generator.integers(1, 3, n)
@@ -17,7 +17,7 @@ def answers(d_prime: float, criterion: float, n: int, seed: int) -> tuple[list[i
 
 @pytest.mark.parametrize(("d_prime", "criterion"), [(0.0, 0.0), (1.64, 0.0), (1.64, 0.5), (2.5, -1.0)])
 def test_sensitivity_and_criterion_are_recovered(d_prime, criterion):
-    bias = response_bias(*answers(d_prime, criterion, 20_000, seed=5))
+    bias = response_bias(*simulate_answers(d_prime, criterion, 20_000, seed=5))
     assert bias.d_prime == pytest.approx(d_prime, abs=0.06)
     assert bias.criterion == pytest.approx(criterion, abs=0.04)
 

@@ -8,24 +8,24 @@ from protocols.trial import TrialStatus
 
 
 @pytest.fixture
-def catch(caught):
+def run_with_catches(simulate_with_catches):
     """One run with one catch trial in four; lapse: how often those are wrong."""
 
     def run(lapse, **columns):
-        return caught(np.random.default_rng(4), lapse=lapse, one_in=4, **columns)
+        return simulate_with_catches(np.random.default_rng(4), lapse=lapse, one_in=4, **columns)
 
     return run
 
 
-def test_an_attentive_participant_has_no_lapse(catch):
-    (tally,) = catch_tallies(catch(0.0, subject="a", frequency_hz=5.0))
+def test_an_attentive_participant_has_no_lapse(run_with_catches):
+    (tally,) = catch_tallies(run_with_catches(0.0, subject="a", frequency_hz=5.0))
     assert (tally.subject, tally.frequency_hz, tally.wrong, tally.lapse_rate, tally.lower) == ("a", 5.0, 0, 0.0, 0.0)
     assert tally.given > 5
 
 
-def test_the_lapse_rate_is_recovered(caught):
+def test_the_lapse_rate_is_recovered(simulate_with_catches):
     generator = np.random.default_rng(8)
-    trials = [trial for run in range(40) for trial in caught(generator, lapse=0.15, one_in=4, run=run)]
+    trials = [trial for run in range(40) for trial in simulate_with_catches(generator, lapse=0.15, one_in=4, run=run)]
     (tally,) = catch_tallies(trials)
     assert tally.given > 400
     assert tally.lower < 0.15 < tally.upper
@@ -48,19 +48,19 @@ def test_the_interval_is_wilsons():
     assert wilson_interval(3, 20) == pytest.approx((centre - half, centre + half), rel=1e-6)
 
 
-def test_void_and_open_presentations_count_for_nothing(catch):
-    trials = catch(0.0)
+def test_void_and_open_presentations_count_for_nothing(run_with_catches):
+    trials = run_with_catches(0.0)
     shown = next(trial for trial in trials if trial.phase.value == "catch")
     void = replace(shown, attempt=0, answer=None, correct=None, status=TrialStatus.SPOILED)
     assert catch_tallies([*trials, void]) == catch_tallies(trials)
 
 
-def test_participants_and_frequencies_are_distinguished(catch):
+def test_participants_and_frequencies_are_distinguished(run_with_catches):
     rows = catch_tallies(
         [
-            *catch(0.0, subject="b", frequency_hz=45.0),
-            *catch(0.0, subject="b", frequency_hz=5.0),
-            *catch(1.0, subject="a"),
+            *run_with_catches(0.0, subject="b", frequency_hz=45.0),
+            *run_with_catches(0.0, subject="b", frequency_hz=5.0),
+            *run_with_catches(1.0, subject="a"),
         ]
     )
     assert [(row.subject, row.frequency_hz) for row in rows] == [("b", 5.0), ("b", 45.0), ("a", 15.0)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.psychophysics.group_contrasts import contrasts, pair_contrast
-from analysis.psychophysics.study_analysis import analyse_study, anova_document
+from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
 from analysis.reports.study_report import render_study_report
 from protocols.definition.declared_analysis import AnalysisSettings
 from study.workflows.results.analyze_data import text_table
@@ -23,7 +23,7 @@ def trials(simulate_study):
 
 
 @pytest.fixture(scope="module")
-def analysed(trials, protocol):
+def analyse_declared(trials, protocol):
     def analyse(*declared, left_out=()):
         return analyse_study(trials, replace(protocol, analysis=AnalysisSettings(*declared)), left_out)
 
@@ -31,12 +31,12 @@ def analysed(trials, protocol):
 
 
 @pytest.fixture(scope="module")
-def model_first(analysed):
+def hierarchical_declared(analyse_declared):
     settings = "hierarchical", (45.0, 35.0), 10, ("Who stops early is left out.",)
-    return analysed(*settings, left_out=("S07 was withdrawn by the participant.",))
+    return analyse_declared(*settings, left_out=("S07 was withdrawn by the participant.",))
 
 
-def page(analysis):
+def page_text(analysis):
     html = render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z")
     return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", html))
 
@@ -60,24 +60,24 @@ def test_equivalence_is_asked_where_both_frequencies_are_low():
     assert pair_contrast((5.0, 25.0), values, (5.0, 25.0), 0.95).p_equivalence is not None
 
 
-def test_the_declared_contrast_is_computed_by_both_analyses_the_declared_first(model_first, analysed):
-    by_model, published = model_first.declared_result.results
+def test_the_declared_contrast_is_computed_by_both_analyses_the_declared_first(hierarchical_declared, analyse_declared):
+    by_model, published = hierarchical_declared.declared_result.results
     assert (by_model.analysis, by_model.declared, by_model.unit) == ("hierarchical", True, "dB")
-    medians = {median.frequency_hz: median.db for median in model_first.primary.medians}
+    medians = {median.frequency_hz: median.db for median in hierarchical_declared.primary.medians}
     assert by_model.difference == pytest.approx(medians[45.0] - medians[35.0])
     assert by_model.lower < by_model.difference < by_model.upper and 0.0 < by_model.p < 1.0
-    (pair,) = [p for p in model_first.comparisons.pairs if (p.first, p.second) == ("35 Hz", "45 Hz")]
+    (pair,) = [p for p in hierarchical_declared.comparisons.pairs if (p.first, p.second) == ("35 Hz", "45 Hz")]
     assert (published.difference, published.lower, published.upper, published.p, published.unit) == (
         pair.difference, pair.lower, pair.upper, pair.p, "N",
     )  # fmt: skip
-    first, _ = analysed("published", (35.0, 45.0)).declared_result.results
+    first, _ = analyse_declared("published", (35.0, 45.0)).declared_result.results
     assert (first.analysis, first.declared) == ("published", True)
     assert (first.difference, first.lower, first.upper) == (-pair.difference, -pair.upper, -pair.lower)
-    assert not any(row.declared for row in analysed("undeclared", (35.0, 45.0)).declared_result.results)
+    assert not any(row.declared for row in analyse_declared("undeclared", (35.0, 45.0)).declared_result.results)
 
 
-def test_the_report_begins_with_it(model_first):
-    words = page(model_first)
+def test_the_report_begins_with_it(hierarchical_declared):
+    words = page_text(hierarchical_declared)
     assert words.index("The declared result") < words.index("Before you read the numbers")
     for said in ("45 Hz minus 35 Hz, by the hierarchical model of all answers, the declared analysis: +",
                  "published one-way analysis", "Participants 10 6", "Who stops early is left out.",
@@ -85,22 +85,24 @@ def test_the_report_begins_with_it(model_first):
         assert said in words
 
 
-def test_the_terminal_and_the_document_have_it(model_first):
-    printed = [line for line in text_table(model_first) if line.startswith("Declared contrast, 45 Hz minus 35 Hz")]
+def test_the_terminal_and_the_document_have_it(hierarchical_declared):
+    printed = [
+        line for line in text_table(hierarchical_declared) if line.startswith("Declared contrast, 45 Hz minus 35 Hz")
+    ]
     assert len(printed) == 2 and "declared analysis" in printed[0] and "declared analysis" not in printed[1]
-    written = json.loads(json.dumps(anova_document(model_first), allow_nan=False))["declared_result"]
-    assert written["results"][0]["difference"] == model_first.declared_result.results[0].difference
+    written = json.loads(json.dumps(make_anova_document(hierarchical_declared), allow_nan=False))["declared_result"]
+    assert written["results"][0]["difference"] == hierarchical_declared.declared_result.results[0].difference
     assert (written["participants_declared"], written["participants_analysed"]) == (10, 6)
     assert written["left_out_count"] == 1
     assert "S07" not in json.dumps(written)  # who withdrew is named in the report alone
 
 
-def test_nothing_declared_takes_a_sentence(analysed):
-    undeclared = analysed()
+def test_nothing_declared_takes_a_sentence(analyse_declared):
+    undeclared = analyse_declared()
     assert undeclared.declared_result.results == ()
     assert undeclared.declared.count(". ") == 0
-    assert undeclared.declared in page(undeclared)
-    assert "Participants and exclusions" not in page(undeclared)
+    assert undeclared.declared in page_text(undeclared)
+    assert "Participants and exclusions" not in page_text(undeclared)
     assert not any("Declared" in line for line in text_table(undeclared))
 
 
@@ -109,7 +111,7 @@ def test_what_the_data_do_not_tell_is_not_known(trials, protocol):
     analysis = analyse_study(alone, replace(protocol, analysis=AnalysisSettings("hierarchical", (45.0, 35.0))))
     by_model, published = analysis.declared_result.results
     assert by_model.difference is None and published.p is None
-    assert "not known. The model needs answers of two participants" in page(analysis)
+    assert "not known. The model needs answers of two participants" in page_text(analysis)
 
 
 @pytest.mark.slow

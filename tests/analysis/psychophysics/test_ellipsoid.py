@@ -19,7 +19,7 @@ def tone(phasor, frequency_hz, n=2000):
     return np.real(np.asarray(phasor)[None, :] * np.exp(2j * np.pi * frequency_hz * t)[:, None])
 
 
-def recorded(parts, frequencies, unit_vector=UP_LEFT):
+def record_sinusoids(parts, frequencies, unit_vector=UP_LEFT):
     """Segments of sinusoids one after another with rest between, in the device frame."""
     frame = direction_frame(unit_vector)
     pieces, segments, described, at = [], [], [], 0
@@ -53,7 +53,7 @@ def test_a_direction_that_is_no_unit_vector_is_refused(vector):
 
 
 def test_motion_along_the_direction_alone_is_a_line_without_tilt():
-    (result,) = ellipsoids(recorded([tone([2.0, 0.0, 0.0], 15.0)], [15.0]))
+    (result,) = ellipsoids(record_sinusoids([tone([2.0, 0.0, 0.0], 15.0)], [15.0]))
     assert result.moments.semi_axes_mps2 == pytest.approx((math.sqrt(2.0), 0.0, 0.0), abs=1e-7)
     assert result.moments.normalised_axes == pytest.approx((1.0, 0.0), abs=1e-7)
     assert result.phasor.semi_axes_mps2 == pytest.approx((2.0, 0.0), abs=1e-9)
@@ -61,7 +61,7 @@ def test_motion_along_the_direction_alone_is_a_line_without_tilt():
 
 
 def test_coupling_in_phase_tilts_the_line():
-    (result,) = ellipsoids(recorded([tone([1.0, math.tan(math.radians(20.0)), 0.0], 25.0)], [25.0]))
+    (result,) = ellipsoids(record_sinusoids([tone([1.0, math.tan(math.radians(20.0)), 0.0], 25.0)], [25.0]))
     assert result.phasor.tilt_deg == pytest.approx(20.0)
     assert result.phasor.turn_deg == pytest.approx(20.0)
     assert result.moments.turn_deg == pytest.approx(20.0)
@@ -69,12 +69,12 @@ def test_coupling_in_phase_tilts_the_line():
 
 
 def test_a_negative_coupling_turns_the_other_way():
-    (result,) = ellipsoids(recorded([tone([-1.0, 0.5, 0.0], 25.0)], [25.0]))
+    (result,) = ellipsoids(record_sinusoids([tone([-1.0, 0.5, 0.0], 25.0)], [25.0]))
     assert result.phasor.turn_deg == pytest.approx(-math.degrees(math.atan(0.5)))
 
 
 def test_coupling_a_quarter_period_late_widens_the_ellipse_without_tilt():
-    (result,) = ellipsoids(recorded([tone([1.0, 0.4j, 0.0], 35.0)], [35.0]))
+    (result,) = ellipsoids(record_sinusoids([tone([1.0, 0.4j, 0.0], 35.0)], [35.0]))
     assert result.phasor.ellipticity == pytest.approx(0.4)
     assert result.phasor.tilt_deg == pytest.approx(0.0, abs=1e-6)
     assert result.moments.normalised_axes[1] == pytest.approx(0.4)
@@ -117,7 +117,7 @@ def test_gravity_and_offset_are_no_motion():
 
 
 def test_a_turned_sensor_is_turned_back():
-    recording = recorded([tone([1.0, 0.3, 0.1j], 25.0)], [25.0])
+    recording = record_sinusoids([tone([1.0, 0.3, 0.1j], 25.0)], [25.0])
     sensor_to_device = direction_frame(np.array([0.36, 0.48, 0.8]))
     felt = recording.response
     turned = replace(recording, response=replace(felt, samples=felt.samples @ sensor_to_device))
@@ -127,7 +127,7 @@ def test_a_turned_sensor_is_turned_back():
 
 
 def test_one_result_per_sinusoid_in_the_order_played():
-    recording = recorded([tone([1.0, 0, 0], f) for f in (25.0, 5.0, 25.0)], (25.0, 5.0, 25.0))
+    recording = record_sinusoids([tone([1.0, 0, 0], f) for f in (25.0, 5.0, 25.0)], (25.0, 5.0, 25.0))
     assert [result.frequency_hz for result in ellipsoids(recording)] == [25.0, 5.0, 25.0]
 
 
@@ -136,13 +136,13 @@ def test_a_harmonic_above_half_the_rate_is_not_asked_for():
 
 
 def test_a_result_is_json():
-    results = ellipsoids(recorded([tone([1.0, 0.1, 0], 5.0)], [5.0]))
+    results = ellipsoids(record_sinusoids([tone([1.0, 0.1, 0], 5.0)], [5.0]))
     assert json.loads(json.dumps([asdict(result) for result in results], allow_nan=False))[0]["along"] == "direction_1"
 
 
 @pytest.fixture
 def recording():
-    return recorded([tone([1.0, 0.1, 0.0], 15.0)], [15.0])
+    return record_sinusoids([tone([1.0, 0.1, 0.0], 15.0)], [15.0])
 
 
 def test_a_response_that_is_no_acceleration_is_refused(recording):
@@ -167,7 +167,7 @@ def test_segments_without_a_description_are_refused(recording):
 
 def test_a_sensor_that_is_turned_is_turned_back():
     quarter = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-    played = recorded([tone([2.0, 0.0, 0.0], 15.0)], [15.0])
+    played = record_sinusoids([tone([2.0, 0.0, 0.0], 15.0)], [15.0])
     read = replace(played.response, samples=played.response.samples @ np.array(quarter))
     turned = replace(played, response=read, meta={**played.meta, "sensor": {"frame_to_device": quarter}})
     assert ellipsoids(turned, sensor_frame(turned))[0].phasor.tilt_deg == pytest.approx(0.0, abs=1e-6)

@@ -9,11 +9,11 @@ from scipy.stats import sem
 
 from analysis.psychophysics.group_contrasts import mean_errors
 from analysis.psychophysics.hierarchy import primary
-from analysis.psychophysics.hierarchy.answers import count_answers, tally
-from analysis.psychophysics.hierarchy.primary import answers_of, primary_analysis
+from analysis.psychophysics.hierarchy.answers import count_answers, count_cells
+from analysis.psychophysics.hierarchy.primary import primary_analysis, select_persons
 from analysis.psychophysics.power.simulated_study import Crowd
 from analysis.psychophysics.power.simulated_study import simulate_study as simulate_crowd
-from analysis.psychophysics.study_analysis import analyse_study, anova_document
+from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
 from analysis.reports.study_report import render_study_report
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.trial import TrialStatus
@@ -29,12 +29,12 @@ def trials(simulate_study):
     return simulate_study(subjects=4, true_n=LOW)
 
 
-def without(trials, *frequencies_hz):
+def drop_frequencies(trials, *frequencies_hz):
     return [trial for trial in trials if trial.frequency_hz not in frequencies_hz]
 
 
 def test_the_model_is_that_of_a_protocol_with_the_played_frequencies_alone(trials):
-    played = without(trials, 15.0, 35.0)
+    played = drop_frequencies(trials, 15.0, 35.0)
     found = primary_analysis(count_answers(played, (5.0, 15.0, 25.0, 35.0, 45.0)), 3.0)
     alone = primary_analysis(count_answers(played, PLAYED), 3.0)
     assert found.missing_hz == (15.0, 35.0) and alone.missing_hz == ()
@@ -46,13 +46,13 @@ def test_the_model_is_that_of_a_protocol_with_the_played_frequencies_alone(trial
 
 
 def test_the_report_names_the_missing_and_both_analyses_compare_with_the_lowest_played(trials, protocol):
-    analysis = analyse_study(without(trials, 5.0), protocol)
+    analysis = analyse_study(drop_frequencies(trials, 5.0), protocol)
     assert analysis.compared.startswith("The model leaves 5 Hz out, where there is no answer yet.")
     assert {contrast.against_hz for contrast in (*analysis.primary.contrasts, *analysis.mean_contrasts)} == {15.0}
     assert [contrast.frequency_hz for contrast in analysis.mean_contrasts] == [25.0, 35.0, 45.0]
     assert "Differences to 15 Hz by the model and by reversal means" in analysis.compared
     assert "The model leaves 5 Hz out" in render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z")
-    assert json.loads(json.dumps(anova_document(analysis), allow_nan=False))["primary"]["missing_hz"] == [5.0]
+    assert json.loads(json.dumps(make_anova_document(analysis), allow_nan=False))["primary"]["missing_hz"] == [5.0]
 
 
 def test_a_frequency_with_broken_runs_alone_has_no_reversal_means_to_compare(trials, protocol):
@@ -70,7 +70,7 @@ def test_void_trials_are_no_answers(trials):
 
 def test_a_declared_contrast_with_a_missing_frequency_is_not_known(trials, protocol):
     declared = replace(protocol, analysis=AnalysisSettings("hierarchical", (45.0, 35.0)))
-    by_model, _ = analyse_study(without(trials, 35.0), declared).declared_result.results
+    by_model, _ = analyse_study(drop_frequencies(trials, 35.0), declared).declared_result.results
     assert by_model.difference is None
     assert by_model.notes == ("There is no answer at 35 Hz yet.",)
 
@@ -97,7 +97,7 @@ def test_few_people_at_a_frequency_count_as_few():
     assert widths[0] > 1.4 * widths[1]
     assert few.overall.participants == 3 and few.overall.left_out == STUDY.subjects[3:]
     assert few.overall == replace(
-        primary_analysis(answers_of(STUDY, np.arange(10) < 3), 3.0).overall,
+        primary_analysis(select_persons(STUDY, np.arange(10) < 3), 3.0).overall,
         left_out=few.overall.left_out,
         notes=few.overall.notes,
     )
@@ -106,19 +106,19 @@ def test_few_people_at_a_frequency_count_as_few():
 def test_short_runs_of_all_are_not_few():
     """A protocol of short runs: all have as many answers as anyone."""
     short = with_few(STUDY, 0, 12)
-    assert short.played.all()
+    assert short.has_enough_answers.all()
 
 
-def answers_with(counts):
+def make_answers(counts):
     """counts: (persons, frequencies), numbers of answers."""
     run = np.repeat(np.arange(np.size(counts)), np.ravel(counts))
     subjects = tuple(f"s{number}" for number in range(len(counts)))
     side, right = np.where(np.arange(len(run)) % 2, 1.0, -1.0), np.ones(len(run), dtype=bool)
-    return tally(subjects, PLAYED[: len(counts[0])], run, np.zeros(len(run)), side, right)
+    return count_cells(subjects, PLAYED[: len(counts[0])], run, np.zeros(len(run)), side, right)
 
 
 def test_whole_short_runs_are_not_few_beside_the_long_ones_of_others():
-    played = answers_with([[60, 60], [16, 14], [60, 8], [8, 0], [60, 25]]).played
+    played = make_answers([[60, 60], [16, 14], [60, 8], [8, 0], [60, 25]]).has_enough_answers
     assert played.tolist() == [[True, True], [True, True], [True, False], [False, False], [True, True]]
 
 

@@ -2,14 +2,14 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.psychophysics.study_analysis import practice_runs
+from analysis.psychophysics.study_analysis import evaluate_practice_runs
 from protocols.definition.preparation import PracticeSettings
 from protocols.definition.study_protocol import TrainingSettings
 from protocols.trial import Phase, TrialStatus
 
 
 @pytest.fixture
-def practising(protocol):
+def practice_protocol(protocol):
     """One training staircase (run 0), two practice runs (1 and 2)."""
     return replace(
         protocol,
@@ -19,9 +19,9 @@ def practising(protocol):
 
 
 @pytest.fixture
-def practice(answered):
+def make_practice_run(make_run_from_answers):
     """Rows of one practice run from answers written as 1 (right) and 0 (wrong)."""
-    (template,) = answered("1")
+    (template,) = make_run_from_answers("1")
 
     def run(answers, **columns):
         return [
@@ -41,36 +41,43 @@ def practice(answered):
         ("101", 2, 2, False, False),
     ],
 )
-def test_a_practice_run_is_reported_as_passed_or_not(practising, practice, answers, right, of_last, passed, over):
-    (row,) = practice_runs(practice(answers), practising)
+def test_a_practice_run_is_reported_as_passed_or_not(
+    practice_protocol, make_practice_run, answers, right, of_last, passed, over
+):
+    (row,) = evaluate_practice_runs(make_practice_run(answers), practice_protocol)
     assert (row.trials, row.right, row.right_of_last) == (len(answers), right, of_last)
     assert (row.passed, row.over) == (passed, over)
 
 
-def test_training_staircases_and_test_runs_are_no_practice(practising, practice):
-    others = [*practice("1111", run=0), *[replace(row, phase=Phase.TEST, run=3) for row in practice("1111")]]
-    assert practice_runs(others, practising) == ()
+def test_training_staircases_and_test_runs_are_no_practice(practice_protocol, make_practice_run):
+    others = [
+        *make_practice_run("1111", run=0),
+        *[replace(row, phase=Phase.TEST, run=3) for row in make_practice_run("1111")],
+    ]
+    assert evaluate_practice_runs(others, practice_protocol) == ()
 
 
-def test_void_presentations_count_for_nothing(practising, practice):
-    first, *rest = practice("1111")
+def test_void_presentations_count_for_nothing(practice_protocol, make_practice_run):
+    first, *rest = make_practice_run("1111")
     void = replace(first, answer=None, correct=None, status=TrialStatus.SPOILED)
-    (row,) = practice_runs([void, replace(first, attempt=2), *rest], practising)
+    (row,) = evaluate_practice_runs([void, replace(first, attempt=2), *rest], practice_protocol)
     assert (row.trials, row.passed) == (4, True)
 
 
-def test_each_run_of_each_participant_has_its_row(practising, practice):
+def test_each_run_of_each_participant_has_its_row(practice_protocol, make_practice_run):
     trials = [
-        *practice("1111", subject="a"),
-        *practice("0000000000", subject="a", run=2, frequency_hz=35.0),
-        *practice("1111", subject="b"),
+        *make_practice_run("1111", subject="a"),
+        *make_practice_run("0000000000", subject="a", run=2, frequency_hz=35.0),
+        *make_practice_run("1111", subject="b"),
     ]
-    assert [(row.subject, row.frequency_hz, row.passed) for row in practice_runs(trials, practising)] == [
+    assert [
+        (row.subject, row.frequency_hz, row.passed) for row in evaluate_practice_runs(trials, practice_protocol)
+    ] == [
         ("a", 15.0, True),
         ("a", 35.0, False),
         ("b", 15.0, True),
     ]
 
 
-def test_a_protocol_without_practice_has_none(protocol, practice):
-    assert practice_runs(practice("1111"), protocol) == ()
+def test_a_protocol_without_practice_has_none(protocol, make_practice_run):
+    assert evaluate_practice_runs(make_practice_run("1111"), protocol) == ()

@@ -12,12 +12,12 @@ DRUGS = ((30, 28, 16, 34), (14, 18, 10, 22), (24, 20, 18, 30), (38, 34, 20, 44),
 REACTIONS = ((1, 3, 4), (2, 2, 3), (2, 5, 6), (3, 4, 4), (3, 5, 6))
 
 
-def analysed(values):
+def analyse(values):
     return repeated_measures([f"s{i}" for i in range(len(values))], values)
 
 
 def test_four_drugs_give_the_published_table():
-    result = analysed(DRUGS)
+    result = analyse(DRUGS)
     assert (result.df_conditions, result.df_error) == (3, 12)
     assert (result.ss_conditions, result.ss_error, result.ss_participants) == pytest.approx((698.2, 112.8, 680.8))
     assert result.f == pytest.approx(24.7589, abs=5e-5)
@@ -28,7 +28,7 @@ def test_four_drugs_give_the_published_table():
 
 
 def test_three_conditions_give_the_published_table():
-    result = analysed(REACTIONS)
+    result = analyse(REACTIONS)
     assert result.f == pytest.approx(13.5758, abs=5e-5)
     assert result.p_uncorrected == pytest.approx(0.002683, abs=5e-7)
     assert result.epsilon == pytest.approx(0.575277, abs=5e-7)
@@ -36,7 +36,7 @@ def test_three_conditions_give_the_published_table():
 
 
 def test_effect_sizes_follow_from_the_sums_of_squares():
-    result = analysed(DRUGS)
+    result = analyse(DRUGS)
     assert result.partial_eta_squared == pytest.approx(698.2 / (698.2 + 112.8))
     assert result.generalized_eta_squared == pytest.approx(698.2 / (698.2 + 112.8 + 680.8))
 
@@ -45,20 +45,20 @@ def test_any_table_agrees_with_statsmodels_before_correction():
     values = np.random.default_rng(6).normal(size=(9, 5)) + np.arange(9)[:, None]
     long = pd.DataFrame({"y": values.ravel(), "who": np.repeat(np.arange(9), 5), "what": np.tile(np.arange(5), 9)})
     oracle = AnovaRM(long, "y", "who", within=["what"]).fit().anova_table
-    result = analysed(values.tolist())
+    result = analyse(values.tolist())
     assert result.f == pytest.approx(oracle["F Value"].iloc[0])
     assert result.p_uncorrected == pytest.approx(oracle["Pr > F"].iloc[0])
 
 
 def test_differences_between_people_change_nothing():
     shifted = [[value + 100.0 * i for value in row] for i, row in enumerate(DRUGS)]
-    assert analysed(shifted).p == pytest.approx(analysed(DRUGS).p)
+    assert analyse(shifted).p == pytest.approx(analyse(DRUGS).p)
 
 
 def test_the_correction_keeps_its_promise_where_the_conditions_vary_unequally():
     generator = np.random.default_rng(10)
     tables = generator.normal(size=(1500, 10, 5)) * np.array([1.0, 1.0, 1.0, 3.0, 6.0])
-    results = [analysed(table.tolist()) for table in tables]
+    results = [analyse(table.tolist()) for table in tables]
     assert 0.03 < np.mean([result.p < 0.05 for result in results]) < 0.07
     assert np.mean([result.p_uncorrected < 0.05 for result in results]) > 0.075
 
@@ -68,8 +68,8 @@ def test_two_conditions_need_no_correction():
 
 
 def test_a_participant_with_a_gap_is_left_out_by_name():
-    result = analysed([*DRUGS, (1.0, None, 2.0, 3.0), (1.0, 2.0, float("nan"), 3.0)])
-    assert result.p == analysed(DRUGS).p
+    result = analyse([*DRUGS, (1.0, None, 2.0, 3.0), (1.0, 2.0, float("nan"), 3.0)])
+    assert result.p == analyse(DRUGS).p
     assert result.left_out == ("s5", "s6")
     assert result.notes == ("Left out because a value is missing: s5, s6.",)
 
@@ -85,18 +85,18 @@ def test_a_participant_with_a_gap_is_left_out_by_name():
     ],
 )
 def test_too_little_data_is_reported_in_a_sentence(values, note):
-    result = analysed(values)
+    result = analyse(values)
     assert (result.f, result.p, result.epsilon) == (None, None, None)
     assert note in result.notes[-1]
 
 
 def test_a_result_is_json():
-    assert json.loads(json.dumps(asdict(analysed(DRUGS)), allow_nan=False))["participants"] == 5
+    assert json.loads(json.dumps(asdict(analyse(DRUGS)), allow_nan=False))["participants"] == 5
 
 
 def test_huynh_feldt_and_mauchly_of_the_ncss_manual():
     assert huynh_feldt(greenhouse_geisser(np.array(DRUGS, float)), 5, 4) == pytest.approx(1.0789, abs=1e-4)
-    found = analysed(DRUGS)
+    found = analyse(DRUGS)
     assert found.epsilon_huynh_feldt == 1.0
     assert found.p_huynh_feldt == pytest.approx(found.p_uncorrected)
     assert found.mauchly_w == pytest.approx(0.186495, abs=1e-6)

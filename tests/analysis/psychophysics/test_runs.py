@@ -88,38 +88,38 @@ def test_a_doubled_row_is_named(rows, rule):
 
 
 @pytest.fixture
-def caught_rows(caught):
-    return caught(np.random.default_rng(3), lapse=0.5, one_in=4, true_n=1.0)
+def rows_with_catches(simulate_with_catches):
+    return simulate_with_catches(np.random.default_rng(3), lapse=0.5, one_in=4, true_n=1.0)
 
 
-def test_catch_trials_move_no_staircase_and_leave_no_gap(rows, caught_rows, rule):
-    (run,), (plain,) = recompute_runs(caught_rows, rule), recompute_runs(rows, rule)
-    assert sum(row.phase is Phase.CATCH for row in caught_rows) > 10
+def test_catch_trials_move_no_staircase_and_leave_no_gap(rows, rows_with_catches, rule):
+    (run,), (plain,) = recompute_runs(rows_with_catches, rule), recompute_runs(rows, rule)
+    assert sum(row.phase is Phase.CATCH for row in rows_with_catches) > 10
     assert run.state.reversals == 13
     assert (run.state, len(run.answered)) == (plain.state, len(plain.answered))
     assert {trial.phase for trial in run.answered} == {Phase.TEST}
 
 
-def test_a_void_catch_trial_is_none_of_the_staircases_spoiled_trials(caught_rows, rule):
-    catch = next(row for row in caught_rows if row.phase is Phase.CATCH)
+def test_a_void_catch_trial_is_none_of_the_staircases_spoiled_trials(rows_with_catches, rule):
+    catch = next(row for row in rows_with_catches if row.phase is Phase.CATCH)
     void = replace(catch, attempt=0, answer=None, correct=None, status=TrialStatus.SPOILED)
-    (run,) = recompute_runs(caught_rows, rule)
-    assert recompute_runs([*caught_rows, void], rule) == (replace(run, presentations=run.presentations + 1),)
+    (run,) = recompute_runs(rows_with_catches, rule)
+    assert recompute_runs([*rows_with_catches, void], rule) == (replace(run, presentations=run.presentations + 1),)
 
 
 @pytest.mark.parametrize("phase", [Phase.CATCH, Phase.TEST])
-def test_a_missing_row_is_named_between_catch_trials_too(caught_rows, rule, phase):
-    gone = next(i for i, row in enumerate(caught_rows) if row.phase is phase and i > 1)
-    number = caught_rows.pop(gone).trial
+def test_a_missing_row_is_named_between_catch_trials_too(rows_with_catches, rule, phase):
+    gone = next(i for i, row in enumerate(rows_with_catches) if row.phase is phase and i > 1)
+    number = rows_with_catches.pop(gone).trial
     with pytest.raises(InconsistentTrialsError, match=f"trial {number + 1}: the trial before it .* is {number - 1};"):
-        recompute_runs(caught_rows, rule)
+        recompute_runs(rows_with_catches, rule)
 
 
-def test_a_catch_trial_below_the_cap_is_refused(caught_rows, rule):
-    place = next(i for i, row in enumerate(caught_rows) if row.phase is Phase.CATCH)
-    caught_rows[place] = replace(caught_rows[place], level_n=1.0)
+def test_a_catch_trial_below_the_cap_is_refused(rows_with_catches, rule):
+    place = next(i for i, row in enumerate(rows_with_catches) if row.phase is Phase.CATCH)
+    rows_with_catches[place] = replace(rows_with_catches[place], level_n=1.0)
     with pytest.raises(InconsistentTrialsError, match=r"trial 4: level_n of a catch trial is 1 N; .* cap of 3 N"):
-        recompute_runs(caught_rows, rule)
+        recompute_runs(rows_with_catches, rule)
 
 
 def test_a_test_trial_renamed_to_a_catch_trial_is_found(rows, rule):
@@ -128,19 +128,19 @@ def test_a_test_trial_renamed_to_a_catch_trial_is_found(rows, rule):
         recompute_runs(rows, rule)
 
 
-def test_a_catch_trial_after_the_end_is_refused(caught_rows, rule):
-    late = replace(caught_rows[-1], trial=caught_rows[-1].trial + 1, phase=Phase.CATCH, level_n=rule.cap_n)
+def test_a_catch_trial_after_the_end_is_refused(rows_with_catches, rule):
+    late = replace(rows_with_catches[-1], trial=rows_with_catches[-1].trial + 1, phase=Phase.CATCH, level_n=rule.cap_n)
     with pytest.raises(InconsistentTrialsError, match="although the run was over"):
-        recompute_runs([*caught_rows, late], rule)
+        recompute_runs([*rows_with_catches, late], rule)
 
 
-def test_a_run_that_got_no_further_than_a_catch_trial_is_an_empty_run(caught_rows, rule):
-    (run,) = recompute_runs([row for row in caught_rows if row.phase is Phase.CATCH][:1], rule)
+def test_a_run_that_got_no_further_than_a_catch_trial_is_an_empty_run(rows_with_catches, rule):
+    (run,) = recompute_runs([row for row in rows_with_catches if row.phase is Phase.CATCH][:1], rule)
     assert (run.answered, run.complete, run.state.trials) == ((), False, 0)
 
 
-def test_catch_trials_belong_to_no_detection_run(caught_rows, rule):
-    assert recompute_runs(caught_rows, rule, Phase.DETECTION) == ()
+def test_catch_trials_belong_to_no_detection_run(rows_with_catches, rule):
+    assert recompute_runs(rows_with_catches, rule, Phase.DETECTION) == ()
 
 
 @pytest.mark.parametrize("rove_db", [0.0, 6.0])

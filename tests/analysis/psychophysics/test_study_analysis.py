@@ -8,28 +8,28 @@ import pytest
 from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.population import Population
 from analysis.psychophysics.repeated_measures import repeated_measures
-from analysis.psychophysics.study_analysis import analyse_study, anova_document
+from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
 from analysis.psychophysics.threshold_table import threshold_table
 from analysis.psychophysics.thresholds import thresholds
 from protocols.trial import Phase
 
 
 @pytest.fixture(scope="module")
-def quick_json():
+def statistics_json():
     def document(analysis) -> dict[str, Any]:
-        return json.loads(json.dumps(anova_document(analysis), allow_nan=False))
+        return json.loads(json.dumps(make_anova_document(analysis), allow_nan=False))
 
     return document
 
 
-def test_a_whole_study_is_analysed(simulate_study, protocol, quick_json):
+def test_a_whole_study_is_analysed(simulate_study, protocol, statistics_json):
     analysis = analyse_study(simulate_study(), protocol)
     assert analysis.population is Population.SIMULATED
     assert len(analysis.thresholds) == 50
     assert analysis.anova.p < 0.001
     assert analysis.within.p < 0.001
     assert len(analysis.comparisons.pairs) == 10
-    document = quick_json(analysis)
+    document = statistics_json(analysis)
     assert (document["format"], document["version"]) == ("hapteq-anova", 1)
     assert document["cut_by_cap"] == document["lower_bounds"] == sum(row.censored for row in analysis.thresholds)
 
@@ -53,18 +53,18 @@ def test_without_an_effect_few_studies_find_one(simulate_study, protocol):
     assert np.all(np.sum(np.array(p) < 0.05, axis=0) <= 4)
 
 
-def test_one_participant_gives_thresholds_and_reasons(simulate_study, protocol, quick_json):
+def test_one_participant_gives_thresholds_and_reasons(simulate_study, protocol, statistics_json):
     analysis = analyse_study(simulate_study(subjects=1, felt=True), protocol)
     assert analysis.population is Population.PEOPLE
     assert len(analysis.thresholds) == 5
-    document = quick_json(analysis)
+    document = statistics_json(analysis)
     assert document["one_way"]["f"] is None
     assert document["within_participants"]["notes"]
     assert document["friedman"]["notes"]
 
 
-def test_nothing_at_all_is_a_result_too(protocol, quick_json):
-    document = quick_json(analyse_study([], protocol))
+def test_nothing_at_all_is_a_result_too(protocol, statistics_json):
+    document = statistics_json(analyse_study([], protocol))
     assert document["population"] is None
     assert document["participants"] == []
 
@@ -77,9 +77,9 @@ def test_training_alone_gives_no_threshold(simulate_study, protocol):
 
 
 @pytest.mark.slow
-def test_detection_practice_and_catch_trials_change_no_threshold(everything, full_protocol, protocol):
-    analysis = analyse_study(everything, full_protocol)
-    plain = analyse_study([trial for trial in everything if trial.phase is Phase.TEST], protocol)
+def test_detection_practice_and_catch_trials_change_no_threshold(all_trial_kinds, full_protocol, protocol):
+    analysis = analyse_study(all_trial_kinds, full_protocol)
+    plain = analyse_study([trial for trial in all_trial_kinds if trial.phase is Phase.TEST], protocol)
     assert analysis.thresholds == plain.thresholds
     assert analysis.anova == plain.anova
     assert analysis.trials == plain.trials
@@ -88,8 +88,8 @@ def test_detection_practice_and_catch_trials_change_no_threshold(everything, ful
     assert all(run.passed for run in analysis.practice)
 
 
-def test_a_study_of_detection_alone_has_thresholds_of_detection(everything, full_protocol):
-    alone = [trial for trial in everything if trial.phase is Phase.DETECTION]
+def test_a_study_of_detection_alone_has_thresholds_of_detection(all_trial_kinds, full_protocol):
+    alone = [trial for trial in all_trial_kinds if trial.phase is Phase.DETECTION]
     analysis = analyse_study(alone, full_protocol)
     assert (analysis.thresholds, len(analysis.detection)) == ((), 3)
     assert analysis.detection_table.frequencies_hz == (35.0,)

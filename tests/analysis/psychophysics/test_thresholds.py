@@ -12,49 +12,49 @@ S2 = "11111101110011111101110111011101110"
 
 
 @pytest.mark.parametrize(("answers", "newton", "db"), [(S1, 0.6335, -4.0), (S2, 0.6043, -4.4)])
-def test_the_check_sequences_give_their_known_thresholds(answered, rule, answers, newton, db):
-    (row,) = thresholds(answered(answers), rule)
+def test_the_check_sequences_give_their_known_thresholds(make_run_from_answers, rule, answers, newton, db):
+    (row,) = thresholds(make_run_from_answers(answers), rule)
     assert row.complete
     assert row.threshold_db == pytest.approx(db, abs=1e-12)
     assert row.threshold_n == pytest.approx(newton, abs=5e-5)
     assert (row.reversals, row.trials, row.cap_reversals) == (13, len(answers), 0)
 
 
-def test_a_run_short_of_its_reversals_is_a_row_without_a_threshold(answered, rule):
-    (row,) = thresholds(answered(S1[:-1]), rule)
+def test_a_run_short_of_its_reversals_is_a_row_without_a_threshold(make_run_from_answers, rule):
+    (row,) = thresholds(make_run_from_answers(S1[:-1]), rule)
     assert not row.complete
     assert row.reversals == 12
     assert (row.threshold_n, row.threshold_db, row.threshold_mps2, row.threshold_mm) == (None, None, None, None)
 
 
-def test_a_run_that_ran_out_of_trials_is_incomplete(answered, rule):
-    (row,) = thresholds(answered(S1[:20]), replace(rule, trial_limit=20))
+def test_a_run_that_ran_out_of_trials_is_incomplete(make_run_from_answers, rule):
+    (row,) = thresholds(make_run_from_answers(S1[:20]), replace(rule, trial_limit=20))
     assert not row.complete
 
 
-def test_the_delivered_threshold_is_the_mean_over_the_same_trials(answered, rule):
-    (row,) = thresholds(answered(S1), rule)
+def test_the_delivered_threshold_is_the_mean_over_the_same_trials(make_run_from_answers, rule):
+    (row,) = thresholds(make_run_from_answers(S1), rule)
     assert row.threshold_mps2 == pytest.approx(4.0 * row.threshold_n)
     assert row.measured_reversals == 10
 
 
-def test_a_reversal_without_measurement_is_left_out_and_counted(answered, rule):
-    rows = answered(S1)
+def test_a_reversal_without_measurement_is_left_out_and_counted(make_run_from_answers, rule):
+    rows = make_run_from_answers(S1)
     rows[-1] = replace(rows[-1], delivered_mps2=None, displacement_mm=None)
     (row,) = thresholds(rows, rule)
     assert row.measured_reversals == 9
     assert row.threshold_mps2 == pytest.approx(4.0 * row.threshold_n, rel=0.01)
 
 
-def test_nothing_measured_leaves_the_delivered_threshold_empty(answered, rule):
-    rows = [replace(row, delivered_mps2=None, displacement_mm=None) for row in answered(S1)]
+def test_nothing_measured_leaves_the_delivered_threshold_empty(make_run_from_answers, rule):
+    rows = [replace(row, delivered_mps2=None, displacement_mm=None) for row in make_run_from_answers(S1)]
     (row,) = thresholds(rows, rule)
     assert (row.threshold_mps2, row.threshold_mm, row.measured_reversals) == (None, None, 0)
 
 
-def test_one_peak_at_the_cap_among_the_averaged_marks_it_as_cut(answered, rule):
+def test_one_peak_at_the_cap_among_the_averaged_marks_it_as_cut(make_run_from_answers, rule):
     # Climb to the cap, three turns by 4 dB, climb again; then peaks at the cap and valleys one step below.
-    (row,) = thresholds(answered("0" * 4 + "111" + "0" + "111" + "0" * 6 + "1110" * 6), rule)
+    (row,) = thresholds(make_run_from_answers("0" * 4 + "111" + "0" + "111" + "0" * 6 + "1110" * 6), rule)
     assert row.complete
     assert row.cap_reversals == 5
     assert row.threshold_n == pytest.approx((5 * 3.0 + 4 * 3.0 / 10**0.05 + 3.0 / 10**0.2) / 10)
@@ -63,9 +63,9 @@ def test_one_peak_at_the_cap_among_the_averaged_marks_it_as_cut(answered, rule):
     assert row.pushes_against_cap > 0
 
 
-def test_cap_contact_before_the_averaged_reversals_does_not_mark(answered, rule):
+def test_cap_contact_before_the_averaged_reversals_does_not_mark(make_run_from_answers, rule):
     # The first peak is at the cap, but by 4 dB steps: the averaged reversals lie below.
-    (row,) = thresholds(answered("000" + "111" * 2 + "0" + "111" * 3 + "0" + "1110" * 6), rule)
+    (row,) = thresholds(make_run_from_answers("000" + "111" * 2 + "0" + "111" * 3 + "0" + "1110" * 6), rule)
     assert row.complete
     assert row.trials_at_cap > 0
     assert row.cap_reversals == 0
@@ -107,7 +107,7 @@ def test_the_columns_begin_as_the_file_format_says():
     ]  # fmt: skip
 
 
-def test_a_row_is_plain_data(answered, rule):
-    (row,) = thresholds(answered(S1), rule)
+def test_a_row_is_plain_data(make_run_from_answers, rule):
+    (row,) = thresholds(make_run_from_answers(S1), rule)
     writer = csv.DictWriter(io.StringIO(), fieldnames=[field.name for field in fields(Threshold)])
     assert writer.writerow(asdict(row)) > 0

@@ -9,13 +9,13 @@ from analysis.psychophysics.tobit import fit_tobit, tobit_contrasts
 HZ = (5.0, 35.0, 45.0)
 
 
-def people(seed: int, n: int = 10, means=(-6.0, 6.0, 8.0), person: float = 2.0, error: float = 1.5):
+def simulate_people(seed: int, n: int = 10, means=(-6.0, 6.0, 8.0), person: float = 2.0, error: float = 1.5):
     random = np.random.default_rng(seed)
     return np.array(means) + person * random.standard_normal((n, 1)) + error * random.standard_normal((n, len(means)))
 
 
 def test_without_a_cut_it_is_the_balanced_model_of_the_textbook():
-    values = people(1)
+    values = simulate_people(1)
     fit = fit_tobit(values, np.zeros_like(values, dtype=bool))
     np.testing.assert_allclose(fit.parameters[:3], values.mean(axis=0), atol=1e-3)
     centred = values - values.mean(axis=0) - values.mean(axis=1, keepdims=True) + values.mean()
@@ -26,7 +26,7 @@ def test_without_a_cut_it_is_the_balanced_model_of_the_textbook():
 
 
 def test_with_a_single_frequency_it_is_scipys_fit_of_censored_values():
-    values = people(2, n=200, means=(0.0,))
+    values = simulate_people(2, n=200, means=(0.0,))
     cut = values > 1.0
     values = np.minimum(values, 1.0)
     mean, sd = norm.fit(CensoredData(uncensored=values[~cut], right=values[cut]))
@@ -38,20 +38,20 @@ def test_with_a_single_frequency_it_is_scipys_fit_of_censored_values():
 def test_differences_that_the_cap_cut_are_recovered_where_cuts_are_clean():
     found, covered = [], 0
     for seed in range(40):
-        values = people(seed)
+        values = simulate_people(seed)
         cut = values > 7.0
         (_, contrast) = tobit_contrasts(HZ, np.minimum(values, 7.0), cut, 0.95)
         found.append(contrast.difference_db)
         covered += contrast.lower_db <= 14.0 <= contrast.upper_db
     assert np.mean(found) == pytest.approx(14.0, abs=0.3)
     # As plain numbers the cut values lose far more: the negative control.
-    plain = np.mean([np.diff(np.minimum(people(seed), 7.0).mean(axis=0)[[0, 2]]) for seed in range(40)])
+    plain = np.mean([np.diff(np.minimum(simulate_people(seed), 7.0).mean(axis=0)[[0, 2]]) for seed in range(40)])
     assert plain < 12.7
     assert covered >= 34  # of 40 at 95 %: fewer has a probability of 1 %
 
 
 def test_gaps_are_left_out_and_where_it_says_nothing_it_is_silent():
-    values = people(3)
+    values = simulate_people(3)
     cut = values > 7.0
     whole = tobit_contrasts(HZ, values, cut, 0.95)
     values[0, 1] = np.nan

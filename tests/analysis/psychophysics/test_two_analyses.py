@@ -8,8 +8,8 @@ import pytest
 
 from analysis.psychophysics.coverage.coverage_words import coverage_sentence
 from analysis.psychophysics.coverage.measured_coverage import MEASURED
-from analysis.psychophysics.hierarchy.primary import FAR_ABOVE
-from analysis.psychophysics.study_analysis import analyse_study, anova_document
+from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_NOTE
+from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
 from analysis.psychophysics.two_analyses import SIMULATED_RULE, comparison_text, declaration_text
 from analysis.reports.study_report import render_study_report
 from protocols.definition.declared_analysis import AnalysisSettings
@@ -67,7 +67,7 @@ def test_frequencies_far_above_the_cap_are_not_compared_and_the_report_says_so(p
     said = "At 35 Hz and 45 Hz the medians lie at more than twice the cap: the differences between these are not known"
     assert said in page
     by_model = analysis.declared_result.results[0]
-    assert by_model.p is None and by_model.notes == (FAR_ABOVE,)
+    assert by_model.p is None and by_model.notes == (FAR_ABOVE_NOTE,)
 
 
 @pytest.mark.slow
@@ -121,7 +121,7 @@ def test_the_page_and_the_document_show_both(analysis):
     for words in ("All answers in one model", "Median participant", "as published", "Huynh-Feldt", "Mauchly",
                   "above the cap", "Direction limit", "p (Holm)"):  # fmt: skip
         assert words in html
-    document = json.loads(json.dumps(anova_document(analysis), allow_nan=False))
+    document = json.loads(json.dumps(make_anova_document(analysis), allow_nan=False))
     assert document["primary"]["medians"][4]["upper_db"] is None
     assert document["primary"]["medians"][0]["lower_db"] < document["primary"]["medians"][0]["db"]
     assert document["declared"]["primary"] == "undeclared"

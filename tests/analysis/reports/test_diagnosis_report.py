@@ -7,7 +7,7 @@ import pytest
 from analysis.diagnosis.document import Candidate, Errors, Estimate, Fit, Mismatch, Rival
 from analysis.diagnosis.result.findings import BalanceErrors, BlackBox
 from analysis.diagnosis.result.plausibility import implausible_sentences
-from analysis.diagnosis.result.wording import final_moved_parameters, summary_lines
+from analysis.diagnosis.result.wording import find_final_moves, write_summary_lines
 from analysis.reports.diagnosis_method import method_paragraphs
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from analysis.reports.diagnosis_tables import (
@@ -40,20 +40,20 @@ class Headings(HTMLParser):
         self.inside = ""
 
 
-def rendered(found, pictures=()):
+def render(found, pictures=()):
     html = render_diagnosis_report(found, pictures, {"Recording": "rec.h5"}, "2026-01-01T00:00Z")
     headings = Headings()
     headings.feed(html)
     return html, headings
 
 
-def told(found, **changes):
+def change_diagnosis(found, **changes):
     return replace(found, diagnosis=replace(found.diagnosis, **changes))
 
 
 @pytest.fixture(scope="module")
-def page(friction_found, friction_pictures):
-    return rendered(friction_found, friction_pictures)
+def page(friction_findings, friction_pictures):
+    return render(friction_findings, friction_pictures)
 
 
 def test_the_verdict_comes_first_then_the_map_then_a_section_per_effect(page):
@@ -77,44 +77,46 @@ def test_the_page_refers_to_nothing_outside_and_says_where_it_comes_from(page):
     assert "<dd>rec.h5</dd>" in page[0]
 
 
-def test_what_a_lab_named_is_escaped(friction_found):
-    text, _ = rendered(replace(friction_found, remarks=("<script>alert(1)</script>",)))
+def test_what_a_lab_named_is_escaped(friction_findings):
+    text, _ = render(replace(friction_findings, remarks=("<script>alert(1)</script>",)))
     assert "<script>" not in text
     assert "&lt;script&gt;" in text
 
 
-def test_held_out_data_that_do_not_confirm_stand_in_the_banner(friction_found):
-    fit = friction_found.diagnosis.fit
-    bad = told(friction_found, fit=Fit(fit.fit, Errors(0.5, 0.3, 0.4, 0.02)))
-    assert 'class="banner" role="note">The held-out data do not confirm this' in rendered(bad)[0]
+def test_held_out_data_that_do_not_confirm_stand_in_the_banner(friction_findings):
+    fit = friction_findings.diagnosis.fit
+    bad = change_diagnosis(friction_findings, fit=Fit(fit.fit, Errors(0.5, 0.3, 0.4, 0.02)))
+    assert 'class="banner" role="note">The held-out data do not confirm this' in render(bad)[0]
 
 
-def test_a_black_box_that_beats_the_physics_stands_in_the_banner(friction_found):
-    better = replace(friction_found, black_box=BlackBox("ARX", 12, 0.01, 0.05))
-    assert 'class="banner" role="note">A black box (ARX, 12 parameters)' in rendered(better)[0]
+def test_a_black_box_that_beats_the_physics_stands_in_the_banner(friction_findings):
+    better = replace(friction_findings, black_box=BlackBox("ARX", 12, 0.01, 0.05))
+    assert 'class="banner" role="note">A black box (ARX, 12 parameters)' in render(better)[0]
 
 
 def test_a_confirmed_diagnosis_has_no_banner(page):
     assert 'class="banner" role' not in page[0]
 
 
-def test_without_effects_there_is_no_section_of_any(friction_found):
+def test_without_effects_there_is_no_section_of_any(friction_findings):
     bare = replace(
-        told(friction_found, verdict="unexplained", effects=(), mismatch=(PLACE,), next_experiment=None),
+        change_diagnosis(friction_findings, verdict="unexplained", effects=(), mismatch=(PLACE,), next_experiment=None),
         named=(), signatures=(), black_box=None, remarks=(), maps={},
     )  # fmt: skip
-    text, headings = rendered(bare)
+    text, headings = render(bare)
     assert "no effect of the catalogue explains it" in text
     assert "What the model lacks" not in headings.found
     assert "There is no map: the noise of this recording is not known." in text
 
 
-def test_candidates_and_classes_are_on_the_page_and_only_where_there_are_some(friction_found, page):
-    (effect,) = friction_found.diagnosis.effects
+def test_candidates_and_classes_are_on_the_page_and_only_where_there_are_some(friction_findings, page):
+    (effect,) = friction_findings.diagnosis.effects
     alike = replace(effect, class_=("coulomb_friction", "stribeck_friction"), rivals=())
     other = Candidate("gravity_torque", "mechanism", "x", {"torque": 0.5, "angle": 0.1}, 0.12, 0.34, "too little")
     reached = (BalanceErrors("x", 0.5, 0.3, 0.1, True),)
-    text, headings = rendered(replace(told(friction_found, effects=(alike,), candidates=(other,)), reached=reached))
+    text, headings = render(
+        replace(change_diagnosis(friction_findings, effects=(alike,), candidates=(other,)), balance_errors=reached)
+    )
     assert "What else may be missing" in headings.found
     for piece in ("The weight of a body off its axis (a pendulum)", "500 mN m, hanging", "34 %", "Too little.",
                   "Friction whose law these data do not determine", "and that is 67 % of the reduction of the error "
@@ -124,41 +126,48 @@ def test_candidates_and_classes_are_on_the_page_and_only_where_there_are_some(fr
     assert "What else may be missing" not in page[1].found
 
 
-def test_the_best_candidate_stands_in_the_first_paragraph_where_nothing_is_named(friction_found):
+def test_the_best_candidate_stands_in_the_first_paragraph_where_nothing_is_named(friction_findings):
     other = Candidate("cogging", "mechanism", "x", {"amplitude": 0.5, "pitch": 0.01}, 0.12, 0.34, "too little")
-    bare = told(friction_found, verdict="unexplained", effects=(), mismatch=(PLACE,), candidates=(other,))
-    text, _ = rendered(bare)
+    bare = change_diagnosis(
+        friction_findings, verdict="unexplained", effects=(), mismatch=(PLACE,), candidates=(other,)
+    )
+    text, _ = render(bare)
     assert "Best candidate, not confirmed: a force ripple along the travel (cogging)" in text[: text.index("<h2")]
 
 
-def test_wrong_parameters_are_said_with_their_numbers(friction_found):
-    alone = replace(friction_found.explanation, after=friction_found.explanation.retuned)
-    bare = replace(told(friction_found, verdict="parameters", effects=()), explanation=alone, named=(), signatures=())
-    moved = final_moved_parameters(bare)
+def test_wrong_parameters_are_said_with_their_numbers(friction_findings):
+    alone = replace(friction_findings.explanation, after=friction_findings.explanation.retuned)
+    bare = replace(
+        change_diagnosis(friction_findings, verdict="parameters", effects=()),
+        explanation=alone,
+        named=(),
+        signatures=(),
+    )
+    moved = find_final_moves(bare)
     assert moved
-    text, _ = rendered(bare)
+    text, _ = render(bare)
     assert f"No physics is missing; parameters of the model are wrong: {moved[0].text}" in text
 
 
-def test_channels_stand_in_their_units_with_the_noise_beside(friction_found):
-    table = channel_table(friction_found, "test")
+def test_channels_stand_in_their_units_with_the_noise_beside(friction_findings):
+    table = channel_table(friction_findings, "test")
     assert [row[0] for row in table.rows] == ["ax", "x"]
     assert table.rows[1][3].endswith("×)")
     assert "µm (" in table.rows[1][3]
-    ratio = friction_found.channel_errors["after"]["x"]
+    ratio = friction_findings.channel_errors["after"]["x"]
     assert f"({ratio:.2f}×)" in table.rows[1][3]
-    assert channel_table(replace(friction_found, time_series=()), "fit") is None
+    assert channel_table(replace(friction_findings, time_series=()), "fit") is None
 
 
-def test_rivals_that_cannot_be_told_apart_stand_above_those_passed_over(friction_found):
-    (effect,) = friction_found.diagnosis.effects
+def test_rivals_that_cannot_be_told_apart_stand_above_those_passed_over(friction_findings):
+    (effect,) = friction_findings.diagnosis.effects
     rivals = (Rival("viscous_damping", 0.1, False, "worse"), Rival("stribeck_friction", 0.05, True, ""))
     table = rival_table(replace(effect, rivals=rivals))
     assert [row[2] for row in table.rows] == ["named", "cannot be distinguished", "passed over"]
 
 
-def test_a_number_without_an_interval_has_a_dash(friction_found):
-    (effect,) = friction_found.diagnosis.effects
+def test_a_number_without_an_interval_has_a_dash(friction_findings):
+    (effect,) = friction_findings.diagnosis.effects
     table = parameter_table(replace(effect, parameters={"level": Estimate(0.2, "N")}))
     assert table.rows == (("level", "0.200 N", "–"),)
 
@@ -169,10 +178,10 @@ def test_a_long_list_of_places_is_cut_and_reports_it():
     assert table.notes[0] == "And 3 smaller places."
 
 
-def test_every_open_number_is_listed_with_how_far_it_moved(friction_found):
-    table = tabulate_retuned(friction_found)
-    assert [row[0] for row in table.rows] == list(friction_found.tuning.names)
-    assert tabulate_retuned(replace(friction_found, tuning=None)) is None
+def test_every_open_number_is_listed_with_how_far_it_moved(friction_findings):
+    table = tabulate_retuned(friction_findings)
+    assert [row[0] for row in table.rows] == list(friction_findings.tuning.names)
+    assert tabulate_retuned(replace(friction_findings, tuning=None)) is None
 
 
 @pytest.mark.parametrize(
@@ -183,46 +192,46 @@ def test_every_open_number_is_listed_with_how_far_it_moved(friction_found):
         ("windows of 1 s", "simulated over windows of 1 s, each started from the measured state"),
     ],
 )
-def test_the_method_says_how_errors_were_measured(friction_found, error, words):
-    assert words in method_paragraphs(told(friction_found, error=error))[0]
+def test_the_method_says_how_errors_were_measured(friction_findings, error, words):
+    assert words in method_paragraphs(change_diagnosis(friction_findings, error=error))[0]
 
 
-def test_the_method_says_how_the_time_was_split_and_the_noise_found(friction_found):
-    said = " ".join(method_paragraphs(friction_found))
+def test_the_method_says_how_the_time_was_split_and_the_noise_found(friction_findings):
+    said = " ".join(method_paragraphs(friction_findings))
     assert "6 s were used for the fit, 3 s were used to choose between explanations and 3 s were held out" in said
     assert "The noise was measured from what differs between repeats" in said
 
 
-def test_the_summary_begins_with_the_verdict_and_ends_with_the_remarks(friction_found):
-    lines = summary_lines(friction_found)
+def test_the_summary_begins_with_the_verdict_and_ends_with_the_remarks(friction_findings):
+    lines = write_summary_lines(friction_findings)
     assert lines[0].startswith("Missing in the model: dry friction on the x drive.")
     assert lines[1].startswith("Dry friction on the x drive, 0.")
     assert lines[-1] == "A remark."
 
 
-def test_a_believable_fit_is_not_doubted(friction_found):
-    assert implausible_sentences(friction_found) == ()
+def test_a_believable_fit_is_not_doubted(friction_findings):
+    assert implausible_sentences(friction_findings) == ()
 
 
-def test_a_number_at_the_end_of_its_range_is_doubted(friction_found):
-    (placed,) = friction_found.named
+def test_a_number_at_the_end_of_its_range_is_doubted(friction_findings):
+    (placed,) = friction_findings.named
     most = {"level": placed.effect.parameters[0].upper}
-    wild = replace(friction_found, named=(PlacedEffect(placed.effect, placed.sites, most),))
+    wild = replace(friction_findings, named=(PlacedEffect(placed.effect, placed.sites, most),))
     (said,) = implausible_sentences(wild)
     assert said.startswith("The level of dry friction reached the limit of its allowed range (")
 
 
-def test_an_interval_that_holds_no_effect_is_doubted(friction_found):
-    (effect,) = friction_found.diagnosis.effects
+def test_an_interval_that_holds_no_effect_is_doubted(friction_findings):
+    (effect,) = friction_findings.diagnosis.effects
     faint = replace(effect, parameters={"level": Estimate(0.01, "N", (-0.01, 0.03))})
-    (said,) = implausible_sentences(told(friction_found, effects=(faint,)))
+    (said,) = implausible_sentences(change_diagnosis(friction_findings, effects=(faint,)))
     assert (
         said == "The interval of dry friction, 0.01 N [−0.01, 0.03], includes the value without the effect: the data "
         "hardly support it."
     )
 
 
-def test_an_improved_model_that_makes_energy_is_doubted(friction_found):
-    model = replace(friction_found.improved, damping=np.array([[-1.0]]))
-    (said,) = implausible_sentences(replace(friction_found, improved=model))
+def test_an_improved_model_that_makes_energy_is_doubted(friction_findings):
+    model = replace(friction_findings.improved, damping=np.array([[-1.0]]))
+    (said,) = implausible_sentences(replace(friction_findings, improved=model))
     assert said == "The improved model's damping is negative in one direction: in it, the device would generate energy."

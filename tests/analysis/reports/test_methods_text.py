@@ -2,16 +2,16 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.reports.methods_text import methods_text
+from analysis.reports.methods_text import compose_methods_text
 from protocols.definition.staircase_rule import StepChange
 
 
-def said(protocol):
-    return " ".join(methods_text(protocol))
+def methods_paragraphs(protocol):
+    return " ".join(compose_methods_text(protocol))
 
 
 def test_the_numbers_of_the_protocol_are_in_the_text(protocol):
-    text = said(protocol)
+    text = methods_paragraphs(protocol)
     for words in (
         "at 135° (1) and 45° (2) in the yz plane",
         "5, 15, 25, 35 and 45 Hz",
@@ -58,10 +58,10 @@ def test_the_numbers_of_the_protocol_are_in_the_text(protocol):
 )
 def test_another_choice_gives_another_sentence(protocol, part, change, words):
     changed = replace(protocol, **{part: replace(getattr(protocol, part), **change)})
-    assert words in said(changed)
-    assert words not in said(protocol)
+    assert words in methods_paragraphs(changed)
+    assert words not in methods_paragraphs(protocol)
 
 
 def test_two_wrong_answers_for_a_step_claim_no_convergence(protocol):
     changed = replace(protocol, staircase=replace(protocol.staircase, up_after_wrong=2))
-    assert "converges" not in said(changed)
+    assert "converges" not in methods_paragraphs(changed)

@@ -7,9 +7,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from analysis.diagnosis.localisation.state_regions import region_in_words
+from analysis.diagnosis.localisation.state_regions import describe_region
 from analysis.diagnosis.real_answer.real_answer import OwnParameter
-from analysis.diagnosis.result.wording import summary_lines
+from analysis.diagnosis.result.wording import write_summary_lines
 from analysis.evaluation.reproduction.document import FigureFindings, PlayedRow, Reproduction
 from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
@@ -18,7 +18,7 @@ from analysis.reports.diagnosis_report import render_diagnosis_report
 from analysis.reports.real_report import parameter_sentence
 from analysis.reports.reproduction_report import render_reproduction_report
 from analysis.reports.study_report import render_study_report
-from analysis.wording import format_signed, number, typeset
+from analysis.wording import format_number, format_signed, typeset
 
 HYPHEN_BEFORE_NUMBER = re.compile(r"(?<![\w-])-\.?\d\S*")
 """Not in "2026-01-02" nor "gpt-2": there something stands before it."""
@@ -26,7 +26,7 @@ MINUS_BEFORE_NUMBER = re.compile(r"−\.?\d")
 NOT_READ = ("style", "script", "code", "pre")
 
 
-class Texts(HTMLParser):
+class PageTexts(HTMLParser):
     """What a person reads on a page, without code."""
 
     def __init__(self) -> None:
@@ -41,8 +41,8 @@ class Texts(HTMLParser):
             self.found.append(data)
 
 
-def texts(html):
-    reader = Texts()
+def page_texts(html):
+    reader = PageTexts()
     reader.feed(html)
     return reader.found
 
@@ -55,7 +55,8 @@ def assert_one_spelling(found):
 @pytest.mark.parametrize(
     ("said", "expected"),
     [
-        (number(-1.5), "−1.50"), (number(-0.001), "0.00"), (number(2.0, 0), "2"), (format_signed(-1.26, 1), "−1.3"),
+        (format_number(-1.5), "−1.50"), (format_number(-0.001), "0.00"), (format_number(2.0, 0), "2"),
+        (format_signed(-1.26, 1), "−1.3"),
         (format_signed(1.26, 1), "+1.3"), (typeset("1e-07"), "1e−07"),
     ],
 )  # fmt: skip
@@ -73,13 +74,13 @@ def test_on_the_report_of_a_study(simulate_study, protocol):
     tilted = (EllipsoidResult(25.0, "direction_1", 1.0, *ellipses),)
     analysis = analyse_study(trials, turned)
     html = render_study_report(analysis, study_pictures(analysis, tilted), {}, "2026-01-02T03:04:05Z", tilted)
-    assert_one_spelling(texts(html))
+    assert_one_spelling(page_texts(html))
 
 
-def test_on_the_page_of_a_diagnosis(friction_found, friction_pictures):
-    html = render_diagnosis_report(friction_found, friction_pictures, {"Recording": "rec.h5"}, "2026-01-01T00:00Z")
-    assert_one_spelling(texts(html))
-    assert [line for line in summary_lines(friction_found) if HYPHEN_BEFORE_NUMBER.search(line)] == []
+def test_on_the_page_of_a_diagnosis(friction_findings, friction_pictures):
+    html = render_diagnosis_report(friction_findings, friction_pictures, {"Recording": "rec.h5"}, "2026-01-01T00:00Z")
+    assert_one_spelling(page_texts(html))
+    assert [line for line in write_summary_lines(friction_findings) if HYPHEN_BEFORE_NUMBER.search(line)] == []
 
 
 def test_on_the_page_of_the_published_figures():
@@ -87,13 +88,13 @@ def test_on_the_page_of_the_published_figures():
     page = Reproduction("simulated", 1, 1, (5.0, 35.0), 26, (), (row,), (row,))
     figure = FigureFindings(5, "Played", "Figure 5", "coupling falls", (), ())
     html = render_reproduction_report(replace(page, figures=(figure,)), {}, {}, "2026-01-01T00:00Z")
-    assert_one_spelling(texts(html))
+    assert_one_spelling(page_texts(html))
 
 
 def test_in_sentences():
     said = [
         parameter_sentence(OwnParameter("mass", "kg", 0.9, 0.8, 1.0, 1.0)),
-        region_in_words("position", "x", "m", (1, 1, 4), -0.012, one_stratum=True),
+        describe_region("position", "x", "m", (1, 1, 4), -0.012, one_stratum=True),
     ]
     assert said[1] == "near x = −12 mm"
     assert_one_spelling(said)

@@ -58,8 +58,8 @@ def test_a_response_that_comes_early_is_no_delay(bench, command):
 
 def test_saturation_and_dead_band_share_a_command_between_them():
     commands = np.linspace(-3, 3, 61)
-    cut = SATURATION.acts.change(commands, 1e-3, {"limit": 0.8})
-    rest = DEADBAND.acts.change(commands, 1e-3, {"width": 0.8})
+    cut = SATURATION.action.change(commands, 1e-3, {"limit": 0.8})
+    rest = DEADBAND.action.change(commands, 1e-3, {"width": 0.8})
     np.testing.assert_allclose(cut + rest, commands)
     assert np.abs(cut).max() == 0.8
     assert not rest[np.abs(commands) < 0.8].any()
@@ -74,7 +74,7 @@ def test_a_gain_scales_the_motion_of_a_linear_device(bench, command):
 
 def test_a_dead_band_may_end_with_a_jump():
     commands = np.array([-2.0, -0.5, 0.5, 2.0])
-    beyond = DEADBAND.acts.change(commands, 1e-3, {"width": 0.8, "jump": 1.0})
+    beyond = DEADBAND.action.change(commands, 1e-3, {"width": 0.8, "jump": 1.0})
     np.testing.assert_allclose(beyond, [-2.0, 0.0, 0.0, 2.0])
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
-from equalizer.effects.command_sign import SIGN_REVERSED, SWAPPED, TILTED, with_reversed_commands
+from equalizer.effects.command_sign import CROSS_AXIS_TILTS, DIRECTION_PAIRS, SIGN_REVERSED, with_reversed_commands
 from equalizer.effects.discovered_law import Channels
 from equalizer.effects.placing import place_effects, place_of_effect
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -72,7 +72,7 @@ def apart(bench, effect: ModelEffect) -> float:
 
 @pytest.mark.parametrize(("side", "way"), [(2.5, 1.0), (-1.0, -1.0), (0.0, -1.0)])
 def test_of_a_side_the_sign_counts_and_zero_is_as_none(bench, side, way):
-    packed = EFFECTS["end_stop"].acts.pack(bench.three_axes(), 0, FAR_STOP | {"side": side, "opposite": 0.3})
+    packed = EFFECTS["end_stop"].action.pack(bench.three_axes(), 0, FAR_STOP | {"side": side, "opposite": 0.3})
     assert packed.tolist() == [way * FAR_STOP["position"], FAR_STOP["stiffness"], way, -way, 0.0 if side else 0.3]
 
 
@@ -105,7 +105,7 @@ def test_a_stop_beyond_zero_pushes_as_its_law_written_out(bench):
 
 def test_every_effect_that_pushes_or_is_pushed_was_turned():
     assert {each.name for each in CATALOGUE if place_of_effect(each) != "sensor"} <= set(NUMBERS)
-    assert {*SIGN_REVERSED, *SWAPPED, *TILTED} <= set(NUMBERS)
+    assert {*SIGN_REVERSED, *DIRECTION_PAIRS, *CROSS_AXIS_TILTS} <= set(NUMBERS)
 
 
 def test_an_effect_of_all_axes_is_split_where_some_turn(bench):

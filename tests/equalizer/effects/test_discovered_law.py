@@ -12,8 +12,8 @@ from scipy.signal import butter, cont2discrete, dlsim, sosfilt
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.discovered_law import Channels, law_effect, law_parameters, law_values
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.simulation.along_motion import force_along
-from equalizer.effects.simulation.mechanism_kernel import LAWS
+from equalizer.effects.simulation.forces_along_motion import effect_forces_along_motion
+from equalizer.effects.simulation.mechanism_kernel import MAX_LAWS
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law, law_of
@@ -148,7 +148,7 @@ def test_the_force_is_what_the_formula_gives_along_the_motion(bench):
     expected = evaluate(law, columns, RATE_HZ)
     assert np.std(played.axis_force[:, 1] - expected) < 1e-6 * np.std(expected)
     motion = played.axis_position, played.axis_velocity, np.gradient(played.axis_velocity, 1 / RATE_HZ, axis=0)
-    along = force_along(bench.three_axes(), [effect], motion, (COMMANDS, played.axis_force), RATE_HZ)
+    along = effect_forces_along_motion(bench.three_axes(), [effect], motion, (COMMANDS, played.axis_force), RATE_HZ)
     step_ahead = evaluate(law, {**columns, "fx": COMMANDS[:, 0]}, RATE_HZ)
     assert np.std(along[:-1, 1] - (step_ahead[:-1] + expected[1:]) / 2) < 0.05 * np.std(expected)
 
@@ -157,7 +157,7 @@ def test_laws_act_beside_each_other_and_beside_named_effects(bench):
     drag = PlacedEffect(EFFECTS["quadratic_damping"], (0,), {"coefficient": 5.0})
     spring = PlacedEffect(EFFECTS["hardening_stiffness"], (1,), {"k3": 1e7})
     many = [at_y("-1e6*y**3")] * 10
-    assert len(many) > LAWS
+    assert len(many) > MAX_LAWS
     assert max(apart(bench, [drag, *many], [drag, spring])) < 1e-4
 
 
@@ -165,7 +165,9 @@ def test_commands_may_be_read_only(bench):
     held = COMMANDS[:50].copy()
     held.flags.writeable = False
     simulate_mechanism(bench.three_axes(), held, RATE_HZ, [at_y("-2.0*vy")])
-    along = force_along(bench.three_axes(), [at_y("-2.0*vy")], (COMMANDS[:50],) * 3, (held, held), RATE_HZ)
+    along = effect_forces_along_motion(
+        bench.three_axes(), [at_y("-2.0*vy")], (COMMANDS[:50],) * 3, (held, held), RATE_HZ
+    )
     assert along[:-1, 1] == pytest.approx(-(held[:-1, 1] + held[1:, 1]), rel=0.05)
 
 

@@ -8,10 +8,10 @@ import pytest
 
 from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit, fit, gather_evidence, sensitivity
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.search.starting_hypotheses import candidates
+from analysis.diagnosis.search.starting_hypotheses import list_candidates
 from equalizer.effects.catalogue import EFFECTS
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import read_recording
@@ -39,11 +39,11 @@ def test_with_the_effect_that_it_names_a_case_is_explained_to_the_noise(shared, 
     record = observe(recording, model.outputs)
     measure = FreeSimulation((record,), NOISE, NOISE)
     tuning = tuning_of(model, recording.command.channels)
-    nominal = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
-    known = sensitivity(measure, tuning, nominal.deviations, NOTHING)
+    nominal = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
+    known = sensitivity(measure, tuning, nominal.deviations, NO_EFFECTS)
     retuned = fit(measure, tuning, nominal, known, 2)
     spread = "one" if truth["axis"] else "all"
-    suggested = candidates([effect], gather_evidence(measure, tuning, retuned)[0])
+    suggested = list_candidates([effect], gather_evidence(measure, tuning, retuned)[0])
     hypothesis = next(each for each in suggested if each.claims[0].spread == spread)
     # From the calibration on: the re-tuned numbers have already bent themselves to what the effect does.
     found = evaluate_fit(measure, tuning, nominal.deviations, hypothesis)

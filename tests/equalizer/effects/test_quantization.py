@@ -56,7 +56,7 @@ def test_given_the_reading_the_right_model_leaves_the_noise(share):
     truth, generator = signal(4)
     step = share * NOISE
     measured = step * np.round((truth + NOISE * generator.standard_normal(len(truth))) / step)
-    predicted = EFFECT.acts.given(truth[:, None], measured[:, None], np.array([NOISE]), (0,), {"step": step})
+    predicted = EFFECT.action.conditioned(truth[:, None], measured[:, None], np.array([NOISE]), (0,), {"step": step})
     residual = (measured - predicted[:, 0]) / NOISE
     assert residual.std() == pytest.approx(1.0, abs=0.02)
     assert abs(np.corrcoef(residual, truth)[0, 1]) < 0.03
@@ -65,14 +65,16 @@ def test_given_the_reading_the_right_model_leaves_the_noise(share):
 def test_given_the_reading_a_wrong_model_still_leaves_its_error():
     truth, generator = signal(5)
     measured = 0.25 * np.round((truth + NOISE * generator.standard_normal(len(truth))) / 0.25)
-    predicted = EFFECT.acts.given(0.9 * truth[:, None], measured[:, None], np.array([NOISE]), (0,), {"step": 0.25})
+    predicted = EFFECT.action.conditioned(
+        0.9 * truth[:, None], measured[:, None], np.array([NOISE]), (0,), {"step": 0.25}
+    )
     assert (measured - predicted[:, 0]).std() > 0.6 * (0.1 * truth).std()
 
 
 def test_a_recording_off_the_lattice_is_compared_with_the_rounded_prediction():
     truth, generator = signal(6)
     measured = 0.3 * np.round(truth / 0.3) + NOISE * generator.standard_normal(len(truth))
-    predicted = EFFECT.acts.given(truth[:, None], measured[:, None], np.array([NOISE]), (0,), {"step": 0.3})
+    predicted = EFFECT.action.conditioned(truth[:, None], measured[:, None], np.array([NOISE]), (0,), {"step": 0.3})
     np.testing.assert_allclose(predicted[:, 0], 0.3 * np.round(truth / 0.3))
 
 

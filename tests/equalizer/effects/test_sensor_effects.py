@@ -34,7 +34,7 @@ def command(bench) -> np.ndarray:
 
 
 def read(name: str, values: dict[str, float], response: np.ndarray, *channels: int) -> np.ndarray:
-    return EFFECTS[name].acts.change(response, 1000.0, channels, values)
+    return EFFECTS[name].action.change(response, 1000.0, channels, values)
 
 
 @pytest.mark.parametrize(("name", "values", "channels", "within"), STRONG, ids=lambda part: str(part))
@@ -150,7 +150,7 @@ def test_a_drift_is_one_over_the_whole_recording_also_where_its_beginning_alone_
     )
     whole = simulate_mechanism(model, command, 1000.0, drift).response
     n = len(command) // 3
-    seen = Measurement(whole[:n], np.ones(3), whole=len(command))
+    seen = Measurement(whole[:n], np.ones(3), full_length=len(command))
     assert np.allclose(
         simulate_mechanism(model, command[:n], 1000.0, drift, measurement=seen).response, whole[:n], atol=1e-9
     )

@@ -67,7 +67,7 @@ def by_numpy(tree: Node, numbers: list[float]) -> np.ndarray:
             return np.full(17, numbers[place])
         case Variable(name):
             return COLUMNS[name]
-    return NUMPY[tree.name](*(by_numpy(part, numbers) for part in tree.parts))
+    return NUMPY[tree.name](*(by_numpy(part, numbers) for part in tree.arguments))
 
 
 def law_with(tree: Node, numbers: list[float]) -> Law:

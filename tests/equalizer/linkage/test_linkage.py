@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from equalizer.linkage.calibration import CalibrationError, inertia_about
-from equalizer.linkage.grid import arm_azimuths, beside, difference_error, symmetric_grid
-from equalizer.linkage.mirror_lines import asymmetry_words, fill_in, line_asymmetry, reflection
+from equalizer.linkage.grid import arm_azimuths, difference_error, difference_positions, symmetric_grid
+from equalizer.linkage.mirror_lines import asymmetry_words, complete_by_symmetry, line_asymmetry, reflection
 from tests.equalizer.linkage.truth import ARMS_DEG, calibration, rates, reading, readings
 
 AZIMUTHS = np.radians(ARMS_DEG)
@@ -62,7 +62,7 @@ def test_what_was_not_read_is_filled_in_as_it_would_have_been_read():
     kept = [each for each in every if each.position_m[2] < 0.03]
     gone = [each for each in every if each.position_m[2] >= 0.03]
     assert len(gone) >= 15
-    filled, unknown = fill_in(kept, AZIMUTHS, np.array([each.position_m for each in gone]))
+    filled, unknown = complete_by_symmetry(kept, AZIMUTHS, np.array([each.position_m for each in gone]))
     assert len(filled) == len(gone) and unknown.size == 0
     for found, true in zip(filled, gone, strict=True):
         np.testing.assert_allclose(found.position_m, true.position_m, atol=1e-12)
@@ -74,21 +74,21 @@ def test_what_was_not_read_is_filled_in_as_it_would_have_been_read():
 def test_gravity_is_filled_in_by_the_upright_line_alone():
     left, right = (reading(np.array([0.01, y, 0.02])) for y in (-0.03, 0.03))
     sideways = replace(left, gravity_n=np.array([0.0, 0.3, 2.0]))
-    (filled,), _ = fill_in([sideways], AZIMUTHS, right.position_m[None])
+    (filled,), _ = complete_by_symmetry([sideways], AZIMUTHS, right.position_m[None])
     np.testing.assert_allclose(filled.gravity_n, [0.0, -0.3, 2.0], atol=1e-12)
     about_another = reflection(AZIMUTHS[1]) @ left.position_m
-    (filled,), _ = fill_in([sideways], AZIMUTHS, about_another[None])
+    (filled,), _ = complete_by_symmetry([sideways], AZIMUTHS, about_another[None])
     assert np.isnan(filled.gravity_n).all()
 
 
 def test_a_place_without_an_image_stays_unknown():
-    filled, unknown = fill_in([reading(np.zeros(3))], AZIMUTHS, np.array([[0.0, 0.01, 0.0]]))
+    filled, unknown = complete_by_symmetry([reading(np.zeros(3))], AZIMUTHS, np.array([[0.0, 0.01, 0.0]]))
     assert filled == [] and len(unknown) == 1
 
 
 def test_a_jacobian_is_told_from_another_by_differences():
     true = np.linalg.inv(rates(np.zeros(3)))
-    places = beside(np.zeros(3))
+    places = difference_positions(np.zeros(3))
     angles = places @ rates(np.zeros(3)).T
     assert difference_error(true, places, angles) < 1e-12
     assert difference_error(1.2 * true, places, angles) == pytest.approx(0.2)

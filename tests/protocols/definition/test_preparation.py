@@ -11,8 +11,14 @@ from protocols.definition.preparation import MaskingSettings, PracticeSettings
 from protocols.definition.probes import ProbeSettings
 from protocols.document.hashing import TABLES_SINCE, protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
-from protocols.procedure.practice import PracticeState, add_answer, practice_over, practice_passed, right_of_last
-from protocols.procedure.run_rules import staircase_rule
+from protocols.procedure.practice import (
+    PracticeState,
+    add_answer,
+    count_right_of_last,
+    is_practice_over,
+    is_practice_passed,
+)
+from protocols.procedure.run_rules import make_staircase_rule
 from protocols.trial import Phase
 
 SETTINGS = PracticeSettings(frequencies_hz=(15.0,), right_needed=3, of_last=4, trial_limit=6)
@@ -26,18 +32,18 @@ def after(*answers: bool) -> PracticeState:
 
 
 def test_practice_is_passed_by_the_last_answers_alone():
-    assert not practice_passed(SETTINGS, after(True, True, False, False))
+    assert not is_practice_passed(SETTINGS, after(True, True, False, False))
     passed = after(True, False, False, True, True, True)
-    assert practice_passed(SETTINGS, passed)
-    assert right_of_last(SETTINGS, passed) == 3
-    assert practice_over(SETTINGS, after(True, True, True))
+    assert is_practice_passed(SETTINGS, passed)
+    assert count_right_of_last(SETTINGS, passed) == 3
+    assert is_practice_over(SETTINGS, after(True, True, True))
 
 
 def test_practice_ends_without_being_passed():
     never = after(False, True, False, True, False, True)
-    assert not practice_passed(SETTINGS, never)
-    assert practice_over(SETTINGS, never)
-    assert not practice_over(SETTINGS, after(False, True, False, True, False))
+    assert not is_practice_passed(SETTINGS, never)
+    assert is_practice_over(SETTINGS, never)
+    assert not is_practice_over(SETTINGS, after(False, True, False, True, False))
 
 
 @pytest.mark.parametrize(
@@ -117,7 +123,7 @@ def _other(table, threshold):
 
 
 def test_detection_follows_the_rule_from_a_level_of_its_own(small_protocol):
-    rule = staircase_rule(replace(small_protocol, detection=DetectionSettings(start_n=0.25)), Phase.DETECTION)
+    rule = make_staircase_rule(replace(small_protocol, detection=DetectionSettings(start_n=0.25)), Phase.DETECTION)
     assert rule == replace(small_protocol.staircase, start_n=0.25)
     with pytest.raises(ValueError, match="follow no staircase"):
-        staircase_rule(small_protocol, Phase.CATCH)
+        make_staircase_rule(small_protocol, Phase.CATCH)

@@ -6,7 +6,7 @@ from protocols.definition.probes import ProbeSettings
 from protocols.document.hashing import protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
 from study.session.views.form_views import FormKind
-from study.session.views.forms import form_of
+from study.session.views.forms import make_form
 
 PROBES = "[probes]\nlevels_n = [0.2, 0.4, 0.8]\nreference_s = 20.0\n"
 
@@ -56,7 +56,7 @@ def test_a_probe_stays_below_the_cap_of_the_trials_and_is_no_steeper_than_they_a
 
 def test_the_consent_says_what_is_played_between_trials(small_text):
     protocol = load_protocol(text_of(small_text, PROBES), "small.toml")
-    form = form_of(protocol, FormKind.CONSENT)
+    form = make_form(protocol, FormKind.CONSENT)
     assert form is not None
     said = form.fields[-1].label
     assert "at most once in 60 seconds" in said
@@ -65,5 +65,5 @@ def test_the_consent_says_what_is_played_between_trials(small_text):
 
 
 def test_there_is_no_statement_where_nothing_is_played(small_protocol):
-    assert form_of(small_protocol, FormKind.CONSENT) is None
+    assert make_form(small_protocol, FormKind.CONSENT) is None
     assert ProbeSettings() == small_protocol.probes

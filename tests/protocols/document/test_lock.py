@@ -8,7 +8,7 @@ import pytest
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.document.hashing import protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
-from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_of, lock_to_json
+from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_to_json, make_lock
 
 WHEN = "2024-05-01T09:00:00+00:00"
 LOCAL = "2024-05-01 11:00 +02:00"
@@ -16,7 +16,7 @@ LOCAL = "2024-05-01 11:00 +02:00"
 
 @pytest.fixture
 def lock(threshold) -> ProtocolLock:
-    return lock_of(threshold, WHEN, "0.1.0")
+    return make_lock(threshold, WHEN, "0.1.0")
 
 
 def test_a_lock_fits_its_protocol(lock, threshold):
@@ -94,7 +94,7 @@ OTHERS = {
 @pytest.mark.parametrize("key", list(OTHERS))
 def test_contrast_sample_size_exclusions_and_interval_are_locked_each_by_its_own_key(threshold, key):
     declared = replace(threshold, analysis=AnalysisSettings(**DECLARED))
-    fixed = lock_of(declared, WHEN, "0.1.0")
+    fixed = make_lock(declared, WHEN, "0.1.0")
     check_lock(fixed, declared, LOCAL)
     changed = replace(threshold, analysis=AnalysisSettings(**{**DECLARED, key: OTHERS[key]}))
     with pytest.raises(LockError, match="has changed since"):

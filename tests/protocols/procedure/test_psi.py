@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 
 from protocols.definition.staircase_rule import BayesianPlacement
 from protocols.procedure.psi import (
-    LAPSE,
+    LAPSE_RATE,
     SLOPES,
-    estimate,
+    compute_posterior,
+    estimate_threshold,
     levels_db,
     next_level_db,
-    posterior,
     thresholds_db,
 )
-from protocols.procedure.staircase import begin, is_complete, is_finished, level_n, step, to_db
+from protocols.procedure.staircase import begin_staircase, is_complete, is_finished, level_n, step, to_db
 from tests.analysis.conftest import PUBLISHED
 
 CAP_DB = to_db(3.0)
@@ -29,7 +29,7 @@ def chance_right(level_db: float, threshold_db: float, slope: float) -> float:
     """The curve written out anew: Weibull over newtons, 79.37 % of attentive answers right at the threshold."""
     scale_n = 10 ** (threshold_db / 20) / (-math.log(2 - 2 * 0.5 ** (1 / 3))) ** (1 / slope)
     attentive = 1 - 0.5 * math.exp(-((10 ** (level_db / 20) / scale_n) ** slope))
-    return LAPSE * 0.5 + (1 - LAPSE) * attentive
+    return LAPSE_RATE * 0.5 + (1 - LAPSE_RATE) * attentive
 
 
 def brute_force(answers) -> dict[tuple[float, float], float]:
@@ -49,11 +49,11 @@ ANSWERS = ((0.0, True), (-6.0, True), (-12.0, False), (-8.0, True), (-10.0, Fals
 
 
 def test_the_posterior_is_bayes_rule_by_brute_force():
-    found, expected = posterior(ANSWERS, CAP_DB), brute_force(ANSWERS)
+    found, expected = compute_posterior(ANSWERS, CAP_DB), brute_force(ANSWERS)
     for i, threshold_db in enumerate(thresholds_db(CAP_DB)):
         for j, slope in enumerate(SLOPES):
             assert found[i, j] == pytest.approx(expected[threshold_db, slope], rel=1e-9, abs=1e-14)
-    got = estimate(found, CAP_DB)
+    got = estimate_threshold(found, CAP_DB)
     mean = sum(key[0] * p for key, p in expected.items())
     assert got.mean_db == pytest.approx(mean)
     assert got.sd_db == pytest.approx(math.sqrt(sum((key[0] - mean) ** 2 * p for key, p in expected.items())))
@@ -77,7 +77,7 @@ def test_the_next_level_leaves_the_least_entropy_by_brute_force(count):
         return total
 
     best = min(levels_db(CAP_DB), key=expected_entropy)
-    chosen = next_level_db(posterior(ANSWERS[:count], CAP_DB), CAP_DB)
+    chosen = next_level_db(compute_posterior(ANSWERS[:count], CAP_DB), CAP_DB)
     assert expected_entropy(chosen) == pytest.approx(expected_entropy(best), abs=1e-8)
 
 
@@ -87,7 +87,7 @@ def test_no_answers_lead_above_the_cap_and_the_same_answers_lead_to_the_same_lev
     rule = replace(RULE, cap_n=cap_n, start_n=min(1.0, cap_n))
     levels = []
     for _ in range(2):
-        state, played = begin(rule), []
+        state, played = begin_staircase(rule), []
         for answer in answers:
             played.append(level_n(rule, state))
             state = step(rule, state, answer)
@@ -104,7 +104,7 @@ def test_a_spread_without_trials_is_refused():
 
 def test_off_is_the_published_rule_to_the_last_level():
     random = np.random.default_rng(1)
-    a, b = begin(PUBLISHED), begin(replace(PUBLISHED, bayesian=BayesianPlacement()))
+    a, b = begin_staircase(PUBLISHED), begin_staircase(replace(PUBLISHED, bayesian=BayesianPlacement()))
     while not is_finished(PUBLISHED, a):
         answer = bool(random.random() < 0.8)
         a, b = step(PUBLISHED, a, answer), step(PUBLISHED, b, answer)

@@ -15,14 +15,14 @@ from protocols.definition.preparation import PracticeSettings
 from protocols.definition.study_protocol import ScheduleSettings
 from protocols.procedure.schedule import (
     Draw,
+    are_labels_swapped,
     detection_direction,
     draw_trial,
     draw_words,
-    frequency_order,
     is_catch_trial,
-    label_of,
-    labels_swapped,
-    runs,
+    label_direction,
+    order_frequencies,
+    schedule_runs,
 )
 from protocols.trial import Phase
 
@@ -40,7 +40,7 @@ def neighbour_correlation(values: np.ndarray) -> float:
 
 
 def test_training_comes_first_and_then_every_frequency_once(threshold):
-    plan = runs(threshold, seed=3, participant_number=0)
+    plan = schedule_runs(threshold, seed=3, participant_number=0)
     assert [run.index for run in plan] == list(range(10))
     assert [run.phase for run in plan] == [Phase.TRAINING] * 5 + [Phase.TEST] * 5
     assert [run.practice for run in plan] == [False] + [True] * 4 + [False] * 5
@@ -50,7 +50,7 @@ def test_training_comes_first_and_then_every_frequency_once(threshold):
 
 def test_detection_runs_come_last(threshold):
     asked = replace(threshold, detection=DetectionSettings(frequencies_hz=(45.0, 35.0)))
-    assert [(run.phase, run.frequency_hz) for run in runs(asked, seed=3, participant_number=0)[-2:]] == [
+    assert [(run.phase, run.frequency_hz) for run in schedule_runs(asked, seed=3, participant_number=0)[-2:]] == [
         (Phase.DETECTION, 45.0),
         (Phase.DETECTION, 35.0),
     ]
@@ -75,31 +75,31 @@ def test_the_direction_of_a_detection_trial_tells_nothing_of_its_interval():
 
 def test_training_alone_has_no_test_run(threshold):
     alone = replace(threshold, stimulus=replace(threshold.stimulus, frequencies_hz=()), practice=PracticeSettings())
-    assert [run.phase for run in runs(alone, seed=3, participant_number=0)] == [Phase.TRAINING]
+    assert [run.phase for run in schedule_runs(alone, seed=3, participant_number=0)] == [Phase.TRAINING]
     williams = replace(alone, schedule=ScheduleSettings(order="williams", labels="swapped_for_half"))
-    assert len(runs(williams, seed=3, participant_number=0)) == 1
-    assert labels_swapped(williams.schedule, 0, 1)
+    assert len(schedule_runs(williams, seed=3, participant_number=0)) == 1
+    assert are_labels_swapped(williams.schedule, 0, 1)
 
 
 def test_the_listed_order_is_kept_where_it_is_asked_for():
-    assert frequency_order(ScheduleSettings(order="as_listed"), (25.0, 5.0), 1, 0) == (25.0, 5.0)
+    assert order_frequencies(ScheduleSettings(order="as_listed"), (25.0, 5.0), 1, 0) == (25.0, 5.0)
 
 
 def test_random_orders_are_equally_likely():
-    orders = Counter(frequency_order(RANDOM, (1.0, 2.0, 3.0), seed, 0) for seed in range(3000))
+    orders = Counter(order_frequencies(RANDOM, (1.0, 2.0, 3.0), seed, 0) for seed in range(3000))
     assert len(orders) == 6
     # Six standard deviations of a binomial count.
     assert all(abs(count - 500) < 6 * np.sqrt(3000 * 1 / 6 * 5 / 6) for count in orders.values())
 
 
 def test_a_random_order_depends_on_the_seed_alone():
-    assert frequency_order(RANDOM, FIVE, 11, 0) == frequency_order(RANDOM, FIVE, 11, 9)
+    assert order_frequencies(RANDOM, FIVE, 11, 0) == order_frequencies(RANDOM, FIVE, 11, 9)
 
 
 @pytest.mark.parametrize("frequencies", [FIVE, FIVE[:4]])
 def test_williams_orders_are_balanced_over_participants_for_any_seeds(frequencies):
     participants = 2 * len(frequencies)
-    orders = [frequency_order(WILLIAMS, frequencies, seed, seed) for seed in range(participants)]
+    orders = [order_frequencies(WILLIAMS, frequencies, seed, seed) for seed in range(participants)]
     positions = Counter((position, value) for order in orders for position, value in enumerate(order))
     neighbours = Counter(pair for order in orders for pair in pairwise(order))
     assert set(positions.values()) == {2}
@@ -108,16 +108,21 @@ def test_williams_orders_are_balanced_over_participants_for_any_seeds(frequencie
 
 def test_labels_are_swapped_for_half_and_for_every_williams_row_alike():
     settings_ = ScheduleSettings(order="williams", labels="swapped_for_half")
-    swapped = [labels_swapped(settings_, 5, number) for number in range(20)]
+    swapped = [are_labels_swapped(settings_, 5, number) for number in range(20)]
     assert sum(swapped[:10]) == 5
     assert all(swapped[row] != swapped[row + 10] for row in range(10))
-    assert [labels_swapped(replace(settings_, order="random"), 5, n) for n in range(4)] == [False, True, False, True]
-    assert not any(labels_swapped(WILLIAMS, 5, number) for number in range(20))
+    assert [are_labels_swapped(replace(settings_, order="random"), 5, n) for n in range(4)] == [
+        False,
+        True,
+        False,
+        True,
+    ]
+    assert not any(are_labels_swapped(WILLIAMS, 5, number) for number in range(20))
 
 
 def test_swapped_labels_change_places_and_back():
-    assert [label_of(direction, True) for direction in (1, 2)] == [2, 1]
-    assert [label_of(direction, False) for direction in (1, 2)] == [1, 2]
+    assert [label_direction(direction, True) for direction in (1, 2)] == [2, 1]
+    assert [label_direction(direction, False) for direction in (1, 2)] == [1, 2]
 
 
 def test_independent_draws_are_fair_and_know_nothing_of_their_neighbours():
@@ -199,7 +204,7 @@ def test_draws_are_the_same_on_every_machine_and_for_all_time():
         Draw(direction=2, polarity=-1),
         Draw(direction=2, polarity=1),
     ]
-    assert frequency_order(RANDOM, FIVE, 1, 0) == (15.0, 25.0, 35.0, 5.0, 45.0)
+    assert order_frequencies(RANDOM, FIVE, 1, 0) == (15.0, 25.0, 35.0, 5.0, 45.0)
 
 
 @given(seed=st.integers(0, 2**63), run=st.integers(0, 30), trial=st.integers(0, 10_000), attempt=st.integers(0, 50))

@@ -9,7 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocols.definition.staircase_rule import StaircaseRule, StepChange, StepPhase
-from protocols.procedure.staircase import Heading, StaircaseState, begin, is_finished, level_n, step, to_db, to_newton
+from protocols.procedure.staircase import (
+    Heading,
+    StaircaseState,
+    begin_staircase,
+    is_finished,
+    level_n,
+    step,
+    to_db,
+    to_newton,
+)
 
 S1 = "111111011101110011111101110011101110"
 S2 = "11111101110011111101110111011101110"
@@ -37,7 +46,7 @@ CASES = [
 
 def states(rule: StaircaseRule, answers: str) -> list[StaircaseState]:
     """The state before every answer, and the last one."""
-    run = [begin(rule)]
+    run = [begin_staircase(rule)]
     for answer in answers:
         run.append(step(rule, run[-1], answer == "1"))
     return run
@@ -49,7 +58,7 @@ def levels_db(rule: StaircaseRule, answers: str) -> list[float]:
 
 
 def until_finished(rule: StaircaseRule, answers: list[bool]) -> list[StaircaseState]:
-    run = [begin(rule)]
+    run = [begin_staircase(rule)]
     for correct in answers:
         if is_finished(rule, run[-1]):
             break
@@ -163,7 +172,7 @@ def test_only_peaks_at_the_cap_count_as_reversals_there(published):
 @settings(max_examples=60, deadline=None)
 def test_no_rounding_of_decibels_leads_above_the_cap(published, cap_n):
     rule = replace(published, start_n=cap_n, cap_n=cap_n)
-    assert level_n(rule, begin(rule)) <= cap_n
+    assert level_n(rule, begin_staircase(rule)) <= cap_n
 
 
 @pytest.mark.parametrize(("change", "last_db"), [(A, -3.0), (B, -6.0), (C, -3.0)])

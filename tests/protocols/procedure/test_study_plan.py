@@ -6,7 +6,7 @@ import pytest
 
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.study_protocol import ScheduleSettings
-from protocols.procedure.schedule import frequency_order, labels_swapped
+from protocols.procedure.schedule import are_labels_swapped, order_frequencies
 from protocols.procedure.study_plan import Participant, plan_study
 
 FIVE = (5.0, 15.0, 25.0, 35.0, 45.0)
@@ -45,18 +45,18 @@ def test_cells_are_what_the_schedule_gives_to_each_number(study_of, order, label
     for number in range(60):
         plan = plan_study(protocol, [], number)
         assert len(plan.cells) == cells
-        assert plan.next_cell.swapped == labels_swapped(protocol.schedule, len(frequencies_hz), number)
+        assert plan.next_cell.swapped == are_labels_swapped(protocol.schedule, len(frequencies_hz), number)
         if order == "random":
             assert plan.next_cell.frequencies_hz == ()
         else:
-            given = frequency_order(protocol.schedule, frequencies_hz, 11, number)
+            given = order_frequencies(protocol.schedule, frequencies_hz, 11, number)
             assert plan.next_cell.frequencies_hz == given
 
 
 @pytest.mark.parametrize("order", ["random", "as_listed"])
 def test_where_nothing_is_balanced_there_is_no_cell(study_of, order):
     plan = plan_study(study_of(order), people("done"), 1)
-    assert (plan.cells, plan.next_cell, plan.balanced_sizes) == ((), None, 1)
+    assert (plan.cells, plan.next_cell, plan.cycle_length) == ((), None, 1)
 
 
 def test_a_whole_sample_needs_nothing_and_fills_each_cell_equally_often(study_of):
@@ -84,11 +84,11 @@ def test_participants_without_a_number_hold_no_cell(study_of):
 
 def test_a_sample_that_is_no_multiple_wants_the_first_cells_once_more(study_of):
     plan = plan_study(study_of(planned=13), [], 0)
-    assert [cell.wanted for cell in plan.cells] == [2, 2, 2, *[1] * 7]
-    assert plan.planned % plan.balanced_sizes == 3
+    assert [cell.required for cell in plan.cells] == [2, 2, 2, *[1] * 7]
+    assert plan.planned % plan.cycle_length == 3
 
 
 @pytest.mark.parametrize(("begun", "wanted"), [(0, 1), (10, 1), (11, 2)])
 def test_without_a_declared_size_the_cycles_begun_are_wanted(study_of, begun, wanted):
     plan = plan_study(study_of(), people(*["done"] * begun), begun)
-    assert {cell.wanted for cell in plan.cells} == {wanted}
+    assert {cell.required for cell in plan.cells} == {wanted}

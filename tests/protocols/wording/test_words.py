@@ -11,7 +11,7 @@ from protocols.document.loading import ProtocolError, load_protocol, protocol_fr
 from protocols.wording.english import ENGLISH, LANGUAGES, placeholders
 from protocols.wording.english_facts import FACTS
 from protocols.wording.english_forms import PROTOCOLS
-from protocols.wording.in_language import in_language, table_problems
+from protocols.wording.in_language import find_table_problems, translate_protocol
 from protocols.wording.words import ENGLISH_WORDS, Words
 
 TRANSLATED = tuple(code for code in LANGUAGES if code != "en")
@@ -33,7 +33,7 @@ def text_of(name):
 
 @pytest.mark.parametrize("code", TRANSLATED)
 def test_a_shipped_table_has_every_text_with_the_braces_of_the_english_one(code):
-    assert table_problems(table_of(code), whole=True) == ()
+    assert find_table_problems(table_of(code), require_all=True) == ()
 
 
 @pytest.mark.parametrize("code", TRANSLATED)
@@ -64,15 +64,15 @@ def test_choices_of_a_form_can_be_told_apart(code):
     ],
 )
 def test_a_wrong_text_is_refused(key, text, told):
-    (problem,) = table_problems({key: text}, whole=False)
+    (problem,) = find_table_problems({key: text}, require_all=False)
     assert told in str(problem)
 
 
 def test_every_missing_key_is_named_with_its_english_text():
     table = table_of("de")
     del table["rest_title"], table["yes"]
-    assert [problem.key for problem in table_problems(table, whole=True)] == ["rest_title", "yes"]
-    assert '"Rest"' in str(table_problems(table, whole=True)[0])
+    assert [problem.key for problem in find_table_problems(table, require_all=True)] == ["rest_title", "yes"]
+    assert '"Rest"' in str(find_table_problems(table, require_all=True)[0])
 
 
 def test_a_fact_is_recognised_and_its_parts_too():
@@ -93,8 +93,8 @@ def test_a_text_whose_braces_do_not_fit_is_shown_in_english():
 
 def test_all_braces_of_the_english_texts_are_names():
     assert [key for key, text in ENGLISH.items() if placeholders(text) is None] == []
-    assert ENGLISH_WORDS.counted("runs_left", 1) == "1 run is left."
-    assert ENGLISH_WORDS.counted("runs_left", 0) == "0 runs are left."
+    assert ENGLISH_WORDS.fill_count("runs_left", 1) == "1 run is left."
+    assert ENGLISH_WORDS.fill_count("runs_left", 0) == "0 runs are left."
 
 
 @pytest.mark.parametrize("name", STUDIES)
@@ -112,7 +112,7 @@ def test_a_study_in_another_language_is_the_same_study(name, code):
     values = tomllib.loads(text_of(name))
     english, other = (
         protocol_from_values(values, name),
-        protocol_from_values(in_language(values, table_of(code), code), name),
+        protocol_from_values(translate_protocol(values, table_of(code), code), name),
     )
     assert protocol_hash(english) != protocol_hash(other)
     assert not {other.title, *other.consent.statements, *other.consent.exclusions} & set(PROTOCOLS.values())
@@ -126,10 +126,10 @@ def test_a_study_in_another_language_is_the_same_study(name, code):
 
 def test_a_text_of_ones_own_wins_and_counts():
     values = {**tomllib.loads(text_of("direction_training")), "text": {"words": {"rest_title": "Kaffee"}}}
-    own = protocol_from_values(in_language(values, table_of("de"), "de"), "mine")
+    own = protocol_from_values(translate_protocol(values, table_of("de"), "de"), "mine")
     assert own.text.words["rest_title"] == "Kaffee"
     assert own.text.words["pause_free"] == table_of("de")["pause_free"]
-    plain = protocol_from_values(in_language({**values, "text": {}}, table_of("de"), "de"), "mine")
+    plain = protocol_from_values(translate_protocol({**values, "text": {}}, table_of("de"), "de"), "mine")
     assert protocol_hash(own) != protocol_hash(plain)
 
 

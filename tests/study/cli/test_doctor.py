@@ -12,12 +12,12 @@ import pytest
 from study.cli import doctor
 from study.cli.main import main
 from study.devices.accelerometer import six_positions
-from study.devices.accelerometer.calibration import GRAVITY_MPS2, UP
+from study.devices.accelerometer.calibration import GRAVITY_MPS2, UP_DIRECTIONS
 from study.devices.device import Fault, Health
 from study.devices.force_dimension import findings
 from study.devices.force_dimension.usb import UsbDevice
 from study.errors import ExitCode
-from study.session.stimulus.timing_verdict import judge_lateness, judge_load, lateness_of
+from study.session.stimulus.timing_verdict import judge_lateness, judge_load, measure_lateness
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.check_timing import Timing
@@ -156,7 +156,7 @@ def test_six_positions_by_enter_are_kept_in_the_lab_s_file(capsys, monkeypatch, 
     monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "lab.toml"))
     monkeypatch.setattr(six_positions, "REST_S", 0.3)
     with contextlib.closing(Board(2000.0)) as board:
-        laid = iter(UP)
+        laid = iter(UP_DIRECTIONS)
 
         def readline() -> str:
             board.acceleration = GRAVITY_MPS2 * next(laid)
@@ -253,7 +253,7 @@ def examination(timing: Timing) -> Examination:
 
 
 def measured(late_ms: float, load: float, simulated: bool) -> Timing:
-    lateness = lateness_of(np.full(2000, late_ms / 1000.0), 1000.0)
+    lateness = measure_lateness(np.full(2000, late_ms / 1000.0), 1000.0)
     return Timing(2.0, HEALTH, lateness, (judge_lateness(lateness, simulated), judge_load(load)))
 
 
@@ -278,7 +278,7 @@ def test_verdict_figures_summary_and_exit_code_agree(capsys, late_ms, load, simu
     assert tuple(words[0] for words in timing) == verdicts
     assert (looked.exit_code, lines[-1]) == (code, summary)
     assert not any(line.lstrip().startswith("fine") and "too late" in line for line in lines)
-    assert doctor._document(looked)["fine"] is (summary[:3] == "All")
+    assert doctor._make_document(looked)["fine"] is (summary[:3] == "All")
 
 
 def test_without_a_sensor_no_daily_check_begins(run, monkeypatch, tmp_path):

@@ -13,7 +13,7 @@ from scipy.io import loadmat
 from protocols.definition.participant_text import Question
 from protocols.trial import Trial
 from study.cli.main import main
-from study.store.disk.csv_rows import columns
+from study.store.disk.csv_rows import column_names
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats.answer_table import AnswerColumn, AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
@@ -42,7 +42,7 @@ def logged(data: Path) -> list[Trial]:
 
 
 def test_every_column_is_described():
-    assert set(TRIAL_COLUMNS) == set(columns(Trial))
+    assert set(TRIAL_COLUMNS) == set(column_names(Trial))
 
 
 def test_a_psych_ds_dataset_names_all_its_columns(data, tmp_path):
@@ -155,7 +155,7 @@ def test_one_table_has_every_trial_and_a_dictionary_of_its_columns(data, tmp_pat
     assert read_trials(tmp_path / "csv" / "trials.csv") == tuple(logged(data))
     with (tmp_path / "csv" / "dictionary.csv").open(newline="", encoding="utf-8") as table:
         described = {row["column"]: row for row in csv.DictReader(table)}
-    assert list(described) == list(columns(Trial))
+    assert list(described) == list(column_names(Trial))
     assert described["level_n"]["unit"] == "N"
     assert {name: row["description"] for name, row in described.items()} == {
         name: words for name, (words, _) in TRIAL_COLUMNS.items()
@@ -180,7 +180,7 @@ def test_a_matlab_file_holds_every_trial(data, tmp_path):
     trials = logged(data)
     assert found["trials"]["level_n"].tolist() == [trial.level_n for trial in trials]
     assert list(found["trials"]["session"]) == [trial.session for trial in trials]
-    assert set(found["trials"]) == set(columns(Trial))
+    assert set(found["trials"]) == set(column_names(Trial))
     assert found["units"]["level_n"] == "N"
 
 

@@ -8,7 +8,7 @@ import select
 import pytest
 
 from study.cli.motion_notice import announce
-from study.cli.progress import late_bar
+from study.cli.progress import show_late_bar
 from study.errors import StudyError, WrongUseError
 from study.session.views.views import DeviceReport
 from study.workflows.checks import examine_setup
@@ -127,7 +127,7 @@ def test_a_late_bar_draws_nothing_before_there_is_progress(monkeypatch):
     os.set_blocking(reader, False)
     with os.fdopen(writer, "w") as screen:
         monkeypatch.setattr("sys.stderr", screen)
-        with late_bar("Sweeps (s)", total=10.0) as show:
+        with show_late_bar("Sweeps (s)", total=10.0) as show:
             with pytest.raises(BlockingIOError):
                 os.read(reader, 1)
             show(2.0)

@@ -97,7 +97,7 @@ def test_a_wrong_protocol_names_file_key_and_what_is_allowed(run, small_file, tm
 def test_leaving_is_not_finishing(run, small_file, tmp_path, monkeypatch):
     from study.session.views.views import Unanswered
 
-    leave = Unanswered("the participant left", leave=True)
+    leave = Unanswered("the participant left", ends_sitting=True)
     monkeypatch.setattr("study.workflows.session.simulated_display.SimulatedDisplay.ask", lambda *_: leave)
     code, out, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", tmp_path / "d")
     assert (code, out) == (130, "")

@@ -189,7 +189,7 @@ def test_the_watch_outlives_a_count_that_fails_in_an_unforeseen_way(address, mon
 
 
 def test_workers_that_leave_while_they_are_asked_are_no_workers(monkeypatch):
-    monkeypatch.setattr(cluster, "_ask", lambda client: cluster._Found({"tcp://w": cluster.own_version()}, ()))
+    monkeypatch.setattr(cluster, "_ask", lambda client: cluster._WorkerSetup({"tcp://w": cluster.hapteq_version()}, ()))
     with pytest.raises(StudyError, match=r"The scheduler at tcp://s has no workers\."):
         cluster._require_workers(None, "tcp://s", one_thread=True)
 

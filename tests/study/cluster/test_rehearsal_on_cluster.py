@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from protocols.document.loading import load_protocol
-from study.store.sessions.archive import session_folders
+from study.store.sessions.archive import list_session_folders
 from study.workflows.cluster import cluster_workers
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
@@ -32,7 +32,7 @@ def here(rehearsal):
 def tables(data):
     """Thresholds and trials of all sessions."""
     found = {}
-    for folder in session_folders(data):
+    for folder in list_session_folders(data):
         found[folder.name] = (folder.path / "thresholds.csv").read_bytes()
         with (folder.path / "trials.csv").open(newline="") as table:
             rows = [
@@ -53,11 +53,11 @@ def test_a_cluster_plays_the_same_sessions_and_keeps_those_that_are_there(rehear
         rehearse_study(there, pool, done.append)
         assert done == [1, 2, 3]
         assert tables(there.data) == here
-        logs = [folder.log.stat().st_mtime_ns for folder in session_folders(there.data)]
+        logs = [folder.log.stat().st_mtime_ns for folder in list_session_folders(there.data)]
         rehearse_study(there, pool, done.append)
     assert done == [1, 2, 3, 1, 2, 3]
-    assert [folder.log.stat().st_mtime_ns for folder in session_folders(there.data)] == logs
-    assert all(fold_session(folder).state.closed for folder in session_folders(there.data))
+    assert [folder.log.stat().st_mtime_ns for folder in list_session_folders(there.data)] == logs
+    assert all(fold_session(folder).state.closed for folder in list_session_folders(there.data))
     assert {path.stat().st_mode & 0o077 for path in there.data.rglob("*")} == {0}
 
 
@@ -77,7 +77,7 @@ def test_a_session_that_was_begun_here_is_finished(rehearsal, local, here, sessi
     there = elsewhere(rehearsal, tmp_path)
     with cluster_workers(local.scheduler_address, one_thread=True) as pool:
         rehearse_study(there, pool, lambda done: None)
-        first, second = session_folders(there.data)[:2]
+        first, second = list_session_folders(there.data)[:2]
         log = first.log.read_bytes()
         first.log.write_bytes(log[: len(log) // 2])
         session_logs.unsealed(first.path)
@@ -85,7 +85,7 @@ def test_a_session_that_was_begun_here_is_finished(rehearsal, local, here, sessi
             path.rmdir() if path.is_dir() else path.unlink()
         second.path.rmdir()
         rehearse_study(there, pool, lambda done: None)
-    assert all(fold_session(folder).state.closed for folder in session_folders(there.data))
+    assert all(fold_session(folder).state.closed for folder in list_session_folders(there.data))
     after = tables(there.data)
     untouched = [name for name in here if not name.startswith(first.name)]
     assert {name: after[name] for name in untouched} == {name: here[name] for name in untouched}

@@ -11,7 +11,7 @@ import pytest
 
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
-from study.devices.drive.realtime_drive import PATIENCE_S, Glances
+from study.devices.drive.realtime_drive import PATIENCE_S, ReadingRequests
 from study.devices.rig import READING_SIZE
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
@@ -208,23 +208,23 @@ class StillClock(RealClock):
 
 def test_concurrent_requests_get_the_same_reading():
     clock, served = StillClock(), []
-    glances = Glances(clock, wake=lambda: None)
+    glances = ReadingRequests(clock, wake=lambda: None)
     askers = [threading.Thread(target=lambda: served.append(glances.ask())) for _ in range(2)]
     for asker in askers:
         asker.start()
-    while not glances.wanted:
+    while not glances.is_pending:
         time.sleep(0.001)
     time.sleep(0.02)
     glances.mark_taken()
     for asker in askers:
         asker.join()
     assert served == [True, True]
-    assert not glances.wanted
+    assert not glances.is_pending
 
 
 def test_a_late_request_is_not_waited_for_again_until_it_is_served():
     clock = StillClock()
-    glances = Glances(clock, wake=lambda: None)
+    glances = ReadingRequests(clock, wake=lambda: None)
     assert not glances.ask()
     clock.seconds = 1.0
     assert seconds_for(glances.ask) < 0.05

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from study.devices.masking_sound import MaskingSound
-from study.devices.opening import masking_sound
+from study.devices.opening import make_masking_sound
 from study.errors import DeviceError
 
 SAMPLES = np.arange(1, 101, dtype=np.int16)
@@ -97,7 +97,7 @@ def test_an_output_that_refuses_is_an_error_with_what_to_do(sound, output):
 def test_without_a_library_or_an_output_it_is_said_before_anything_begins(monkeypatch, library):
     monkeypatch.setitem(sys.modules, "sounddevice", library)
     with pytest.raises(DeviceError, match="cannot be played"):
-        masking_sound(SAMPLES, 44_100)
+        make_masking_sound(SAMPLES, 44_100)
 
 
 def test_the_library_is_asked_for_one_channel_of_16_bit(monkeypatch, output):
@@ -110,7 +110,7 @@ def test_the_library_is_asked_for_one_channel_of_16_bit(monkeypatch, output):
 
     fake = SimpleNamespace(OutputStream=stream, query_devices=lambda kind: {"name": f"default {kind}"})
     monkeypatch.setitem(sys.modules, "sounddevice", fake)
-    sound = masking_sound(SAMPLES, 44_100)
+    sound = make_masking_sound(SAMPLES, 44_100)
     sound.start()
     assert asked == {"samplerate": 44_100, "channels": 1, "dtype": "int16"}
     assert sound.output == "default output" and output.taken(2) == [1, 2]

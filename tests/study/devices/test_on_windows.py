@@ -117,7 +117,7 @@ def test_where_the_parent_s_number_stays_after_its_end_the_closed_pipe_ends_the_
 
     parent = os.getppid()
     monkeypatch.setattr(serve.os, "getppid", lambda: parent)
-    assert not serve.Lifetime(parent, []).is_over()
+    assert not serve.Lifetime(parent, []).must_end()
     device = SafeDevice(rigs.ScriptedRig(), rigs.SETTINGS, RealClock())
     here = served_device.ServedHere(device)
     assert not here.server.ended.wait(0.2)

@@ -17,7 +17,7 @@ NAMED_IN = {
     "RIGS_BY_NAME": {"study/devices/opening.py"},
     "find_rig": {"study/devices/opening.py"},
     "make_simulated_rig": set(),
-    "replay_rig": {"study/devices/rigs_by_name.py"},
+    "make_replay_rig": {"study/devices/rigs_by_name.py"},
     "build_omega3": {"study/devices/rigs_by_name.py"},
     "force_dimension_rig": {"study/devices/rigs_by_name.py"},
     "ForceDimensionRig": {"study/devices/force_dimension/rigs.py"},
@@ -39,7 +39,7 @@ NAMED_IN = {
     },
     "CompiledTicks": {"study/devices/drive/stepped_runner.py"},
     "write_once": {"study/devices/force_dimension/tick_io.py", "study/devices/force_dimension/rig.py"},
-    "rest_once": {
+    "repeat_zero_once": {
         "study/devices/force_dimension/tick_io.py",
         "study/devices/force_dimension/rig.py",  # zero only
     },

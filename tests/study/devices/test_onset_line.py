@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from study.devices import onset_line as module
 from study.devices.onset_line import OnsetLine, PulseSettings, open_onset_line, open_port
-from study.devices.opening import onset_line
+from study.devices.opening import find_onset_line
 from study.errors import DeviceError
 
 BYTE = PulseSettings("serial-byte", "/dev/ttyUSB0", code=7)
@@ -183,7 +183,7 @@ def test_a_parallel_port_is_claimed_shows_the_code_and_is_given_back(monkeypatch
     with contextlib.closing(OnsetLine(PulseSettings("parallel", str(port), code=9), open_port)) as pulses:
         assert pulses.pulse().line == f"data lines 9 of {port}"
     high, low = (module.WRITE_DATA, b"\x09"), (module.WRITE_DATA, b"\x00")
-    assert asked == [(module.CLAIM, 0), high, low, low, (module.RELEASE, 0)]
+    assert asked == [(module.CLAIM_PORT, 0), high, low, low, (module.RELEASE_PORT, 0)]
 
 
 @pytest.mark.parametrize("kind", ["serial-byte", "serial-dtr", "parallel"])
@@ -192,9 +192,9 @@ def test_a_line_that_is_not_there_stops_before_the_session(tmp_path, kind, monke
     file.write_text(f'[pulse]\nkind = "{kind}"\nport = "{tmp_path}/none"\n')
     monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(file))
     with pytest.raises(DeviceError, match="onset pulses cannot be opened"):
-        onset_line()
+        find_onset_line()
     file.write_text("")
-    assert onset_line() is None
+    assert find_onset_line() is None
 
 
 @pytest.mark.parametrize("wrong", [{"code": 0}, {"code": 256}, {"width_s": 0.0}, {"kind": "usb"}, {"volts": 5}])

@@ -9,7 +9,7 @@ from study.importing.header_map import header_map, header_notes, header_problems
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import MapNeededError
 from study.importing.map_format.map_toml import parse_map
-from study.importing.map_format.signal_words import name_signal, propose_roles, unit_in
+from study.importing.map_format.signal_words import parse_signal_name, propose_roles, split_bracketed_unit
 from study.importing.map_skeleton import map_skeleton
 from study.store.disk.file_errors import UnusableFileError
 from study.workflows.recording.import_recording import read_foreign
@@ -30,7 +30,7 @@ def arrays(tmp_path, header):
      ("[N]", ("[N]", ""))],
 )  # fmt: skip
 def test_a_header_is_a_name_and_a_unit(header, expected):
-    assert unit_in(header) == expected
+    assert split_bracketed_unit(header) == expected
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_arrays_of_several_lengths_are_not_guessed_at(tmp_path):
 
 def test_a_reference_is_no_response(tmp_path):
     held = arrays(tmp_path, "t_s,u_V,y_m,y_ref_m")
-    roles = dict(zip(held.by_name, propose_roles([name_signal(name) for name in held.by_name]), strict=True))
+    roles = dict(zip(held.by_name, propose_roles([parse_signal_name(name) for name in held.by_name]), strict=True))
     assert (roles["u_V"], roles["y_m"], roles["y_ref_m"]) == ("command", "response", "helper")
 
 
@@ -180,8 +180,8 @@ def test_a_completed_skeleton_is_a_map(tmp_path):
     ],
 )  # fmt: skip
 def test_quantity_and_unit_are_read_out_of_a_name(name, unit, quantity, sure):
-    found = name_signal(name)
-    assert (found.unit, found.quantity, found.sure) == (unit, quantity, sure)
+    found = parse_signal_name(name)
+    assert (found.unit, found.quantity, found.is_certain) == (unit, quantity, sure)
 
 
 def runs(*names):
@@ -268,12 +268,12 @@ def test_a_rate_without_a_unit_is_not_guessed_and_of_two_none_is_chosen(tmp_path
 
 @pytest.mark.parametrize("none", ["N/A", "n/a", "-"])
 def test_no_unit_may_be_said_in_brackets(none):
-    assert (name_signal(f"force [{none}]").unit, name_signal(f"force [{none}]").doubt) == ("", "")
+    assert (parse_signal_name(f"force [{none}]").unit, parse_signal_name(f"force [{none}]").doubt) == ("", "")
 
 
 @pytest.mark.parametrize("header", ["p [bar g]", "pressure [bar g]", "x [N V]"])
 def test_a_unit_of_nothing_that_is_known_is_doubted(header):
-    assert "what is measured in" in name_signal(header).doubt
+    assert "what is measured in" in parse_signal_name(header).doubt
 
 
 @pytest.mark.parametrize(("unit", "said"), [("A rms", True), ("A (peak)", True), ("Arms", True), ("A", False)])

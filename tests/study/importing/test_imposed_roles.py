@@ -5,7 +5,7 @@ from study.importing.arrays.arrays import read_arrays
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_skeleton import map_skeleton
 from study.workflows.recording.import_recording import read_foreign
-from tests.analysis.look.test_imposed_motion import TRIANGLE, element, motion_of, smooth
+from tests.analysis.look.test_imposed_motion import TRIANGLE, driven_motion, hysteretic_force, smooth
 
 COUNT = 4000
 PULL = 5 * TRIANGLE[:COUNT]
@@ -20,7 +20,7 @@ def table(tmp_path, header, *columns):
 
 @pytest.mark.parametrize("names", ["displacement [mm],load [kN]", "stroke_mm,force_N", "angle [deg],torque [N m]"])
 def test_an_imposed_displacement_is_the_command_and_both_ways_are_said(tmp_path, names):
-    path = table(tmp_path, f"time [s],{names}", PULL, element(TRIANGLE)[:COUNT])
+    path = table(tmp_path, f"time [s],{names}", PULL, hysteretic_force(TRIANGLE)[:COUNT])
     found = read_foreign((path,), None)
     assert found.recording.command.quantities[0] in ("position", "angle")
     assert found.recording.response.quantities[0] in ("force", "torque")
@@ -30,7 +30,7 @@ def test_an_imposed_displacement_is_the_command_and_both_ways_are_said(tmp_path,
 
 
 def test_a_force_that_is_no_answer_stays_the_command_and_both_ways_are_said(tmp_path):
-    path = table(tmp_path, "time [s],displacement [mm],load [kN]", motion_of(NOISE), NOISE)
+    path = table(tmp_path, "time [s],displacement [mm],load [kN]", driven_motion(NOISE), NOISE)
     found = read_foreign((path,), None)
     assert found.recording.command.quantities == ("force",)
     (note,) = [note for note in found.notes if "taken for the command" in note]
@@ -39,14 +39,14 @@ def test_a_force_that_is_no_answer_stays_the_command_and_both_ways_are_said(tmp_
 
 @pytest.mark.parametrize("names", ["displacement [mm],force command [N]", "speed [mm/s],force [N]"])
 def test_where_names_say_the_command_the_data_are_not_asked(tmp_path, names):
-    path = table(tmp_path, f"time [s],{names}", PULL, element(TRIANGLE)[:COUNT])
+    path = table(tmp_path, f"time [s],{names}", PULL, hysteretic_force(TRIANGLE)[:COUNT])
     found = read_foreign((path,), None)
     assert found.recording.command.quantities == ("force",)
     assert not [note for note in found.notes if "taken for the command" in note]
 
 
 def test_the_map_that_is_proposed_has_the_same_roles_and_says_so(tmp_path):
-    path = table(tmp_path, "clock,displacement [mm],load [kN]", PULL, element(TRIANGLE)[:COUNT])
+    path = table(tmp_path, "clock,displacement [mm],load [kN]", PULL, hysteretic_force(TRIANGLE)[:COUNT])
     text = map_skeleton(read_arrays(path, CsvMap()))
     roles = [line.split('"')[1] for line in text.splitlines() if line.startswith("role = ")]
     assert roles[-2:] == ["command", "response"]

@@ -5,7 +5,7 @@ import pytest
 
 from study.importing.arrays.arrays import Arrays
 from study.importing.header_map import header_map, header_problems
-from study.importing.map_format.signal_words import name_signal
+from study.importing.map_format.signal_words import parse_signal_name
 from study.importing.map_skeleton import map_skeleton
 
 
@@ -36,13 +36,13 @@ def test_a_header_says_all(tmp_path, names):
      ("Yaw_Rate_deg_s", "deg/s", "velocity"), ("pitch [deg]", "deg", "angle"), ("Fuerza_N", "N", "force")],
 )  # fmt: skip
 def test_what_underscores_join_is_sure(name, unit, quantity):
-    found = name_signal(name)
-    assert (found.unit, found.quantity, found.sure) == (unit, quantity, True)
+    found = parse_signal_name(name)
+    assert (found.unit, found.quantity, found.is_certain) == (unit, quantity, True)
 
 
 @pytest.mark.parametrize("name", ["phase_A", "y_s", "stage_in", "value_min", "average_MA"])
 def test_an_end_that_may_be_a_word_stays_unsure(name):
-    assert not name_signal(name).sure
+    assert not parse_signal_name(name).is_certain
 
 
 def test_the_output_of_a_loop_is_proposed_and_what_it_measures_stays_open(tmp_path):

@@ -8,7 +8,7 @@ from protocols.trial import Phase
 from study.participants.delivered_feeler import DeliveredFeeler
 from study.participants.observer import PerceivedStimulus
 from study.participants.observers import find_observer
-from study.participants.population import TYPICAL_THRESHOLDS_N, member, person
+from study.participants.population import TYPICAL_THRESHOLDS_N, draw_person, make_member
 from study.session.stimulus.delivered import Delivered
 
 TARGET = 0.5 ** (1 / 3)
@@ -61,9 +61,9 @@ def test_a_long_run_numbs_by_a_decibel_and_a_new_one_begins_afresh(observer):
 
 
 def test_the_delivered_population_has_the_thresholds_of_the_population(observer):
-    found = member("delivered", 3, 5)
+    found = make_member("delivered", 3, 5)
     assert isinstance(found, DeliveredFeeler)
-    assert (found.feeler, found.name) == (person(3, 5), "delivered_3_seed_5")
+    assert (found.feeler, found.name) == (draw_person(3, 5), "delivered_3_seed_5")
     assert find_observer("delivered_3_seed_5", 0) == found
 
 

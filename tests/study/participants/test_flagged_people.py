@@ -9,12 +9,12 @@ from analysis.psychophysics.repeated_trials import repeat_warning
 from analysis.psychophysics.study_warnings import study_warnings
 from analysis.psychophysics.threshold_table import threshold_table
 from analysis.psychophysics.thresholds import thresholds
-from protocols.procedure.staircase import begin, is_finished, level_n
+from protocols.procedure.staircase import begin_staircase, is_finished, level_n
 from protocols.trial import Phase, TrialStatus, VoidCause
 from study.participants.observer import PerceivedStimulus
 from study.participants.observers import find_observer
-from study.participants.population import member
-from tests.analysis.conftest import PUBLISHED, TEMPLATE, played
+from study.participants.population import make_member
+from tests.analysis.conftest import PUBLISHED, TEMPLATE, play_trial
 
 HZ = (5.0, 15.0, 25.0, 35.0, 45.0)
 REPEATS = 3
@@ -25,7 +25,7 @@ def session(observer, subject, seed):
     """Five runs in random order, device-free; trials asked for again are void, and counted towards the limit."""
     random, trials, before = np.random.default_rng([seed, 77]), [], 0
     for run, place in enumerate(random.permutation(len(HZ)), start=1):
-        state, left = begin(PUBLISHED), REPEATS
+        state, left = begin_staircase(PUBLISHED), REPEATS
         template = replace(TEMPLATE, subject=subject, session=f"{subject}_001", run=run, frequency_hz=HZ[place])
         while not is_finished(PUBLISHED, state):
             shown = int(random.integers(1, 3))
@@ -41,7 +41,7 @@ def session(observer, subject, seed):
                     )
                 )  # fmt: skip
                 felt = replace(felt, attempt=felt.attempt + 1)
-            state, trial = played(
+            state, trial = play_trial(
                 PUBLISHED, state, replace(template, attempt=felt.attempt), reply.answer == shown, shown
             )
             trials.append(trial)
@@ -59,7 +59,7 @@ def warnings_of(observer, seed, protocol, company):
 
 
 def people(kind, count):
-    return [member(kind, 1 + number % 10, 300 + number // 10) for number in range(count)]
+    return [make_member(kind, 1 + number % 10, 300 + number // 10) for number in range(count)]
 
 
 DRIFTS, LEANS = "changed from run to run of a session", "A bias towards one of the two answers, which"

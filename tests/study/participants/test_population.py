@@ -8,13 +8,13 @@ from scipy.stats import tukey_hsd
 
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.loading import load_protocol
-from protocols.procedure.schedule import draw_trial, runs
-from protocols.procedure.staircase import begin, is_finished, level_n, step, to_newton
+from protocols.procedure.schedule import draw_trial, schedule_runs
+from protocols.procedure.staircase import begin_staircase, is_finished, level_n, step, to_newton
 from protocols.trial import Phase
 from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.observer import Observer, PerceivedStimulus
 from study.participants.observers import find_observer
-from study.participants.population import population
+from study.participants.population import draw_population
 
 FREQUENCIES = (5.0, 15.0, 25.0, 35.0, 45.0)
 
@@ -22,8 +22,8 @@ FREQUENCIES = (5.0, 15.0, 25.0, 35.0, 45.0)
 def sitting(protocol: StudyProtocol, observer: Observer, seed: int) -> dict[float, float]:
     """Threshold in N of every test run; staircase and draws alone, no device."""
     found, answered = {}, 0
-    for run in runs(protocol, seed, 0):
-        state = begin(protocol.staircase)
+    for run in schedule_runs(protocol, seed, 0):
+        state = begin_staircase(protocol.staircase)
         while not is_finished(protocol.staircase, state):
             draw = draw_trial(protocol.schedule, "random", seed, run.index, state.trials, 0)
             level = level_n(protocol.staircase, state)
@@ -47,7 +47,7 @@ def protocol() -> StudyProtocol:
 @pytest.fixture(scope="module")
 def measured_n(protocol) -> np.ndarray:
     """(40, 5) thresholds in N: four studies of ten, participants by frequencies."""
-    sittings = [sitting(protocol, person, seed) for seed, person in enumerate(population(40, seed=1))]
+    sittings = [sitting(protocol, person, seed) for seed, person in enumerate(draw_population(40, seed=1))]
     return np.array([[found[frequency] for frequency in FREQUENCIES] for found in sittings])
 
 
@@ -79,20 +79,20 @@ def test_people_who_are_all_the_same_show_no_rise(protocol):
 
 
 def test_people_differ_by_about_three_decibels():
-    thresholds_db = 20 * np.log10([[n for _, n in person.thresholds_n] for person in population(400, seed=2)])
+    thresholds_db = 20 * np.log10([[n for _, n in person.thresholds_n] for person in draw_population(400, seed=2)])
     assert thresholds_db.std(axis=0, ddof=1) == pytest.approx(np.full(5, 3.02), abs=0.4)
     # Who is good at one frequency is good at another: 2.5^2 / (2.5^2 + 1.7^2).
     assert np.corrcoef(thresholds_db.T)[np.triu_indices(5, 1)].mean() == pytest.approx(0.68, abs=0.08)
 
 
 def test_people_feel_that_it_shakes_far_below_where_they_feel_the_direction():
-    for someone in population(200, seed=2):
+    for someone in draw_population(200, seed=2):
         pairs = zip(someone.detection_n, someone.thresholds_n, strict=True)
         assert all(detection_n < 0.8 * direction_n for (_, detection_n), (_, direction_n) in pairs)
 
 
 def test_people_differ_in_detection_by_as_much_and_independently():
-    people = population(400, seed=2)
+    people = draw_population(400, seed=2)
     detection_db = 20 * np.log10([someone.detection_n[0][1] / TYPICAL_DETECTION_N[0][1] for someone in people])
     direction_db = 20 * np.log10([np.prod([n for _, n in someone.thresholds_n]) ** 0.2 for someone in people])
     assert detection_db.std(ddof=1) == pytest.approx(2.5, abs=0.35)
@@ -101,22 +101,22 @@ def test_people_differ_in_detection_by_as_much_and_independently():
 
 def test_the_people_of_older_studies_are_still_the_same():
     """Values of the version before detection trials."""
-    someone = population(1, seed=1)[0]
+    someone = draw_population(1, seed=1)[0]
     assert [round(n, 6) for _, n in someone.thresholds_n] == [0.520389, 0.724903, 1.034365, 2.866593, 2.684562]
     assert round(someone.slope, 6) == 1.618158
     assert round(someone.drift_db_per_100_trials, 6) == 0.146749
 
 
 def test_a_larger_population_begins_with_the_same_people():
-    assert population(5, seed=3) == population(9, seed=3)[:5]
+    assert draw_population(5, seed=3) == draw_population(9, seed=3)[:5]
 
 
 def test_another_seed_is_other_people():
-    assert not set(population(5, seed=3)) & set(population(5, seed=4))
+    assert not set(draw_population(5, seed=3)) & set(draw_population(5, seed=4))
 
 
 def test_a_logged_name_calls_the_same_person_back():
-    person = population(7, seed=12)[6]
+    person = draw_population(7, seed=12)[6]
     assert person.name == "person_7_seed_12"
     assert find_observer(person.name, seed=99) == person
 

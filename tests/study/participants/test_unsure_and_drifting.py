@@ -10,8 +10,8 @@ from protocols.trial import Phase
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.observer import PerceivedStimulus
 from study.participants.observers import find_observer
-from study.participants.population import KINDS, member
-from study.participants.unsure import UnsureRepeater
+from study.participants.population import KINDS, make_member
+from study.participants.unsure_repeater import UnsureRepeater
 
 N = 3000
 NORMAL = NormalDist()
@@ -78,10 +78,10 @@ def test_who_goes_by_strength_is_thrown_off_by_a_roved_level(rove_db, expected):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_member_can_be_made_again_from_its_name(kind):
-    assert find_observer(f"{kind}_2_seed_9", 0) == member(kind, 2, 9)
-    assert member(kind, 2, 9).name == f"{kind}_2_seed_9"
+    assert find_observer(f"{kind}_2_seed_9", 0) == make_member(kind, 2, 9)
+    assert make_member(kind, 2, 9).name == f"{kind}_2_seed_9"
 
 
 def test_a_population_of_an_unknown_kind_is_refused():
     with pytest.raises(ValueError, match="not of robots"):
-        member("robots", 1, 1)
+        make_member("robots", 1, 1)

@@ -17,9 +17,9 @@ from protocols.trial import Phase, TrialStatus, VoidCause
 from study.participants.psychometric_curve import WeibullCurve
 from study.session.facts.events import AnswerGiven, TrialMeasured, TrialSpoiled
 from study.session.state.draw_check import LogContradiction
-from study.session.state.fold import apply
+from study.session.state.fold import apply_event
 from study.session.state.machine import next_action
-from study.session.state.state import begin_session, repeats_left
+from study.session.state.state import begin_session, count_repeats_left
 from study.store.formats.protocol_files import read_study_protocol
 
 UTC = "2026-01-01T00:00:00.000+00:00"
@@ -47,17 +47,17 @@ def run_of(facts, protocol, seed: int, rules: int, cause: VoidCause, unsure: flo
     evidence, looks = 0.0, 0
     while not state.finished:
         action = next_action(state)
-        state = apply(state, facts.presented(action))
+        state = apply_event(state, facts.presented(action))
         side = 1.0 if action.label == 1 else -1.0
         fresh = side * CURVE.distance(action.level_n) / 2 + luck.normal()
         evidence, looks = (evidence + fresh, looks + 1) if rules == 2 else (fresh, 1)
-        allowed = cause is not VoidCause.ASKED or repeats_left(state) != 0
+        allowed = cause is not VoidCause.ASKED or count_repeats_left(state) != 0
         if allowed and abs(evidence) / np.sqrt(looks) < unsure:
-            state = apply(state, spoiled(action, cause if rules == 2 else None))
+            state = apply_event(state, spoiled(action, cause if rules == 2 else None))
             continue
         answer = 1 if evidence > 0 else 2
-        state = apply(state, AnswerGiven(UTC, action.run, action.trial, action.attempt, answer, 1.0))
-        state = apply(state, TrialMeasured(UTC, action.run, action.trial, action.attempt, "ok"))
+        state = apply_event(state, AnswerGiven(UTC, action.run, action.trial, action.attempt, answer, 1.0))
+        state = apply_event(state, TrialMeasured(UTC, action.run, action.trial, action.attempt, "ok"))
         evidence, looks = 0.0, 0
     return state.trials
 
@@ -114,12 +114,12 @@ def test_every_void_trial_comes_again_with_the_same_stimulus_and_under_the_first
         state = begin_session(facts.opened(protocol, "", seed=seed, rules=rules), protocol)
         state = replace(state, sitting=replace(state.sitting, demo_done=True))
         first = next_action(state)
-        state = apply(apply(state, facts.presented(first)), spoiled(first, cause))
+        state = apply_event(apply_event(state, facts.presented(first)), spoiled(first, cause))
         again = next_action(state)
         assert (again.trial, again.attempt, again.level_n) == (0, 1, first.level_n)
         kept += (again.label, again.angle_deg, again.polarity) == (first.label, first.angle_deg, first.polarity)
         assert (state.trials[0].void_cause, state.trials[0].status) == (cause, TrialStatus.SPOILED)
-        assert apply(state, facts.presented(again)).trials[-1].repeat_cause is cause
+        assert apply_event(state, facts.presented(again)).trials[-1].repeat_cause is cause
     assert kept == len(seeds) if rules == 2 else 2 <= kept <= 20  # a fourth, of 40
 
 
@@ -130,7 +130,7 @@ def test_in_a_detection_run_interval_and_direction_stay_too(facts, protocol):
         state = begin_session(facts.opened(detecting, "", seed=seed, rules=2, observer="attack"), detecting)
         first = next_action(state)
         assert first.phase is Phase.DETECTION
-        again = next_action(apply(apply(state, facts.presented(first)), spoiled(first, VoidCause.EARLY)))
+        again = next_action(apply_event(apply_event(state, facts.presented(first)), spoiled(first, VoidCause.EARLY)))
         assert replace(again, attempt=0) == first
 
 
@@ -139,20 +139,20 @@ def test_the_number_of_repeats_in_a_run_is_limited_by_the_protocol(facts, protoc
     limited = replace(protocol, trial=replace(protocol.trial, repeats_per_run=limit))
     state = begin_session(facts.opened(limited, "", rules=2, observer="attack"), limited)
     for asked in range(limit):
-        assert repeats_left(state) == limit - asked
+        assert count_repeats_left(state) == limit - asked
         action = next_action(state)
-        state = apply(apply(state, facts.presented(action)), spoiled(action, VoidCause.ASKED))
-    assert repeats_left(state) == 0
+        state = apply_event(apply_event(state, facts.presented(action)), spoiled(action, VoidCause.ASKED))
+    assert count_repeats_left(state) == 0
     action = next_action(state)
-    state = apply(state, facts.presented(action))
+    state = apply_event(state, facts.presented(action))
     with pytest.raises(LogContradiction, match="no repeat of this run remained"):
-        apply(state, spoiled(action, VoidCause.ASKED))
-    assert repeats_left(apply(state, spoiled(action, VoidCause.FAULT))) == 0
+        apply_event(state, spoiled(action, VoidCause.ASKED))
+    assert count_repeats_left(apply_event(state, spoiled(action, VoidCause.FAULT))) == 0
 
 
 def test_sessions_of_the_first_rules_have_no_limit(facts, protocol):
     state = begin_session(facts.opened(protocol, "", observer="attack"), protocol)
-    assert repeats_left(state) is None
+    assert count_repeats_left(state) is None
 
 
 def test_the_band_of_the_attack_is_as_wide_as_stated():

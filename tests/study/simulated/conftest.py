@@ -8,7 +8,7 @@ from numba import njit, types
 
 from study.devices.rig import READING_SIZE, TRUE_ACCELERATION
 from study.devices.simulated.omega3 import build_omega3
-from study.devices.simulated.packing import pack_parameters, state_at_rest
+from study.devices.simulated.packing import make_rest_state, pack_parameters
 
 _VECTOR, _ROWS, _NOISE = types.float64[::1], types.float64[:, ::1], types.uint64[::1]
 _SENSE = types.FunctionType(types.void(_VECTOR, _VECTOR, _NOISE, _VECTOR))
@@ -50,7 +50,7 @@ class Bench:
     def rig_of(self, parameters, hand=False, place_m=CENTRE):
         """A device with other parameters than the shipped ones."""
         packed = pack_parameters(parameters, hand, place_m)
-        return replace(build_omega3(0, hand), parameters=packed, state=state_at_rest(packed, place_m))
+        return replace(build_omega3(0, hand), parameters=packed, state=make_rest_state(packed, place_m))
 
     def phasor(self, rig, frequency_hz, direction, amplitude_n=1.0, what=TRUE_ACCELERATION):
         """Complex response (3,) to amplitude * sin, once settled, over whole periods in at least 0.8 s."""

@@ -4,7 +4,7 @@ import pytest
 from study.devices.rig import POSITION, READING_SIZE
 from study.devices.simulated import layout
 from study.devices.simulated.compiled import pose
-from study.devices.simulated.inertia import mass_matrix
+from study.devices.simulated.inertia import fill_mass_matrix
 from study.devices.simulated.omega3 import build_omega3
 
 
@@ -12,7 +12,7 @@ def masses_at(rig, place):
     """Inertia (3, 3) that a slow push at the handle meets."""
     jacobian, mass = np.empty((3, 3)), np.empty((5, 5))
     pose(rig.parameters, np.array(place, float), np.empty(3), jacobian)
-    mass_matrix(rig.parameters, jacobian, mass)
+    fill_mass_matrix(rig.parameters, jacobian, mass)
     modes = rig.parameters[layout.MODE_DIRECTION :][: 3 * layout.MODES].reshape(-1, 3)
     weights = rig.parameters[layout.MODE_MASS :][: layout.MODES]
     carried = modes.T @ np.diag(weights) @ modes

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 from numba import njit
 
-from study.devices.simulated.sensors import three_normals, uniform
+from study.devices.simulated.sensors import draw_three_normals, draw_uniform
 
 
 @njit
 def draw(noise, rows):
     for k in range(len(rows)):
-        three_normals(noise, rows[k])
+        draw_three_normals(noise, rows[k])
 
 
 @pytest.fixture(scope="module")
@@ -28,4 +28,4 @@ def test_they_are_standard_normal_and_independent(normals):
 def test_the_generator_is_the_published_one():
     """First output of SplitMix64 from state 0 (reference implementation of its authors)."""
     noise = np.zeros(1, dtype=np.uint64)
-    assert uniform(noise) == ((0xE220A8397B1DCDAF >> 11) + 1) / 2**53
+    assert draw_uniform(noise) == ((0xE220A8397B1DCDAF >> 11) + 1) / 2**53

@@ -230,7 +230,7 @@ def test_what_scipy_writes_is_read_to_the_last_digit(tmp_path, kind, packed):
 
 def test_an_hour_of_nine_channels_at_ten_kilohertz_is_within_the_limit():
     size = 3600 * 10_000 * 9 * 8
-    SizeLimit(size // FACTOR).take("it", size)
+    SizeLimit(size // FACTOR).add_size("it", size)
     assert PLAIN_BYTES < size < MOST_BYTES
 
 

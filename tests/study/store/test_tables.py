@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from analysis.psychophysics.thresholds import Threshold
 from protocols.trial import Phase, Trial, TrialStatus
-from study.store.disk.csv_rows import CsvError, as_written_in, in_words, rows_from_csv, rows_to_csv
+from study.store.disk.csv_rows import CsvError, describe_type, drop_absent_columns, rows_from_csv, rows_to_csv
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats.thresholds_file import THRESHOLDS_HEADER, read_thresholds, write_thresholds
 from study.store.formats.trials_file import TRIALS_HEADER, read_trials, write_trials
@@ -170,17 +170,17 @@ def test_of_many_faults_the_first_are_named_and_the_rest_counted():
 
 
 def test_columns_are_described_for_people():
-    assert in_words(bool | None) == "`true` or `false`, or empty"
-    assert in_words(Phase) == "`training`, `detection`, `test`, `catch`"
+    assert describe_type(bool | None) == "`true` or `false`, or empty"
+    assert describe_type(Phase) == "`training`, `detection`, `test`, `catch`"
 
 
 def test_a_table_of_before_a_column_was_added_agrees_with_rows_of_today():
     before = "\n".join(line.rpartition(",")[0] for line in rows_to_csv((TRIAL,), Trial).splitlines()) + "\n"
     (read,) = rows_from_csv(before, Trial)
-    assert as_written_in(before, (TRIAL,), Trial) == (read,)
+    assert drop_absent_columns(before, (TRIAL,), Trial) == (read,)
     last = fields(Trial)[-1]
     changed = replace(TRIAL, **{last.name: "something else", "level_n": 9.0})
-    assert as_written_in(before, (changed,), Trial) == (replace(read, level_n=9.0),)
+    assert drop_absent_columns(before, (changed,), Trial) == (replace(read, level_n=9.0),)
 
 
 @pytest.mark.parametrize("name", ["level_n", " answer", "mine"])

@@ -17,7 +17,7 @@ from textual.screen import Screen
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_mode.line_input import LineInput
-from study.tui.line_mode.plain import PlainDisplay
+from study.tui.line_mode.plain_display import PlainDisplay
 
 SETTLED_S = 30.0
 """Longer than any machine takes; an application that never settles fails here."""

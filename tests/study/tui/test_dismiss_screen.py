@@ -8,7 +8,7 @@ from textual.events import Key
 from textual.screen import Screen
 
 import study.tui
-from study.session.views.views import DemoMenu, PlayDemo, picture_of
+from study.session.views.views import DemoMenu, PlayDemo, make_direction_picture
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.demo import DemoScreen
 
@@ -30,7 +30,7 @@ def test_what_is_taken_off_twice_leaves_the_screen_below_and_replies_once():
 
 
 def test_a_burst_of_keys_plays_one_demonstration(small_protocol):
-    menu = DemoMenu(picture_of(small_protocol.directions, False), 3, 1, (), True)
+    menu = DemoMenu(make_direction_picture(small_protocol.directions, False), 3, 1, (), True)
 
     async def story():
         app, replies = App(), []

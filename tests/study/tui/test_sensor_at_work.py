@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP
+from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP_DIRECTIONS
 from study.devices.force_dimension.lab import read_lab
 from study.tui.app.app import HapteqApp
 from study.tui.app.app_start import AppStart
@@ -60,7 +60,7 @@ def test_by_keys_from_the_start_screen_to_the_lab_s_file(tmp_path, lab_file):
 
         async def story(person):
             await person.opens(board.path)
-            for number, (position, up) in enumerate(zip(POSITIONS, UP, strict=True), 1):
+            for number, (position, up) in enumerate(zip(POSITIONS, UP_DIRECTIONS, strict=True), 1):
                 await person.until("SensorScreen", f"{number} of 6: lay the sensor down with {position}")
                 board.acceleration = GRAVITY_MPS2 * up
                 await person.pilot.press("enter")

@@ -61,7 +61,7 @@ class SittingOptions:
         return conduct_new(self.plan(subject), "simulated", self.participant())
 
     def interrupted(self, after: int, instead=None) -> ConductedSitting:
-        leave = instead or (lambda: Unanswered("the participant left", leave=True))
+        leave = instead or (lambda: Unanswered("the participant left", ends_sitting=True))
         return conduct_new(self.plan(), "simulated", self.participant(after, leave))
 
     def resumed(self, folder: SessionFolder) -> ConductedSitting:

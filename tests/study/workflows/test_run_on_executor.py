@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from study.errors import StudyError
-from study.workflows.run_on_executor import run_pieces
+from study.workflows.run_on_executor import run_tasks
 from study.workflows.worker_processes import worker_processes
 
 
@@ -32,7 +32,7 @@ def test_results_that_are_there_come_before_an_error_beside_them():
     pieces = [(number, (12, number % 2)) for number in range(20)]
     came = []
     with pytest.raises(ZeroDivisionError):
-        for key, _ in run_pieces(AtOnce(), divmod, pieces):
+        for key, _ in run_tasks(AtOnce(), divmod, pieces):
             came.append(key)
     assert sorted(came) == [number for number in range(20) if number % 2]
 
@@ -49,7 +49,7 @@ def faults_of_arrays(rounds):
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries have limits of their own")
 def test_a_worker_keeps_the_memory_that_its_fits_free_and_ask_for_again():
     with worker_processes(1) as pool:
-        ((_, faults),) = run_pieces(pool, faults_of_arrays, [("arrays", (100,))])
+        ((_, faults),) = run_tasks(pool, faults_of_arrays, [("arrays", (100,))])
     once = 6 * 2**21 / resource.getpagesize()
     assert faults < 3 * once  # a hundred times as many where each round gets its pages anew
 
@@ -71,6 +71,6 @@ def test_a_killed_worker_is_an_error_that_says_what_is_kept_and_what_to_do():
     came = []
     told = pytest.raises(StudyError, match=r"worker process was killed.*finished is kept.*continues where it stopped")
     with told, worker_processes(1) as pool:
-        for key, _ in run_pieces(pool, killed, ((number, (number,)) for number in range(6))):
+        for key, _ in run_tasks(pool, killed, ((number, (number,)) for number in range(6))):
             came.append(key)
     assert sorted(came) == [0, 1, 2]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, correlation_ratio
+from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, compute_correlation_ratio
 from analysis.diagnosis.result.findings import Signature
 from equalizer.effects.discovered_law import COMMAND, DERIVATIVES, axis_names, has_memory, law_with_values
 from equalizer.effects.effect import PlacedEffect
@@ -19,7 +19,7 @@ from equalizer.laws.law import Law
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
-_BEYOND = 0.25
+_EXTRAPOLATED_SHARE = 0.25
 """Share of the visited range by which a formula is drawn beyond it, on either side."""
 _MAIN_SHARE = 0.5
 """Correlation ratio of a law's force with one variable from which the curve is drawn against it alone. By hand."""
@@ -38,39 +38,39 @@ class _Variable:
 
 
 def law_signature(
-    evidence: Evidence, placed: PlacedEffect, axes: tuple[str, ...], system: UnitSystem
+    evidence: Evidence, placed_effect: PlacedEffect, axes: tuple[str, ...], system: UnitSystem
 ) -> Signature | None:
     """The curve of a discovered law along the measured motion; for a law of the command, of its change of the command.
     None where it acts on a response, or depends on a signal other than time, motions and commands. axes: names."""
-    if placed.effect.law is None or placed.effect.law.acts_on == "response":
+    if placed_effect.effect.law is None or placed_effect.effect.law.acts_on == "response":
         return None
-    law = law_with_values(placed.effect.law, placed.values)
+    law = law_with_values(placed_effect.effect.law, placed_effect.values)
     if law.acts_on == "command":
-        command = COMMAND + axis_names(axes)[placed.sites[0]]
+        command = COMMAND + axis_names(axes)[placed_effect.sites[0]]
         law = replace(law, expression=f"({law.expression}) - {command}", acts_on="force", units=())
     variables = _variables(evidence, axes, system)
     if not law.variables or not set(law.variables) <= variables.keys():
         return None
-    rate_hz, axis = evidence.sample_rate_hz, placed.sites[0]
+    rate_hz, axis = evidence.sample_rate_hz, placed_effect.sites[0]
     force = evaluate(law, {name: variables[name].values for name in law.variables}, rate_hz)
     used = (evidence.used > 0) & np.isfinite(force)
-    shares = {name: correlation_ratio(variables[name].values[used], force[used]) for name in law.variables}
-    main = variables[max(shares, key=lambda name: shares[name])]
-    along, visited = main.name, None
+    shares = {name: compute_correlation_ratio(variables[name].values[used], force[used]) for name in law.variables}
+    variable = variables[max(shares, key=lambda name: shares[name])]
+    abscissa, visited = variable.name, None
     if max(shares.values()) < _MAIN_SHARE:  # only the variables together explain most of it
-        main = _Variable(f"force of the law ({system.force})", force)
-        along, law_at, values = main.name, *_identity(force[used])
+        variable = _Variable(f"force of the law ({system.force})", force)
+        abscissa, law_at, values = variable.name, *_identity(force[used])
     elif len(law.variables) == 1 and not has_memory(law):
-        law_at, values, visited = _evaluate_beyond(law, main.values[used], rate_hz)
+        law_at, values, visited = _evaluate_extrapolated(law, variable.values[used], rate_hz)
     else:
-        law_at, values = bin_law_means(main.values[used], force[used])
-    at, mean, spread = bin_means(main.values, evidence.axis_force[:, axis], used, rate_hz)
+        law_at, values = bin_law_means(variable.values[used], force[used])
+    bin_centres, mean, spread = bin_means(variable.values, evidence.axis_force[:, axis], used, rate_hz)
     return Signature(
-        placed.effect.name,
+        placed_effect.effect.name,
         axes[axis],
-        along,
+        abscissa,
         f"missing force ({system.force})",
-        at,
+        bin_centres,
         mean,
         spread,
         law_at,
@@ -82,26 +82,28 @@ def law_signature(
 def _variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSystem) -> Mapping[str, _Variable]:
     """Signals by their names in a formula: time, then position, velocity, acceleration and command of each axis."""
     rate_hz, length = evidence.sample_rate_hz, system.length
-    found = {"t": _Variable("time (s)", np.arange(len(evidence.command)) / rate_hz)}
-    for number, (axis, letter) in enumerate(zip(axes, axis_names(axes), strict=True)):
-        velocity = evidence.axis_velocity[:, number]
-        motions = (evidence.axis_position[:, number], velocity, np.gradient(velocity) * rate_hz)
+    variables = {"t": _Variable("time (s)", np.arange(len(evidence.command)) / rate_hz)}
+    for index, (axis, letter) in enumerate(zip(axes, axis_names(axes), strict=True)):
+        velocity = evidence.axis_velocity[:, index]
+        motions = (evidence.axis_position[:, index], velocity, np.gradient(velocity) * rate_hz)
         kinds = (("position", length), ("velocity", f"{length}/s"), ("acceleration", f"{length}/s^2"))
         for prefix, values, (kind, unit) in zip(DERIVATIVES, motions, kinds, strict=True):
-            found[prefix + letter] = _Variable(f"{kind} of {axis} ({unit})", np.asarray(values))
-        found[COMMAND + letter] = _Variable(f"command of {axis} ({system.force})", evidence.command[:, number])
-    return found
+            variables[prefix + letter] = _Variable(f"{kind} of {axis} ({unit})", np.asarray(values))
+        variables[COMMAND + letter] = _Variable(f"command of {axis} ({system.force})", evidence.command[:, index])
+    return variables
 
 
-def _evaluate_beyond(law: Law, seen: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
-    """Abscissa and value of a formula of one variable over the visited range and `_BEYOND` of it on either side; and
-    that range. seen: (n,), visited values."""
-    low, high = float(seen.min()), float(seen.max())
-    margin = _BEYOND * (high - low)
-    at = np.linspace(low - margin, high + margin, _LINE_POINTS)
-    values = evaluate(law, {law.variables[0]: at}, rate_hz)
-    known = np.isfinite(values)
-    return at[known], values[known], (low, high)
+def _evaluate_extrapolated(
+    law: Law, visited: FloatArray, rate_hz: float
+) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
+    """Abscissa and value of a formula of one variable over the visited range and `_EXTRAPOLATED_SHARE` of it on either
+    side; and that range. visited: (n,)."""
+    low, high = float(visited.min()), float(visited.max())
+    margin = _EXTRAPOLATED_SHARE * (high - low)
+    abscissa = np.linspace(low - margin, high + margin, _LINE_POINTS)
+    values = evaluate(law, {law.variables[0]: abscissa}, rate_hz)
+    is_known = np.isfinite(values)
+    return abscissa[is_known], values[is_known], (low, high)
 
 
 def _identity(values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -14,46 +14,47 @@ _BINS, _LAW_BINS = 30, 120
 """Number of bins of the missing force over a state, and of a drawn law."""
 _BLOCK_S = 0.5
 """Length of the blocks (s) that count as independent."""
-_FEWEST = 20
+_MIN_BIN_SAMPLES = 20
 """Least number of samples of a bin that is shown."""
-_RESTING = 0.01
+_REST_SHARE = 0.01
 """Share of the range on either side of the median that counts as rest when bins are chosen."""
 
 
 def bin_means(
-    at: FloatArray, values: FloatArray, used: Mask, rate_hz: float
+    abscissa: FloatArray, values: FloatArray, used: Mask, rate_hz: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean abscissa, mean value and its standard error per bin, (bins,) each. Half of the bin edges are at equal
-    counts, half at equal widths, so that both the middle and the ends are covered. at, values, used: (n,)"""
+    counts, half at equal widths, so that both the middle and the ends are covered. abscissa, values, used: (n,)"""
     blocks = (np.flatnonzero(used) / (_BLOCK_S * rate_hz)).astype(int)
-    x, y = at[used], values[used]
-    bin_of = np.digitize(x, _edges(x, _BINS)[1:-1])
+    x, y = abscissa[used], values[used]
+    bin_of = np.digitize(x, _compute_edges(x, _BINS)[1:-1])
     rows = []
     for k in range(bin_of.max(initial=0) + 1):
-        inside = bin_of == k
-        if inside.sum() >= _FEWEST:
-            rows.append((float(x[inside].mean()), *_mean(y[inside], blocks[inside])))
+        in_bin = bin_of == k
+        if in_bin.sum() >= _MIN_BIN_SAMPLES:
+            rows.append((float(x[in_bin].mean()), *_compute_mean(y[in_bin], blocks[in_bin])))
     table = np.array(rows).reshape(-1, 3)
     return table[:, 0], table[:, 1], table[:, 2]
 
 
-def bin_law_means(at: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Bin means of a law over finer bins, without standard errors; none where its simulation diverges. at, values:
-    (n,)"""
-    known = np.isfinite(at) & np.isfinite(values)
-    at, values = at[known], values[known]
-    if not len(at):
-        return at, values
-    bin_of = np.digitize(at, _edges(at, _LAW_BINS)[1:-1])
+def bin_law_means(abscissa: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Bin means of a law over finer bins, without standard errors; none where its simulation diverges. abscissa,
+    values: (n,)"""
+    is_finite = np.isfinite(abscissa) & np.isfinite(values)
+    abscissa, values = abscissa[is_finite], values[is_finite]
+    if not len(abscissa):
+        return abscissa, values
+    bin_of = np.digitize(abscissa, _compute_edges(abscissa, _LAW_BINS)[1:-1])
     count = np.bincount(bin_of)
-    full = count >= 3
-    means = [np.bincount(bin_of, weights=each)[full] / count[full] for each in (at, values)]
+    is_filled = count >= 3
+    means = [np.bincount(bin_of, weights=weights)[is_filled] / count[is_filled] for weights in (abscissa, values)]
     return means[0], means[1]
 
 
-def correlation_ratio(at: FloatArray, values: FloatArray) -> float:
-    """Share of the values' variance explained by their mean per bin of `at` (eta squared). at, values: (n,)"""
-    bin_of = np.digitize(at, _edges(at, _BINS)[1:-1])
+def compute_correlation_ratio(abscissa: FloatArray, values: FloatArray) -> float:
+    """Share of the values' variance explained by their mean per bin of the abscissa (eta squared). abscissa, values:
+    (n,)"""
+    bin_of = np.digitize(abscissa, _compute_edges(abscissa, _BINS)[1:-1])
     count = np.maximum(np.bincount(bin_of), 1)
     means = np.bincount(bin_of, weights=values) / count
     return float(np.var(means[bin_of]) / max(float(np.var(values)), 1e-300))
@@ -69,20 +70,20 @@ def compute_running_rms(
     return np.array([float(seconds[part].mean()) for part in parts]), rms, error / np.maximum(2 * rms, 1e-300)
 
 
-def _edges(x: FloatArray, bins: int) -> FloatArray:
-    """Edges of at most `bins` bins, rising."""
+def _compute_edges(x: FloatArray, bins: int) -> FloatArray:
+    """Edges of at most `bins` bins, rising: half at quantiles, half at equal widths. x: (n,)"""
     low, high = np.quantile(x, [0.001, 0.999])
     # A channel that rests most of the time would have all its bins at rest.
-    busy = x[np.abs(x - np.median(x)) > _RESTING * (high - low)]
-    shares = np.quantile(busy if len(busy) else x, np.linspace(0, 1, bins // 2))
-    return np.unique(np.concatenate([shares, np.linspace(low, high, bins // 2)]))
+    moving_samples = x[np.abs(x - np.median(x)) > _REST_SHARE * (high - low)]
+    quantile_edges = np.quantile(moving_samples if len(moving_samples) else x, np.linspace(0, 1, bins // 2))
+    return np.unique(np.concatenate([quantile_edges, np.linspace(low, high, bins // 2)]))
 
 
-def _mean(values: FloatArray, blocks: npt.NDArray[np.int_]) -> tuple[float, float]:
-    """Mean and its standard error (see above); for a single block, the standard deviation of the values."""
-    _, where = np.unique(blocks, return_inverse=True)
-    weight = np.bincount(where).astype(float)
-    means = np.bincount(where, weights=values) / weight
+def _compute_mean(values: FloatArray, blocks: npt.NDArray[np.int_]) -> tuple[float, float]:
+    """Mean and its standard error by the formula of this file; for a single block, the standard deviation of values."""
+    _, block_of = np.unique(blocks, return_inverse=True)
+    weight = np.bincount(block_of).astype(float)
+    means = np.bincount(block_of, weights=values) / weight
     mean = float(values.mean())
     if len(means) < 2:
         return mean, float(values.std())

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.diagnosis.errors.evidence_from_residuals import EXPECTED
+from analysis.diagnosis.errors.evidence_from_residuals import EXPECTED_FORCE_SHARE
 from analysis.diagnosis.forces.missing_force import missing_force
 from analysis.diagnosis.result.curves.law_curves import law_signature
 from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, compute_running_rms
@@ -24,9 +24,9 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import spectral_density
 from equalizer.signals.unit_system import LINEAR, UnitSystem
 
-Along = Literal["velocity", "position", "acceleration", "command", "reading", "time", "growth", "frequency"]
+Abscissa = Literal["velocity", "position", "acceleration", "command", "reading", "time", "growth", "frequency"]
 
-ALONG: Mapping[str, Along] = {
+ABSCISSA: Mapping[str, Abscissa] = {
     "coulomb_friction": "velocity",
     "asymmetric_friction": "velocity",
     "stribeck_friction": "velocity",
@@ -77,74 +77,76 @@ def signature_of(evidence: Evidence, complete: FloatArray, placed: PlacedEffect,
     law = law_signature(evidence, placed, names.axes, names.system)
     if law is not None:
         return law
-    acts, along = placed.effect.acts, ALONG.get(placed.effect.name, "frequency")
-    if along in ("velocity", "position", "acceleration") and not isinstance(acts, (OnCommand, OnResponse)):
-        return _motion_signature(evidence, placed, along, names, hold)
-    if along == "command" and isinstance(acts, OnCommand):
+    action, abscissa = placed.effect.action, ABSCISSA.get(placed.effect.name, "frequency")
+    if abscissa in ("velocity", "position", "acceleration") and not isinstance(action, (OnCommand, OnResponse)):
+        return _motion_signature(evidence, placed, abscissa, names, hold)
+    if abscissa == "command" and isinstance(action, OnCommand):
         return _command_signature(evidence, placed, names)
-    if along in ("reading", "time", "growth") and isinstance(acts, OnResponse):
-        changed = acts.change(evidence.predicted, evidence.sample_rate_hz, placed.sites, placed.values)
-        if along == "reading":
-            return _make_reading_signature(evidence, placed, changed - evidence.predicted, names)
-        return _time_signature(evidence, placed, changed - evidence.predicted, names, along)
+    if abscissa in ("reading", "time", "growth") and isinstance(action, OnResponse):
+        changed_signal = action.change(evidence.predicted, evidence.sample_rate_hz, placed.sites, placed.values)
+        if abscissa == "reading":
+            return _make_reading_signature(evidence, placed, changed_signal - evidence.predicted, names)
+        return _time_signature(evidence, placed, changed_signal - evidence.predicted, names, abscissa)
     return _frequency_signature(evidence, complete - evidence.predicted, placed, names)
 
 
-def _motion_signature(evidence: Evidence, placed: PlacedEffect, along: Along, names: Names, hold: Hold) -> Signature:
+def _motion_signature(
+    evidence: Evidence, placed: PlacedEffect, abscissa: Abscissa, names: Names, hold: Hold
+) -> Signature:
     """Missing force of the axis with the strongest one, over its motion."""
     axis = _strongest(placed.sites, evidence.axis_force)
-    played = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (placed,), hold)
-    force = played.axis_force
-    if isinstance(placed.effect.acts, Structure):
-        force = _equivalent_force(evidence, played, hold)
+    simulated = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (placed,), hold)
+    force = simulated.axis_force
+    if isinstance(placed.effect.action, Structure):
+        force = _equivalent_force(evidence, simulated, hold)
     used, unit = evidence.used > 0, names.system.length
-    unit += {"position": "", "velocity": "/s", "acceleration": "/s^2"}[along]
-    seen, law_seen = (
-        _abscissa(position[:, axis], velocity[:, axis], along, evidence.sample_rate_hz)
+    unit += {"position": "", "velocity": "/s", "acceleration": "/s^2"}[abscissa]
+    visited, law_abscissa = (
+        _abscissa(position[:, axis], velocity[:, axis], abscissa, evidence.sample_rate_hz)
         for position, velocity in (
             (evidence.axis_position, evidence.axis_velocity),
-            (played.axis_position, played.axis_velocity),
+            (simulated.axis_position, simulated.axis_velocity),
         )
     )
-    at, mean, spread = bin_means(seen, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
-    law_at, law = bin_law_means(law_seen[used], force[used, axis])
+    bin_centres, mean, spread = bin_means(visited, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
+    law_at, law = bin_law_means(law_abscissa[used], force[used, axis])
     return Signature(
-        placed.effect.name, names.axes[axis], f"{along} of {names.axes[axis]} ({unit})",
-        f"missing force ({names.system.force})", at, mean, spread, law_at, law,
+        placed.effect.name, names.axes[axis], f"{abscissa} of {names.axes[axis]} ({unit})",
+        f"missing force ({names.system.force})", bin_centres, mean, spread, law_at, law,
     )  # fmt: skip
 
 
-def _abscissa(position: FloatArray, velocity: FloatArray, along: Along, rate_hz: float) -> FloatArray:
+def _abscissa(position: FloatArray, velocity: FloatArray, abscissa: Abscissa, rate_hz: float) -> FloatArray:
     """(n,): position, velocity or acceleration of an axis."""
-    if along == "acceleration":
+    if abscissa == "acceleration":
         return np.asarray(np.gradient(velocity) * rate_hz)
-    return velocity if along == "velocity" else position
+    return velocity if abscissa == "velocity" else position
 
 
-def _equivalent_force(evidence: Evidence, played: SimulationResult, hold: Hold) -> FloatArray:
+def _equivalent_force(evidence: Evidence, with_effect: SimulationResult, hold: Hold) -> FloatArray:
     """(n, m), N: the force on the model without the effect that would cause the same responses, by deconvolution."""
-    without = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (), hold)
-    change, unit = [played.response - without.response], [evidence.noise]
+    without_effect = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (), hold)
+    change, unit = [with_effect.response - without_effect.response], [evidence.noise]
     if evidence.position_noise is not None:
-        change.append(played.position - without.position)
+        change.append(with_effect.position - without_effect.position)
         unit.append(evidence.position_noise)
-    expected = EXPECTED * np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-12)
+    expected = EXPECTED_FORCE_SHARE * np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-12)
     noise = np.concatenate(unit)
     return missing_force(evidence.model, np.hstack(change) / noise, noise, evidence.sample_rate_hz, expected).force
 
 
 def _command_signature(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signature:
     """Missing force over the command of its axis; the law is the change of the command."""
-    assert isinstance(placed.effect.acts, OnCommand)
+    assert isinstance(placed.effect.action, OnCommand)
     axis = _strongest(placed.sites, evidence.axis_force)
     command, used = evidence.command[:, axis], evidence.used > 0
-    changed = placed.effect.acts.change(command, 1 / evidence.sample_rate_hz, placed.values)
-    at, mean, spread = bin_means(command, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
-    law_at, law = bin_law_means(command[used], (changed - command)[used])
+    changed_command = placed.effect.action.change(command, 1 / evidence.sample_rate_hz, placed.values)
+    bin_centres, mean, spread = bin_means(command, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
+    law_at, law = bin_law_means(command[used], (changed_command - command)[used])
     unit = names.system.force
     return Signature(
         placed.effect.name, names.axes[axis], f"command of {names.axes[axis]} ({unit})", f"missing force ({unit})",
-        at, mean, spread, law_at, law,
+        bin_centres, mean, spread, law_at, law,
     )  # fmt: skip
 
 
@@ -154,45 +156,47 @@ def _make_reading_signature(evidence: Evidence, placed: PlacedEffect, change: Fl
     drives = evidence.predicted[used]
     # The pair of channels with the strongest effect: regression of the change in one channel on the signal of the
     # other.
-    together = np.abs(change[used].T @ drives) / np.maximum(np.sqrt(np.sum(drives**2, axis=0)), 1e-300)
-    here, there = np.unravel_index(int(np.argmax(together)), together.shape)
-    errors = (evidence.response - evidence.predicted)[:, here]
-    at, mean, spread = bin_means(evidence.predicted[:, there], errors, used, evidence.sample_rate_hz)
-    law_at, law = bin_law_means(drives[:, there], change[used, here])
+    projections = np.abs(change[used].T @ drives) / np.maximum(np.sqrt(np.sum(drives**2, axis=0)), 1e-300)
+    channel, predictor = np.unravel_index(int(np.argmax(projections)), projections.shape)
+    errors = (evidence.response - evidence.predicted)[:, channel]
+    bin_centres, mean, spread = bin_means(evidence.predicted[:, predictor], errors, used, evidence.sample_rate_hz)
+    law_at, law = bin_law_means(drives[:, predictor], change[used, channel])
     return Signature(
-        placed.effect.name, names.channels[here], f"predicted {names.channels[there]} ({names.unit})",
-        f"error of {names.channels[here]} ({names.unit})", at, mean, spread, law_at, law,
+        placed.effect.name, names.channels[channel], f"predicted {names.channels[predictor]} ({names.unit})",
+        f"error of {names.channels[channel]} ({names.unit})", bin_centres, mean, spread, law_at, law,
     )  # fmt: skip
 
 
 def _time_signature(
-    evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names, along: Along
+    evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names, abscissa: Abscissa
 ) -> Signature:
     """Error of the channel with the largest change over time; its running rms where it grows with time ("growth")."""
     used, rate_hz = evidence.used > 0, evidence.sample_rate_hz
-    here = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
-    errors, seconds = (evidence.response - evidence.predicted)[:, here], np.arange(len(change)) / rate_hz
-    what = f"error of {names.channels[here]} ({names.unit})"
-    if along == "growth":
-        at, mean, spread = compute_running_rms(seconds, errors, used)
-        law_at, law, _ = compute_running_rms(seconds, np.hypot(change[:, here], evidence.noise[here]), used)
-        what = f"rms {what}"
+    channel = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
+    errors, seconds = (evidence.response - evidence.predicted)[:, channel], np.arange(len(change)) / rate_hz
+    ordinate = f"error of {names.channels[channel]} ({names.unit})"
+    if abscissa == "growth":
+        bin_centres, mean, spread = compute_running_rms(seconds, errors, used)
+        law_at, law, _ = compute_running_rms(seconds, np.hypot(change[:, channel], evidence.noise[channel]), used)
+        ordinate = f"rms {ordinate}"
     else:
-        at, mean, spread = bin_means(seconds, errors, used, rate_hz)
-        law_at, law = bin_law_means(seconds[used], change[used, here])
-    return Signature(placed.effect.name, names.channels[here], "time (s)", what, at, mean, spread, law_at, law)
+        bin_centres, mean, spread = bin_means(seconds, errors, used, rate_hz)
+        law_at, law = bin_law_means(seconds[used], change[used, channel])
+    return Signature(
+        placed.effect.name, names.channels[channel], "time (s)", ordinate, bin_centres, mean, spread, law_at, law
+    )
 
 
 def _frequency_signature(evidence: Evidence, change: FloatArray, placed: PlacedEffect, names: Names) -> Signature:
     """Spectrum of the error of the channel with the largest change, and that of the change by the effect."""
     rate_hz, used = evidence.sample_rate_hz, evidence.used > 0
     errors = evidence.response - evidence.predicted
-    here = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
-    frequency_hz, measured, spread = _spectrum(errors[used, here], rate_hz)
-    _, law, _ = _spectrum(change[used, here], rate_hz)
+    channel = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
+    frequency_hz, measured, spread = _spectrum(errors[used, channel], rate_hz)
+    _, law, _ = _spectrum(change[used, channel], rate_hz)
     return Signature(
-        placed.effect.name, names.channels[here], "frequency (Hz)",
-        f"error of {names.channels[here]}, amplitude density ({names.unit}/√Hz)",
+        placed.effect.name, names.channels[channel], "frequency (Hz)",
+        f"error of {names.channels[channel]}, amplitude density ({names.unit}/√Hz)",
         frequency_hz, measured, spread, frequency_hz, law,
     )  # fmt: skip
 
@@ -202,13 +206,15 @@ def _spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArra
     Hann windows count as 1.5 independent ones per window length."""
     length = min(2 * _FREQUENCY_LINES, len(signal))
     lines_hz, power = spectral_density(signal, rate_hz, length)
-    stretches = max(1.0, 1.5 * len(signal) / length)
+    window_count = max(1.0, 1.5 * len(signal) / length)
     edges = np.geomspace(lines_hz[1], lines_hz[-1], int(12 * np.log2(lines_hz[-1] / lines_hz[1])) + 1)
-    which = np.digitize(lines_hz[1:], edges)
-    groups = [power[1:][which == k] for k in np.unique(which)]
-    at = np.array([float(np.exp(np.mean(np.log(lines_hz[1:][which == k])))) for k in np.unique(which)])
+    bin_of_line = np.digitize(lines_hz[1:], edges)
+    groups = [power[1:][bin_of_line == k] for k in np.unique(bin_of_line)]
+    centres_hz = np.array(
+        [float(np.exp(np.mean(np.log(lines_hz[1:][bin_of_line == k])))) for k in np.unique(bin_of_line)]
+    )
     mean = np.array([float(np.sqrt(group.mean())) for group in groups])
-    return at, mean, mean / 2 / np.sqrt(stretches * np.array([len(group) for group in groups]))
+    return centres_hz, mean, mean / 2 / np.sqrt(window_count * np.array([len(group) for group in groups]))
 
 
 def _strongest(sites: tuple[int, ...], force: FloatArray) -> int:

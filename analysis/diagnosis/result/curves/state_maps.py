@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from analysis.diagnosis.balance.regression import Regression
 
 
-CLOUD = 600
-"""Number of single samples that are drawn, about."""
+SCATTER_SAMPLES = 600
+"""Approximate number of single samples that are drawn."""
 LOOP_SAMPLES = 2000
 """Largest number of samples of a loop."""
 LOOP_PERIODS = 1.1
 """Length of a loop in periods of the motion's strongest line, so that it closes."""
-NAMED, NOT_CONFIRMED = "with the named effects", "with the best candidates, not confirmed"
+WITH_NAMED, WITH_CANDIDATES = "with the named effects", "with the best candidates, not confirmed"
 """Texts for the laws that complete the model."""
 
 
@@ -41,36 +41,36 @@ NAMED, NOT_CONFIRMED = "with the named effects", "with the best candidates, not 
 class StateView:
     """The missing force against a state variable: single samples, and means per bin."""
 
-    along: str
+    abscissa_name: str
     """Name of the abscissa: "position"."""
     unit: str
     """Unit of the abscissa, SI."""
-    cloud_at: FloatArray
-    """Abscissa of the single samples."""
-    cloud: FloatArray
-    """Single samples of the missing force."""
-    at: FloatArray
-    """Mean abscissa per bin."""
+    sample_abscissa: FloatArray
+    """(samples,): abscissa of the single samples."""
+    sample_force: FloatArray
+    """(samples,): single samples of the missing force."""
+    bin_abscissa: FloatArray
+    """(bins,): mean abscissa."""
     mean: FloatArray
-    """Mean of the missing force per bin."""
+    """(bins,): mean of the missing force."""
     error: FloatArray
-    """Standard error of the mean."""
-    left: FloatArray
-    """Mean residual of the completed model per bin; empty without one."""
+    """(bins,): standard error of the mean."""
+    mean_residual: FloatArray
+    """(bins,): mean residual of the completed model; empty without one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loop:
-    """Forces over a state variable for about one period of the motion, in the order of time."""
+    """Forces (n,) over a state variable for about one period of the motion, in the order of time."""
 
-    along: str
+    abscissa_name: str
     unit: str
-    at: FloatArray
+    abscissa: FloatArray
     measured: FloatArray
     """Applied or measured force."""
-    before: FloatArray
+    model_force: FloatArray
     """Force that the model without new physics needs for this motion."""
-    after: FloatArray
+    completed_force: FloatArray
     """The same with the completed model; empty where there is none."""
 
 
@@ -84,7 +84,7 @@ class StateMaps:
     model: str
     """The model that lacks the force, in words."""
     completed: str
-    """Kind of the laws that complete the model: NAMED, NOT_CONFIRMED; empty = none."""
+    """Kind of the laws that complete the model: WITH_NAMED, WITH_CANDIDATES; empty = none."""
     share: float
     """Missing force over force, rms."""
     views: tuple[StateView, ...]
@@ -100,13 +100,13 @@ class _AxisSeries:
     position: FloatArray
     velocity: FloatArray
     force: FloatArray
-    before: FloatArray
-    after: FloatArray | None
+    model_force: FloatArray
+    completed_force: FloatArray | None
     used: Mask
     parts: tuple[slice, ...]
 
 
-def state_maps(
+def compute_state_maps(
     diagnosis: Diagnosis, balances: "Sequence[Balance]", evidence: Sequence[Evidence], recording: Recording
 ) -> tuple[StateMaps, ...]:
     """Maps of all axes, in the order of drawing: the axis of the first named effect, then by missing force. From the
@@ -114,132 +114,140 @@ def state_maps(
     channels = recording.command.channels
     letters = tuple(axis_letter(channel, channels) for channel in channels)
     units = recording.command.units
-    length = system_of(units, recording.response.units).length
-    found = []
+    length_unit = system_of(units, recording.response.units).length
+    maps = []
     for axis, letter in enumerate(letters):
         if balances:
-            series, completed = _series_of_balance(balances[axis], diagnosis, letter)
-            given = balances[axis].search.regression.prior is not None
-            model = "the re-tuned model" if given else "mass, damping and stiffness alone"
+            series, completed = _extract_balance_series(balances[axis], diagnosis, letter)
+            has_prior = balances[axis].search.regression.prior is not None
+            model = "the re-tuned model" if has_prior else "mass, damping and stiffness alone"
         else:
-            series, completed, model = _series_of_evidence(evidence, axis), "", "the re-tuned model"
+            series, completed, model = _extract_evidence_series(evidence, axis), "", "the re-tuned model"
         if series is not None:
             labels = (letter, units[axis], model, completed)
-            found.append(_maps(series, labels, length))
-    first = diagnosis.effects[0].axis if diagnosis.effects else None
-    return tuple(sorted(found, key=lambda each: (each.axis != first, -each.share)))
+            maps.append(_make_maps(series, labels, length_unit))
+    first_axis = diagnosis.effects[0].axis if diagnosis.effects else None
+    return tuple(sorted(maps, key=lambda axis_map: (axis_map.axis != first_axis, -axis_map.share)))
 
 
-def _series_of_balance(balance: "Balance", diagnosis: Diagnosis, letter: str) -> tuple[_AxisSeries | None, str]:
+def _extract_balance_series(balance: "Balance", diagnosis: Diagnosis, letter: str) -> tuple[_AxisSeries | None, str]:
     """The samples of one axis from its balance, None without any, and the text for the laws that complete the model:
     the named ones, else all that were chosen."""
     regression = balance.search.regression
     names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
-    named = [law.place for law in balance.laws if law.played_as in names]
-    laws = named or [law.place for law in balance.laws]
-    linear, whole = (regression.remainder(regression.columns_of(each)) for each in ((), laws))
+    named_laws = [law.place for law in balance.laws if law.simulated_as in names]
+    laws = named_laws or [law.place for law in balance.laws]
+    linear, completed = (regression.remainder(regression.columns_of(law_set)) for law_set in ((), laws))
     axis = min(regression.axis, len(regression.motions[0].channels) - 1)
     motions = regression.motions
     series = _AxisSeries(
         motions[0].rate_hz / motions[0].step,
-        _seconds(motions),
+        _compute_times_s(motions),
         np.concatenate([motion.position[:: motion.step, axis] for motion in motions]),
         np.concatenate([motion.velocity[:: motion.step, axis] for motion in motions]),
         np.concatenate(regression.force),
-        np.concatenate(_forces_without_remainder(regression, linear)),
-        np.concatenate(_forces_without_remainder(regression, whole)) if laws else None,
+        np.concatenate(_subtract_remainder(regression, linear)),
+        np.concatenate(_subtract_remainder(regression, completed)) if laws else None,
         np.concatenate([motion.valid_samples(motion.fit | motion.test) for motion in motions]),
-        _slices([len(force) for force in regression.force]),
+        _make_slices([len(force) for force in regression.force]),
     )
-    return (series if series.used.any() else None), (NAMED if named else NOT_CONFIRMED if laws else "")
+    return (series if series.used.any() else None), (WITH_NAMED if named_laws else WITH_CANDIDATES if laws else "")
 
 
-def _forces_without_remainder(regression: "Regression", remainder: Sequence[FloatArray]) -> list[FloatArray]:
+def _subtract_remainder(regression: "Regression", remainder: Sequence[FloatArray]) -> list[FloatArray]:
     """Force that the model needs for the motion: the measured force less the residual, per motion."""
-    return [force - left for force, left in zip(regression.force, remainder, strict=True)]
+    return [force - residual for force, residual in zip(regression.force, remainder, strict=True)]
 
 
-def _seconds(motions: "Sequence[Motion]") -> FloatArray:
+def _compute_times_s(motions: "Sequence[Motion]") -> FloatArray:
     """(n,): time of the decimated samples, as if the parts followed one another without a gap."""
     count = sum(len(motion.force[:: motion.step]) for motion in motions)
     return np.asarray(np.arange(count) * motions[0].step / motions[0].rate_hz)
 
 
-def _slices(counts: Sequence[int]) -> tuple[slice, ...]:
+def _make_slices(counts: Sequence[int]) -> tuple[slice, ...]:
     """Ranges of parts with these numbers of samples."""
     ends = np.cumsum([0, *counts]).tolist()
-    return tuple(slice(begin, end) for begin, end in pairwise(ends))
+    return tuple(slice(start, end) for start, end in pairwise(ends))
 
 
-def _series_of_evidence(evidence: Sequence[Evidence], axis: int) -> _AxisSeries | None:
+def _extract_evidence_series(evidence: Sequence[Evidence], axis: int) -> _AxisSeries | None:
     """The samples of one axis from the evidence; None where its motion is not known."""
-    if not evidence or any(axis >= each.axis_force.shape[1] for each in evidence):
+    if not evidence or any(axis >= record.axis_force.shape[1] for record in evidence):
         return None
-    position, velocity, force, missing = (
-        np.concatenate([getattr(each, name)[:, axis] for each in evidence])
+    position, velocity, force, missing_force = (
+        np.concatenate([getattr(record, name)[:, axis] for record in evidence])
         for name in ("axis_position", "axis_velocity", "command", "axis_force")
     )
-    known = np.isfinite(position) & np.isfinite(velocity) & np.isfinite(force) & np.isfinite(missing)
-    used = known & np.concatenate([each.used > 0 for each in evidence])
+    is_finite = np.isfinite(position) & np.isfinite(velocity) & np.isfinite(force) & np.isfinite(missing_force)
+    used = is_finite & np.concatenate([record.used > 0 for record in evidence])
     rate_hz = evidence[0].sample_rate_hz
     if not used.any() or not np.ptp(velocity[used]) > 0:
         return None
     seconds = np.arange(len(force)) / rate_hz
-    parts = _slices([len(each.command) for each in evidence])
-    return _AxisSeries(rate_hz, seconds, position, velocity, force, force + missing, None, used, parts)
+    parts = _make_slices([len(record.command) for record in evidence])
+    return _AxisSeries(rate_hz, seconds, position, velocity, force, force + missing_force, None, used, parts)
 
 
-def _maps(series: _AxisSeries, labels: tuple[str, str, str, str], length: str) -> StateMaps:
+def _make_maps(series: _AxisSeries, labels: tuple[str, str, str, str], length_unit: str) -> StateMaps:
     """The maps of one axis. labels: axis, unit of the force, model, completed. length: unit of the position."""
     axis, unit, model, completed = labels
     # As the missing force on the device: friction then points against the motion.
-    missing = series.before - series.force
-    left = None if series.after is None else series.after - series.force
+    missing_force = series.model_force - series.force
+    residual = None if series.completed_force is None else series.completed_force - series.force
     views = tuple(
-        _view(series, (along, its_unit), at, (missing, left))
-        for along, its_unit, at in (
-            ("position", length, series.position),
-            ("velocity", f"{length}/s", series.velocity),
+        _make_view(series, (abscissa, abscissa_unit), values, (missing_force, residual))
+        for abscissa, abscissa_unit, values in (
+            ("position", length_unit, series.position),
+            ("velocity", f"{length_unit}/s", series.velocity),
             ("command", unit, series.force),
             ("time", "s", series.seconds),
         )
     )
-    signal = series.force[series.used] - series.force[series.used].mean()
-    size = max(float(np.sqrt(np.mean(signal**2))), 1e-300)
-    share = float(np.sqrt(np.mean(missing[series.used] ** 2))) / size
-    return StateMaps(axis, unit, model, completed, share, views, _loops(series, length))
+    force_deviation = series.force[series.used] - series.force[series.used].mean()
+    force_rms = max(float(np.sqrt(np.mean(force_deviation**2))), 1e-300)
+    share = float(np.sqrt(np.mean(missing_force[series.used] ** 2))) / force_rms
+    return StateMaps(axis, unit, model, completed, share, views, _make_loops(series, length_unit))
 
 
-def _view(
-    series: _AxisSeries, labels: tuple[str, str], at: FloatArray, missing: tuple[FloatArray, FloatArray | None]
+def _make_view(
+    series: _AxisSeries, labels: tuple[str, str], abscissa: FloatArray, missing: tuple[FloatArray, FloatArray | None]
 ) -> StateView:
     """The missing force over one variable. labels: its name and unit. missing: without and with completing laws."""
-    before, after = missing
-    places = np.flatnonzero(series.used)
-    shown = places[:: max(len(places) // CLOUD, 1)]
-    where, mean, error = bin_means(at, before, series.used, series.rate_hz)
-    left = np.zeros(0) if after is None else bin_means(at, after, series.used, series.rate_hz)[1]
-    return StateView(*labels, at[shown], before[shown], where, mean, error, left)
-
-
-def _loops(series: _AxisSeries, length: str) -> tuple[Loop, ...]:
-    """Loops over position and velocity."""
-    part = _largest_period(series)
-    after = np.zeros(0) if series.after is None else series.after[part]
-    forces = series.force[part], series.before[part], after
-    return tuple(
-        Loop(along, unit, at[part], *forces)
-        for along, unit, at in (("position", length, series.position), ("velocity", f"{length}/s", series.velocity))
+    missing_force, residual = missing
+    used_samples = np.flatnonzero(series.used)
+    drawn_samples = used_samples[:: max(len(used_samples) // SCATTER_SAMPLES, 1)]
+    bin_centres, mean, error = bin_means(abscissa, missing_force, series.used, series.rate_hz)
+    bin_residuals = np.zeros(0) if residual is None else bin_means(abscissa, residual, series.used, series.rate_hz)[1]
+    return StateView(
+        *labels, abscissa[drawn_samples], missing_force[drawn_samples], bin_centres, mean, error, bin_residuals
     )
 
 
-def _largest_period(series: _AxisSeries) -> slice:
+def _make_loops(series: _AxisSeries, length_unit: str) -> tuple[Loop, ...]:
+    """Loops over position and velocity."""
+    part = _find_largest_period(series)
+    completed_force = np.zeros(0) if series.completed_force is None else series.completed_force[part]
+    forces = series.force[part], series.model_force[part], completed_force
+    return tuple(
+        Loop(abscissa, unit, values[part], *forces)
+        for abscissa, unit, values in (
+            ("position", length_unit, series.position),
+            ("velocity", f"{length_unit}/s", series.velocity),
+        )
+    )
+
+
+def _find_largest_period(series: _AxisSeries) -> slice:
     """About one period of the motion, where its travel is largest."""
-    part = max(series.parts, key=lambda each: float(np.ptp(series.position[each])) if each.stop > each.start else 0.0)
+    part = max(
+        series.parts,
+        key=lambda samples: float(np.ptp(series.position[samples])) if samples.stop > samples.start else 0.0,
+    )
     position = series.position[part]
     power = np.abs(np.fft.rfft(position - position.mean()))
-    line = int(np.argmax(power[1:])) + 1 if len(power) > 1 else 1
-    count = int(np.clip(LOOP_PERIODS * len(position) / line, min(40, len(position)), LOOP_SAMPLES))
+    strongest_line = int(np.argmax(power[1:])) + 1 if len(power) > 1 else 1
+    count = int(np.clip(LOOP_PERIODS * len(position) / strongest_line, min(40, len(position)), LOOP_SAMPLES))
     starts = range(0, max(len(position) - count, 0) + 1, max(count // 4, 1))
-    best = max(starts, key=lambda begin: float(np.ptp(position[begin : begin + count])))
-    return slice(part.start + best, part.start + min(best + count, len(position)))
+    best_start = max(starts, key=lambda start: float(np.ptp(position[start : start + count])))
+    return slice(part.start + best_start, part.start + min(best_start + count, len(position)))

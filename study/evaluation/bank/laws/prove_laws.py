@@ -16,7 +16,7 @@ from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
 from analysis.evaluation.laws.law_score import LawScore, law_score
 from study.errors import resumable
 from study.evaluation.bank.ask_engine import ask_and_count, is_answered
-from study.evaluation.bank.laws.seal_laws import fresh_file, fresh_motions, seal_laws
+from study.evaluation.bank.laws.seal_laws import fresh_motions_path, read_fresh_motions, seal_laws
 from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.seal_cases import BankPlan, read_case_names
 from study.evaluation.bank.sealed_bank import BankOptions, Progress, answered_fields, engines, reveal_bank
@@ -48,9 +48,16 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
     with resumable("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_laws(folder, plan, options.workers, lambda done: on_progress("sealing", done, plan.cases))
         names = read_case_names(folder, range(plan.cases))
-        there = [name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING).exists()]
+        diagnosable = [
+            name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING).exists()
+        ]
         ask_and_count(
-            folder, names, options.answering, partial(on_progress, "diagnosing"), keep=options.keep, asked=there
+            folder,
+            names,
+            options.answering,
+            partial(on_progress, "diagnosing"),
+            keep=options.keep,
+            diagnosable=diagnosable,
         )
     outcomes = reveal_laws(folder, plan.cases)
     return LawBlindTest(folder, plan, seal, outcomes, law_score(outcomes), engines(folder, names))
@@ -60,27 +67,27 @@ def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
     """Outcomes of the answered cases among the first `cases` numbers. Raises StudyError where a label or a fresh test
     motion differs from its seal."""
 
-    def is_whole(label: Mapping[str, Any]) -> bool:
-        return sha256_of(fresh_file(folder, label["number"])) == str(label["fresh_sha256"])
+    def is_unchanged(label: Mapping[str, Any]) -> bool:
+        return sha256_of(fresh_motions_path(folder, label["number"])) == str(label["fresh_sha256"])
 
     def outcome_of(label: Mapping[str, Any], answer: Mapping[str, Any]) -> LawOutcome:
-        return _outcome(label, answer, fresh_file(folder, label["number"]))
+        return _make_outcome(label, answer, fresh_motions_path(folder, label["number"]))
 
-    return reveal_bank(folder, cases, outcome_of, is_whole)
+    return reveal_bank(folder, cases, outcome_of, is_unchanged)
 
 
-def _outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh: Path) -> LawOutcome:
+def _make_outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh_path: Path) -> LawOutcome:
     """One case with its true law (None where the case has none), and the error of the found laws on
-    each fresh test motion in the file `fresh`."""
-    truth = None if label["truth"] is None else _true_law(label["truth"])
-    found = LawOutcome(concealed=label["concealed"], truth=truth, **answered_fields(label, answer))
-    if truth is None or not found.laws:
-        return found
-    motions = fresh_motions(fresh, label["axes"], truth.axes, truth.acts_on == ("response",))
-    return replace(found, errors=tuple(law_error(found.laws, motion) for motion in motions))
+    each fresh test motion in the file `fresh_path`."""
+    truth = None if label["truth"] is None else _read_true_law(label["truth"])
+    outcome = LawOutcome(concealed=label["concealed"], truth=truth, **answered_fields(label, answer))
+    if truth is None or not outcome.laws:
+        return outcome
+    motions = read_fresh_motions(fresh_path, label["axes"], truth.axes, truth.acts_on == ("response",))
+    return replace(outcome, errors=tuple(law_error(outcome.laws, motion) for motion in motions))
 
 
-def _true_law(label: Mapping[str, Any]) -> TrueLaw:
+def _read_true_law(label: Mapping[str, Any]) -> TrueLaw:
     """The true law from the values of its label."""
     return TrueLaw(
         label["law"],

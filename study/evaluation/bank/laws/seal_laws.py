@@ -20,7 +20,7 @@ from study.evaluation.bank.begun_cases import begin_case, show_case
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.seal_cases import PROCESSOR_S, SALT_BYTES, BankPlan, seal_missing
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
-from study.evaluation.challenge.laws.draw_law import Fresh, LawCase, LawDraw, draw_law, law_case
+from study.evaluation.challenge.laws.draw_law import FreshTestMotion, LawCase, LawDraw, draw_law, generate_law_case
 from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import write_text
 from study.store.formats.mechanical_model_file import write_mechanical_model
@@ -28,78 +28,89 @@ from study.store.formats.recording_file import write_recording
 
 
 def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
-    """Draw, write and seal the missing cases in `workers` processes, calling `on_sealed(count)`. Returns the SHA-256 of
-    labels.sha256. Raises StudyError."""
-    drawn = [draw_law(plan.seed, number, plan.brief) for number in range(plan.cases)]
-    write_case = {each.number: partial(_seal_law, folder, each) for each in drawn}
+    """Draw, write and seal the missing cases in `workers` processes, calling `on_sealed` with the
+    number of cases sealed so far. Returns the SHA-256 of labels.sha256. Raises StudyError."""
+    law_draws = [draw_law(plan.seed, number, plan.brief) for number in range(plan.cases)]
+    write_case = {law_draw.number: partial(_seal_law, folder, law_draw) for law_draw in law_draws}
     return seal_missing(folder, write_case, workers, on_sealed)
 
 
-def fresh_file(folder: ProofFolder, number: int) -> Path:
+def fresh_motions_path(folder: ProofFolder, number: int) -> Path:
     """Path of the sealed fresh motions of a case."""
-    return folder.label(number).with_suffix(".npz")
+    return folder.label_file(number).with_suffix(".npz")
 
 
-def fresh_motions(path: Path, axes: Sequence[str], pushed: Sequence[str], response: bool) -> tuple[FreshMotion, ...]:
-    """Read a sealed file of fresh motions. axes: driven axes; pushed: axes on which the laws act; response: whether
-    the law acts on the sensor reading."""
-    with np.load(path) as kept:
-        count = len({name.split("_")[1] for name in kept.files})
+def read_fresh_motions(
+    path: Path, axes: Sequence[str], law_axes: Sequence[str], acts_on_response: bool
+) -> tuple[FreshMotion, ...]:
+    """Read a sealed file of fresh motions. axes: driven axes; law_axes: axes on which the laws act; acts_on_response:
+    whether the law acts on the sensor reading."""
+    with np.load(path) as arrays_file:
+        motion_count = len({name.split("_")[1] for name in arrays_file.files})
         return tuple(
-            _fresh_motion({name: kept[f"{name}_{number}"] for name in _KEPT}, axes, pushed, response)
-            for number in range(count)
+            _read_motion(
+                {name: arrays_file[f"{name}_{number}"] for name in _ARRAY_NAMES}, axes, law_axes, acts_on_response
+            )
+            for number in range(motion_count)
         )
 
 
-_KEPT = ("position", "velocity", "acceleration", "command", "reading", "lawful")
+_ARRAY_NAMES = ("position", "velocity", "acceleration", "command", "reading", "lawful")
 """Sealed arrays of a fresh motion, (samples, axes) each; the first four are the variables x, v, a and f of an axis."""
 
 
-def _fresh_motion(of: dict[str, Any], axes: Sequence[str], pushed: Sequence[str], response: bool) -> FreshMotion:
-    """A fresh motion as columns (t in s, and x, v, a and f by axis), with the law's contribution on the axes `pushed`:
-    to the sensor reading (m/s²), or the force (N)."""
-    columns = {"t": np.arange(len(of["command"])) / RATE_HZ}
-    for place, axis in enumerate(axes):
-        for prefix, name in zip(("", "v", "a", "f"), _KEPT, strict=False):
-            columns[prefix + axis] = np.ascontiguousarray(of[name][:, place], dtype=np.float64)
-    added = of["reading"] - of["acceleration"] if response else of["lawful"]
-    return FreshMotion(columns, {axis: added[:, axes.index(axis)] for axis in pushed}, response, RATE_HZ)
+def _read_motion(
+    arrays: dict[str, Any], axes: Sequence[str], law_axes: Sequence[str], acts_on_response: bool
+) -> FreshMotion:
+    """A fresh motion as columns (t in s, and x, v, a and f by axis), with the law's contribution on the axes
+    `law_axes`: to the sensor reading (m/s²), or the force (N)."""
+    columns = {"t": np.arange(len(arrays["command"])) / RATE_HZ}
+    for column, axis in enumerate(axes):
+        for prefix, name in zip(("", "v", "a", "f"), _ARRAY_NAMES, strict=False):
+            columns[prefix + axis] = np.ascontiguousarray(arrays[name][:, column], dtype=np.float64)
+    contribution = arrays["reading"] - arrays["acceleration"] if acts_on_response else arrays["lawful"]
+    return FreshMotion(
+        columns, {axis: contribution[:, axes.index(axis)] for axis in law_axes}, acts_on_response, RATE_HZ
+    )
 
 
-def _seal_law(folder: ProofFolder, each: LawDraw) -> None:
+def _seal_law(folder: ProofFolder, law_draw: LawDraw) -> None:
     """Write one case. The label is written after all other files: without a label, the case is unfinished."""
-    place = begin_case(folder)
-    found = law_case(each, place.name)
-    write_recording(place / RECORDING, found.case.recording, precision="float32")
-    write_mechanical_model(place / MODEL, found.case.model)
-    asked = {"without": [], "discovery": True, "processor_s": PROCESSOR_S}
-    write_text(place / SETTINGS, json.dumps(asked) + "\n")
-    np.savez(fresh_file(folder, each.number), allow_pickle=False, **_arrays(found.fresh))
-    label = _label(folder, each, found, place)
-    write_text(folder.label(each.number), json.dumps(label, indent=1, allow_nan=False) + "\n")
-    show_case(folder, place)
+    case_folder = begin_case(folder)
+    law_case = generate_law_case(law_draw, case_folder.name)
+    write_recording(case_folder / RECORDING, law_case.case.recording, precision="float32")
+    write_mechanical_model(case_folder / MODEL, law_case.case.model)
+    diagnosis_settings = {"without": [], "discovery": True, "processor_s": PROCESSOR_S}
+    write_text(case_folder / SETTINGS, json.dumps(diagnosis_settings) + "\n")
+    np.savez(fresh_motions_path(folder, law_draw.number), allow_pickle=False, **_collect_arrays(law_case.fresh_motions))
+    label = _make_label(folder, law_draw, law_case, case_folder)
+    write_text(folder.label_file(law_draw.number), json.dumps(label, indent=1, allow_nan=False) + "\n")
+    show_case(folder, case_folder)
 
 
-def _arrays(fresh: Sequence[Fresh]) -> dict[str, Any]:
-    """Arrays of all fresh motions by name and number, as `fresh_motions` reads them."""
-    found = {}
-    for number, each in enumerate(fresh):
-        moved = (each.moved.position, each.moved.velocity, each.moved.acceleration)
-        for name, values in zip(_KEPT, (*moved, each.command, each.reading, each.lawful), strict=True):
-            found[f"{name}_{number}"] = values
-    return found
+def _collect_arrays(motions: Sequence[FreshTestMotion]) -> dict[str, Any]:
+    """Arrays of all fresh motions by name and number, as `read_fresh_motions` reads them."""
+    arrays = {}
+    for number, motion in enumerate(motions):
+        motion_arrays = (motion.motion.position, motion.motion.velocity, motion.motion.acceleration)
+        for name, values in zip(
+            _ARRAY_NAMES, (*motion_arrays, motion.command, motion.reading, motion.lawful), strict=True
+        ):
+            arrays[f"{name}_{number}"] = values
+    return arrays
 
 
-def _label(folder: ProofFolder, each: LawDraw, found: LawCase, place: Path) -> dict[str, Any]:
-    """Everything that is concealed. A random salt keeps the content from being guessed from its hash."""
+def _make_label(folder: ProofFolder, law_draw: LawDraw, law_case: LawCase, case_folder: Path) -> dict[str, Any]:
+    """The sealed label: the true law and the hashes of the files of the case. A random salt keeps the content from
+    being guessed from its hash."""
     return {
-        "name": place.name,
-        **{key: getattr(each, key) for key in ("number", "seed", "kind", "concealed", "strength", "model")},
-        "axes": [AXES[axis] for axis in each.rig.axes],
-        "truth": None if found.truth is None else asdict(found.truth),
-        "adds": found.case.adds,
-        "recording_sha256": sha256_of(place / RECORDING),
-        "model_sha256": sha256_of(place / MODEL),
-        "fresh_sha256": sha256_of(fresh_file(folder, each.number)),
+        "name": case_folder.name,
+        **{key: getattr(law_draw, key) for key in ("number", "seed", "kind", "concealed", "strength", "model")},
+        "axes": [AXES[axis] for axis in law_draw.settings.axes],
+        "truth": None if law_case.truth is None else asdict(law_case.truth),
+        "adds": law_case.case.detectability,
+        "recording_sha256": sha256_of(case_folder / RECORDING),
+        "model_sha256": sha256_of(case_folder / MODEL),
+        "fresh_sha256": sha256_of(fresh_motions_path(folder, law_draw.number)),
         "salt": secrets.token_hex(SALT_BYTES),
     }

@@ -2,9 +2,8 @@
 concealed.
 
 `write_laws` writes into the folder of the test: `proof.json` (all figures) and `proof.csv` (one row per case).
-`write_law_table` writes figures and misses as small CSV tables that can be kept under version control. `law_lines` and
-`law_summary` give the result as text for the terminal and as JSON.
-"""
+`write_law_table` writes figures and misses as small CSV tables that can be kept under version control.
+`format_law_lines` and `format_law_summary` give the result as text for the terminal and as JSON."""
 
 import json
 import sys
@@ -13,14 +12,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis.evaluation.blind_test.wording import figure_text
+from analysis.evaluation.blind_test.wording import format_figure
 from analysis.evaluation.laws.law_outcome import LawOutcome
 from equalizer.laws.law import Law
 from study.evaluation.bank.laws.prove_laws import LawBlindTest
-from study.evaluation.bank.write_proof import FigureRow, commit
+from study.evaluation.bank.write_proof import FigureRow, read_current_commit
 from study.store.disk.csv_rows import rows_to_csv
 from study.store.disk.json_document import write_json
-from study.store.disk.provenance import command_line, gather_provenance
+from study.store.disk.provenance import anonymise_arguments, gather_provenance
 from study.store.disk.text_file import write_text
 
 FORMAT, VERSION = "hapteq-proof", 1
@@ -67,94 +66,102 @@ class LawRow:
     miss: bool
 
 
-def write_laws(done: LawBlindTest) -> None:
+def write_laws(result: LawBlindTest) -> None:
     """Write document and table, replacing earlier ones. Raises StudyError."""
     document = {
-        **_facts(done),
-        "commit": commit(),
-        "command": " ".join(command_line(sys.argv)),
+        **_collect_facts(result),
+        "commit": read_current_commit(),
+        "command": " ".join(anonymise_arguments(sys.argv)),
     }
-    write_json(done.folder.path / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
-    rows = [_row(each) for each in done.outcomes]
-    write_text(done.folder.path / TABLE, rows_to_csv(rows, LawRow), overwrite=True)
+    write_json(result.folder.path / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
+    rows = [_make_row(outcome) for outcome in result.outcomes]
+    write_text(result.folder.path / TABLE, rows_to_csv(rows, LawRow), overwrite=True)
 
 
-def write_law_table(path: Path, done: LawBlindTest) -> None:
+def write_law_table(path: Path, result: LawBlindTest) -> None:
     """Write the figures as a small table at `path`, and the misses in a second table with the suffix -misses. Raises
     StudyError."""
-    figures = [FigureRow(each.name, each.value, each.low, each.high, each.of) for each in done.score.figures]
+    figures = [
+        FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in result.score.figures
+    ]
     lines = [
-        f"# {len(done.outcomes)} cases of laws, seeds {done.plan.seed} to {done.plan.seed + done.plan.cases - 1}",
-        f"# commit {commit()}, code of the diagnosis {' '.join(done.engines)}",
-        f"# seal of the labels {done.seal}",
+        f"# {len(result.outcomes)} cases of laws, seeds {result.plan.seed} to "
+        f"{result.plan.seed + result.plan.cases - 1}",
+        f"# commit {read_current_commit()}, code of the diagnosis {' '.join(result.engines)}",
+        f"# seal of the labels {result.seal}",
     ]
     write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
-    misses = [_row(each) for each in done.score.misses]
+    misses = [_make_row(miss) for miss in result.score.misses]
     write_text(path.with_name(f"{path.stem}-misses{path.suffix}"), rows_to_csv(misses, LawRow), overwrite=True)
 
 
-def law_lines(done: LawBlindTest) -> Iterator[str]:
-    """Lines for the terminal: each miss, each figure, the seal of the labels."""
-    yield f"{len(done.score.misses)} misses in {len(done.outcomes)} cases"
-    for miss in done.score.misses:
+def format_law_lines(result: LawBlindTest) -> Iterator[str]:
+    """Format lines for the terminal: each miss, each figure, the seal of the labels."""
+    yield f"{len(result.score.misses)} misses in {len(result.outcomes)} cases"
+    for miss in result.score.misses:
         truth = miss.kind if miss.truth is None else miss.truth.formula
-        yield f"  {miss.number:5d} {miss.concealed or 'nothing'} ({truth}): {_answer_text(miss)}"
+        yield f"  {miss.number:5d} {miss.concealed or 'nothing'} ({truth}): {_format_answer(miss)}"
     yield ""
-    for figure in done.score.figures:
-        yield f"{figure.name:52s} {figure_text(figure)}"
-    if len(done.engines) > 1:
+    for figure in result.score.figures:
+        yield f"{figure.name:52s} {format_figure(figure)}"
+    if len(result.engines) > 1:
         yield (
-            f"The answers come from {len(done.engines)} versions of the diagnosis: run the bank again, so that all "
+            f"The answers come from {len(result.engines)} versions of the diagnosis: run the bank again, so that all "
             "figures are of one version."
         )
-    yield f"Seal of the labels (SHA-256 of labels.sha256): {done.seal}"
-    yield f"Everything is in {done.folder.path}"
+    yield f"Seal of the labels (SHA-256 of labels.sha256): {result.seal}"
+    yield f"Everything is in {result.folder.path}"
 
 
-def law_summary(done: LawBlindTest) -> str:
-    """Result as JSON text."""
-    return json.dumps({"folder": str(done.folder.path), **_facts(done)}, indent=2)
+def format_law_summary(result: LawBlindTest) -> str:
+    """Format the result as JSON text."""
+    return json.dumps({"folder": str(result.folder.path), **_collect_facts(result)}, indent=2)
 
 
-def _facts(done: LawBlindTest) -> dict[str, Any]:
+def _collect_facts(result: LawBlindTest) -> dict[str, Any]:
     """Values that the document and the summary share."""
     return {
         "of": "laws",
-        "seed": done.plan.seed,
-        "cases": len(done.outcomes),
-        "brief": done.plan.brief,
-        "seal": done.seal,
-        "engines": list(done.engines),
-        "figures": [asdict(figure) for figure in done.score.figures],
-        "misses": [miss.number for miss in done.score.misses],
+        "seed": result.plan.seed,
+        "cases": len(result.outcomes),
+        "brief": result.plan.brief,
+        "seal": result.seal,
+        "engines": list(result.engines),
+        "figures": [asdict(figure) for figure in result.score.figures],
+        "misses": [miss.number for miss in result.score.misses],
     }
 
 
-def _answer_text(of: LawOutcome) -> str:
+def _format_answer(outcome: LawOutcome) -> str:
     """The answer in words: verdict, effects, laws or candidates, and the error of the law in percent."""
-    laws = " and ".join(_law_text(law) for law in of.laws)
-    how = "" if of.named or not of.candidates else "candidate "
-    names = ", ".join(of.names)
-    near = f", {100 * of.errors[0]:.3g} % off" if of.errors else ""
-    return f"{of.verdict}: {names}{' and ' if names and laws else ''}{how}{laws or ('' if names else 'no law')}{near}"
+    laws = " and ".join(_format_law(law) for law in outcome.laws)
+    prefix = "" if outcome.named or not outcome.candidates else "candidate "
+    names = ", ".join(outcome.names)
+    error_text = f", {100 * outcome.errors[0]:.3g} % off" if outcome.errors else ""
+    return (
+        f"{outcome.verdict}: {names}{' and ' if names and laws else ''}{prefix}"
+        f"{laws or ('' if names else 'no law')}{error_text}"
+    )
 
 
-def _law_text(law: Law) -> str:
+def _format_law(law: Law) -> str:
     return f"{law.acts_on} {law.axis} = {law.text}"
 
 
-def _row(of: LawOutcome) -> LawRow:
-    numbers = {} if of.truth is None else of.truth.numbers
-    error, louder = of.errors or (None, None)
+def _make_row(outcome: LawOutcome) -> LawRow:
+    numbers = {} if outcome.truth is None else outcome.truth.numbers
+    error, louder_error = outcome.errors or (None, None)
     return LawRow(
-        of.number, of.seed, of.kind, of.concealed, " ".join(of.axes if of.truth is None else of.truth.axes),
-        " ".join(f"{name}={value:.4g}" for name, value in numbers.items()), of.detectable, of.verdict,
-        " and ".join(map(_law_text, of.named)), " ".join(of.names), " and ".join(map(_law_text, of.candidates)),
-        of.structured, _short(error), _short(louder), _short(of.left("retuned")), _short(of.left("after")),
-        _short(of.seconds), of.missed,
+        outcome.number, outcome.seed, outcome.kind, outcome.concealed,
+        " ".join(outcome.axes if outcome.truth is None else outcome.truth.axes),
+        " ".join(f"{name}={value:.4g}" for name, value in numbers.items()), outcome.detectable, outcome.verdict,
+        " and ".join(map(_format_law, outcome.named)), " ".join(outcome.names),
+        " and ".join(map(_format_law, outcome.candidates)), outcome.structured, _round(error), _round(louder_error),
+        _round(outcome.worst_error("retuned")), _round(outcome.worst_error("after")),
+        _round(outcome.seconds), outcome.missed,
     )  # fmt: skip
 
 
-def _short(value: float | None) -> float | None:
+def _round(value: float | None) -> float | None:
     """The value with four decimals; None for NaN and infinity."""
     return None if value is None or value != value or value == float("inf") else round(value, 4)

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.evaluation.challenge.actuator_kernel import FADE, FADE_S, HELD
+from study.evaluation.challenge.actuator_kernel import FADE, FADE_S, HYSTERESIS
 from study.evaluation.challenge.concealed_effect import (
     ConcealedEffect,
     EffectContext,
@@ -32,9 +32,9 @@ CREEP_TIMES_S = (0.02, 0.2, 2.0)
 """Time constants of the creep (s), a decade apart."""
 
 
-def _draw_creep(at: EffectContext) -> dict[str, float]:
+def _draw_creep(context: EffectContext) -> dict[str, float]:
     """stiffness: N/m, of each of the relaxing springs; relative to the ground stiffness of the axis."""
-    return {"stiffness": at.log_between(0.05, 1.0) * at.bench.stiffness[at.axis, at.axis]}
+    return {"stiffness": context.log_between(0.05, 1.0) * context.bench.stiffness[context.axis, context.axis]}
 
 
 def _build_creep(device: Device, axis: int, values: Values) -> Device:
@@ -43,80 +43,85 @@ def _build_creep(device: Device, axis: int, values: Values) -> Device:
     return replace(device, creep_stiffness=stiffness, creep_time_s=np.array(CREEP_TIMES_S))
 
 
-def _draw_damping(at: EffectContext) -> dict[str, float]:
+def _draw_damping(context: EffectContext) -> dict[str, float]:
     """damping_per_m2: N s/m per m²; at the largest distance of the motion, 0.5 to 12 N s/m."""
-    return {"damping_per_m2": at.log_between(0.5, 12.0) / at.travel_m[at.axis] ** 2}
+    return {"damping_per_m2": context.log_between(0.5, 12.0) / context.travel_m[context.axis] ** 2}
 
 
 def _build_damping(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {DAMPING_SQUARE: values["damping_per_m2"]})
 
 
-def _draw_swing(at: EffectContext) -> dict[str, float]:
+def _draw_switching(context: EffectContext) -> dict[str, float]:
     """rate_hz: of the switching; depth: change of the stiffness, relative to that of the axis."""
-    return {"rate_hz": at.draw_log_uniform(0.7, 9.0), "depth": at.log_between(0.05, 0.7)}
+    return {"rate_hz": context.draw_log_uniform(0.7, 9.0), "depth": context.log_between(0.05, 0.7)}
 
 
-def _build_swing(device: Device, axis: int, values: Values) -> Device:
+def _build_switching(device: Device, axis: int, values: Values) -> Device:
     varying = device.varying.copy()
     stiffness = values["depth"] * device.bench.stiffness[axis, axis]
     varying[axis] = (values["rate_hz"], 0.0, stiffness, 0.0, 1.0)
     return replace(device, varying=varying)
 
 
-def _draw_bending(at: EffectContext) -> dict[str, float]:
+def _draw_bending(context: EffectContext) -> dict[str, float]:
     """bend: s²/m, reciprocal of the largest reading of the saturation; play: m/s², half its width."""
-    return {"bend": at.log_between(0.3, 1.5) / at.peak_mps2.max(), "play": at.log_between(0.03, 0.8)}
+    return {"bend": context.log_between(0.3, 1.5) / context.peak_mps2.max(), "play": context.log_between(0.03, 0.8)}
 
 
 def _build_bending(device: Device, axis: int, values: Values) -> Device:
     return replace(device, sensor=replace(device.sensor, bend=values["bend"], play=values["play"]))
 
 
-def _draw_crossed(at: EffectContext) -> dict[str, float]:
+def _draw_coupling(context: EffectContext) -> dict[str, float]:
     """coupling: N/m²; relative to the ground stiffness of the x axis over the largest travel."""
-    return {"coupling": at.sign() * at.log_between(0.02, 0.3) * at.bench.stiffness[0, 0] / at.travel_m.max()}
+    return {
+        "coupling": context.draw_sign()
+        * context.log_between(0.02, 0.3)
+        * context.bench.stiffness[0, 0]
+        / context.travel_m.max()
+    }
 
 
-def _build_crossed(device: Device, axis: int, values: Values) -> Device:
+def _build_coupling(device: Device, axis: int, values: Values) -> Device:
     return replace(device, coupling=values["coupling"])
 
 
-def _draw_skipped(at: EffectContext) -> dict[str, float]:
+def _draw_skipped(context: EffectContext) -> dict[str, float]:
     """every: n; the command numbered n, 2n, … is not written. Stronger is a smaller n."""
-    return {"every": float(round(at.log_between(2000.0, 8.0)))}
+    return {"every": float(round(context.log_between(2000.0, 8.0)))}
 
 
 def _build_skipped(device: Device, axis: int, values: Values) -> Device:
     return replace(device, skipped=int(values["every"]))
 
 
-def _draw_tired(at: EffectContext) -> dict[str, float]:
+def _draw_heating(context: EffectContext) -> dict[str, float]:
     """loss_per_n2: share of the force lost per N² of mean square force; seconds: averaging time of that mean."""
-    return {"loss_per_n2": at.log_between(0.02, 0.3), "seconds": at.draw_log_uniform(2.0, 8.0)}
+    return {"loss_per_n2": context.log_between(0.02, 0.3), "seconds": context.draw_log_uniform(2.0, 8.0)}
 
 
-def _build_tired(device: Device, axis: int, values: Values) -> Device:
+def _build_heating(device: Device, axis: int, values: Values) -> Device:
     return with_amplifier(device, axis, {FADE: values["loss_per_n2"], FADE_S: values["seconds"]})
 
 
-def _draw_iron(at: EffectContext) -> dict[str, float]:
+def _draw_hysteresis(context: EffectContext) -> dict[str, float]:
     """half_width: N, half the play between command and force."""
-    return {"half_width": at.log_between(0.01, 0.3)}
+    return {"half_width": context.log_between(0.01, 0.3)}
 
 
-def _build_iron(device: Device, axis: int, values: Values) -> Device:
-    return with_amplifier(device, axis, {HELD: values["half_width"]})
+def _build_hysteresis(device: Device, axis: int, values: Values) -> Device:
+    return with_amplifier(device, axis, {HYSTERESIS: values["half_width"]})
 
 
 DECOYS = (
     ConcealedEffect("creep", "mechanism", True, _draw_creep, _build_creep),
     ConcealedEffect("damping_of_place", "mechanism", True, _draw_damping, _build_damping),
-    ConcealedEffect("stiffness_in_time", "mechanism", True, _draw_swing, _build_swing),
+    ConcealedEffect("stiffness_in_time", "mechanism", True, _draw_switching, _build_switching),
     ConcealedEffect("bending_sensor", "sensor", False, _draw_bending, _build_bending),
-    ConcealedEffect("crossed_axes", "mechanism", False, _draw_crossed, _build_crossed),
+    ConcealedEffect("crossed_axes", "mechanism", False, _draw_coupling, _build_coupling),
     ConcealedEffect("skipped_commands", "actuator", False, _draw_skipped, _build_skipped),
-    ConcealedEffect("tired_motor", "actuator", True, _draw_tired, _build_tired),
-    ConcealedEffect("force_hysteresis", "actuator", True, _draw_iron, _build_iron),
+    ConcealedEffect("tired_motor", "actuator", True, _draw_heating, _build_heating),
+    ConcealedEffect("force_hysteresis", "actuator", True, _draw_hysteresis, _build_hysteresis),
 )
 """The decoys, in the form of `EFFECTS` in the modules of this package; no name is in the vocabulary of effects."""

@@ -25,29 +25,29 @@ def _with_bristle(device: Device, axis: int, cells: dict[int, float]) -> Device:
     return replace(device, friction=with_cells(device.friction, axis, {STIFFNESS: STIFF_N_PER_M} | cells))
 
 
-def _draw_coulomb(at: EffectContext) -> dict[str, float]:
-    return {"level": at.log_between(0.003, 0.25)}
+def _draw_coulomb(context: EffectContext) -> dict[str, float]:
+    return {"level": context.log_between(0.003, 0.25)}
 
 
 def _build_coulomb(device: Device, axis: int, values: Values) -> Device:
     return _with_bristle(device, axis, {POSITIVE: values["level"], NEGATIVE: values["level"]})
 
 
-def _draw_asymmetric(at: EffectContext) -> dict[str, float]:
-    mean, unlike = at.log_between(0.01, 0.25), at.sign() * at.random.uniform(0.2, 0.6)
-    return {"level_positive": mean * (1 + unlike), "level_negative": mean * (1 - unlike)}
+def _draw_asymmetric(context: EffectContext) -> dict[str, float]:
+    mean, asymmetry = context.log_between(0.01, 0.25), context.draw_sign() * context.random.uniform(0.2, 0.6)
+    return {"level_positive": mean * (1 + asymmetry), "level_negative": mean * (1 - asymmetry)}
 
 
 def _build_asymmetric(device: Device, axis: int, values: Values) -> Device:
     return _with_bristle(device, axis, {POSITIVE: values["level_positive"], NEGATIVE: values["level_negative"]})
 
 
-def _draw_stribeck(at: EffectContext) -> dict[str, float]:
-    coulomb = at.log_between(0.01, 0.2)
+def _draw_stribeck(context: EffectContext) -> dict[str, float]:
+    coulomb = context.log_between(0.01, 0.2)
     return {
         "coulomb": coulomb,
-        "static": coulomb * at.random.uniform(1.3, 2.2),
-        "speed": at.draw_log_uniform(0.003, 0.02),
+        "static": coulomb * context.random.uniform(1.3, 2.2),
+        "speed": context.draw_log_uniform(0.003, 0.02),
     }
 
 
@@ -57,9 +57,9 @@ def _build_stribeck(device: Device, axis: int, values: Values) -> Device:
     return _with_bristle(device, axis, {POSITIVE: level, NEGATIVE: level, STATIC_RATIO: ratio, SPEED: values["speed"]})
 
 
-def _draw_presliding(at: EffectContext) -> dict[str, float]:
-    level = at.log_between(0.01, 0.25)
-    return {"level": level, "stiffness": level / at.draw_log_uniform(5e-5, 5e-4)}
+def _draw_presliding(context: EffectContext) -> dict[str, float]:
+    level = context.log_between(0.01, 0.25)
+    return {"level": level, "stiffness": level / context.draw_log_uniform(5e-5, 5e-4)}
 
 
 def _build_presliding(device: Device, axis: int, values: Values) -> Device:
@@ -67,13 +67,13 @@ def _build_presliding(device: Device, axis: int, values: Values) -> Device:
     return _with_bristle(device, axis, {POSITIVE: level, NEGATIVE: level, STIFFNESS: values["stiffness"]})
 
 
-def _draw_along(at: EffectContext) -> dict[str, float]:
-    slope = at.sign() * at.random.uniform(0.3, 0.7) / at.travel_m[at.axis]
-    bend = at.random.uniform(-0.25, 0.6) / at.travel_m[at.axis] ** 2
-    return {"level": at.log_between(0.01, 0.25), "slope_per_m": float(slope), "bend_per_m2": float(bend)}
+def _draw_position_dependent(context: EffectContext) -> dict[str, float]:
+    slope = context.draw_sign() * context.random.uniform(0.3, 0.7) / context.travel_m[context.axis]
+    bend = context.random.uniform(-0.25, 0.6) / context.travel_m[context.axis] ** 2
+    return {"level": context.log_between(0.01, 0.25), "slope_per_m": float(slope), "bend_per_m2": float(bend)}
 
 
-def _build_along(device: Device, axis: int, values: Values) -> Device:
+def _build_position_dependent(device: Device, axis: int, values: Values) -> Device:
     level = values["level"]
     cells = {POSITIVE: level, NEGATIVE: level, SLOPE: values["slope_per_m"], BEND: values["bend_per_m2"]}
     return _with_bristle(device, axis, cells)
@@ -84,6 +84,8 @@ EFFECTS = (
     ConcealedEffect("asymmetric_friction", "mechanism", True, _draw_asymmetric, _build_asymmetric),
     ConcealedEffect("stribeck_friction", "mechanism", True, _draw_stribeck, _build_stribeck),
     ConcealedEffect("presliding_hysteresis", "mechanism", True, _draw_presliding, _build_presliding),
-    ConcealedEffect("position_dependent_friction", "mechanism", True, _draw_along, _build_along),
+    ConcealedEffect(
+        "position_dependent_friction", "mechanism", True, _draw_position_dependent, _build_position_dependent
+    ),
 )
 """Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""

@@ -13,19 +13,19 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values
 from study.evaluation.challenge.device import Device
-from study.evaluation.challenge.mechanism_kernel import DAMPING_DEPTH, RATE, STIFFNESS_DEPTH, TURN
+from study.evaluation.challenge.mechanism_kernel import DAMPING_DEPTH, PHASE, RATE, STIFFNESS_DEPTH
 
 
-def _draw_hand(at: EffectContext) -> dict[str, float]:
+def _draw_hand(context: EffectContext) -> dict[str, float]:
     """Along x at strength 1: 0.04 to 0.09 kg, 2.5 to 6 N s/m, 100 to 300 N/m, log-uniform."""
-    tight = at.log_between(0.01, 1.0)
-    drawn = {
-        "mass": tight * at.draw_log_uniform(0.04, 0.09),
-        "damping": tight * at.draw_log_uniform(2.5, 6.0),
-        "stiffness": tight * at.draw_log_uniform(100.0, 300.0),
+    grip_strength = context.log_between(0.01, 1.0)
+    x_values = {
+        "mass": grip_strength * context.draw_log_uniform(0.04, 0.09),
+        "damping": grip_strength * context.draw_log_uniform(2.5, 6.0),
+        "stiffness": grip_strength * context.draw_log_uniform(100.0, 300.0),
     }
-    parts = {f"{name}_{axis}": float(at.random.uniform(0.3, 1.2)) for name in drawn for axis in "yz"}
-    return drawn | parts
+    yz_factors = {f"{name}_{axis}": float(context.random.uniform(0.3, 1.2)) for name in x_values for axis in "yz"}
+    return x_values | yz_factors
 
 
 def _build_hand(device: Device, axis: int, values: Values) -> Device:
@@ -42,19 +42,19 @@ def _build_hand(device: Device, axis: int, values: Values) -> Device:
     return replace(device, bench=bench)
 
 
-def _draw_grip(at: EffectContext) -> dict[str, float]:
+def _draw_grip(context: EffectContext) -> dict[str, float]:
     """Rate (Hz), depth 0.02 to 0.8, phase (rad); stiffness_share: 0 or 1, whether the stiffness varies too."""
     return {
-        "rate_hz": at.draw_log_uniform(0.03, 0.5),
-        "depth": at.log_between(0.02, 0.8),
-        "phase": at.random.uniform(0, 2 * np.pi),
-        "stiffness_share": float(at.random.integers(2)),
+        "rate_hz": context.draw_log_uniform(0.03, 0.5),
+        "depth": context.log_between(0.02, 0.8),
+        "phase": context.random.uniform(0, 2 * np.pi),
+        "stiffness_share": float(context.random.integers(2)),
     }
 
 
 def _build_grip(device: Device, axis: int, values: Values) -> Device:
     varying = np.zeros((3, 5))
-    varying[:, RATE], varying[:, TURN] = values["rate_hz"], values["phase"]
+    varying[:, RATE], varying[:, PHASE] = values["rate_hz"], values["phase"]
     varying[:, DAMPING_DEPTH] = values["depth"] * np.diag(device.bench.damping)
     varying[:, STIFFNESS_DEPTH] = values["stiffness_share"] * values["depth"] * np.diag(device.bench.stiffness)
     return replace(device, varying=varying)

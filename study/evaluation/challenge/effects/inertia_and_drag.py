@@ -22,60 +22,63 @@ from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import DRAG
 
 
-def _at_handle(device: Device, axis: int, mass_kg: float, damping: float) -> Device:
+def _add_to_handle(device: Device, axis: int, mass_kg: float, damping: float) -> Device:
     """The device with a mass (kg) and a viscous damping (N s/m) added to one axis of the handle."""
-    mass, damper = device.bench.mass.copy(), device.bench.damping.copy()
+    mass, damping_matrix = device.bench.mass.copy(), device.bench.damping.copy()
     mass[axis, axis] += mass_kg
-    damper[axis, axis] += damping
-    return replace(device, bench=replace(device.bench, mass=mass, damping=damper))
+    damping_matrix[axis, axis] += damping
+    return replace(device, bench=replace(device.bench, mass=mass, damping=damping_matrix))
 
 
-def _draw_viscous(at: EffectContext) -> dict[str, float]:
-    return {"damping": at.log_between(0.2, 6.0)}
+def _draw_viscous(context: EffectContext) -> dict[str, float]:
+    return {"damping": context.log_between(0.2, 6.0)}
 
 
 def _build_viscous(device: Device, axis: int, values: Values) -> Device:
-    return _at_handle(device, axis, 0.0, values["damping"])
+    return _add_to_handle(device, axis, 0.0, values["damping"])
 
 
-def _draw_added(at: EffectContext) -> dict[str, float]:
-    return {"mass": at.log_between(0.003, 0.08)}
+def _draw_added(context: EffectContext) -> dict[str, float]:
+    return {"mass": context.log_between(0.003, 0.08)}
 
 
 def _build_added(device: Device, axis: int, values: Values) -> Device:
-    return _at_handle(device, axis, values["mass"], 0.0)
+    return _add_to_handle(device, axis, values["mass"], 0.0)
 
 
-def _draw_quadratic(at: EffectContext) -> dict[str, float]:
-    return {"coefficient": at.log_between(1.0, 60.0)}
+def _draw_quadratic(context: EffectContext) -> dict[str, float]:
+    return {"coefficient": context.log_between(1.0, 60.0)}
 
 
 def _build_quadratic(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {DRAG: values["coefficient"]})
 
 
-def _draw_pose(at: EffectContext) -> dict[str, float]:
+def _draw_pose(context: EffectContext) -> dict[str, float]:
     """per_m (1/m): the mass changes by 1 to 50 % over the largest distance from the centre."""
-    whole = float(at.random.integers(2))
-    return {"per_m": at.sign() * at.log_between(0.01, 0.5) / at.travel_m[at.axis], "whole_handle": whole}
+    whole_handle = float(context.random.integers(2))
+    return {
+        "per_m": context.draw_sign() * context.log_between(0.01, 0.5) / context.travel_m[context.axis],
+        "whole_handle": whole_handle,
+    }
 
 
 def _build_pose(device: Device, axis: int, values: Values) -> Device:
-    along = np.zeros(3)
-    along[axis] = values["per_m"]
+    change_per_m = np.zeros(3)
+    change_per_m[axis] = values["per_m"]
     if values["whole_handle"]:
-        return replace(device, inertia_per_m=device.inertia_per_m + along)
-    return replace(device, axis_mass_per_m=device.axis_mass_per_m + along * device.bench.mass[axis, axis])
+        return replace(device, inertia_per_m=device.inertia_per_m + change_per_m)
+    return replace(device, axis_mass_per_m=device.axis_mass_per_m + change_per_m * device.bench.mass[axis, axis])
 
 
-def _draw_mode(at: EffectContext) -> dict[str, float]:
+def _draw_mode(context: EffectContext) -> dict[str, float]:
     """Parameters of the oscillator. The tilts are components of its direction along the two other axes, in cyclic
     order."""
-    tilts = at.random.uniform(-0.25, 0.25, 2)
+    tilts = context.random.uniform(-0.25, 0.25, 2)
     return {
-        "frequency": at.draw_log_uniform(18.0, 190.0),
-        "mass": at.log_between(0.0005, 0.025),
-        "damping_ratio": at.draw_log_uniform(0.02, 0.06),
+        "frequency": context.draw_log_uniform(18.0, 190.0),
+        "mass": context.log_between(0.0005, 0.025),
+        "damping_ratio": context.draw_log_uniform(0.02, 0.06),
         "tilt_next": float(tilts[0]),
         "tilt_after_next": float(tilts[1]),
     }
@@ -86,22 +89,22 @@ def _build_mode(device: Device, axis: int, values: Values) -> Device:
     direction /= np.linalg.norm(direction)
     if values["mass"] == 0.0:
         return device
-    oscillators = device.bench.oscillators.and_one(
+    oscillators = device.bench.oscillators.with_oscillator(
         values["frequency"], values["mass"], values["damping_ratio"], direction
     )
     return replace(device, bench=replace(device.bench, oscillators=oscillators))
 
 
-def _draw_backlash(at: EffectContext) -> dict[str, float]:
+def _draw_backlash(context: EffectContext) -> dict[str, float]:
     """The motor has 20 to 40 % of the axis's mass m; contact stiffness m (2 pi f)² with f from 220 to 400 Hz, contact
     damping 2 zeta sqrt(stiffness m) with zeta from 0.015 to 0.06."""
-    mass = at.bench.mass[at.axis, at.axis] * at.random.uniform(0.2, 0.4)
-    spring = mass * (2 * np.pi * at.draw_log_uniform(220.0, 400.0)) ** 2
+    mass = context.bench.mass[context.axis, context.axis] * context.random.uniform(0.2, 0.4)
+    spring = mass * (2 * np.pi * context.draw_log_uniform(220.0, 400.0)) ** 2
     return {
-        "gap": at.log_between(3e-6, 1.5e-4),
+        "gap": context.log_between(3e-6, 1.5e-4),
         "motor_mass": float(mass),
         "contact_stiffness": float(spring),
-        "contact_damping": float(2 * at.draw_log_uniform(0.015, 0.06) * np.sqrt(spring * mass)),
+        "contact_damping": float(2 * context.draw_log_uniform(0.015, 0.06) * np.sqrt(spring * mass)),
     }
 
 

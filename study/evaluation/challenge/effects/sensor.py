@@ -24,97 +24,97 @@ def _with_sensor(device: Device, sensor: Sensor) -> Device:
     return replace(device, sensor=sensor)
 
 
-def _in_channel(table: FloatArray, axis: int, value: float) -> FloatArray:
+def _set_channel(table: FloatArray, axis: int, value: float) -> FloatArray:
     """Copy of the table (3,) with the value of a channel replaced."""
-    changed = table.copy()
-    changed[axis] = value
-    return changed
+    new_table = table.copy()
+    new_table[axis] = value
+    return new_table
 
 
-def _draw_lag(at: EffectContext) -> dict[str, float]:
-    return {"bandwidth": at.log_between(420.0, 30.0)}
+def _draw_lag(context: EffectContext) -> dict[str, float]:
+    return {"bandwidth": context.log_between(420.0, 30.0)}
 
 
 def _build_lag(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, bandwidth_hz=values["bandwidth"]))
 
 
-def _draw_clipping(at: EffectContext) -> dict[str, float]:
+def _draw_clipping(context: EffectContext) -> dict[str, float]:
     """Limit (m/s^2) that cuts 2 % to 70 % off the largest reading."""
-    return {"limit": at.peak_mps2[at.axis] * (1.0 - at.log_between(0.02, 0.7))}
+    return {"limit": context.peak_mps2[context.axis] * (1.0 - context.log_between(0.02, 0.7))}
 
 
 def _build_clipping(device: Device, axis: int, values: Values) -> Device:
-    return _with_sensor(device, replace(device.sensor, limit=_in_channel(device.sensor.limit, axis, values["limit"])))
+    return _with_sensor(device, replace(device.sensor, limit=_set_channel(device.sensor.limit, axis, values["limit"])))
 
 
-def _draw_misalignment(at: EffectContext) -> dict[str, float]:
+def _draw_misalignment(context: EffectContext) -> dict[str, float]:
     """Angle of 0.1 to 15 degrees, and the rotation vector (degrees)."""
-    degrees = at.log_between(0.1, 15.0)
-    about = degrees * at.direction()
-    return {"degrees": degrees} | dict(zip(("about_x", "about_y", "about_z"), map(float, about), strict=True))
+    degrees = context.log_between(0.1, 15.0)
+    rotation_deg = degrees * context.draw_direction()
+    return {"degrees": degrees} | dict(zip(("about_x", "about_y", "about_z"), map(float, rotation_deg), strict=True))
 
 
 def _build_misalignment(device: Device, axis: int, values: Values) -> Device:
-    about = np.array([values["about_x"], values["about_y"], values["about_z"]])
+    rotation_deg = np.array([values["about_x"], values["about_y"], values["about_z"]])
     return _with_sensor(
-        device, replace(device.sensor, orientation=Rotation.from_rotvec(about, degrees=True).as_matrix())
+        device, replace(device.sensor, orientation=Rotation.from_rotvec(rotation_deg, degrees=True).as_matrix())
     )
 
 
-def _draw_gain(at: EffectContext) -> dict[str, float]:
-    return {"gain": 1.0 + at.sign() * at.log_between(0.005, 0.3)}
+def _draw_gain(context: EffectContext) -> dict[str, float]:
+    return {"gain": 1.0 + context.draw_sign() * context.log_between(0.005, 0.3)}
 
 
 def _build_gain(device: Device, axis: int, values: Values) -> Device:
-    return _with_sensor(device, replace(device.sensor, gain=_in_channel(device.sensor.gain, axis, values["gain"])))
+    return _with_sensor(device, replace(device.sensor, gain=_set_channel(device.sensor.gain, axis, values["gain"])))
 
 
-def _draw_curve(at: EffectContext) -> dict[str, float]:
+def _draw_nonlinearity(context: EffectContext) -> dict[str, float]:
     """cubic, 1/(m/s^2)^2: at the largest reading, the cubic term is 0.5 % to 25 % of the reading."""
-    return {"cubic": at.sign() * at.log_between(0.005, 0.25) / at.peak_mps2[at.axis] ** 2}
+    return {"cubic": context.draw_sign() * context.log_between(0.005, 0.25) / context.peak_mps2[context.axis] ** 2}
 
 
-def _build_curve(device: Device, axis: int, values: Values) -> Device:
-    return _with_sensor(device, replace(device.sensor, cubic=_in_channel(device.sensor.cubic, axis, values["cubic"])))
+def _build_nonlinearity(device: Device, axis: int, values: Values) -> Device:
+    return _with_sensor(device, replace(device.sensor, cubic=_set_channel(device.sensor.cubic, axis, values["cubic"])))
 
 
-def _shares(at: EffectContext) -> dict[str, float]:
+def _draw_shares(context: EffectContext) -> dict[str, float]:
     """Shares of the three channels; the largest among those that are read is 1."""
-    drawn = at.direction()
-    read = drawn[list(at.axes)]
-    drawn /= read[np.argmax(np.abs(read))]
-    return dict(zip(("share_x", "share_y", "share_z"), map(float, drawn), strict=True))
+    shares = context.draw_direction()
+    read_shares = shares[list(context.axes)]
+    shares /= read_shares[np.argmax(np.abs(read_shares))]
+    return dict(zip(("share_x", "share_y", "share_z"), map(float, shares), strict=True))
 
 
-def _in_shares(values: Values) -> FloatArray:
+def _channel_shares(values: Values) -> FloatArray:
     return np.array([values["share_x"], values["share_y"], values["share_z"]])
 
 
-def _draw_drift(at: EffectContext) -> dict[str, float]:
-    return {"total": at.sign() * at.log_between(0.01, 2.0)} | _shares(at)
+def _draw_drift(context: EffectContext) -> dict[str, float]:
+    return {"total": context.draw_sign() * context.log_between(0.01, 2.0)} | _draw_shares(context)
 
 
 def _build_drift(device: Device, axis: int, values: Values) -> Device:
-    return _with_sensor(device, replace(device.sensor, drift=values["total"] * _in_shares(values)))
+    return _with_sensor(device, replace(device.sensor, drift=values["total"] * _channel_shares(values)))
 
 
-def _draw_steps(at: EffectContext) -> dict[str, float]:
-    return {"step": at.log_between(0.02, 1.5)}
+def _draw_steps(context: EffectContext) -> dict[str, float]:
+    return {"step": context.log_between(0.02, 1.5)}
 
 
 def _build_steps(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, step=values["step"]))
 
 
-def _draw_hum(at: EffectContext) -> dict[str, float]:
-    mains_hz = float(at.random.choice((50.0, 60.0))) + at.random.uniform(-0.05, 0.05)
-    turn = at.random.uniform(0.0, 2 * np.pi)
-    return {"amplitude": at.log_between(0.01, 1.0), "frequency": mains_hz, "phase": turn} | _shares(at)
+def _draw_hum(context: EffectContext) -> dict[str, float]:
+    mains_hz = float(context.random.choice((50.0, 60.0))) + context.random.uniform(-0.05, 0.05)
+    phase = context.random.uniform(0.0, 2 * np.pi)
+    return {"amplitude": context.log_between(0.01, 1.0), "frequency": mains_hz, "phase": phase} | _draw_shares(context)
 
 
 def _build_hum(device: Device, axis: int, values: Values) -> Device:
-    size = values["amplitude"] * _in_shares(values)
+    size = values["amplitude"] * _channel_shares(values)
     return _with_sensor(
         device,
         replace(
@@ -125,27 +125,27 @@ def _build_hum(device: Device, axis: int, values: Values) -> Device:
     )
 
 
-def _draw_clock(at: EffectContext) -> dict[str, float]:
-    return {"ppm": at.sign() * at.log_between(0.5, 100.0)}
+def _draw_clock(context: EffectContext) -> dict[str, float]:
+    return {"ppm": context.draw_sign() * context.log_between(0.5, 100.0)}
 
 
 def _build_clock(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, ppm=values["ppm"]))
 
 
-def _draw_lost(at: EffectContext) -> dict[str, float]:
-    return {"fraction": at.log_between(1e-4, 0.04)}
+def _draw_lost(context: EffectContext) -> dict[str, float]:
+    return {"fraction": context.log_between(1e-4, 0.04)}
 
 
 def _build_lost(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, lost=values["fraction"]))
 
 
-def _draw_crossed(at: EffectContext) -> dict[str, float]:
+def _draw_crossed(context: EffectContext) -> dict[str, float]:
     """Shares of the two other channels, in cyclic order; together 0.3 % to 15 % (root of the sum of squares)."""
-    turn = at.random.uniform(0.0, 2 * np.pi)
-    size = at.log_between(0.003, 0.15)
-    return {"from_next": float(size * np.cos(turn)), "from_after_next": float(size * np.sin(turn))}
+    angle = context.random.uniform(0.0, 2 * np.pi)
+    size = context.log_between(0.003, 0.15)
+    return {"from_next": float(size * np.cos(angle)), "from_after_next": float(size * np.sin(angle))}
 
 
 def _build_crossed(device: Device, axis: int, values: Values) -> Device:
@@ -156,18 +156,18 @@ def _build_crossed(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(device, replace(device.sensor, orientation=mixing))
 
 
-def _draw_offset(at: EffectContext) -> dict[str, float]:
-    return {"offset": at.sign() * at.log_between(5e-4, 0.5)}
+def _draw_offset(context: EffectContext) -> dict[str, float]:
+    return {"offset": context.draw_sign() * context.log_between(5e-4, 0.5)}
 
 
 def _build_offset(device: Device, axis: int, values: Values) -> Device:
     return _with_sensor(
-        device, replace(device.sensor, offset=_in_channel(device.sensor.offset, axis, values["offset"]))
+        device, replace(device.sensor, offset=_set_channel(device.sensor.offset, axis, values["offset"]))
     )
 
 
-def _draw_logger(at: EffectContext) -> dict[str, float]:
-    return {"offset": at.sign() * at.log_between(1e-5, 5e-3)}
+def _draw_logger(context: EffectContext) -> dict[str, float]:
+    return {"offset": context.draw_sign() * context.log_between(1e-5, 5e-3)}
 
 
 def _build_logger(device: Device, axis: int, values: Values) -> Device:
@@ -179,7 +179,7 @@ EFFECTS = (
     ConcealedEffect("sensor_clipping", "sensor", True, _draw_clipping, _build_clipping),
     ConcealedEffect("sensor_misalignment", "sensor", False, _draw_misalignment, _build_misalignment),
     ConcealedEffect("sensor_gain", "sensor", True, _draw_gain, _build_gain),
-    ConcealedEffect("sensor_nonlinearity", "sensor", True, _draw_curve, _build_curve),
+    ConcealedEffect("sensor_nonlinearity", "sensor", True, _draw_nonlinearity, _build_nonlinearity),
     ConcealedEffect("sensor_drift", "sensor", False, _draw_drift, _build_drift),
     ConcealedEffect("quantization", "sensor", False, _draw_steps, _build_steps),
     ConcealedEffect("mains_hum", "sensor", False, _draw_hum, _build_hum),

@@ -26,38 +26,40 @@ from study.evaluation.challenge.handle_force_kernel import (
 )
 
 
-def _draw_hardening(at: EffectContext) -> dict[str, float]:
+def _draw_hardening(context: EffectContext) -> dict[str, float]:
     """k3 such that the force at the end of the travel is 0.005 to 0.4 N."""
-    return {"k3": at.log_between(0.005, 0.4) / at.travel_m[at.axis] ** 3}
+    return {"k3": context.log_between(0.005, 0.4) / context.travel_m[context.axis] ** 3}
 
 
 def _build_hardening(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {CUBE: values["k3"]})
 
 
-def _draw_asymmetric(at: EffectContext) -> dict[str, float]:
+def _draw_asymmetric(context: EffectContext) -> dict[str, float]:
     # k2 x at the end of the travel over the ground's stiffness; above 0.5 the tangent stiffness would be negative.
-    stiffness = at.bench.stiffness[at.axis, at.axis]
-    return {"k2": float(at.sign() * at.log_between(0.005, 0.3) * stiffness / at.travel_m[at.axis])}
+    stiffness = context.bench.stiffness[context.axis, context.axis]
+    return {
+        "k2": float(context.draw_sign() * context.log_between(0.005, 0.3) * stiffness / context.travel_m[context.axis])
+    }
 
 
 def _build_asymmetric(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {SQUARE: values["k2"]})
 
 
-def _draw_constant(at: EffectContext) -> dict[str, float]:
-    return {"force": at.sign() * at.log_between(0.001, 0.3)}
+def _draw_constant(context: EffectContext) -> dict[str, float]:
+    return {"force": context.draw_sign() * context.log_between(0.001, 0.3)}
 
 
 def _build_constant(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, {CONSTANT: values["force"]})
 
 
-def _draw_cogging(at: EffectContext) -> dict[str, float]:
+def _draw_cogging(context: EffectContext) -> dict[str, float]:
     return {
-        "amplitude": at.log_between(0.004, 0.15),
-        "pitch": at.draw_log_uniform(4e-4, 4e-3),
-        "phase": at.random.uniform(0, 2 * np.pi),
+        "amplitude": context.log_between(0.004, 0.15),
+        "pitch": context.draw_log_uniform(4e-4, 4e-3),
+        "phase": context.random.uniform(0, 2 * np.pi),
     }
 
 
@@ -66,21 +68,21 @@ def _build_cogging(device: Device, axis: int, values: Values) -> Device:
     return with_forces(device, axis, cells)
 
 
-def _draw_stop(at: EffectContext) -> dict[str, float]:
+def _draw_stop(context: EffectContext) -> dict[str, float]:
     """Position at 99.8 % (weakest) to 40 % of the travel without the stop; opposite: 1 for a stop on both sides."""
-    reached = 1.0 - 0.6 * at.log_between(0.003, 1.0)
+    travel_share = 1.0 - 0.6 * context.log_between(0.003, 1.0)
     return {
-        "position": at.sign() * reached * at.travel_m[at.axis],
-        "stiffness": at.draw_log_uniform(300.0, 2e4),
-        "opposite": float(at.random.integers(2)),
+        "position": context.draw_sign() * travel_share * context.travel_m[context.axis],
+        "stiffness": context.draw_log_uniform(300.0, 2e4),
+        "opposite": float(context.random.integers(2)),
     }
 
 
 def _build_stop(device: Device, axis: int, values: Values) -> Device:
-    place = values["position"]
-    side, other = (ABOVE, BELOW) if place > 0.0 else (BELOW, ABOVE)
-    cells = {side: place, STOP: values["stiffness"]}
-    return with_forces(device, axis, cells | ({other: -place} if values["opposite"] else {}))
+    position = values["position"]
+    near_side, far_side = (ABOVE, BELOW) if position > 0.0 else (BELOW, ABOVE)
+    cells = {near_side: position, STOP: values["stiffness"]}
+    return with_forces(device, axis, cells | ({far_side: -position} if values["opposite"] else {}))
 
 
 EFFECTS = (

@@ -49,18 +49,18 @@ def level_of(motion: AxisMotion, strength: float) -> float:
     return rms(motion.command) * float(0.02 * 50.0**strength)
 
 
-def _shift_later(samples: FloatArray, by: float) -> FloatArray:
-    """Samples `by` samples later (negative: earlier), interpolated linearly."""
-    at = np.arange(len(samples), dtype=np.float64)
-    return np.asarray(np.interp(at - by, at, samples))
+def _shift_later(samples: FloatArray, delay_samples: float) -> FloatArray:
+    """Samples `delay_samples` samples later (negative: earlier), interpolated linearly."""
+    index = np.arange(len(samples), dtype=np.float64)
+    return np.asarray(np.interp(index - delay_samples, index, samples))
 
 
 def _undo_cubic_gain(motion: AxisMotion, values: Values) -> FloatArray:
     """Command u' with u' + cubic u'^3 = u (Newton iteration)."""
-    found = motion.command.copy()
+    command = motion.command.copy()
     for _ in range(NEWTON_STEPS):
-        found -= (found + values["cubic"] * found**3 - motion.command) / (1 + 3 * values["cubic"] * found**2)
-    return found
+        command -= (command + values["cubic"] * command**3 - motion.command) / (1 + 3 * values["cubic"] * command**2)
+    return command
 
 
 def _draw_limit(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
@@ -71,27 +71,27 @@ def _draw_limit(motion: AxisMotion, strength: float, random: np.random.Generator
 
 def _undo_saturation(motion: AxisMotion, values: Values) -> FloatArray:
     """A larger command wherever the force reached 97 % of its limit."""
-    over = np.abs(motion.command) >= 0.97 * values["limit"]
-    return np.asarray(np.where(over, motion.command * (1 + values["more"]), motion.command))
+    is_saturated = np.abs(motion.command) >= 0.97 * values["limit"]
+    return np.asarray(np.where(is_saturated, motion.command * (1 + values["more"]), motion.command))
 
 
 def _draw_rate(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Highest rate of the force, and the fraction of it from which the force counts as limited: 0.95 down to 0.3."""
     steps = np.abs(np.diff(motion.command))
-    top = float(np.quantile(steps[steps > 0], HIGH_QUANTILE)) if steps.any() else 0.0
-    return {"rate": top * motion.rate_hz, "from": 1.0 - 0.05 * 14.0**strength}
+    max_step = float(np.quantile(steps[steps > 0], HIGH_QUANTILE)) if steps.any() else 0.0
+    return {"rate": max_step * motion.rate_hz, "from": 1.0 - 0.05 * 14.0**strength}
 
 
 def _undo_slew_limit(motion: AxisMotion, values: Values) -> FloatArray:
     """A command that steps at once to the end of each stretch over which the force changed in one direction at about
     its highest rate."""
     steps = np.diff(motion.command)
-    fast = np.abs(steps) * motion.rate_hz >= values["from"] * values["rate"]
-    goes_on = fast[1:] & fast[:-1] & (steps[1:] * steps[:-1] > 0)
-    found = motion.command.copy()
-    for k in np.flatnonzero(goes_on)[::-1]:
-        found[k + 1] = found[k + 2]
-    return found
+    is_limited = np.abs(steps) * motion.rate_hz >= values["from"] * values["rate"]
+    continues = is_limited[1:] & is_limited[:-1] & (steps[1:] * steps[:-1] > 0)
+    command = motion.command.copy()
+    for k in np.flatnonzero(continues)[::-1]:
+        command[k + 1] = command[k + 2]
+    return command
 
 
 def _gain(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
@@ -99,11 +99,11 @@ def _gain(motion: AxisMotion, strength: float, random: np.random.Generator) -> d
     return {"gain": float(1 + random.choice((-0.5, 1.0)) * 0.02 * 40.0**strength)}
 
 
-def _middle_turn(samples: FloatArray, rate_hz: float) -> float:
+def _median_rad_per_s(samples: FloatArray, rate_hz: float) -> float:
     """Angular frequency (rad/s) below which half of the power lies, the mean removed."""
     power = np.abs(np.fft.rfft(samples - samples.mean())) ** 2
-    middle = int(np.searchsorted(np.cumsum(power), power.sum() / 2))
-    return 2 * np.pi * max(middle, 1) * rate_hz / len(samples)
+    median_line = int(np.searchsorted(np.cumsum(power), power.sum() / 2))
+    return 2 * np.pi * max(median_line, 1) * rate_hz / len(samples)
 
 
 DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
@@ -116,14 +116,18 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
     ),
     ForceInjection(
         "transport_delay",
-        lambda motion, s, r: {"delay": max(0.3 * 0.02 * 50.0**s / _middle_turn(motion.command, motion.rate_hz), 1e-9)},
+        lambda motion, s, r: {
+            "delay": max(0.3 * 0.02 * 50.0**s / _median_rad_per_s(motion.command, motion.rate_hz), 1e-9)
+        },
         lambda motion, values: _shift_later(motion.command, -values["delay"] * motion.rate_hz),
         actuator=True,
         memory=True,
     ),
     ForceInjection(
         "amplifier_lag",
-        lambda motion, s, r: {"time_constant": 0.3 * 0.02 * 50.0**s / _middle_turn(motion.command, motion.rate_hz)},
+        lambda motion, s, r: {
+            "time_constant": 0.3 * 0.02 * 50.0**s / _median_rad_per_s(motion.command, motion.rate_hz)
+        },
         lambda motion, values: motion.command + values["time_constant"] * np.gradient(motion.command) * motion.rate_hz,
         actuator=True,
         memory=True,

@@ -23,7 +23,7 @@ from study.evaluation.challenge.injection.drive_injections import (
     rms,
 )
 
-SHARP = 0.05
+SIGN_WIDTH = 0.05
 """Width of the smoothed sign change of dry friction, tanh(v / width), as a fraction of the rms speed."""
 
 
@@ -38,7 +38,7 @@ def _scale_shape(name: str, shape: Callable[[AxisMotion], FloatArray]) -> ForceI
 
 def _sign(motion: AxisMotion) -> FloatArray:
     """(n,): smoothed sign of the velocity, -1 to 1."""
-    return np.asarray(np.tanh(motion.v / max(SHARP * float(np.sqrt(np.mean(motion.v**2))), 1e-300)))
+    return np.asarray(np.tanh(motion.v / max(SIGN_WIDTH * float(np.sqrt(np.mean(motion.v**2))), 1e-300)))
 
 
 def _centre_position(motion: AxisMotion) -> FloatArray:
@@ -59,8 +59,8 @@ def _add_cogging(motion: AxisMotion, values: Values) -> FloatArray:
 
 def _travel_beyond(motion: AxisMotion, position: float) -> FloatArray:
     """(n,): penetration of stops at +-position from the centre; 0 between them."""
-    far = _centre_position(motion)
-    return np.asarray(np.sign(far) * np.maximum(np.abs(far) - position, 0.0))
+    displacement = _centre_position(motion)
+    return np.asarray(np.sign(displacement) * np.maximum(np.abs(displacement) - position, 0.0))
 
 
 def _draw_stop(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
@@ -84,18 +84,18 @@ def _add_asymmetric_friction(motion: AxisMotion, values: Values) -> FloatArray:
 
 def _draw_bristles(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Friction level, and stiffness of the bristle, which slips after 1 to 15 % of the travel."""
-    give = float(np.ptp(motion.q)) * float(random.uniform(0.01, 0.15))
+    slip_distance = float(np.ptp(motion.q)) * float(random.uniform(0.01, 0.15))
     level = 1.2 * level_of(motion, strength)
-    return {"level": level, "stiffness": level / give}
+    return {"level": level, "stiffness": level / slip_distance}
 
 
 def _add_bristles(motion: AxisMotion, values: Values) -> FloatArray:
     """(n,): command with elastoplastic friction: a spring whose force is limited to +-level, from 0 at the start."""
-    force, found = 0.0, np.empty(len(motion.q))
-    for k, way in enumerate(np.diff(motion.q, prepend=motion.q[0])):
-        force = min(max(force + values["stiffness"] * way, -values["level"]), values["level"])
-        found[k] = force
-    return motion.command + found
+    force, forces = 0.0, np.empty(len(motion.q))
+    for k, travel_step in enumerate(np.diff(motion.q, prepend=motion.q[0])):
+        force = min(max(force + values["stiffness"] * travel_step, -values["level"]), values["level"])
+        forces[k] = force
+    return motion.command + forces
 
 
 FORCE_INJECTIONS: tuple[ForceInjection, ...] = (

@@ -19,21 +19,21 @@ from study.evaluation.challenge.injection.drive_injections import ForceInjection
 from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
 from study.evaluation.challenge.injection.reading_faults import (
     clip,
-    cross,
     cubic,
+    delay,
     drift,
     hum,
     lag,
-    late,
-    lose,
+    lose_samples,
+    mix_channels,
     noise,
     offset,
-    other_clock,
     play,
+    quantize,
+    rotate,
     scale,
+    shift_clock,
     square,
-    steps,
-    turn,
 )
 
 MAINS_HZ = (50.0, 60.0)
@@ -43,7 +43,7 @@ FASTEST_PPM = 2e4
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ResponseStatistics:
     """Properties of the response by which the size of a fault is drawn; rms and peak in the unit of the response."""
 
     rate_hz: float
@@ -52,15 +52,15 @@ class Reading:
     """Largest rms of a channel, without its mean."""
     peak: float
     """Largest magnitude in any channel."""
-    middle_hz: float
+    median_hz: float
     """Median frequency of the response's power (Hz), at least the resolution of its spectrum."""
     seconds: float
     """Duration of the response (s)."""
 
 
-Draw = Callable[[Reading, float, np.random.Generator], dict[str, float]]
+Draw = Callable[[ResponseStatistics, float, np.random.Generator], dict[str, float]]
 """draw(reading, strength, random): the parameters of a fault; strength 0 = weakest, 1 = strongest."""
-Spoil = Callable[[FloatArray, float, Mapping[str, float], np.random.Generator], FloatArray]
+ApplyFault = Callable[[FloatArray, float, Mapping[str, float], np.random.Generator], FloatArray]
 """spoil(samples, rate_hz, values, random): the response (n, p) with the fault (`reading_faults`)."""
 
 
@@ -71,7 +71,7 @@ class Injection:
     effect: str
     """Name in the vocabulary."""
     draw: Draw
-    spoil: Spoil
+    apply: ApplyFault
     axes: int = 1
     """Number of response channels that it needs."""
     memory: bool = False
@@ -97,7 +97,7 @@ def _log_between(low: float, high: float, strength: float) -> float:
     return float(low * (high / low) ** strength)
 
 
-def _draw_turn(at: Reading, strength: float, random: np.random.Generator) -> dict[str, float]:
+def _draw_turn(statistics: ResponseStatistics, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Misalignment: angle of 1 to 20 degrees about a random axis, a unit vector."""
     x, y, z = (direction := random.normal(size=3)) / np.linalg.norm(direction)
     return {"degrees": _log_between(1.0, 20.0, strength), "about_x": float(x), "about_y": float(y), "about_z": float(z)}
@@ -109,49 +109,75 @@ def _random_sign(random: np.random.Generator) -> float:
 
 INJECTIONS: tuple[Injection, ...] = (
     Injection(
-        "sensor_lag", lambda at, s, r: {"bandwidth": at.middle_hz * _log_between(20.0, 0.5, s)}, lag, memory=True
+        "sensor_lag",
+        lambda statistics, s, r: {"bandwidth": statistics.median_hz * _log_between(20.0, 0.5, s)},
+        lag,
+        memory=True,
     ),
-    Injection("sensor_clipping", lambda at, s, r: {"limit": at.peak * _log_between(0.95, 0.25, s)}, clip),
+    Injection(
+        "sensor_clipping", lambda statistics, s, r: {"limit": statistics.peak * _log_between(0.95, 0.25, s)}, clip
+    ),
     Injection(
         "mains_hum",
-        lambda at, s, r: {
-            "amplitude": at.rms * _log_between(0.01, 1.0, s),
+        lambda statistics, s, r: {
+            "amplitude": statistics.rms * _log_between(0.01, 1.0, s),
             "frequency": float(r.choice(MAINS_HZ)) + float(r.normal(0.0, 0.02)),
             "turn": float(r.random()),
         },
         hum,
     ),
-    Injection("sensor_drift", lambda at, s, r: {"total": _random_sign(r) * at.rms * _log_between(0.05, 3.0, s)}, drift),
     Injection(
-        "sensor_offset", lambda at, s, r: {"offset": _random_sign(r) * at.rms * _log_between(0.02, 1.5, s)}, offset
+        "sensor_drift",
+        lambda statistics, s, r: {"total": _random_sign(r) * statistics.rms * _log_between(0.05, 3.0, s)},
+        drift,
     ),
-    Injection("quantization", lambda at, s, r: {"step": at.rms * _log_between(0.05, 1.5, s)}, steps),
-    Injection("lost_samples", lambda at, s, r: {"fraction": _log_between(0.003, 0.3, s)}, lose),
+    Injection(
+        "sensor_offset",
+        lambda statistics, s, r: {"offset": _random_sign(r) * statistics.rms * _log_between(0.02, 1.5, s)},
+        offset,
+    ),
+    Injection("quantization", lambda statistics, s, r: {"step": statistics.rms * _log_between(0.05, 1.5, s)}, quantize),
+    Injection("lost_samples", lambda statistics, s, r: {"fraction": _log_between(0.003, 0.3, s)}, lose_samples),
     Injection(
         "clock_drift",
-        lambda at, s, r: {
-            "ppm": _random_sign(r) * min(1e6 * _log_between(0.02, 1.0, s) / at.middle_hz / at.seconds, FASTEST_PPM)
+        lambda statistics, s, r: {
+            "ppm": _random_sign(r)
+            * min(1e6 * _log_between(0.02, 1.0, s) / statistics.median_hz / statistics.seconds, FASTEST_PPM)
         },
-        other_clock,
+        shift_clock,
     ),
     Injection(
-        "sensor_gain", lambda at, s, r: {"gain": 1 + float(r.choice((-0.5, 1.0))) * _log_between(0.02, 0.8, s)}, scale
+        "sensor_gain",
+        lambda statistics, s, r: {"gain": 1 + float(r.choice((-0.5, 1.0))) * _log_between(0.02, 0.8, s)},
+        scale,
     ),
     Injection(
-        "logger_offset", lambda at, s, r: {"offset": _log_between(0.005, 0.1, s) / at.middle_hz}, late, memory=True
+        "logger_offset",
+        lambda statistics, s, r: {"offset": _log_between(0.005, 0.1, s) / statistics.median_hz},
+        delay,
+        memory=True,
     ),
     Injection(
         "sensor_nonlinearity",
-        lambda at, s, r: {"cubic": _random_sign(r) * _log_between(0.02, 0.3, s) / at.peak**2},
+        lambda statistics, s, r: {"cubic": _random_sign(r) * _log_between(0.02, 0.3, s) / statistics.peak**2},
         cubic,
     ),
     Injection(
-        "sensor_asymmetry", lambda at, s, r: {"square": _random_sign(r) * _log_between(0.02, 0.4, s) / at.peak}, square
+        "sensor_asymmetry",
+        lambda statistics, s, r: {"square": _random_sign(r) * _log_between(0.02, 0.4, s) / statistics.peak},
+        square,
     ),
-    Injection("sensor_noise", lambda at, s, r: {"rms": at.rms * _log_between(0.003, 0.5, s)}, noise),
-    Injection("sensor_play", lambda at, s, r: {"gap": at.rms * _log_between(0.01, 0.6, s)}, play, memory=True),
-    Injection("cross_axis_sensitivity", lambda at, s, r: {"from_next": _log_between(0.02, 0.8, s)}, cross, axes=2),
-    Injection("sensor_misalignment", _draw_turn, turn, axes=3),
+    Injection("sensor_noise", lambda statistics, s, r: {"rms": statistics.rms * _log_between(0.003, 0.5, s)}, noise),
+    Injection(
+        "sensor_play", lambda statistics, s, r: {"gap": statistics.rms * _log_between(0.01, 0.6, s)}, play, memory=True
+    ),
+    Injection(
+        "cross_axis_sensitivity",
+        lambda statistics, s, r: {"from_next": _log_between(0.02, 0.8, s)},
+        mix_channels,
+        axes=2,
+    ),
+    Injection("sensor_misalignment", _draw_turn, rotate, axes=3),
 )
 """Faults of sensor, clock and line: name in the vocabulary, draw of the parameters, and change of the response."""
 
@@ -163,27 +189,29 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
         return Injected(recording, "", {}, 0.0, np.zeros(recording.response.samples.shape[1]))
     if not 0.0 <= strength <= 1.0:
         raise ValueError(f"strength is {strength}; it must lie between 0 and 1")
-    forced = next((each for each in FORCE_INJECTIONS if each.effect == effect), None)
-    if forced is not None:
-        return _inject_force(recording, forced, strength, random)
-    wanted = next((each for each in INJECTIONS if each.effect == effect), None)
-    if wanted is None:
-        known = ", ".join([*(each.effect for each in INJECTIONS), *(each.effect for each in FORCE_INJECTIONS)])
-        raise ValueError(f"there is no way to inject '{effect}'; known are {known}")
+    force_injection = next((candidate for candidate in FORCE_INJECTIONS if candidate.effect == effect), None)
+    if force_injection is not None:
+        return _inject_force(recording, force_injection, strength, random)
+    injection = next((candidate for candidate in INJECTIONS if candidate.effect == effect), None)
+    if injection is None:
+        known_names = ", ".join(
+            [*(candidate.effect for candidate in INJECTIONS), *(candidate.effect for candidate in FORCE_INJECTIONS)]
+        )
+        raise ValueError(f"there is no way to inject '{effect}'; known are {known_names}")
     samples = recording.response.samples
-    if samples.shape[1] < wanted.axes:
-        raise ValueError(f"{effect} needs {wanted.axes} response channels, and there are {samples.shape[1]}")
-    values = wanted.draw(describe_reading(recording), strength, random)
-    takes = takes_of(recording) if wanted.memory else ((0, len(recording)),)
+    if samples.shape[1] < injection.axes:
+        raise ValueError(f"{effect} needs {injection.axes} response channels, and there are {samples.shape[1]}")
+    values = injection.draw(measure_response(recording), strength, random)
+    takes = takes_of(recording) if injection.memory else ((0, len(recording)),)
     rate_hz = recording.sample_rate_hz
-    spoiled = np.vstack([wanted.spoil(samples[start:stop], rate_hz, values, random) for start, stop in takes])
-    change = np.sqrt(np.nanmean((spoiled - samples) ** 2, axis=0))
-    response = replace(recording.response, samples=spoiled)
+    faulty = np.vstack([injection.apply(samples[start:stop], rate_hz, values, random) for start, stop in takes])
+    change = np.sqrt(np.nanmean((faulty - samples) ** 2, axis=0))
+    response = replace(recording.response, samples=faulty)
     return Injected(replace(recording, response=response), effect, values, strength, np.asarray(change))
 
 
 def _inject_force(
-    recording: Recording, wanted: ForceInjection, strength: float, random: np.random.Generator
+    recording: Recording, injection: ForceInjection, strength: float, random: np.random.Generator
 ) -> Injected:
     """Inject a fault of mechanism or drive at a random axis: the recorded command is changed instead of the response.
     Raises ValueError where the recording has no motion along the command."""
@@ -191,13 +219,13 @@ def _inject_force(
     axis = int(random.integers(samples.shape[1]))
     motion = axis_motion(recording, axis)
     if motion is None:
-        raise ValueError(f"{wanted.effect} needs a motion along command {axis + 1}")
-    values = wanted.draw(motion, strength, random)
-    takes = takes_of(recording) if wanted.memory else ((0, len(recording)),)
-    samples[:, axis] = np.concatenate([wanted.command(motion.part(*take), values) for take in takes])
+        raise ValueError(f"{injection.effect} needs a motion along command {axis + 1}")
+    values = injection.draw(motion, strength, random)
+    takes = takes_of(recording) if injection.memory else ((0, len(recording)),)
+    samples[:, axis] = np.concatenate([injection.command(motion.part(*bounds), values) for bounds in takes])
     change = np.sqrt(np.mean((samples - recording.command.samples) ** 2, axis=0))
     command = replace(recording.command, samples=samples)
-    return Injected(replace(recording, command=command), wanted.effect, values, strength, np.asarray(change))
+    return Injected(replace(recording, command=command), injection.effect, values, strength, np.asarray(change))
 
 
 def applicable_injections(recording: Recording) -> tuple[str, ...]:
@@ -206,38 +234,41 @@ def applicable_injections(recording: Recording) -> tuple[str, ...]:
     motion along each command; a fault of the drive needs in addition that the motion is not imposed."""
     rate_hz = recording.sample_rate_hz
     width = 3 if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"} else 1
-    hums = rate_hz > 4 * max(MAINS_HZ)
-    several = len(recording.response.channels) > 1
-    sensed = [
-        each.effect
-        for each in INJECTIONS
-        if (each.axes in (1, width) or (each.axes == 2 and several)) and (hums or each.effect != "mains_hum")
+    can_hum = rate_hz > 4 * max(MAINS_HZ)
+    has_channels = len(recording.response.channels) > 1
+    sensor_effects = [
+        injection.effect
+        for injection in INJECTIONS
+        if (injection.axes in (1, width) or (injection.axes == 2 and has_channels))
+        and (can_hum or injection.effect != "mains_hum")
     ]
     axes = range(recording.command.samples.shape[1])
-    forced = [each for each in FORCE_INJECTIONS if not (each.actuator and "imposed" in recording.meta)]
-    moves = all(axis_motion(recording, axis) is not None for axis in axes)
-    return (*sensed, *(each.effect for each in forced if moves))
+    force_injections = [
+        injection for injection in FORCE_INJECTIONS if not (injection.actuator and "imposed" in recording.meta)
+    ]
+    is_measured = all(axis_motion(recording, axis) is not None for axis in axes)
+    return (*sensor_effects, *(injection.effect for injection in force_injections if is_measured))
 
 
 def place_of(effect: str) -> Place:
     """Place where the fault acts: mechanism, actuator or sensor."""
-    forced = next((each for each in FORCE_INJECTIONS if each.effect == effect), None)
-    return "sensor" if forced is None else "actuator" if forced.actuator else "mechanism"
+    injection = next((candidate for candidate in FORCE_INJECTIONS if candidate.effect == effect), None)
+    return "sensor" if injection is None else "actuator" if injection.actuator else "mechanism"
 
 
-def describe_reading(recording: Recording) -> Reading:
+def measure_response(recording: Recording) -> ResponseStatistics:
     """Rate, rms, peak, median frequency and duration of the response; rows with NaN are left out, except in
     duration."""
     samples = recording.response.samples
-    known = samples[np.isfinite(samples).all(axis=1)]
-    moving = known - known.mean(axis=0)
-    power = np.sum(np.abs(np.fft.rfft(moving, axis=0)) ** 2, axis=1)
+    finite_rows = samples[np.isfinite(samples).all(axis=1)]
+    centred = finite_rows - finite_rows.mean(axis=0)
+    power = np.sum(np.abs(np.fft.rfft(centred, axis=0)) ** 2, axis=1)
     rate_hz = recording.sample_rate_hz
-    middle = float(np.searchsorted(np.cumsum(power), power.sum() / 2)) * rate_hz / len(known)
-    return Reading(
+    median_hz = float(np.searchsorted(np.cumsum(power), power.sum() / 2)) * rate_hz / len(finite_rows)
+    return ResponseStatistics(
         rate_hz,
-        float(np.sqrt(np.mean(moving**2, axis=0)).max()),
-        float(np.abs(known).max()),
-        max(middle, rate_hz / len(known)),
+        float(np.sqrt(np.mean(centred**2, axis=0)).max()),
+        float(np.abs(finite_rows).max()),
+        max(median_hz, rate_hz / len(finite_rows)),
         len(samples) / rate_hz,
     )

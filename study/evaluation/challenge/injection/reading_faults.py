@@ -41,32 +41,36 @@ def offset(samples: FloatArray, rate_hz: float, values: Mapping[str, float], ran
     return samples + values["offset"]
 
 
-def steps(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def quantize(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Quantization to multiples of `step`."""
     return np.asarray(values["step"] * np.round(samples / values["step"]))
 
 
-def lose(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def lose_samples(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Each sample is lost with probability `fraction` and then repeats the previous sample."""
     lost = random.random(len(samples)) < values["fraction"]
     lost[0] = False
-    kept = np.maximum.accumulate(np.where(lost, 0, np.arange(len(samples))))
-    return np.asarray(samples[kept])
+    source_index = np.maximum.accumulate(np.where(lost, 0, np.arange(len(samples))))
+    return np.asarray(samples[source_index])
 
 
-def other_clock(
+def shift_clock(
     samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
     """Clock error: readings taken at t (1 + ppm 1e-6), interpolated linearly."""
-    at = np.arange(len(samples), dtype=np.float64)
-    read = at * (1.0 + 1e-6 * values["ppm"])
-    return np.column_stack([np.interp(read, at, channel) for channel in samples.T])
+    index = np.arange(len(samples), dtype=np.float64)
+    read_index = index * (1.0 + 1e-6 * values["ppm"])
+    return np.column_stack([np.interp(read_index, index, channel) for channel in samples.T])
 
 
-def turn(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def rotate(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Misalignment: rotation of the three channels by `degrees` about the unit vector (about_x, about_y, about_z)."""
-    about = np.array([values["about_x"], values["about_y"], values["about_z"]])
-    return np.asarray(Rotation.from_rotvec(np.radians(values["degrees"]) * about).apply(np.array(samples)))
+    axis = np.array([values["about_x"], values["about_y"], values["about_z"]])
+    return np.asarray(Rotation.from_rotvec(np.radians(values["degrees"]) * axis).apply(np.array(samples)))
 
 
 def scale(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
@@ -74,10 +78,10 @@ def scale(samples: FloatArray, rate_hz: float, values: Mapping[str, float], rand
     return values["gain"] * samples
 
 
-def late(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def delay(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Readings delayed by `offset` (s), interpolated linearly."""
-    at = np.arange(len(samples), dtype=np.float64)
-    return np.column_stack([np.interp(at - values["offset"] * rate_hz, at, channel) for channel in samples.T])
+    index = np.arange(len(samples), dtype=np.float64)
+    return np.column_stack([np.interp(index - values["offset"] * rate_hz, index, channel) for channel in samples.T])
 
 
 def cubic(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
@@ -97,17 +101,23 @@ def noise(samples: FloatArray, rate_hz: float, values: Mapping[str, float], rand
 
 def play(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Hysteresis (play operator) with the total width `gap`. A missing reading (NaN) stays missing."""
-    found, read, half = np.empty_like(samples), samples[0], 0.5 * values["gap"]
-    for k, here in enumerate(samples):
-        known = np.isfinite(here)
-        read = np.where(known, np.where(np.isfinite(read), np.clip(read, here - half, here + half), here), read)
-        found[k] = np.where(known, read, np.nan)
-    return found
+    output, previous, half = np.empty_like(samples), samples[0], 0.5 * values["gap"]
+    for k, reading in enumerate(samples):
+        is_finite = np.isfinite(reading)
+        previous = np.where(
+            is_finite,
+            np.where(np.isfinite(previous), np.clip(previous, reading - half, reading + half), reading),
+            previous,
+        )
+        output[k] = np.where(is_finite, previous, np.nan)
+    return output
 
 
-def cross(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def mix_channels(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Cross-axis sensitivity: the first channel also reads the second, scaled to the standard deviation of the first,
     times `from_next`."""
-    found = samples.copy()
-    found[:, 0] += values["from_next"] * samples[:, 1] * np.nanstd(samples[:, 0]) / np.nanstd(samples[:, 1])
-    return np.asarray(found)
+    output = samples.copy()
+    output[:, 0] += values["from_next"] * samples[:, 1] * np.nanstd(samples[:, 0]) / np.nanstd(samples[:, 1])
+    return np.asarray(output)

@@ -18,7 +18,7 @@ from study.evaluation.challenge.mechanism_kernel import Motion
 
 WEAKEST, STRONGEST = 0.015, 0.25
 """Rms of a law relative to that of the commands, or of the readings, at strength 0 and 1."""
-OF_SOFT = 1.0
+SOFT_LAW_SIZE = 1.0
 """Size k of a saturating law of commands or readings: its parameter a alone sets its strength."""
 
 
@@ -42,46 +42,53 @@ class LawTruth:
 
 
 def build_law(
-    device: Device, kind: LawKind, free: tuple[Motion, FloatArray], places: tuple[int, int], strength: float,
+    device: Device, kind: LawKind, baseline: tuple[Motion, FloatArray], places: tuple[int, int], strength: float,
     random: Random,
 ) -> tuple[Device, LawTruth]:  # fmt: skip
-    """The device with the law, and its label. free: motion and commands (samples, 3) without the law. places: the axis
-    of the law, and another axis. strength: 0 to 1."""
-    moved, command = free
-    axis, other = places
+    """The device with the law, and its label. baseline: motion and commands (samples, 3) without the law. places: the
+    axis of the law, and another axis. strength: 0 to 1."""
+    motion, command = baseline
+    axis, other_axis = places
     sizes = Sizes(
-        *(float(np.abs(part[:, axis]).max()) for part in (moved.position, moved.velocity, moved.acceleration))
+        *(float(np.abs(part[:, axis]).max()) for part in (motion.position, motion.velocity, motion.acceleration))
     )
     first, second = kind.draw(random, sizes)
     side = float(random.choice((-1.0, 1.0)))
     share = WEAKEST * (STRONGEST / WEAKEST) ** strength
     if kind.change is not None:
-        device, size = _build_change(device, kind, (moved, command), places, (first, second, side, share))
+        device, size = _build_change(device, kind, (motion, command), places, (first, second, side, share))
     else:
-        row = np.array([kind.code, axis, other, 1.0, first, second, side])
-        size = share * _rms(command[:, axis]) / _rms(_force_along_motion(row, moved, command))
-        rows = [[kind.code, axis, other, size, first, second, side]]
-        if kind.both:
-            rows.append([kind.code, other, axis, size, first, second, -side])
+        unit_row = np.array([kind.code, axis, other_axis, 1.0, first, second, side])
+        size = share * _rms(command[:, axis]) / _rms(_evaluate_force(unit_row, motion, command))
+        rows = [[kind.code, axis, other_axis, size, first, second, side]]
+        if kind.mutual:
+            rows.append([kind.code, other_axis, axis, size, first, second, -side])
         device = replace(device, laws=np.array(rows))
     numbers = {"k": abs(float(size)), "a": first, "b": second, "s": side}
-    return device, _truth(kind, places, numbers)
+    return device, _make_truth(kind, places, numbers)
 
 
-def _truth(kind: LawKind, places: tuple[int, int], numbers: dict[str, float]) -> LawTruth:
+def _make_truth(kind: LawKind, places: tuple[int, int], numbers: dict[str, float]) -> LawTruth:
     """The label of a law at these axes."""
-    turned = (places, places[::-1]) if kind.both else (places,)
+    axis_pairs = (places, places[::-1]) if kind.mutual else (places,)
     readings = tuple(
-        tuple(_with_axis_names(reading, own, other) for reading in kind.variables) for own, other in turned
+        tuple(_with_axis_names(reading, axis, other_axis) for reading in kind.variables)
+        for axis, other_axis in axis_pairs
     )
     return LawTruth(
-        kind.name, kind.formula, tuple(AXES[own] for own, _ in turned), kind.acts_on, readings, kind.memory, numbers
+        kind.name,
+        kind.formula,
+        tuple(AXES[axis] for axis, _ in axis_pairs),
+        kind.acts_on,
+        readings,
+        kind.memory,
+        numbers,
     )
 
 
-def _with_axis_names(reading: str, own: int, other: int) -> str:
-    """Variables such as "vx vy", with x and y replaced by the letters of the axes `own` and `other`."""
-    letters = {"x": AXES[own], "y": AXES[other]}
+def _with_axis_names(reading: str, axis: int, other_axis: int) -> str:
+    """Variables such as "vx vy", with x and y replaced by the letters of the axes `axis` and `other_axis`."""
+    letters = {"x": AXES[axis], "y": AXES[other_axis]}
     names = [name if name == "t" else name[:-1] + letters[name[-1]] for name in reading.split()]
     return " ".join(sorted(names))
 
@@ -89,36 +96,37 @@ def _with_axis_names(reading: str, own: int, other: int) -> str:
 def _build_change(
     device: Device,
     kind: LawKind,
-    free: tuple[Motion, FloatArray],
+    baseline: tuple[Motion, FloatArray],
     places: tuple[int, int],
     numbers: tuple[float, float, float, float],
 ) -> tuple[Device, float]:
     """Build in a law that changes commands or readings; returns the device and the size of the law. numbers: parameters
-    a and b, sign, and share (rms of the change relative to the signal). A law with a > 0 has the size `OF_SOFT`."""
-    change, (axis, other), (moved, command) = kind.change, places, free
+    a and b, sign, and share (rms of the change relative to the signal). A law with a > 0 has the size
+    `SOFT_LAW_SIZE`."""
+    change, (axis, other_axis), (motion, command) = kind.change, places, baseline
     first, second, side, share = numbers
     assert change is not None
-    argument = moved.acceleration if kind.acts_on == ("response",) else command
-    added = _rms(change(argument[:, axis], argument[:, other], first, second))
-    size = OF_SOFT if first > 0 else side * share * _rms(argument[:, axis]) / added
+    argument = motion.acceleration if kind.acts_on == ("response",) else command
+    unit_change_rms = _rms(change(argument[:, axis], argument[:, other_axis], first, second))
+    size = SOFT_LAW_SIZE if first > 0 else side * share * _rms(argument[:, axis]) / unit_change_rms
 
-    def become(samples: FloatArray) -> FloatArray:
-        changed = samples.copy()
-        changed[:, axis] += size * change(samples[:, axis], samples[:, other], first, second)
-        return changed
+    def apply_law(samples: FloatArray) -> FloatArray:
+        new_samples = samples.copy()
+        new_samples[:, axis] += size * change(samples[:, axis], samples[:, other_axis], first, second)
+        return new_samples
 
     if kind.acts_on == ("response",):
-        return replace(device, sensor=replace(device.sensor, law=become)), size
-    return replace(device, drive_law=become), size
+        return replace(device, sensor=replace(device.sensor, law=apply_law)), size
+    return replace(device, drive_law=apply_law), size
 
 
-def _force_along_motion(row: FloatArray, moved: Motion, command: FloatArray) -> FloatArray:
+def _evaluate_force(row: FloatArray, motion: Motion, command: FloatArray) -> FloatArray:
     """(samples,), N: force of the law (a row of `law_kernel`) along the given motion and command."""
-    kept, force = 0.0, np.zeros(len(command))
+    memory, force = 0.0, np.zeros(len(command))
     for k in range(len(command)):
-        q, v, drive = moved.position[k], moved.velocity[k], command[k]
-        force[k] = law_force(row, q, v, drive, kept, k / RATE_HZ)
-        kept = law_memory(row, q, drive, kept, 1 / RATE_HZ)
+        q, v, drive = motion.position[k], motion.velocity[k], command[k]
+        force[k] = law_force(row, q, v, drive, memory, k / RATE_HZ)
+        memory = law_memory(row, q, drive, memory, 1 / RATE_HZ)
     return force
 
 

@@ -40,7 +40,7 @@ class MujocoBench:
     """N s/m, to the ground."""
     stiffness: FloatArray
     """N/m, to the ground."""
-    riders: Oscillators
+    oscillators: Oscillators
     """Oscillators attached to the handle."""
     friction_n: FloatArray
     """Dry friction."""
@@ -60,21 +60,21 @@ class MujocoBench:
     """Axis, and the parameters of `backlash`: motor mass, gap, contact stiffness and damping (SI units)."""
 
 
-def bare(bench: Bench) -> MujocoBench:
+def baseline_bench(bench: Bench) -> MujocoBench:
     """The closest MuJoCo equivalent of a bench, without concealed effects: the off-diagonal terms of mass, damping and
     stiffness are dropped."""
     mass, damping, stiffness = (np.diag(part).copy() for part in (bench.mass, bench.damping, bench.stiffness))
-    none = np.zeros(3)
-    return MujocoBench(mass, damping, stiffness, bench.oscillators, none, none, np.ones(3), none)
+    zeros = np.zeros(3)
+    return MujocoBench(mass, damping, stiffness, bench.oscillators, zeros, zeros, np.ones(3), zeros)
 
 
-def linear(bench: MujocoBench) -> Bench:
+def linear_bench(bench: MujocoBench) -> Bench:
     """The linear part as a bench. Perpendicular to its slide, an oscillator moves with the handle, so that its mass
     adds to the handle's in these directions."""
     mass = np.diag(bench.mass_kg)
-    for kg, along in zip(bench.riders.mass_kg, bench.riders.direction, strict=True):
-        mass += kg * (np.eye(3) - np.outer(along, along))
-    return Bench(mass, np.diag(bench.damping), np.diag(bench.stiffness), bench.riders)
+    for kg, direction in zip(bench.oscillators.mass_kg, bench.oscillators.direction, strict=True):
+        mass += kg * (np.eye(3) - np.outer(direction, direction))
+    return Bench(mass, np.diag(bench.damping), np.diag(bench.stiffness), bench.oscillators)
 
 
 def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -86,17 +86,17 @@ def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray
     data = mujoco.MjData(model)
     handle = [model.joint(axis).dofadr[0] for axis in AXES]
     data.qfrc_applied[handle] = bench.force_n
-    late = round(bench.delay_s / STEP_S)
-    whole, part = divmod(late, STEPS)
+    delay_steps = round(bench.delay_s / STEP_S)
+    delay_samples, extra_steps = divmod(delay_steps, STEPS)
     acceleration, position = np.zeros((len(command), 3)), np.zeros((len(command), 3))
     for k in range(len(command)):
         mujoco.mj_forward(model, data)
         acceleration[k], position[k] = data.qacc[handle], data.qpos[handle]
-        if part:
-            data.ctrl[:] = _command_at(command, k - whole - 1)
-            mujoco.mj_step(model, data, part)
-        data.ctrl[:] = _command_at(command, k - whole)
-        mujoco.mj_step(model, data, STEPS - part)
+        if extra_steps:
+            data.ctrl[:] = _command_at(command, k - delay_samples - 1)
+            mujoco.mj_step(model, data, extra_steps)
+        data.ctrl[:] = _command_at(command, k - delay_samples)
+        mujoco.mj_step(model, data, STEPS - extra_steps)
     if not (np.isfinite(acceleration).all() and np.abs(position).max() < 1.0):
         raise ValueError("the device of the second engine ran away")
     return acceleration, position
@@ -115,81 +115,87 @@ def _command_at(command: FloatArray, sample: int) -> FloatArray:
 def _model_xml(bench: MujocoBench) -> str:
     """MuJoCo's description of the bench (MJCF). Armature adds inertia along a single joint, so that axes differ."""
     root = Xml.Element("mujoco")
-    _add(root, "compiler", {"autolimits": "true"})
+    _add_element(root, "compiler", {"autolimits": "true"})
     exact = {"integrator": "RK4", "tolerance": "1e-12", "iterations": "50"}
-    _add(root, "option", {"timestep": f"{STEP_S:.12g}", "gravity": "0 0 0"} | exact)
-    world = _add(root, "worldbody")
-    handle = _add(world, "body", {"name": "handle"})
-    light = HANDLE_SHARE * float(bench.mass_kg.min())
-    behind = np.zeros(3)
+    _add_element(root, "option", {"timestep": f"{STEP_S:.12g}", "gravity": "0 0 0"} | exact)
+    world = _add_element(root, "worldbody")
+    handle = _add_element(world, "body", {"name": "handle"})
+    handle_kg = HANDLE_SHARE * float(bench.mass_kg.min())
+    motor_kg = np.zeros(3)
     if bench.play is not None:
         axis, values = bench.play
-        behind[axis] = values["motor_mass"]
-        motor = _add(world, "body", {"name": "motor"})
-        _slide(motor, "motor", np.eye(3)[axis], {})
-        _body(motor, float(values["motor_mass"]))
+        motor_kg[axis] = values["motor_mass"]
+        motor = _add_element(world, "body", {"name": "motor"})
+        _add_slide(motor, "motor", np.eye(3)[axis], {})
+        _add_mass(motor, float(values["motor_mass"]))
     for j, name in enumerate(AXES):
-        more = {
-            "armature": bench.mass_kg[j] - light - behind[j], "damping": bench.damping[j],
+        joint_values = {
+            "armature": bench.mass_kg[j] - handle_kg - motor_kg[j], "damping": bench.damping[j],
             "stiffness": bench.stiffness[j], "frictionloss": bench.friction_n[j],
         }  # fmt: skip
-        _slide(handle, name, np.eye(3)[j], more)
-    _body(handle, light)
-    _riders(handle, bench.riders)
-    tendons = _add(root, "tendon")
+        _add_slide(handle, name, np.eye(3)[j], joint_values)
+    _add_mass(handle, handle_kg)
+    _add_oscillators(handle, bench.oscillators)
+    tendons = _add_element(root, "tendon")
     if bench.stop is not None:
         axis, low, high, stiffness = bench.stop
         ends = f"{low:.12g} {high:.12g}"
-        held = _add(tendons, "fixed", {"name": "stop", "stiffness": stiffness, "springlength": ends})
-        _add(held, "joint", {"joint": AXES[axis], "coef": 1.0})
+        stop_tendon = _add_element(tendons, "fixed", {"name": "stop", "stiffness": stiffness, "springlength": ends})
+        _add_element(stop_tendon, "joint", {"joint": AXES[axis], "coef": 1.0})
     if bench.play is not None:
         _add_play(tendons, bench, *bench.play)
-    _actuators(_add(root, "actuator"), bench)
+    _add_actuators(_add_element(root, "actuator"), bench)
     return Xml.tostring(root, encoding="unicode")
 
 
-def _riders(handle: Xml.Element, riders: Oscillators) -> None:
+def _add_oscillators(handle: Xml.Element, oscillators: Oscillators) -> None:
     """Add each oscillator as a body on a slide with spring and damper, along its direction."""
-    for k, (hz, kg, ratio, along) in enumerate(
-        zip(riders.frequency_hz, riders.mass_kg, riders.damping_ratio, riders.direction, strict=True)
+    for k, (hz, kg, ratio, direction) in enumerate(
+        zip(
+            oscillators.frequency_hz, oscillators.mass_kg, oscillators.damping_ratio, oscillators.direction, strict=True
+        )
     ):
         stiffness = kg * (2 * np.pi * hz) ** 2
-        body = _add(handle, "body", {"name": f"rider {k}"})
-        _slide(body, f"rider {k}", along, {"stiffness": stiffness, "damping": 2 * ratio * np.sqrt(stiffness * kg)})
-        _body(body, float(kg))
+        body = _add_element(handle, "body", {"name": f"rider {k}"})
+        _add_slide(
+            body, f"rider {k}", direction, {"stiffness": stiffness, "damping": 2 * ratio * np.sqrt(stiffness * kg)}
+        )
+        _add_mass(body, float(kg))
 
 
 def _add_play(tendons: Xml.Element, bench: MujocoBench, axis: int, values: Values) -> None:
     """Backlash: a tendon between motor and handle limits their distance, a one-sided contact at each end of the gap."""
     motor_kg = values["motor_mass"]
-    mass, _, _ = linear(bench).matrices()
+    mass, _, _ = linear_bench(bench).matrices()
     mass[axis, axis] -= motor_kg
     # MuJoCo takes stiffness and damping of a contact per unit of effective mass, here of motor and handle in series.
     reduced = 1.0 / (1.0 / motor_kg + np.linalg.inv(mass)[axis, axis])
     spring, damper = values["contact_stiffness"] / reduced, values["contact_damping"] / reduced
     half = 0.5 * values["gap"]
     contact = {"solreflimit": f"{-spring:.12g} {-damper:.12g}", "solimplimit": f"{CONTACT} {CONTACT} 1"}
-    apart = _add(tendons, "fixed", {"name": "play", "range": f"{-half:.12g} {half:.12g}"} | contact)
-    _add(apart, "joint", {"joint": "motor", "coef": 1.0})
-    _add(apart, "joint", {"joint": AXES[axis], "coef": -1.0})
+    play_tendon = _add_element(tendons, "fixed", {"name": "play", "range": f"{-half:.12g} {half:.12g}"} | contact)
+    _add_element(play_tendon, "joint", {"joint": "motor", "coef": 1.0})
+    _add_element(play_tendon, "joint", {"joint": AXES[axis], "coef": -1.0})
 
 
-def _actuators(parent: Xml.Element, bench: MujocoBench) -> None:
+def _add_actuators(parent: Xml.Element, bench: MujocoBench) -> None:
     """Add the force of each axis, with gain, saturation and lag; with backlash it acts on the motor."""
     for j, name in enumerate(AXES):
-        driven = "motor" if bench.play is not None and bench.play[0] == j else name
-        made = _add(parent, "general", {"joint": driven, "gainprm": float(bench.gain[j])})
+        joint = "motor" if bench.play is not None and bench.play[0] == j else name
+        actuator = _add_element(parent, "general", {"joint": joint, "gainprm": float(bench.gain[j])})
         if bench.limit_n[j] > 0.0:
-            made.set("forcerange", f"{-bench.limit_n[j]:.12g} {bench.limit_n[j]:.12g}")
+            actuator.set("forcerange", f"{-bench.limit_n[j]:.12g} {bench.limit_n[j]:.12g}")
         if bench.lag_s > 0.0:
-            made.set("dyntype", "filter")
-            made.set("dynprm", f"{bench.lag_s:.12g}")
+            actuator.set("dyntype", "filter")
+            actuator.set("dynprm", f"{bench.lag_s:.12g}")
 
 
-def _slide(body: Xml.Element, name: str, along: FloatArray, values: Mapping[str, float]) -> None:
+def _add_slide(body: Xml.Element, name: str, direction: FloatArray, values: Mapping[str, float]) -> None:
     """Add a sliding joint along a direction; values that are zero are left out. Dry friction is a nearly rigid
     constraint with a time constant of two steps and a damping ratio of 1."""
-    joint = _add(body, "joint", {"name": name, "type": "slide", "axis": " ".join(f"{part:.15g}" for part in along)})
+    joint = _add_element(
+        body, "joint", {"name": name, "type": "slide", "axis": " ".join(f"{component:.15g}" for component in direction)}
+    )
     for key, value in values.items():
         if value:
             joint.set(key, f"{value:.15g}")
@@ -198,12 +204,12 @@ def _slide(body: Xml.Element, name: str, along: FloatArray, values: Mapping[str,
         joint.set("solimpfriction", "0.999 0.9999 1")
 
 
-def _body(body: Xml.Element, mass_kg: float) -> None:
+def _add_mass(body: Xml.Element, mass_kg: float) -> None:
     """Give a body its mass. MuJoCo also requires a moment of inertia, which has no effect on slides."""
-    _add(body, "inertial", {"pos": "0 0 0", "mass": mass_kg, "diaginertia": "1e-4 1e-4 1e-4"})
+    _add_element(body, "inertial", {"pos": "0 0 0", "mass": mass_kg, "diaginertia": "1e-4 1e-4 1e-4"})
 
 
-def _add(parent: Xml.Element, kind: str, attributes: Mapping[str, str | float] | None = None) -> Xml.Element:
+def _add_element(parent: Xml.Element, kind: str, attributes: Mapping[str, str | float] | None = None) -> Xml.Element:
     """Append an element; numbers are written with 15 digits."""
-    written = {key: value if isinstance(value, str) else f"{value:.15g}" for key, value in (attributes or {}).items()}
-    return Xml.SubElement(parent, kind, written)
+    texts = {key: value if isinstance(value, str) else f"{value:.15g}" for key, value in (attributes or {}).items()}
+    return Xml.SubElement(parent, kind, texts)

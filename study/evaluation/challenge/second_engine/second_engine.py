@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from study.evaluation.challenge.rig import Rig
+from study.evaluation.challenge.case_settings import CaseSettings
 
 if TYPE_CHECKING:
-    from study.evaluation.challenge.draw_case import Case, Concealed
+    from study.evaluation.challenge.draw_case import Case, ModelOrigin
 
 EFFECTS = (
     "coulomb_friction", "viscous_damping", "added_mass", "constant_force", "end_stop", "backlash", "extra_mode",
@@ -26,9 +26,14 @@ def is_installed() -> bool:
 
 
 def draw_engine_case(
-    seed: int, effects: Sequence[str], concealed: "Concealed", strength: Sequence[float], name: str, rig: Rig
+    seed: int,
+    effects: Sequence[str],
+    origin: "ModelOrigin",
+    strength: Sequence[float],
+    name: str,
+    settings: CaseSettings,
 ) -> "Case":
     """Draw a case as `draw_case` does, simulated by MuJoCo. Raises ImportError where it is not installed."""
     from study.evaluation.challenge.second_engine.mujoco_case import draw_mujoco_case
 
-    return draw_mujoco_case(seed, effects, concealed, strength, name, rig)
+    return draw_mujoco_case(seed, effects, origin, strength, name, settings)

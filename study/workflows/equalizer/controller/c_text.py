@@ -22,9 +22,9 @@ GROUP = 4
 """Rows and columns that a loop of the C code processes at once; matrices are padded to multiples of it."""
 
 
-def header_text(controller: RealtimeController, written_for: tuple[str, ...]) -> str:
-    """C header with an exported controller. written_for: lines that describe the model; they become a comment."""
-    comment = "\n".join(f"/* {line.replace('*/', '* /')} */" for line in written_for)
+def header_text(controller: RealtimeController, description_lines: tuple[str, ...]) -> str:
+    """C header with an exported controller. description_lines: lines that describe the model; they become a comment."""
+    comment = "\n".join(f"/* {line.replace('*/', '* /')} */" for line in description_lines)
     return _source("controller.h").replace("@TABLES@", f"{comment}\n\n{_sizes(controller)}\n\n{_tables(controller)}")
 
 
@@ -96,7 +96,7 @@ def _tables(controller: RealtimeController) -> str:
         c_table("hapteq_gains", controller.transient.K),
         c_table("hapteq_basis", controller.transient.g),
         c_table("hapteq_gain", tracker.K),
-        c_table("hapteq_ahead", tracker.ahead),
+        c_table("hapteq_ahead", tracker.preview_gains),
         c_table("hapteq_split_weight", [comb(split.order, power) for power in powers]),
     ]
     for name, edge_hz in (("low", split.edges.low_hz), ("high", split.edges.high_hz)):

@@ -68,9 +68,9 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
         raise _refusal(f"The cap is {plan.settings.cap_n:g} N; the strongest device gives {STRONGEST_N:g} N.", TRY)
     model = read_identified_model(plan.model)
     try:
-        _require_plain(model)
-        wanted = None if plan.transient is None else _read_wanted(plan.transient, model)
-        controller = realtime_controller(model, wanted, plan.settings)
+        _require_force_model(model)
+        transient = None if plan.transient is None else _read_transient(plan.transient, model)
+        controller = realtime_controller(model, transient, plan.settings)
         cases = controller_cases(controller)
     except (TrackingError, TableError) as problem:
         raise _refusal(f"{capitalise(str(problem))}.", "Correct what it says, or choose another model.") from problem
@@ -126,18 +126,18 @@ def warn_of_export(exported: ExportedController) -> tuple[str, ...]:
 def describe_export(exported: ExportedController) -> tuple[str, ...]:
     """Lines for the terminal: files, length of the transient, delay and predicted error of the stream, command of the
     check."""
-    found, (low_hz, high_hz) = summarise_export(exported), exported.model.band_hz
+    values, (low_hz, high_hz) = summarise_export(exported), exported.model.band_hz
     return (
-        *found["files"],
-        f"Transient: {found['transient_rows']} rows with their room to come to rest, turned by any rotation.",
-        f"Stream: {1000 * found['stream_late_s']:.0f} ms late; as the model itself predicts, error "
-        f"{100 * found['stream_error']:.2g} % from {low_hz:g} to {high_hz:g} Hz "
-        f"({100 * found['stream_error_without_limit']:.2g} % with all of it known), and what the bands' overlap adds.",
+        *values["files"],
+        f"Transient: {values['transient_rows']} rows with their room to come to rest, turned by any rotation.",
+        f"Stream: {1000 * values['stream_late_s']:.0f} ms late; as the model itself predicts, error "
+        f"{100 * values['stream_error']:.2g} % from {low_hz:g} to {high_hz:g} Hz "
+        f"({100 * values['stream_error_without_limit']:.2g} % with all of it known), and what the bands' overlap adds.",
         f"Check it where it shall run: cc -std=c11 -O2 {CHECK} -o check -lm && ./check",
     )
 
 
-def _read_wanted(path: Path, model: IdentifiedModel) -> FloatArray:
+def _read_transient(path: Path, model: IdentifiedModel) -> FloatArray:
     """(N, 3), m/s²: the transient of a table. Raises TableError for another kind of table, another sample rate than the
     model's, or too many rows."""
     table = read_trajectory(path)
@@ -149,7 +149,7 @@ def _read_wanted(path: Path, model: IdentifiedModel) -> FloatArray:
     return table.signal.samples
 
 
-def _require_plain(model: IdentifiedModel) -> None:
+def _require_force_model(model: IdentifiedModel) -> None:
     """Require a model of three forces (N) and three accelerations (m/s²), the units of the exported loop and of its
     cap. Raises TrackingError."""
     if model.D.shape != (3, 3) or model.input_unit != "N" or model.output_unit != "m/s^2":
@@ -160,7 +160,9 @@ def _origin(plan: ControllerPlan, model: IdentifiedModel) -> tuple[str, ...]:
     """Lines for the header: model file, band, place, channels, transient and weight."""
     low_hz, high_hz = model.band_hz
     table = "a tap along the last axis, 1 m/s^2" if plan.transient is None else plan.transient.name
-    place = "" if model.place_m is None else f", at {', '.join(f'{each:g}' for each in model.place_m)} m"
+    place = (
+        "" if model.place_m is None else f", at {', '.join(f'{coordinate_m:g}' for coordinate_m in model.place_m)} m"
+    )
     return (
         f"Of {plan.model.name} (SHA-256 {sha256_of(plan.model)[:16]}), {low_hz:g} to {high_hz:g} Hz{place}.",
         f"Forces {', '.join(model.input_channels)} in N; accelerations {', '.join(model.output_channels)} in m/s^2.",
@@ -168,5 +170,5 @@ def _origin(plan: ControllerPlan, model: IdentifiedModel) -> tuple[str, ...]:
     )
 
 
-def _refusal(happened: str, do_now: str) -> StudyError:
-    return StudyError(TITLE, happened, do_now, saved="Nothing was written.")
+def _refusal(explanation: str, advice: str) -> StudyError:
+    return StudyError(TITLE, explanation, advice, saved="Nothing was written.")

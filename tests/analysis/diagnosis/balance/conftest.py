@@ -11,22 +11,22 @@ from equalizer.signals.signal import Signal
 
 
 @pytest.fixture(scope="session")
-def axes(module_at) -> ModuleType:
+def axis_module(module_at) -> ModuleType:
     """`invented_axis.py`. Imported late: it compiles."""
     return module_at(Path(__file__).parent / "invented_axis.py")
 
 
 @pytest.fixture(scope="session")
-def balance_of():
+def find_balance():
     """Of a recording, one per axis."""
     from analysis.diagnosis.balance.balances import find_balances
-    from analysis.diagnosis.search.time_budget import always
+    from analysis.diagnosis.search.time_budget import unlimited_time
 
-    return lambda recording, without=(): find_balances([recording], frozenset(without), always)
+    return lambda recording, without=(): find_balances([recording], frozenset(without), unlimited_time)
 
 
 @pytest.fixture(scope="session")
-def recording_of():
+def record_samples():
     """force (n, m) and response (n, p) of one quantity, without an axis behind them."""
 
     def recording(force, response, rate_hz, quantity="position", hold=Hold.BAND_LIMITED, unit=None, **beside):

@@ -43,7 +43,7 @@ class Physics:
 
 
 @njit
-def force_at(p, q, v, bend):
+def holding_force(p, q, v, bend):
     """What holds the axis back: all but inertia and dry friction."""
     held = p[1] * v + p[2] * q + bend + p[8] * v * abs(v) + p[9] * q**3 + p[10] * q**2
     held += p[15] * max(q - p[14], 0.0) + p[11] * np.sin(2 * np.pi * q / p[12] + p[13])
@@ -51,13 +51,13 @@ def force_at(p, q, v, bend):
 
 
 @njit
-def rubbing_at(p, q, v):
+def friction_level(p, q, v):
     level = p[3] + p[4] * np.exp(-((v / p[5]) ** 2))
     return level * max(1 + p[17] * q + p[18] * q * q, 0.0)
 
 
 @njit
-def played(p, drive, gains, noise, rate_hz):
+def simulate_axis(p, drive, gains, noise, rate_hz):
     """drive: forces, or where gains are given a reference that they follow. Position and force, (n,) each."""
     n, dt = len(drive), 1 / (STEPS * rate_hz)
     position, force = np.zeros(n), np.zeros(n)
@@ -77,8 +77,8 @@ def played(p, drive, gains, noise, rate_hz):
                 other = p[19] * (turn * turn * (q - q2) + 2 * p[21] * turn * (v - v2))
                 v2 += dt * other / p[19]
                 q2 += dt * v2
-            free = v + dt * (last - force_at(p, q, v, bend) - other) / mass
-            grip = dt * rubbing_at(p, q, v) / mass
+            free = v + dt * (last - holding_force(p, q, v, bend) - other) / mass
+            grip = dt * friction_level(p, q, v) / mass
             v = np.sign(free) * max(abs(free) - grip, 0.0)
             q += dt * v
             if p[6] > 0:
@@ -86,7 +86,7 @@ def played(p, drive, gains, noise, rate_hz):
     return position, force
 
 
-def wave(seed, count, rate_hz, band=(0.2, 15.0)):
+def random_course(seed, count, rate_hz, band=(0.2, 15.0)):
     """(count,): a random course of rms 1 within a band, not periodic."""
     spectrum = np.fft.rfft(np.random.default_rng([seed, 3]).standard_normal(count))
     frequency_hz = np.fft.rfftfreq(count, 1 / rate_hz)
@@ -95,7 +95,7 @@ def wave(seed, count, rate_hz, band=(0.2, 15.0)):
     return course / course.std()
 
 
-def recorded(
+def record_axis(
     physics=Physics(), seed=1, *, seconds=12.0, rate_hz=500.0, level=5.0, gains=None, noise=1e-6, force_noise=0.0,
     colour=0.0, swells=True,
 ):  # fmt: skip
@@ -103,17 +103,17 @@ def recorded(
     the force's rms, of what else pushes and is not in the command; colour: from one sample to the next."""
     count = int(seconds * rate_hz)
     random = np.random.default_rng([seed, 7])
-    drive = wave(seed, count, rate_hz) * (0.05 / 2 if gains is not None else level)
+    drive = random_course(seed, count, rate_hz) * (0.05 / 2 if gains is not None else level)
     if swells:
         drive *= 0.6 + 0.4 * np.sin(2 * np.pi * np.arange(count) / count * 3)
     read = noise * random.standard_normal(count)
-    position, force = played(physics.numbers(), drive, np.array(gains or (0.0, 0.0)), read, rate_hz)
+    position, force = simulate_axis(physics.numbers(), drive, np.array(gains or (0.0, 0.0)), read, rate_hz)
     if force_noise:
-        force = force + force_noise * force.std() * coloured(random, count, colour)
-    return recording(force[:, None], position[:, None], rate_hz)
+        force = force + force_noise * force.std() * coloured_noise(random, count, colour)
+    return make_recording(force[:, None], position[:, None], rate_hz)
 
 
-def coloured(random, count, colour):
+def coloured_noise(random, count, colour):
     white, left = random.standard_normal(count), np.empty(count)
     left[0] = white[0]
     for k in range(1, count):
@@ -121,7 +121,7 @@ def coloured(random, count, colour):
     return left
 
 
-def recording(force, position, rate_hz, hold=Hold.ZERO_ORDER):
+def make_recording(force, position, rate_hz, hold=Hold.ZERO_ORDER):
     names = "xyz"[: position.shape[1]]
     return Recording(
         "invented",
@@ -131,17 +131,20 @@ def recording(force, position, rate_hz, hold=Hold.ZERO_ORDER):
     )
 
 
-def imposed(physics, seed=1, *, seconds=12.0, rate_hz=500.0, travel=0.03, force_noise=0.005):
+def record_imposed_motion(physics, seed=1, *, seconds=12.0, rate_hz=500.0, travel=0.03, force_noise=0.005):
     """The motion is given and the force is read: dry friction by the sign of the velocity, no second body, no bend."""
     count = int(seconds * rate_hz)
     random, p = np.random.default_rng([seed, 8]), physics
-    q = wave(seed, count, rate_hz, (0.3, 8.0)) * travel
+    q = random_course(seed, count, rate_hz, (0.3, 8.0)) * travel
     turn = 2j * np.pi * np.fft.rfftfreq(count, 1 / rate_hz)
     v, a = (np.fft.irfft(turn**k * np.fft.rfft(q), count) for k in (1, 2))
     level = p.coulomb + p.stiction * np.exp(-((v / p.stribeck_speed) ** 2))
     force = p.mass * (1 + p.inertia_per_m * q) * a + level * (
         1 + p.rubbing_per_m * q + p.rubbing_per_m2 * q**2
     ) * np.sign(v)
-    force += np.array([force_at(p.numbers(), *pair, 0.0) for pair in zip(q, v, strict=True)])
+    force += np.array([holding_force(p.numbers(), *pair, 0.0) for pair in zip(q, v, strict=True)])
     force += force_noise * force.std() * random.standard_normal(count)
-    return replace(recording(force[:, None], q[:, None], rate_hz, Hold.BAND_LIMITED), meta={"imposed": "position"})
+    return replace(
+        make_recording(force[:, None], q[:, None], rate_hz, Hold.BAND_LIMITED),
+        meta={"record_imposed_motion": "position"},
+    )

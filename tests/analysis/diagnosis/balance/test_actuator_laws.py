@@ -10,53 +10,55 @@ from analysis.diagnosis.balance.command_laws import AS_COMMANDED, neighbours_of
 
 
 @pytest.fixture(scope="module")
-def found(axes, balance_of):
+def find_laws(axis_module, find_balance):
     """Of an axis behind an actuator: what it is commanded is recorded, what it gives moves the axis."""
 
     def laws(given, physics=None, seed=1, level=5.0):
-        axis = physics or axes.Physics()
-        command = axes.wave(seed, 2000, 250.0) * level
+        axis = physics or axis_module.Physics()
+        command = axis_module.random_course(seed, 2000, 250.0) * level
         entered = given(command)
         count, random = len(command), np.random.default_rng([seed, 9])
-        position, _ = axes.played(axis.numbers(), entered, np.zeros(2), 3e-6 * random.standard_normal(count), 250.0)
-        return balance_of(axes.recording(command[:, None], position[:, None], 250.0))[0]
+        position, _ = axis_module.simulate_axis(
+            axis.numbers(), entered, np.zeros(2), 3e-6 * random.standard_normal(count), 250.0
+        )
+        return find_balance(axis_module.make_recording(command[:, None], position[:, None], 250.0))[0]
 
     return laws
 
 
 @pytest.fixture(scope="module")
-def dead_band(found):
+def dead_band(find_laws):
     """Of 1.5 N."""
-    return found(lambda u: u - np.clip(u, -1.5, 1.5))
+    return find_laws(lambda u: u - np.clip(u, -1.5, 1.5))
 
 
-def named(balance):
+def laws_by_name(balance):
     return {law.law.effect: law for law in balance.named}
 
 
 def test_a_dead_band_is_recovered_with_its_width(dead_band):
-    law = named(dead_band)["force_deadband"]
+    law = laws_by_name(dead_band)["force_deadband"]
     assert law.values["width"] == pytest.approx(1.5, rel=0.1)
     assert law.gain > 0.8
-    assert law.alike == ()
-    assert set(named(dead_band)) == {"force_deadband"}
+    assert law.equivalents == ()
+    assert set(laws_by_name(dead_band)) == {"force_deadband"}
 
 
-def test_a_limit_of_the_force_is_recovered(found):
-    balance = found(lambda u: np.clip(u, -4.0, 4.0))
-    assert named(balance)["force_saturation"].values["limit"] == pytest.approx(4.0, rel=0.1)
+def test_a_limit_of_the_force_is_recovered(find_laws):
+    balance = find_laws(lambda u: np.clip(u, -4.0, 4.0))
+    assert laws_by_name(balance)["force_saturation"].values["limit"] == pytest.approx(4.0, rel=0.1)
 
 
 @pytest.fixture(scope="module")
-def rubbing_dead_band(found, axes):
+def rubbing_dead_band(find_laws, axis_module):
     """Of 1.5 N, beside a dry friction of 0.5 N."""
-    return found(lambda u: u - np.clip(u, -1.5, 1.5), replace(axes.Physics(), coulomb=0.5))
+    return find_laws(lambda u: u - np.clip(u, -1.5, 1.5), replace(axis_module.Physics(), coulomb=0.5))
 
 
 def test_a_dead_band_leaves_the_dry_friction_beside_it(rubbing_dead_band):
     balance = rubbing_dead_band
-    assert set(named(balance)) == {"force_deadband", "coulomb_friction"}
-    assert named(balance)["coulomb_friction"].values["level"] == pytest.approx(0.5, rel=0.2)
+    assert set(laws_by_name(balance)) == {"force_deadband", "coulomb_friction"}
+    assert laws_by_name(balance)["coulomb_friction"].values["level"] == pytest.approx(0.5, rel=0.2)
 
 
 def test_the_error_before_is_that_of_the_force_as_commanded(dead_band):
@@ -66,25 +68,25 @@ def test_the_error_before_is_that_of_the_force_as_commanded(dead_band):
 @pytest.mark.parametrize(
     "physics", [pytest.param({"coulomb": 0.8}, marks=pytest.mark.slow), {"coulomb": 0.4, "stiction": 0.6, "cubic": 2e5}]
 )
-def test_a_linear_actuator_has_no_deadband_saturation_or_nonlinearity(found, axes, physics):
-    balance = found(lambda u: u, replace(axes.Physics(), **physics))
-    assert not {"force_deadband", "force_saturation", "force_nonlinearity"} & set(named(balance))
+def test_a_linear_actuator_has_no_deadband_saturation_or_nonlinearity(find_laws, axis_module, physics):
+    balance = find_laws(lambda u: u, replace(axis_module.Physics(), **physics))
+    assert not {"force_deadband", "force_saturation", "force_nonlinearity"} & set(laws_by_name(balance))
 
 
 @pytest.mark.parametrize("square", [-0.5, pytest.param(0.4, marks=pytest.mark.slow)])
-def test_a_gain_that_changes_with_the_command_is_recovered_with_its_size(found, square):
-    balance = found(lambda u: u * (1 - square + square * np.abs(u) / np.abs(u).max()))
-    assert set(named(balance)) == {"force_nonlinearity"}
-    assert named(balance)["force_nonlinearity"].values["square"] == pytest.approx(square, rel=0.15)
+def test_a_gain_that_changes_with_the_command_is_recovered_with_its_size(find_laws, square):
+    balance = find_laws(lambda u: u * (1 - square + square * np.abs(u) / np.abs(u).max()))
+    assert set(laws_by_name(balance)) == {"force_nonlinearity"}
+    assert laws_by_name(balance)["force_nonlinearity"].values["square"] == pytest.approx(square, rel=0.15)
 
 
 @pytest.mark.slow
-def test_a_gain_that_grows_with_the_square_of_the_command_grows_with_its_size(found):
-    law = named(found(lambda u: u * (1 + 0.02 * u**2)))["force_nonlinearity"]
+def test_a_gain_that_grows_with_the_square_of_the_command_grows_with_its_size(find_laws):
+    law = laws_by_name(find_laws(lambda u: u * (1 + 0.02 * u**2)))["force_nonlinearity"]
     assert 0 < law.values["square"] <= 1
 
 
-def driven_speed(given, drag, seed=3, rate_hz=50.0, count=6000):
+def simulate_speed(given, drag, seed=3, rate_hz=50.0, count=6000):
     """Speed of a mass of 1 with a damping of 1 and a drag, driven in random steps; both (n, 1)."""
     random = np.random.default_rng(seed)
     command = np.repeat(random.uniform(-1.0, 1.0, count // 50), 50)
@@ -97,13 +99,13 @@ def driven_speed(given, drag, seed=3, rate_hz=50.0, count=6000):
 
 
 @pytest.fixture(scope="module")
-def of_speed(balance_of):
+def find_speed_balance(find_balance):
     from equalizer.signals.recording import Hold, Recording
     from equalizer.signals.signal import Signal
 
     def found(given, drag):
-        command, speed = driven_speed(given, drag)
-        return balance_of(
+        command, speed = simulate_speed(given, drag)
+        return find_balance(
             Recording(
                 "invented",
                 Signal(command, 50.0, "force", "N", ("fx",)),
@@ -116,17 +118,17 @@ def of_speed(balance_of):
 
 
 @pytest.mark.slow
-def test_a_gain_that_falls_with_the_command_is_no_drag(of_speed):
-    balance = of_speed(lambda u: u * (1 - 0.5 * np.abs(u)), 0.0)
-    assert named(balance)["force_nonlinearity"].values["square"] == pytest.approx(-1, abs=0.2)
-    assert "quadratic_damping" not in named(balance)
+def test_a_gain_that_falls_with_the_command_is_no_drag(find_speed_balance):
+    balance = find_speed_balance(lambda u: u * (1 - 0.5 * np.abs(u)), 0.0)
+    assert laws_by_name(balance)["force_nonlinearity"].values["square"] == pytest.approx(-1, abs=0.2)
+    assert "quadratic_damping" not in laws_by_name(balance)
 
 
-def test_a_drag_is_none_of_the_actuator(of_speed):
-    assert set(named(of_speed(lambda u: u, 2.0))) == {"quadratic_damping"}
+def test_a_drag_is_none_of_the_actuator(find_speed_balance):
+    assert set(laws_by_name(find_speed_balance(lambda u: u, 2.0))) == {"quadratic_damping"}
 
 
-def noisy_speed(curve, drag, seed=3, rate_hz=10.0, count=4000):
+def record_noisy_speed(curve, drag, seed=3, rate_hz=10.0, count=4000):
     """Of a motor with a time constant of 1 s, through steps of 5 s, with a noise of a fifth of it. curve: power of the
     command, with a dead band of 0.04 where it is no straight line."""
     from equalizer.signals.recording import Hold, Recording
@@ -150,15 +152,15 @@ def noisy_speed(curve, drag, seed=3, rate_hz=10.0, count=4000):
 
 
 @pytest.mark.parametrize(("curve", "drag", "drags"), [(0.55, 0.0, False), (1.0, 0.1, True)])
-def test_a_drag_is_named_only_where_no_curve_of_the_command_does_as_well(balance_of, curve, drag, drags):
+def test_a_drag_is_named_only_where_no_curve_of_the_command_does_as_well(find_balance, curve, drag, drags):
     """Though noise hides which of both leaves less by far."""
-    balance = balance_of(noisy_speed(curve, drag))[0]
-    assert ("quadratic_damping" in named(balance)) == drags
+    balance = find_balance(record_noisy_speed(curve, drag))[0]
+    assert ("quadratic_damping" in laws_by_name(balance)) == drags
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("lag_s", [0.06, pytest.param(0.01, marks=pytest.mark.slow)])
-def test_a_valve_whose_speed_falls_behind_its_command_is_no_drag(balance_of, lag_s):
+def test_a_valve_whose_speed_falls_behind_its_command_is_no_drag(find_balance, lag_s):
     """lag_s: of the speed behind the valve; below the sample period, no inertia shows."""
     from equalizer.signals.recording import Recording
     from equalizer.signals.signal import Signal
@@ -173,13 +175,13 @@ def test_a_valve_whose_speed_falls_behind_its_command_is_no_drag(balance_of, lag
         Signal(command[:, None], 50.0, "force", "N", ("u",)),
         Signal(read[:, None], 50.0, "velocity", "m/s", ("v",)),
     )
-    balance = balance_of(Recording("invented", *signals))[0]
-    assert not {"quadratic_damping", "coulomb_friction", "stribeck_friction"} & set(named(balance))
+    balance = find_balance(Recording("invented", *signals))[0]
+    assert not {"quadratic_damping", "coulomb_friction", "stribeck_friction"} & set(laws_by_name(balance))
 
 
-def pulled(law, seed, count=2500, rate_hz=250.0):
+def record_pulled_mass(law, seed, count=2500, rate_hz=250.0):
     """Recording of a mass of 0.1 kg on a spring, pulled by law(current, position), in random steps of the current."""
-    from tests.analysis.diagnosis.balance.invented_axis import recording
+    from tests.analysis.diagnosis.balance.invented_axis import make_recording
 
     random = np.random.default_rng([seed, 5])
     current = np.repeat(random.uniform(0.3, 1.0, count // 25), 25)
@@ -190,14 +192,14 @@ def pulled(law, seed, count=2500, rate_hz=250.0):
             v += (law(given, x) - 20.0 * x - 3.0 * v) / 0.1 / (10 * rate_hz)
             x += v / (10 * rate_hz)
     noise = 3e-8 * random.standard_normal(count)
-    return recording(current[:, None], (position + noise)[:, None], rate_hz)
+    return make_recording(current[:, None], (position + noise)[:, None], rate_hz)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("power", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_the_pull_of_a_coil_is_the_first_candidate_and_laws_of_the_motion_do_not_take_its_part(balance_of, power):
-    shot = pulled(lambda i, x: 2.9e-6 * i**power / (0.01 - x) ** 2, 1)
-    balance = balance_of(shot)[0]
+def test_the_pull_of_a_coil_is_the_first_candidate_and_laws_of_the_motion_do_not_take_its_part(find_balance, power):
+    shot = record_pulled_mass(lambda i, x: 2.9e-6 * i**power / (0.01 - x) ** 2, 1)
+    balance = find_balance(shot)[0]
     first = balance.laws[0]
     assert first.law.effect == "electromagnet"
     assert not balance.named
@@ -208,9 +210,9 @@ def test_the_pull_of_a_coil_is_the_first_candidate_and_laws_of_the_motion_do_not
 @pytest.mark.parametrize(
     "law", [lambda i, x: 0.05 * i - 1e6 * x**3, pytest.param(lambda i, x: 0.03 * i**2, marks=pytest.mark.slow)]
 )
-def test_what_pulls_alike_everywhere_is_no_coil(balance_of, law):
-    balance = balance_of(pulled(law, 2))[0]
-    assert "electromagnet" not in {each.law.effect for each in (*balance.laws, *balance.others)}
+def test_what_pulls_alike_everywhere_is_no_coil(find_balance, law):
+    balance = find_balance(record_pulled_mass(law, 2))[0]
+    assert "electromagnet" not in {each.law.effect for each in (*balance.laws, *balance.further_laws)}
 
 
 def test_a_law_of_the_command_is_tried_in_order_and_never_twice():
@@ -226,5 +228,5 @@ def test_laws_behind_a_dead_band_in_doubt_are_not_named(rubbing_dead_band, monke
     balance = rubbing_dead_band
     monkeypatch.setattr(actuator_equivalents, "_has_inertia", lambda regression, laws: inertia)
     doubted = actuator_equivalents.doubt_laws_of_actuator(balance)
-    assert set(named(doubted)) == ({"force_deadband", "coulomb_friction"} if inertia else set())
+    assert set(laws_by_name(doubted)) == ({"force_deadband", "coulomb_friction"} if inertia else set())
     assert len(doubted.laws) == len(balance.laws)

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.balances import look_again, samples_in_motion
-from analysis.diagnosis.balance.motion import motions_of
+from analysis.diagnosis.balance.balances import balance_selected_motions, select_samples_in_motion
+from analysis.diagnosis.balance.motion import compute_motions
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME
 
 RATE_HZ, LEVEL, MASS, DAMPING = 100.0, 0.4, 0.05, 0.8
 
 
-def _hunt(friction, seconds=120.0, fine=20):
+def _simulate_hunting(friction, seconds=120.0, fine=20):
     """Force and position (n, 1) of an axis that an integrating controller leads after a slow target; it waits at
     the end of each way, while its force wanders below what moves the axis."""
     rng, n, step_s = np.random.default_rng(3), int(seconds * RATE_HZ), 1 / (RATE_HZ * fine)
@@ -35,13 +35,13 @@ def _hunt(friction, seconds=120.0, fine=20):
 
 
 @pytest.fixture(scope="module")
-def held(recording_of, balance_of):
-    force, position = _hunt(LEVEL)
-    return position, balance_of(recording_of(force, position, RATE_HZ))[0]
+def hunting_balance(record_samples, find_balance):
+    force, position = _simulate_hunting(LEVEL)
+    return position, find_balance(record_samples(force, position, RATE_HZ))[0]
 
 
-def test_friction_of_an_axis_that_rests_at_its_targets_is_named(held):
-    position, balance = held
+def test_friction_of_an_axis_that_rests_at_its_targets_is_named(hunting_balance):
+    position, balance = hunting_balance
     speed = np.gradient(position[:, 0], 1 / RATE_HZ)
     (named, *_) = balance.named
 
@@ -50,13 +50,13 @@ def test_friction_of_an_axis_that_rests_at_its_targets_is_named(held):
     assert named.values["level"] == pytest.approx(LEVEL, rel=0.15)
 
 
-def test_an_axis_that_follows_without_friction_gets_no_name(recording_of, balance_of):
-    (balance,) = balance_of(recording_of(*_hunt(0.0, seconds=60.0), RATE_HZ))
+def test_an_axis_that_follows_without_friction_gets_no_name(record_samples, find_balance):
+    (balance,) = find_balance(record_samples(*_simulate_hunting(0.0, seconds=60.0), RATE_HZ))
 
     assert not balance.named
 
 
-def _pushed(friction, width=0.0, wander=0.95, seconds=120.0, fine=20, seed=3):
+def _simulate_pushes(friction, width=0.0, wander=0.95, seconds=120.0, fine=20, seed=3):
     """Force and position (n, 1) of an axis that is pushed now and then beyond what holds it, friction or a dead band.
     wander: of the force in between, as a share of that."""
     rng, n, step_s = np.random.default_rng(seed), int(seconds * RATE_HZ), 1 / (RATE_HZ * fine)
@@ -83,21 +83,23 @@ def _pushed(friction, width=0.0, wander=0.95, seconds=120.0, fine=20, seed=3):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("friction", "width"), [(LEVEL, 0.0), pytest.param(0.0, LEVEL, marks=pytest.mark.slow)])
-def test_a_dead_band_of_an_axis_that_rests_within_it_may_be_dry_friction(friction, width, recording_of, balance_of):
-    (balance,) = balance_of(recording_of(*_pushed(friction, width), RATE_HZ))
+def test_a_dead_band_of_an_axis_that_rests_within_it_may_be_dry_friction(friction, width, record_samples, find_balance):
+    (balance,) = find_balance(record_samples(*_simulate_pushes(friction, width), RATE_HZ))
     band = next(law for law in balance.named if law.law.effect == "force_deadband")
 
     assert band.values["width"] == pytest.approx(LEVEL, rel=0.15)
-    assert "coulomb_friction" in band.alike
+    assert "coulomb_friction" in band.equivalents
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("friction", "wander"), [(LEVEL, 0.95), (0.0, 0.0)])
-def test_samples_in_motion_alone_show_what_holds_the_axis(friction, wander, recording_of):
+def test_samples_in_motion_alone_show_what_holds_the_axis(friction, wander, record_samples):
     """The look that is taken where an axis mostly rests, and nothing is named over all samples."""
-    force, position = _pushed(friction, wander=wander)
+    force, position = _simulate_pushes(friction, wander=wander)
     speed = np.gradient(position[:, 0], 1 / RATE_HZ)
     assert np.mean(speed**2 > 0.01 * np.mean(speed**2)) < MOVES_MOST_OF_THE_TIME
-    records = observe_parts((recording_of(force, position, RATE_HZ),), 1)
-    found = look_again(samples_in_motion, records, motions_of(records), frozenset(), lambda: True, map)
+    records = observe_parts((record_samples(force, position, RATE_HZ),), 1)
+    found = balance_selected_motions(
+        select_samples_in_motion, records, compute_motions(records), frozenset(), lambda: True, map
+    )
     assert bool(found) == bool(friction)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.judged_law import family_of
-from tests.analysis.diagnosis.balance.invented_axis import recording
+from tests.analysis.diagnosis.balance.invented_axis import make_recording
 
 RATE_HZ, STEPS = 250.0, 20
 MASS_KG, DAMPING_N_S_PER_M, GAINS = 0.4, 0.3, (400.0, 25.0)
@@ -19,7 +19,7 @@ def reference_m():
     return 10.0 * whole / whole.max()
 
 
-def moved(friction_n, dead_band_n, seed):
+def simulate_motor(friction_n, dead_band_n, seed):
     """A motor under position control; noise of a tenth in what is recorded of its command."""
     random, aims = np.random.default_rng(seed), reference_m()
     position, command = np.empty(len(aims)), np.empty(len(aims))
@@ -35,18 +35,18 @@ def moved(friction_n, dead_band_n, seed):
             v = np.sign(free) * max(abs(free) - friction_n / MASS_KG / (STEPS * RATE_HZ), 0.0)
             q += v / (STEPS * RATE_HZ)
     command += 0.1 * command.std() * random.standard_normal(len(command))
-    return recording(command[:, None], position[:, None], RATE_HZ)
+    return make_recording(command[:, None], position[:, None], RATE_HZ)
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
-def test_friction_that_holds_a_motor_between_its_moves_is_no_dead_band(balance_of, seed):
-    (balance,) = balance_of(moved(LEVEL_N, 0.0, seed))
+def test_friction_that_holds_a_motor_between_its_moves_is_no_dead_band(find_balance, seed):
+    (balance,) = find_balance(simulate_motor(LEVEL_N, 0.0, seed))
     (named,) = balance.named
     assert named.law.effect in family_of("coulomb_friction")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
-def test_a_dead_band_beside_which_the_motor_coasts_is_no_friction(balance_of, seed):
-    (balance,) = balance_of(moved(0.0, LEVEL_N, seed))
+def test_a_dead_band_beside_which_the_motor_coasts_is_no_friction(find_balance, seed):
+    (balance,) = find_balance(simulate_motor(0.0, LEVEL_N, seed))
     assert not [law for law in balance.named if law.law.effect != "force_deadband"]

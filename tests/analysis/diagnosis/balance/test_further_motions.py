@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.balances import motions_in_own_band
-from analysis.diagnosis.balance.motion import motion_band_hz, motions_of
+from analysis.diagnosis.balance.balances import restrict_to_motion_band
+from analysis.diagnosis.balance.motion import compute_motion_band_hz, compute_motions
 from analysis.diagnosis.confirm.fitting_measures import choose_fitting_measure
 from analysis.diagnosis.confirm.force_balance_measures import BALANCE_PREDICTS_BETTER, choose_forces_of_balance
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.search_by_simulation import _unseen_by_balance
+from analysis.diagnosis.search_by_simulation import _is_unobservable
 from equalizer.plant.mechanical_model import MechanicalModel
 
 RATE_HZ, SECONDS, FINE = 500.0, 5.0, 20
@@ -19,7 +19,7 @@ GAIN, FRICTION, BRISTLE = 9.5, 0.2, 5e-4
 STEP, GAUGE_NOISE = np.deg2rad(0.088), np.deg2rad(0.6)
 
 
-def turned(friction, seed):
+def simulate_hub(friction, seed):
     """Voltage (n,), hub angle and deflection (n, 2), in rad: a square reference under feedback with noise in it."""
     rng = np.random.default_rng(seed)
     count, dt = int(RATE_HZ * SECONDS), 1 / (FINE * RATE_HZ)
@@ -44,33 +44,33 @@ def turned(friction, seed):
 
 
 @pytest.fixture
-def recorded(recording_of):
+def record_hub(record_samples):
     def made(friction, seed=3):
-        command, motion = turned(friction, seed)
-        return recording_of(command[:, None], motion, RATE_HZ)
+        command, motion = simulate_hub(friction, seed)
+        return record_samples(command[:, None], motion, RATE_HZ)
 
     return made
 
 
-def test_the_band_of_the_motion_is_that_of_the_driven_one(recorded):
-    records = observe_parts([recorded(FRICTION)], 2)
-    motions = motions_of(records)
-    hub_hz, both_hz = motion_band_hz(motions, [0]), motion_band_hz(motions, [0, 1])
-    (narrow,) = motions_in_own_band(records, motions)
+def test_the_band_of_the_motion_is_that_of_the_driven_one(record_hub):
+    records = observe_parts([record_hub(FRICTION)], 2)
+    motions = compute_motions(records)
+    hub_hz, both_hz = compute_motion_band_hz(motions, [0]), compute_motion_band_hz(motions, [0, 1])
+    (narrow,) = restrict_to_motion_band(records, motions)
     assert narrow.band_hz == pytest.approx(hub_hz)
     assert hub_hz < 0.8 * both_hz
 
 
 @pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
-def test_friction_of_the_hub_is_named_beside_the_beam(recorded, balance_of, seed):
-    (balance,) = balance_of(recorded(FRICTION, seed))
+def test_friction_of_the_hub_is_named_beside_the_beam(record_hub, find_balance, seed):
+    (balance,) = find_balance(record_hub(FRICTION, seed))
     assert [law.law.effect for law in balance.named] in (["coulomb_friction"], ["presliding_hysteresis"])
     assert balance.named[0].values["level"] == pytest.approx(FRICTION, rel=0.2)
 
 
 @pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
-def test_without_friction_nothing_is_named(recorded, balance_of, seed):
-    assert not balance_of(recorded(0.0, seed))[0].named
+def test_without_friction_nothing_is_named(record_hub, find_balance, seed):
+    assert not find_balance(record_hub(0.0, seed))[0].named
 
 
 def hub_and_beam(hub):
@@ -82,9 +82,9 @@ def hub_and_beam(hub):
 
 
 @pytest.mark.slow
-def test_where_no_law_is_named_the_linear_numbers_that_leave_less_of_the_forces_are_taken(recorded, balance_of):
-    recording = recorded(0.0)
-    balances = balance_of(recording)
+def test_where_no_law_is_named_the_linear_numbers_that_leave_less_of_the_forces_are_taken(record_hub, find_balance):
+    recording = record_hub(0.0)
+    balances = find_balance(recording)
     given = choose_fitting_measure([recording], hub_and_beam(5 * HUB), (), "force", about_mean=True)
     plain = choose_forces_of_balance([recording], given, balances)
     assert plain.model.mass.shape == (1, 1)
@@ -93,14 +93,14 @@ def test_where_no_law_is_named_the_linear_numbers_that_leave_less_of_the_forces_
     assert left[1] < 0.3 * left[0]
 
 
-def test_a_given_model_that_leaves_less_stays(recording_of, balance_of):
+def test_a_given_model_that_leaves_less_stays(record_samples, find_balance):
     """One body under a broad force: the true model's error is the noise, and the balance's numbers are fitted."""
     rng = np.random.default_rng(5)
-    recording, mass = driven_body(recording_of, rng)
+    recording, mass = record_driven_body(record_samples, rng)
     true = MechanicalModel("true", "position", *(np.array([[value]]) for value in mass), np.eye(1), np.eye(1))
     given = choose_fitting_measure([recording], true, (), "force")
     wrong = choose_fitting_measure([recording], replace(true, mass=3 * true.mass), (), "force")
-    balances = balance_of(recording)
+    balances = find_balance(recording)
     left = [rms_of_forces(choose_forces_of_balance([recording], each, balances)) for each in (given, wrong)]
     assert left[0] <= rms_of_forces(given)
     assert left[1] < 0.5 * rms_of_forces(wrong)
@@ -108,12 +108,12 @@ def test_a_given_model_that_leaves_less_stays(recording_of, balance_of):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("offset", [0.0, 2.0])
-def test_a_constant_force_does_not_decide_which_is_taken(recorded, balance_of, offset):
-    recording = recorded(0.0)
+def test_a_constant_force_does_not_decide_which_is_taken(record_hub, find_balance, offset):
+    recording = record_hub(0.0)
     command = replace(recording.command, samples=recording.command.samples + offset)
     moved = replace(recording, command=command)
     given = choose_fitting_measure([moved], hub_and_beam(5 * HUB), (), "force", about_mean=True)
-    plain = choose_forces_of_balance([moved], given, balance_of(moved))
+    plain = choose_forces_of_balance([moved], given, find_balance(moved))
     assert BALANCE_PREDICTS_BETTER in plain.chosen.remarks
     assert plain.is_reduced
     assert rms_of_forces(plain) < 0.3 * rms_of_forces(given)
@@ -129,18 +129,18 @@ def test_a_constant_force_does_not_decide_which_is_taken(recorded, balance_of, o
     ],
 )
 def test_effects_of_the_actuator_are_tried_on_the_commands_as_they_are_alone(name, place, driven, tried):
-    assert _unseen_by_balance(name, place, driven) is tried
+    assert _is_unobservable(name, place, driven) is tried
 
 
 @pytest.mark.slow
-def test_with_a_named_law_or_without_balances_the_model_stays(recorded, balance_of):
-    recording = recorded(FRICTION)
+def test_with_a_named_law_or_without_balances_the_model_stays(record_hub, find_balance):
+    recording = record_hub(FRICTION)
     given = choose_fitting_measure([recording], hub_and_beam(5 * HUB), (), "force", about_mean=True)
-    assert choose_forces_of_balance([recording], given, balance_of(recording)) is given
+    assert choose_forces_of_balance([recording], given, find_balance(recording)) is given
     assert choose_forces_of_balance([recording], given, ()) is given
 
 
-def driven_body(recording_of, rng):
+def record_driven_body(record_samples, rng):
     """Recording, and mass, damping and stiffness."""
     mass, damping, spring = 0.1, 2.0, 400.0
     force = np.convolve(rng.standard_normal(4000), np.hanning(20), "same")
@@ -151,7 +151,7 @@ def driven_body(recording_of, rng):
             speed += (push - damping * speed - spring * place) / mass / RATE_HZ / 10
             place += speed / RATE_HZ / 10
     noisy = np.array(found) + 1e-6 * rng.standard_normal(len(found))
-    return recording_of(force[:, None], noisy[:, None], RATE_HZ), (mass, damping, spring)
+    return record_samples(force[:, None], noisy[:, None], RATE_HZ), (mass, damping, spring)
 
 
 def rms_of_forces(fitting):

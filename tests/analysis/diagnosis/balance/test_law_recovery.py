@@ -38,9 +38,9 @@ CLOSED = ("hardening_stiffness",)
 IMPOSED = ("stribeck_friction", "position_dependent_friction")
 
 
-def check(balance, effect, axis=0):
+def check_balance(balance, effect, axis=0):
     found = {law.law.effect: law for law in balance.named}
-    assert effect in found or any(effect in law.alike for law in balance.named)
+    assert effect in found or any(effect in law.equivalents for law in balance.named)
     if effect in found:
         for name, (truth, within) in NUMBERS[effect].items():
             assert found[effect].values[name] == pytest.approx(truth, rel=within), name
@@ -48,106 +48,114 @@ def check(balance, effect, axis=0):
     assert balance.error < balance.linear
 
 
-def open_loop(axes, balance_of, effect):
-    (balance,) = balance_of(axes.recorded(axes.Physics(**TRUTHS[effect])))
-    check(balance, effect)
+def check_open_loop(axis_module, find_balance, effect):
+    (balance,) = find_balance(axis_module.record_axis(axis_module.Physics(**TRUTHS[effect])))
+    check_balance(balance, effect)
     if effect not in BY_FEW_GRIPS:
         assert [law.law.effect for law in balance.named] == [effect]
 
 
-def closed(axes, balance_of, effect):
-    (balance,) = balance_of(axes.recorded(axes.Physics(**TRUTHS[effect]), gains=PD))
-    check(balance, effect)
+def check_closed_loop(axis_module, find_balance, effect):
+    (balance,) = find_balance(axis_module.record_axis(axis_module.Physics(**TRUTHS[effect]), gains=PD))
+    check_balance(balance, effect)
 
 
-def imposed(axes, balance_of, effect):
-    (balance,) = balance_of(axes.imposed(axes.Physics(**TRUTHS[effect])))
-    check(balance, effect)
+def check_imposed_motion(axis_module, find_balance, effect):
+    (balance,) = find_balance(axis_module.record_imposed_motion(axis_module.Physics(**TRUTHS[effect])))
+    check_balance(balance, effect)
     if effect in IMPOSED:
         assert [law.law.effect for law in balance.named] == [effect]
 
 
 @pytest.mark.parametrize("effect", OPEN)
-def test_in_an_open_loop(axes, balance_of, effect):
-    open_loop(axes, balance_of, effect)
+def test_in_an_open_loop(axis_module, find_balance, effect):
+    check_open_loop(axis_module, find_balance, effect)
 
 
 @pytest.mark.parametrize("effect", CLOSED)
-def test_in_a_closed_loop(axes, balance_of, effect):
-    closed(axes, balance_of, effect)
+def test_in_a_closed_loop(axis_module, find_balance, effect):
+    check_closed_loop(axis_module, find_balance, effect)
 
 
 @pytest.mark.parametrize("effect", IMPOSED)
-def test_where_the_motion_is_imposed_and_the_force_is_read(axes, balance_of, effect):
-    imposed(axes, balance_of, effect)
+def test_where_the_motion_is_imposed_and_the_force_is_read(axis_module, find_balance, effect):
+    check_imposed_motion(axis_module, find_balance, effect)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("effect", [effect for effect in TRUTHS if effect not in OPEN])
-def test_every_law_in_an_open_loop(axes, balance_of, effect):
-    open_loop(axes, balance_of, effect)
+def test_every_law_in_an_open_loop(axis_module, find_balance, effect):
+    check_open_loop(axis_module, find_balance, effect)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("effect", [effect for effect in TRUTHS if effect not in CLOSED])
-def test_every_law_in_a_closed_loop(axes, balance_of, effect):
-    closed(axes, balance_of, effect)
+def test_every_law_in_a_closed_loop(axis_module, find_balance, effect):
+    check_closed_loop(axis_module, find_balance, effect)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "effect", [effect for effect in TRUTHS if effect not in (*IMPOSED, "presliding_hysteresis", "end_stop")]
 )
-def test_every_law_along_an_imposed_motion(axes, balance_of, effect):
-    imposed(axes, balance_of, effect)
+def test_every_law_along_an_imposed_motion(axis_module, find_balance, effect):
+    check_imposed_motion(axis_module, find_balance, effect)
 
 
 @pytest.mark.slow
-def test_a_stop_beyond_zero_is_named_with_its_side(axes, balance_of):
-    recording = axes.recorded(axes.Physics(**TRUTHS["end_stop"]))
+def test_a_stop_beyond_zero_is_named_with_its_side(axis_module, find_balance):
+    recording = axis_module.record_axis(axis_module.Physics(**TRUTHS["end_stop"]))
     moved = replace(recording.response, samples=recording.response.samples - 0.06)
-    (balance,) = balance_of(replace(recording, response=moved))
+    (balance,) = find_balance(replace(recording, response=moved))
     (law,) = balance.named
     assert law.law.effect == "end_stop"
     assert law.values["side"] == 1
     assert law.values["position"] == pytest.approx(-0.02, abs=0.008)
 
 
-def test_of_two_axes_each_has_its_own(axes, balance_of):
-    rubbing = axes.recorded(axes.Physics(coulomb=1.0), seed=1)
-    stiff = axes.recorded(axes.Physics(cubic=3e4), seed=2)
+def test_of_two_axes_each_has_its_own(axis_module, find_balance):
+    rubbing = axis_module.record_axis(axis_module.Physics(coulomb=1.0), seed=1)
+    stiff = axis_module.record_axis(axis_module.Physics(cubic=3e4), seed=2)
     both = [np.hstack([getattr(each, side).samples for each in (rubbing, stiff)]) for side in ("command", "response")]
-    first, second = balance_of(axes.recording(*both, rubbing.sample_rate_hz))
-    check(first, "coulomb_friction")
-    check(second, "hardening_stiffness", axis=1)
+    first, second = find_balance(axis_module.make_recording(*both, rubbing.sample_rate_hz))
+    check_balance(first, "coulomb_friction")
+    check_balance(second, "hardening_stiffness", axis=1)
 
 
-def healthy(axes, balance_of, seed, **beside):
+def effects_of_healthy_axis(axis_module, find_balance, seed, **beside):
     random = np.random.default_rng([seed, 11])
-    physics = axes.Physics(random.uniform(0.1, 1.0), random.uniform(0.5, 5.0), random.uniform(30.0, 300.0), **beside)
+    physics = axis_module.Physics(
+        random.uniform(0.1, 1.0), random.uniform(0.5, 5.0), random.uniform(30.0, 300.0), **beside
+    )
     loop = PD if seed % 2 else None
     colour = (0.0, 0.9, 0.99)[seed % 3]
-    recording = axes.recorded(physics, seed, gains=loop, force_noise=(0.0, 0.01, 0.1)[seed // 2 % 3], colour=colour)
-    (balance,) = balance_of(recording)
+    recording = axis_module.record_axis(
+        physics, seed, gains=loop, force_noise=(0.0, 0.01, 0.1)[seed // 2 % 3], colour=colour
+    )
+    (balance,) = find_balance(recording)
     return [law.law.effect for law in balance.named]
 
 
 @pytest.mark.parametrize("seed", [pytest.param(21, marks=pytest.mark.slow), 22])
-def test_where_nothing_is_missing_nothing_is_named(axes, balance_of, seed):
-    assert healthy(axes, balance_of, seed) == []
+def test_where_nothing_is_missing_nothing_is_named(axis_module, find_balance, seed):
+    assert effects_of_healthy_axis(axis_module, find_balance, seed) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [24])
-def test_a_second_linear_mode_gets_no_nonlinear_name(axes, balance_of, seed):
-    assert healthy(axes, balance_of, seed, second_mass=0.1, second_hz=12.0) == []
+def test_a_second_linear_mode_gets_no_nonlinear_name(axis_module, find_balance, seed):
+    assert effects_of_healthy_axis(axis_module, find_balance, seed, second_mass=0.1, second_hz=12.0) == []
 
 
 @pytest.mark.slow
-def test_nothing_is_named_in_thirty_healthy_axes(axes, balance_of):
-    assert [seed for seed in range(30) if healthy(axes, balance_of, seed)] == []
+def test_nothing_is_named_in_thirty_healthy_axes(axis_module, find_balance):
+    assert [seed for seed in range(30) if effects_of_healthy_axis(axis_module, find_balance, seed)] == []
 
 
 @pytest.mark.slow
-def test_nothing_is_named_in_thirty_axes_of_two_modes(axes, balance_of):
-    assert [seed for seed in range(30) if healthy(axes, balance_of, seed, second_mass=0.1, second_hz=12.0)] == []
+def test_nothing_is_named_in_thirty_axes_of_two_modes(axis_module, find_balance):
+    assert [
+        seed
+        for seed in range(30)
+        if effects_of_healthy_axis(axis_module, find_balance, seed, second_mass=0.1, second_hz=12.0)
+    ] == []

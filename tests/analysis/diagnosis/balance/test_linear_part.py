@@ -10,7 +10,7 @@ MASS, DAMPING, STIFFNESS, LEVEL = 0.1, 0.8, 20.0, 0.6
 FAR_MASS, JOINT, JOINT_DAMPING = 0.06, 30.0, 0.05
 
 
-def _force(seed=3, top_hz=5.0):
+def _make_force(seed=3, top_hz=5.0):
     """(n,) of lines up to top_hz, and the same at any time."""
     rng = np.random.default_rng(seed)
     hz = np.arange(0.2, top_hz, 0.21)
@@ -23,7 +23,7 @@ def _force(seed=3, top_hz=5.0):
     return times_s, at
 
 
-def _moved(times_s, slopes, size):
+def _solve_motion(times_s, slopes, size):
     fine = np.arange(0, times_s[-1] + 1e-3, 1e-3)
     found = solve_ivp(
         slopes, (0, fine[-1]), np.zeros(size), t_eval=fine, method="LSODA", max_step=2e-3, rtol=1e-7, atol=1e-9
@@ -34,19 +34,19 @@ def _moved(times_s, slopes, size):
 @pytest.fixture(scope="module")
 def late_axis():
     """Rubs, and hears of its force late."""
-    times_s, at = _force()
+    times_s, at = _make_force()
 
     def slopes(t, state):
         q, v = state
         return [v, (at(t - LATE_S) - DAMPING * v - STIFFNESS * q - LEVEL * np.tanh(v / 1e-3)) / MASS]
 
-    return at(times_s)[:, None], _moved(times_s, slopes, 2)[:, :1]
+    return at(times_s)[:, None], _solve_motion(times_s, slopes, 2)[:, :1]
 
 
 @pytest.fixture(scope="module")
 def two_bodies():
     """The first rubs and is driven; the second hangs on it by a spring."""
-    times_s, at = _force(5)
+    times_s, at = _make_force(5)
 
     def slopes(t, state):
         q, far, v, far_v = state
@@ -54,64 +54,64 @@ def two_bodies():
         own = at(t) - joint - DAMPING * v - LEVEL * np.tanh(v / 1e-3)
         return [v, far_v, own / MASS, (joint - 0.02 * far_v) / FAR_MASS]
 
-    return at(times_s)[:, None], _moved(times_s, slopes, 4)[:, :2]
+    return at(times_s)[:, None], _solve_motion(times_s, slopes, 4)[:, :2]
 
 
 @pytest.fixture(scope="module")
-def of_both(two_bodies, recording_of, balance_of):
+def balances_of_both(two_bodies, record_samples, find_balance):
     """Both motions measured, the driven one first: the recording, and the balances of it."""
-    recording = recording_of(*two_bodies, RATE_HZ)
-    return recording, balance_of(recording)
+    recording = record_samples(*two_bodies, RATE_HZ)
+    return recording, find_balance(recording)
 
 
-def test_a_late_command_is_seen_and_its_friction_named(late_axis, recording_of, balance_of):
+def test_a_late_command_is_seen_and_its_friction_named(late_axis, record_samples, find_balance):
     force, motion = late_axis
 
-    (balance,) = balance_of(recording_of(force, motion, RATE_HZ))
+    (balance,) = find_balance(record_samples(force, motion, RATE_HZ))
 
-    beside = balance.search.regression.beside
+    beside = balance.search.regression.base_terms
     assert beside.delay_s == pytest.approx(LATE_S, abs=0.002)
     assert balance.named[0].law.effect == "coulomb_friction"
     assert balance.named[0].values["level"] == pytest.approx(LEVEL, rel=0.05)
 
 
-def test_a_command_in_time_is_not_shifted(of_both):
-    _, (balance,) = of_both
+def test_a_command_in_time_is_not_shifted(balances_of_both):
+    _, (balance,) = balances_of_both
 
-    assert abs(balance.search.regression.beside.delay_s) < 1 / RATE_HZ
+    assert abs(balance.search.regression.base_terms.delay_s) < 1 / RATE_HZ
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_of_two_measured_motions_the_driven_one_is_found_and_its_friction_named(
-    two_bodies, recording_of, balance_of, of_both, order
+    two_bodies, record_samples, find_balance, balances_of_both, order
 ):
     force, motion = two_bodies
 
     in_order = order == (0, 1)
-    (balance,) = of_both[1] if in_order else balance_of(recording_of(force, motion[:, order], RATE_HZ))
+    (balance,) = balances_of_both[1] if in_order else find_balance(record_samples(force, motion[:, order], RATE_HZ))
 
     driven = order.index(0)
-    assert balance.search.regression.beside.own == driven
+    assert balance.search.regression.base_terms.driven_channel == driven
     assert (balance.named[0].law.effect, balance.named[0].law.channel) == ("coulomb_friction", driven)
     assert balance.named[0].values["level"] == pytest.approx(LEVEL, rel=0.1)
 
 
 @pytest.mark.slow
-def test_a_body_that_is_not_measured_does_not_hide_friction(two_bodies, recording_of, balance_of):
+def test_a_body_that_is_not_measured_does_not_hide_friction(two_bodies, record_samples, find_balance):
     force, motion = two_bodies
 
-    (balance,) = balance_of(recording_of(force, motion[:, :1], RATE_HZ))
+    (balance,) = find_balance(record_samples(force, motion[:, :1], RATE_HZ))
 
     assert balance.named[0].law.effect == "coulomb_friction"
     assert balance.named[0].values["level"] == pytest.approx(LEVEL, rel=0.1)
     assert not any(law.named for law in balance.laws if law.law.linear)
 
 
-def test_what_is_left_of_a_command_drives_one_body(of_both):
+def test_what_is_left_of_a_command_drives_one_body(balances_of_both):
     from analysis.diagnosis.first_model.model_from_balance import first_model
     from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 
-    recording, balances = of_both
+    recording, balances = balances_of_both
 
     (reduced,) = reduce_recordings((recording,), balances)
     model = first_model(balances, reduced, "one body")
@@ -124,9 +124,9 @@ def test_what_is_left_of_a_command_drives_one_body(of_both):
 
 
 @pytest.mark.slow
-def test_where_only_accelerations_were_measured_a_hardening_spring_is_found(recording_of, balance_of):
+def test_where_only_accelerations_were_measured_a_hardening_spring_is_found(record_samples, find_balance):
     mass, damping, stiffness, cubic, rate_hz = 0.1, 1.0, 2000.0, 6e6, 500.0
-    times_s, at = np.arange(0, 16, 1 / rate_hz), _force(9, 25.0)[1]
+    times_s, at = np.arange(0, 16, 1 / rate_hz), _make_force(9, 25.0)[1]
 
     def slopes(t, state):
         q, v = state
@@ -138,7 +138,7 @@ def test_where_only_accelerations_were_measured_a_hardening_spring_is_found(reco
     seen = np.array([slopes(t, state)[1] for t, state in zip(times_s, found.T, strict=True)])
     seen += 0.01 * seen.std() * np.random.default_rng(1).standard_normal(len(seen))
 
-    (balance,) = balance_of(recording_of(3 * at(times_s)[:, None], seen[:, None], rate_hz, "acceleration"))
+    (balance,) = find_balance(record_samples(3 * at(times_s)[:, None], seen[:, None], rate_hz, "acceleration"))
 
     strongest = next(each for each in balance.laws if not each.law.linear)
     assert strongest.law.effect == "hardening_stiffness"

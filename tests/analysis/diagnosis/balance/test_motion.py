@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.laws import laws_of
-from analysis.diagnosis.balance.motion import NoMotionError, motion_signal, motions_of
+from analysis.diagnosis.balance.motion import NoMotionError, compute_motions, find_motion_signal
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import BAND_WIDEST
 from equalizer.signals.recording import Hold
@@ -19,50 +19,54 @@ LINES = ((0.9, 0.02, 0.3), (3.7, 0.008, 1.1), (11.3, 0.001, 2.0))
 INNER = slice(400, -400)
 
 
-def course(times, later=0.0):
+def exact_derivative(times, later=0.0):
     """(n, 1): the position's derivative of that order."""
     turns = [(2 * np.pi * f, a, p) for f, a, p in LINES]
     return sum(a * w**times * np.sin(w * (T + later) + p + times * np.pi / 2) for w, a, p in turns)[:, None]
 
 
-def motion_of(recording):
-    return motions_of(observe_parts([recording], len(recording.response.channels)))[0]
+def observe_motion(recording):
+    return compute_motions(observe_parts([recording], len(recording.response.channels)))[0]
 
 
-def off(found, truth):
+def relative_error(found, truth):
     return float(np.std((found - truth)[INNER]) / np.std(truth[INNER]))
 
 
 @pytest.mark.parametrize(("order", "quantity"), [(0, "position"), (1, "velocity"), (2, "acceleration")])
-def test_position_velocity_and_acceleration_follow_from_any_of_them(recording_of, order, quantity):
-    found = motion_of(recording_of(course(2), course(order), RATE_HZ, quantity))
+def test_position_velocity_and_acceleration_follow_from_any_of_them(record_samples, order, quantity):
+    found = observe_motion(record_samples(exact_derivative(2), exact_derivative(order), RATE_HZ, quantity))
     assert found.order == order
-    assert off(found.acceleration, course(2)) < 0.01
-    assert off(found.velocity, course(1)) < (0.01 if order < 2 else 0.05)
+    assert relative_error(found.acceleration, exact_derivative(2)) < 0.01
+    assert relative_error(found.velocity, exact_derivative(1)) < (0.01 if order < 2 else 0.05)
     # An integral begins anywhere, and two of them lack what is slower than the recording tells.
-    assert off(found.position, course(0)) < (0.01 if order < 2 else 0.3)
-    assert off(found.velocity, course(2) / 20) > 0.5
+    assert relative_error(found.position, exact_derivative(0)) < (0.01 if order < 2 else 0.3)
+    assert relative_error(found.velocity, exact_derivative(2) / 20) > 0.5
 
 
-def test_a_held_command_is_centred_half_a_sample_later(recording_of):
-    held = motion_of(recording_of(course(2), course(0), RATE_HZ, hold=Hold.ZERO_ORDER))
-    smooth = motion_of(recording_of(course(2), course(0), RATE_HZ))
-    truth = course(1, 0.5 / RATE_HZ)
-    assert off(held.velocity, truth) < 0.2 * off(smooth.velocity, truth)
+def test_a_held_command_is_centred_half_a_sample_later(record_samples):
+    held = observe_motion(record_samples(exact_derivative(2), exact_derivative(0), RATE_HZ, hold=Hold.ZERO_ORDER))
+    smooth = observe_motion(record_samples(exact_derivative(2), exact_derivative(0), RATE_HZ))
+    truth = exact_derivative(1, 0.5 / RATE_HZ)
+    assert relative_error(held.velocity, truth) < 0.2 * relative_error(smooth.velocity, truth)
 
 
-def test_an_imposed_motion_is_read_when_the_force_is(recording_of):
-    plain = motion_of(recording_of(course(2), course(0), RATE_HZ))
-    imposed = recording_of(course(2), course(0), RATE_HZ, hold=Hold.ZERO_ORDER, meta={"imposed": "position"})
-    assert np.array_equal(motion_of(imposed).velocity, plain.velocity)
+def test_an_imposed_motion_is_read_when_the_force_is(record_samples):
+    plain = observe_motion(record_samples(exact_derivative(2), exact_derivative(0), RATE_HZ))
+    imposed = record_samples(
+        exact_derivative(2), exact_derivative(0), RATE_HZ, hold=Hold.ZERO_ORDER, meta={"imposed": "position"}
+    )
+    assert np.array_equal(observe_motion(imposed).velocity, plain.velocity)
 
 
-def test_the_band_ends_where_the_noise_of_the_motion_would_bend_the_mass(recording_of):
+def test_the_band_ends_where_the_noise_of_the_motion_would_bend_the_mass(record_samples):
     random = np.random.default_rng(5)
 
     def end_hz(noise):
-        return motion_of(
-            recording_of(course(2), course(0) + noise * random.standard_normal((COUNT, 1)), RATE_HZ)
+        return observe_motion(
+            record_samples(
+                exact_derivative(2), exact_derivative(0) + noise * random.standard_normal((COUNT, 1)), RATE_HZ
+            )
         ).band_hz
 
     assert end_hz(0.0) == pytest.approx(BAND_WIDEST * RATE_HZ)
@@ -70,58 +74,68 @@ def test_the_band_ends_where_the_noise_of_the_motion_would_bend_the_mass(recordi
     assert ends[0] > ends[1] > ends[2] > 3.0
 
 
-def test_within_its_band_a_noisy_motion_keeps_its_acceleration(recording_of):
+def test_within_its_band_a_noisy_motion_keeps_its_acceleration(record_samples):
     """The control: differences of the same samples are all noise."""
-    read = course(0) + 1e-5 * np.random.default_rng(6).standard_normal((COUNT, 1))
-    found = motion_of(recording_of(course(2), read, RATE_HZ))
-    assert off(found.acceleration, course(2)) < 0.12
-    assert off(np.gradient(np.gradient(read, 1 / RATE_HZ, axis=0), 1 / RATE_HZ, axis=0), course(2)) > 0.3
+    read = exact_derivative(0) + 1e-5 * np.random.default_rng(6).standard_normal((COUNT, 1))
+    found = observe_motion(record_samples(exact_derivative(2), read, RATE_HZ))
+    assert relative_error(found.acceleration, exact_derivative(2)) < 0.12
+    assert (
+        relative_error(np.gradient(np.gradient(read, 1 / RATE_HZ, axis=0), 1 / RATE_HZ, axis=0), exact_derivative(2))
+        > 0.3
+    )
 
 
-def test_samples_near_the_ends_are_not_fitted_to(recording_of):
-    found = motion_of(recording_of(course(2), course(0), RATE_HZ))
+def test_samples_near_the_ends_are_not_fitted_to(record_samples):
+    found = observe_motion(record_samples(exact_derivative(2), exact_derivative(0), RATE_HZ))
     kept = found.valid_samples(np.ones(COUNT, dtype=bool))
     assert kept.any() and not kept[0] and not kept[-1]
     assert len(kept) == len(found.decimate(found.force))
 
 
-def test_gaps_are_bridged_and_never_fitted_to(recording_of):
-    read = course(0)
+def test_gaps_are_bridged_and_never_fitted_to(record_samples):
+    read = exact_derivative(0)
     read[3000:3010] = np.nan
-    found = motion_of(recording_of(course(2), read, RATE_HZ))
+    found = observe_motion(record_samples(exact_derivative(2), read, RATE_HZ))
     assert np.isfinite(found.acceleration).all()
     assert not (found.fit | found.test)[3000:3010].any()
 
 
-def test_without_a_clock_there_is_no_acceleration(recording_of):
-    found = motion_of(recording_of(course(2), course(0), 1.0, meta={"time": "unknown"}))
+def test_without_a_clock_there_is_no_acceleration(record_samples):
+    found = observe_motion(record_samples(exact_derivative(2), exact_derivative(0), 1.0, meta={"time": "unknown"}))
     assert np.isinf(found.band_hz) and found.step == 1 and not found.acceleration.any()
-    assert np.array_equal(np.sign(found.velocity[INNER]), np.sign(np.gradient(course(0), axis=0)[INNER]))
+    assert np.array_equal(np.sign(found.velocity[INNER]), np.sign(np.gradient(exact_derivative(0), axis=0)[INNER]))
 
 
-def test_without_a_clock_no_law_asks_how_fast_it_moves(recording_of):
+def test_without_a_clock_no_law_asks_how_fast_it_moves(record_samples):
     damping = {"quadratic_damping", "drifting_damping", "viscoelastic_relaxation"}
 
     def effects(meta):
-        return {law.effect for law in laws_of([motion_of(recording_of(course(2), course(0), 1.0, meta=meta))], False)}
+        return {
+            law.effect
+            for law in laws_of(
+                [observe_motion(record_samples(exact_derivative(2), exact_derivative(0), 1.0, meta=meta))], False
+            )
+        }
 
     assert damping <= effects({})
     assert not damping & effects({"time": "unknown"})
 
 
-def test_a_motion_is_of_the_lowest_derivative_and_moves(recording_of):
-    both = recording_of(course(2), course(2), RATE_HZ, "acceleration")
-    position = Signal(np.hstack([course(0), np.ones((COUNT, 1))]), RATE_HZ, "position", "m", ("x", "y"))
-    assert motion_signal(replace(both, position=position)).channels == ("x",)
-    assert motion_signal(both).quantities == ("acceleration",)
-    still = recording_of(course(2), np.ones((COUNT, 1)), RATE_HZ)
+def test_a_motion_is_of_the_lowest_derivative_and_moves(record_samples):
+    both = record_samples(exact_derivative(2), exact_derivative(2), RATE_HZ, "acceleration")
+    position = Signal(np.hstack([exact_derivative(0), np.ones((COUNT, 1))]), RATE_HZ, "position", "m", ("x", "y"))
+    assert find_motion_signal(replace(both, position=position)).channels == ("x",)
+    assert find_motion_signal(both).quantities == ("acceleration",)
+    still = record_samples(exact_derivative(2), np.ones((COUNT, 1)), RATE_HZ)
     with pytest.raises(NoMotionError, match="no response is a position, velocity or acceleration"):
-        motion_of(still)
+        observe_motion(still)
 
 
-def test_conditions_count_in_their_own_spread_and_constant_ones_not(recording_of):
+def test_conditions_count_in_their_own_spread_and_constant_ones_not(record_samples):
     warm = np.column_stack([np.linspace(290.0, 310.0, COUNT), np.full(COUNT, 5.0)])
     condition = Signal(warm, RATE_HZ, ("temperature", "pressure"), ("K", "Pa"), ("t", "p"))
-    found = motion_of(recording_of(course(2), course(0), RATE_HZ, condition=condition)).condition
+    found = observe_motion(
+        record_samples(exact_derivative(2), exact_derivative(0), RATE_HZ, condition=condition)
+    ).condition
     assert found.shape == (COUNT, 1)
     assert (found.mean(), found.std()) == (pytest.approx(0.0, abs=1e-9), pytest.approx(1.0))

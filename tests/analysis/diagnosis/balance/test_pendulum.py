@@ -8,7 +8,7 @@ RATE_HZ, TURN, RUBBING, SEED = 200.0, 0.25, 0.02, 5
 INERTIA, DAMPING = 0.01, 0.002
 
 
-def lever(weight, rubbing, seed=SEED):
+def simulate_lever(weight, rubbing, seed=SEED):
     """Torque and angle, (n,) each, in steps of a tenth of a sample; dry friction with a narrow ramp about rest."""
     rng = np.random.default_rng(seed)
     torque = filtfilt(*butter(3, 2 / (RATE_HZ / 2)), rng.standard_normal(6000))
@@ -23,29 +23,29 @@ def lever(weight, rubbing, seed=SEED):
 
 
 @pytest.fixture
-def balance(recording_of, balance_of):
+def find_lever_balance(record_samples, find_balance):
     def found(weight, rubbing):
-        torque, angle = lever(weight, rubbing)
-        recording = recording_of(torque[:, None], angle[:, None], RATE_HZ, unit="rad")
-        return balance_of(recording)[0]
+        torque, angle = simulate_lever(weight, rubbing)
+        recording = record_samples(torque[:, None], angle[:, None], RATE_HZ, unit="rad")
+        return find_balance(recording)[0]
 
     return found
 
 
-def test_the_weight_of_a_lever_is_recovered(balance):
-    named = {law.law.effect: law.values for law in balance(TURN, RUBBING).named}
+def test_the_weight_of_a_lever_is_recovered(find_lever_balance):
+    named = {law.law.effect: law.values for law in find_lever_balance(TURN, RUBBING).named}
     assert named["gravity_torque"]["torque"] == pytest.approx(TURN, rel=0.02)
     assert named["gravity_torque"]["angle"] == pytest.approx(0.0, abs=0.02)
     assert "cogging" not in named
 
 
 @pytest.mark.slow
-def test_a_balanced_lever_has_no_weight(balance):
-    assert "gravity_torque" not in {law.law.effect for law in balance(0.0, RUBBING).named}
+def test_a_balanced_lever_has_no_weight(find_lever_balance):
+    assert "gravity_torque" not in {law.law.effect for law in find_lever_balance(0.0, RUBBING).named}
 
 
 @pytest.mark.slow
-def test_a_weight_that_a_spring_would_have_to_cancel_is_not_named(recording_of, balance_of):
+def test_a_weight_that_a_spring_would_have_to_cancel_is_not_named(record_samples, find_balance):
     """A weak bend of a spring over a small travel is what is left of a huge weight beside its tangent."""
     rng = np.random.default_rng(SEED)
     angle = filtfilt(*butter(3, 2 / (RATE_HZ / 2)), rng.standard_normal(8000))
@@ -54,7 +54,7 @@ def test_a_weight_that_a_spring_would_have_to_cancel_is_not_named(recording_of, 
     huge = 20.0 * (np.sin(angle + 0.3) - np.sin(0.3) - np.cos(0.3) * angle)
     force = angle + 0.01 * speed + huge
     force += 0.01 * force.std() * rng.standard_normal(len(force))
-    recording = recording_of(force[:, None], angle[:, None], RATE_HZ, unit="rad", meta={"imposed": "position"})
-    (found,) = balance_of(recording)
+    recording = record_samples(force[:, None], angle[:, None], RATE_HZ, unit="rad", meta={"imposed": "position"})
+    (found,) = find_balance(recording)
     law = next(each for each in found.laws if each.law.effect == "gravity_torque")
-    assert "times the recorded force" in law.why_not
+    assert "times the recorded force" in law.objection

@@ -7,20 +7,20 @@ import pytest
 
 
 @pytest.fixture(scope="module")
-def played(axes, balance_of):
+def play_axis(axis_module, find_balance):
     def balances(physics):
-        command = axes.wave(1, 2000, 250.0) * 5.0
+        command = axis_module.random_course(1, 2000, 250.0) * 5.0
         noise = 3e-6 * np.random.default_rng([1, 9]).standard_normal(len(command))
-        position, _ = axes.played(physics.numbers(), command, np.zeros(2), noise, 250.0)
-        recording = axes.recording(command[:, None], position[:, None], 250.0)
-        return balance_of(recording), recording
+        position, _ = axis_module.simulate_axis(physics.numbers(), command, np.zeros(2), noise, 250.0)
+        recording = axis_module.make_recording(command[:, None], position[:, None], 250.0)
+        return find_balance(recording), recording
 
     return balances
 
 
 @pytest.fixture(scope="module")
-def rubbing(played, axes):
-    return played(replace(axes.Physics(), coulomb=0.8))
+def rubbing(play_axis, axis_module):
+    return play_axis(replace(axis_module.Physics(), coulomb=0.8))
 
 
 def test_beside_friction_it_is_that_of_the_balance(rubbing):
@@ -33,22 +33,22 @@ def test_beside_friction_it_is_that_of_the_balance(rubbing):
 
 
 @pytest.mark.slow
-def test_without_a_named_law_another_fit_is_asked_for(played, axes):
+def test_without_a_named_law_another_fit_is_asked_for(play_axis, axis_module):
     from analysis.diagnosis.first_model.model_from_balance import plain_model
 
-    assert plain_model(*played(axes.Physics()), "first") is None
+    assert plain_model(*play_axis(axis_module.Physics()), "first") is None
 
 
-def test_a_second_body_asks_for_another_fit(played, axes):
+def test_a_second_body_asks_for_another_fit(play_axis, axis_module):
     from analysis.diagnosis.first_model.model_from_balance import plain_model
 
-    assert plain_model(*played(replace(axes.Physics(), coulomb=0.8, second_mass=0.1)), "first") is None
+    assert plain_model(*play_axis(replace(axis_module.Physics(), coulomb=0.8, second_mass=0.1)), "first") is None
 
 
 def test_a_band_holds_the_friction_of_a_slow_motion_but_no_ripple_above_it(rubbing):
-    from analysis.diagnosis.first_model.model_from_balance import share_within
+    from analysis.diagnosis.first_model.model_from_balance import law_power_share_in_band
 
     balances, _ = rubbing
-    shares = [share_within(balances, band_hz) for band_hz in (1e-3, 1.0, 1e3)]
+    shares = [law_power_share_in_band(balances, band_hz) for band_hz in (1e-3, 1.0, 1e3)]
     assert shares[0] < 0.05 and shares[0] < shares[1] < shares[2]
     assert shares[2] == pytest.approx(1.0)

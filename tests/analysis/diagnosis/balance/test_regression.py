@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.law import Law, name_weights
-from analysis.diagnosis.balance.motion import motions_of
+from analysis.diagnosis.balance.motion import compute_motions
 from analysis.diagnosis.balance.regression import fit_all_laws, keep_laws, regression_of, replace_law
-from analysis.diagnosis.balance.structures import Structure, is_better
+from analysis.diagnosis.balance.structures import Structure, improves_significantly
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import BALANCE_FOLDS
 
@@ -21,7 +21,7 @@ PAIR = Law(
 
 
 @pytest.fixture
-def regression(recording_of):
+def regression(record_samples):
     """Of a force that the laws make in part, with noise; two records."""
     records = []
     for seed in (1, 2):
@@ -30,30 +30,30 @@ def regression(recording_of):
         q = sum(a * np.sin(2 * np.pi * f * t + random.uniform(0, 6)) for f, a in ((0.7, 0.5), (2.3, 0.2), (5.1, 0.05)))
         force = 0.4 * np.gradient(np.gradient(q)) * RATE_HZ**2 + 3.0 * np.gradient(q) * RATE_HZ + 40 * q + 30 * q**3
         force += 5 * np.tanh(np.gradient(q) * RATE_HZ) + random.standard_normal(COUNT)
-        records.append(recording_of(force[:, None], q[:, None], RATE_HZ))
-    motions = motions_of(observe_parts(records, 1))
+        records.append(record_samples(force[:, None], q[:, None], RATE_HZ))
+    motions = compute_motions(observe_parts(records, 1))
     return regression_of(motions, 0, (SCALE, CUBE, PAIR), turns=False)
 
 
-def stacked(regression, columns, blocks):
+def stack_blocks(regression, columns, blocks):
     rows = [regression.columns[b.motion][b.rows][:, columns] for b in blocks]
     return np.vstack(rows), np.concatenate([regression.force[b.motion][b.rows] for b in blocks])
 
 
-def lstsq(regression, columns, blocks):
-    x, y = stacked(regression, columns, blocks)
+def solve_blocks(regression, columns, blocks):
+    x, y = stack_blocks(regression, columns, blocks)
     size = np.linalg.norm(x, axis=0)
     return np.linalg.lstsq(x / size, y, rcond=None)[0] / size
 
 
-def left(regression, columns, weights, block):
-    x, y = stacked(regression, columns, [block])
+def residual_energy(regression, columns, weights, block):
+    x, y = stack_blocks(regression, columns, [block])
     return float(np.sum((y - x @ weights) ** 2))
 
 
 def test_weights_are_those_of_least_squares(regression):
     columns = regression.columns_of((0, 1))
-    assert regression.weights(columns) == pytest.approx(lstsq(regression, columns, regression.fit), rel=1e-4)
+    assert regression.weights(columns) == pytest.approx(solve_blocks(regression, columns, regression.fit), rel=1e-4)
     assert regression.weights(columns)[-1] == pytest.approx(30, rel=0.2)
 
 
@@ -62,14 +62,22 @@ def test_a_folds_error_is_that_of_numbers_fitted_to_all_others(regression):
     found = regression.cross_validated_errors(columns)
     for number, block in enumerate(regression.fit):
         others = [other for other in regression.fit if other is not block]
-        assert found[number] == pytest.approx(left(regression, columns, lstsq(regression, columns, others), block))
-    own = [left(regression, columns, lstsq(regression, columns, regression.fit), block) for block in regression.fit]
+        assert found[number] == pytest.approx(
+            residual_energy(regression, columns, solve_blocks(regression, columns, others), block)
+        )
+    own = [
+        residual_energy(regression, columns, solve_blocks(regression, columns, regression.fit), block)
+        for block in regression.fit
+    ]
     assert found.sum() > sum(own)
 
 
 def test_held_out_errors_are_of_samples_that_nothing_was_fitted_to(regression):
     columns = regression.columns_of((0, 2))
-    truth = [left(regression, columns, lstsq(regression, columns, regression.fit), b) for b in regression.test]
+    truth = [
+        residual_energy(regression, columns, solve_blocks(regression, columns, regression.fit), b)
+        for b in regression.test
+    ]
     assert regression.held_out_errors(columns) == pytest.approx(truth, rel=1e-4)
     rows = {(b.motion, k) for b in regression.fit for k in b.rows.tolist()}
     assert not rows & {(b.motion, k) for b in regression.test for k in b.rows.tolist()}
@@ -118,7 +126,7 @@ def test_an_axis_has_no_mass_and_no_damping_below_zero(regression):
         fit=tuple(replace(b, cross=-b.cross) for b in regression.fit),
     )  # fmt: skip
     columns = turned.columns_of(())
-    assert lstsq(turned, columns, turned.fit)[1] < 0
+    assert solve_blocks(turned, columns, turned.fit)[1] < 0
     assert (turned.weights(columns)[:2] >= 0).all()
 
 
@@ -137,9 +145,9 @@ def test_laws_are_worth_it_where_the_folds_agree():
     plain = np.array([0.6, 0.05, 0.04, 0.1, 0.03, 0.02, 0.08, 0.08])
     swing = Structure((0,), plain / 20)
     luck = Structure((0,), plain * np.array([0.5, 1.1, 1.2, 1.1, 1.05, 1.3, 1.1, 1.2]))
-    assert is_better(Structure((), plain), swing)
-    assert not is_better(Structure((), plain), luck)
-    assert not is_better(Structure((), plain), Structure((0,), 0.99 * plain))
+    assert improves_significantly(Structure((), plain), swing)
+    assert not improves_significantly(Structure((), plain), luck)
+    assert not improves_significantly(Structure((), plain), Structure((0,), 0.99 * plain))
 
 
 def test_a_gain_where_a_stop_is_met_counts_though_the_other_folds_gain_nothing():
@@ -149,5 +157,5 @@ def test_a_gain_where_a_stop_is_met_counts_though_the_other_folds_gain_nothing()
     met, once = plain * rng.uniform(0.9, 1.1, 15), plain * rng.uniform(0.9, 1.1, 15)
     met[[2, 7, 12]] = 5.0
     once[2] = 5.0
-    assert is_better(Structure((), plain), Structure((0,), met))
-    assert not is_better(Structure((), plain), Structure((0,), once))
+    assert improves_significantly(Structure((), plain), Structure((0,), met))
+    assert not improves_significantly(Structure((), plain), Structure((0,), once))

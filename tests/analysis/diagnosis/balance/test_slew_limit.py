@@ -12,7 +12,7 @@ RATE_HZ, SPEED = 50.0, 1.5
 
 
 @pytest.fixture(scope="module")
-def followed(recording_of):
+def record_follower(record_samples):
     """Of a speed: a recording of steps and sines of a target in metres, and the position that follows."""
 
     def recording(speed, late=0, n=6000):
@@ -26,48 +26,48 @@ def followed(recording_of):
             seen[k] = place
             for _ in range(10):
                 place += np.clip((heard[k] - place) / 0.08, -speed, speed) / (10 * RATE_HZ)
-        made = recording_of(target[:, None], seen + 2e-4 * rng.standard_normal((n, 1)), RATE_HZ)
+        made = record_samples(target[:, None], seen + 2e-4 * rng.standard_normal((n, 1)), RATE_HZ)
         return replace(made, command=replace(made.command, quantity="position", unit="m"))
 
     return recording
 
 
 @pytest.mark.parametrize("offset_m", [-10.0, *(pytest.param(m, marks=pytest.mark.slow) for m in (0.0, 1.5))])
-def test_the_limit_is_named_with_its_speed(offset_m, followed, balance_of):
+def test_the_limit_is_named_with_its_speed(offset_m, record_follower, find_balance):
     """Around any place: a servo of 0 to 180 degrees is centred at 90."""
-    given = followed(SPEED)
+    given = record_follower(SPEED)
     command, response = (replace(each, samples=each.samples + offset_m) for each in (given.command, given.response))
-    (balance,) = balance_of(replace(given, command=command, response=response))
+    (balance,) = find_balance(replace(given, command=command, response=response))
 
     assert balance.named[0].law.effect == "slew_limit"
     assert balance.named[0].values["rate"] == pytest.approx(SPEED, rel=0.2)
 
 
 @pytest.mark.slow
-def test_a_late_command_is_in_the_first_model_beside_the_limit(followed, balance_of):
+def test_a_late_command_is_in_the_first_model_beside_the_limit(record_follower, find_balance):
     """Else the limit would be taken for a slower one, which is late, too."""
     from analysis.diagnosis.first_model.model_from_balance import plain_model
 
     late = 4
-    given = followed(SPEED, late, 3000)
-    model = plain_model(balance_of(given), given, "first")
+    given = record_follower(SPEED, late, 3000)
+    model = plain_model(find_balance(given), given, "first")
 
     assert model is not None
     assert model.actuator.delay_s == pytest.approx(late / RATE_HZ, abs=1.2 / RATE_HZ)
 
 
-def test_a_servo_without_a_limit_gets_no_name(followed, balance_of):
-    (balance,) = balance_of(followed(1e3))
+def test_a_servo_without_a_limit_gets_no_name(record_follower, find_balance):
+    (balance,) = find_balance(record_follower(1e3))
 
     assert not balance.named
 
 
 @pytest.mark.slow
-def test_of_a_force_no_limit_is_asked(followed, balance_of):
-    given = followed(SPEED)
-    (balance,) = balance_of(replace(given, command=replace(given.command, quantity="force", unit="N")))
+def test_of_a_force_no_limit_is_asked(record_follower, find_balance):
+    given = record_follower(SPEED)
+    (balance,) = find_balance(replace(given, command=replace(given.command, quantity="force", unit="N")))
 
-    assert not any(law.law.effect == "slew_limit" for law in (*balance.laws, *balance.others))
+    assert not any(law.law.effect == "slew_limit" for law in (*balance.laws, *balance.further_laws))
 
 
 def test_rates_that_never_catch_up_are_not_tried():

@@ -12,13 +12,13 @@ SEED = 4
 
 
 @pytest.fixture(scope="module")
-def said(axes):
+def diagnose_changed_reading(axis_module):
     """Of a linear axis whose reading is changed, with the model that was fitted to it."""
     from analysis.diagnosis.diagnose import diagnose
     from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 
     def of(changed, **physics):
-        given = axes.recorded(axes.Physics(**physics), SEED, seconds=10.0, rate_hz=200.0, noise=1e-4)
+        given = axis_module.record_axis(axis_module.Physics(**physics), SEED, seconds=10.0, rate_hz=200.0, noise=1e-4)
         response = replace(given.response, samples=changed(given.response.samples))
         recording = replace(given, response=response)
         model = widen_tolerance(fit_mechanical_model([recording], name="fitted").model)
@@ -29,22 +29,22 @@ def said(axes):
 
 
 @pytest.mark.slow
-def test_an_offset_of_the_reading_is_a_number_and_no_effect(said):
-    diagnosis = said(lambda read: read + 0.02)
+def test_an_offset_of_the_reading_is_a_number_and_no_effect(diagnose_changed_reading):
+    diagnosis = diagnose_changed_reading(lambda read: read + 0.02)
     assert not diagnosis.effects
     assert diagnosis.verdict in ("no_mismatch", "parameters", "unexplained")
 
 
-def test_a_late_reading_is_a_class_and_not_explained_without_repeats(said):
-    diagnosis = said(lambda read: np.vstack([read[:3] * 0, read[:-3]]))
+def test_a_late_reading_is_a_class_and_not_explained_without_repeats(diagnose_changed_reading):
+    diagnosis = diagnose_changed_reading(lambda read: np.vstack([read[:3] * 0, read[:-3]]))
     assert diagnosis.verdict != "explained"
     for effect in diagnosis.effects:
         assert {"transport_delay", "logger_offset"} <= set(effect.class_)
 
 
 @pytest.mark.parametrize("cubic", [pytest.param(2e5, marks=pytest.mark.slow), -1200.0])
-def test_a_spring_that_hardens_or_softens_is_named_and_not_explained_without_repeats(said, cubic):
-    diagnosis = said(lambda read: read, cubic=cubic)
+def test_a_spring_that_hardens_or_softens_is_named_and_not_explained_without_repeats(diagnose_changed_reading, cubic):
+    diagnosis = diagnose_changed_reading(lambda read: read, cubic=cubic)
     assert diagnosis.verdict == "partly_explained"
     assert [effect.effect for effect in diagnosis.effects] == ["hardening_stiffness"]
     assert diagnosis.effects[0].parameters["k3"].value == pytest.approx(cubic, rel=0.1)
@@ -52,11 +52,13 @@ def test_a_spring_that_hardens_or_softens_is_named_and_not_explained_without_rep
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("seconds", "names"), [(10.0, ["coulomb_friction"]), (1.4, [])], ids=["long", "too short"])
-def test_a_recording_that_is_too_short_to_name_physics_gets_candidates(axes, seconds, names):
+def test_a_recording_that_is_too_short_to_name_physics_gets_candidates(axis_module, seconds, names):
     from analysis.diagnosis.diagnose import TOO_SHORT, diagnose
     from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 
-    recording = axes.recorded(axes.Physics(coulomb=0.6), SEED, seconds=seconds, rate_hz=1000.0, noise=1e-7)
+    recording = axis_module.record_axis(
+        axis_module.Physics(coulomb=0.6), SEED, seconds=seconds, rate_hz=1000.0, noise=1e-7
+    )
     model = widen_tolerance(fit_mechanical_model([recording], name="fitted").model)
     found = diagnose([recording], model, DiagnosisSettings(fitted=True), map, lambda said, share: None).diagnosis
     assert [effect.effect for effect in found.effects] == names
@@ -66,12 +68,12 @@ def test_a_recording_that_is_too_short_to_name_physics_gets_candidates(axes, sec
 
 
 @pytest.mark.slow
-def test_a_short_recording_gets_no_name_by_the_search_either(axes):
+def test_a_short_recording_gets_no_name_by_the_search_either(axis_module):
     """Its readings are clipped, which a search by simulation would name."""
     from analysis.diagnosis.diagnose import diagnose
     from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 
-    whole = axes.recorded(axes.Physics(), SEED, seconds=1.4, rate_hz=1000.0, noise=1e-7)
+    whole = axis_module.record_axis(axis_module.Physics(), SEED, seconds=1.4, rate_hz=1000.0, noise=1e-7)
     top = 0.5 * np.abs(whole.response.samples).max()
     clipped = replace(whole, response=replace(whole.response, samples=np.clip(whole.response.samples, -top, top)))
     model = widen_tolerance(fit_mechanical_model([clipped], name="fitted").model)

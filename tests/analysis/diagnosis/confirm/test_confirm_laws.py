@@ -10,14 +10,14 @@ from analysis.diagnosis.balance.laws import _stop_values
 from analysis.diagnosis.confirm import confirm_laws as by_balance
 from analysis.diagnosis.confirm import require_gain
 from analysis.diagnosis.confirm.confirm_laws import (
-    VAGUE,
-    _find_vague_law,
+    INTERVAL_HALF_WIDTH,
+    _find_undetermined_law,
     _fit_from_starts,
     _prefer_special_case,
-    open_refinements,
+    find_open_refinements,
 )
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
-from analysis.diagnosis.confirm.laws_for_simulation import can_be_played, find_special_case, hypothesis_of_judged
+from analysis.diagnosis.confirm.laws_for_simulation import can_be_simulated, find_special_case, hypothesis_of_judged
 from analysis.diagnosis.confirm.require_gain import ONLY_BESIDE_CALIBRATION, unname_doubtful_effects
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.search.explain import Explanation
@@ -26,7 +26,7 @@ from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.simulation.instant import LENGTH, X_FREE, X
 
-OPEN, SURE = 1.01 / VAGUE, 0.1 / VAGUE
+OPEN, SURE = 1.01 / INTERVAL_HALF_WIDTH, 0.1 / INTERVAL_HALF_WIDTH
 """Standard errors of a logarithm whose interval holds zero, and of one that is well known."""
 DRY = ("coulomb_friction", {"level": 2.0})
 BENDING = ("presliding_hysteresis", {"level": 0.5, "stiffness": 100.0})
@@ -35,7 +35,7 @@ BENT = ("position_dependent_friction", {"level": 0.5, "slope_per_m": 9.0, "bend_
 RIPPLE = ("cogging", {"amplitude": 0.5, "pitch": 0.01, "phase": 0.0})
 
 
-def explained(*laws):
+def make_explanation(*laws):
     whole = hypothesis_of_claim(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 1.0}])
     for name, values in laws:
         whole = combine(whole, hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values]))
@@ -62,13 +62,13 @@ def explained(*laws):
     ],
 )  # fmt: skip
 def test_a_law_goes_by_its_main_number_and_a_refinement_by_any(laws, errors, dropped):
-    assert _find_vague_law(explained(*laws), np.array([0.0, *errors]), 1) == dropped
+    assert _find_undetermined_law(make_explanation(*laws), np.array([0.0, *errors]), 1) == dropped
 
 
-def result_of(*laws, errors=()):
+def make_result(*laws, errors=()):
     """Fitted with one number of the model, which is known."""
     context = SimpleNamespace(tuning=SimpleNamespace(names=("mass",)))
-    return SimpleNamespace(found=explained(*laws), context=context, errors=np.array([0.0, 0.0, *errors]))
+    return SimpleNamespace(found=make_explanation(*laws), context=context, errors=np.array([0.0, 0.0, *errors]))
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def result_of(*laws, errors=()):
     ids=["all known", "no stiffness", "of the second", "nothing simpler", "signed parameters go elsewhere"],
 )
 def test_open_are_positive_numbers_that_the_special_case_lacks(laws, errors, open_ones):
-    assert open_refinements(result_of(*laws, errors=errors), 1) == open_ones
+    assert find_open_refinements(make_result(*laws, errors=errors), 1) == open_ones
 
 
 @pytest.mark.parametrize(
@@ -92,16 +92,16 @@ def test_open_are_positive_numbers_that_the_special_case_lacks(laws, errors, ope
 )  # fmt: skip
 def test_the_special_case_is_named_where_it_leaves_hardly_more(monkeypatch, left, held, preferred):
     whole, plain = (
-        SimpleNamespace(found=SimpleNamespace(after=SimpleNamespace(held_out=np.log(e)))) for e in (1, left)
+        SimpleNamespace(found=SimpleNamespace(after=SimpleNamespace(held_out_error=np.log(e)))) for e in (1, left)
     )
-    monkeypatch.setattr(by_balance, "open_refinements", lambda found, constants: (0,))
+    monkeypatch.setattr(by_balance, "find_open_refinements", lambda found, constants: (0,))
     monkeypatch.setattr(by_balance, "find_special_case", lambda balances, kept, law: (0, "coulomb"))
-    monkeypatch.setattr(by_balance, "_confirm", lambda begun, named: (plain, named[:held]))
+    monkeypatch.setattr(by_balance, "_confirm_by_simulation", lambda begun, named: (plain, named[:held]))
     found = _prefer_special_case(SimpleNamespace(balances=(), constants=1), whole, [(0, "bending")])
     assert found is (plain if preferred else whole)
 
 
-def ends_at(error):
+def candidate_with_test_error(error):
     return FittedCandidate(None, SimpleNamespace(test=np.array([error])))
 
 
@@ -117,12 +117,12 @@ def test_laws_are_fitted_from_the_model_s_own_numbers_where_the_balance_s_end_be
 
     def steps(context, retuned, named, deviations):
         tried.append(deviations)
-        return [ends_at(from_balance if np.any(deviations) else from_model)]
+        return [candidate_with_test_error(from_balance if np.any(deviations) else from_model)]
 
-    monkeypatch.setattr(by_balance, "_steps", steps)
+    monkeypatch.setattr(by_balance, "_fit_steps", steps)
     monkeypatch.setattr(by_balance, "parameters_beside_laws", lambda tuning, balances, laws: np.array([1.0, -2.0]))
     context = SimpleNamespace(tuning=None, with_test_score=lambda candidate: candidate)
-    _, after = _fit_from_starts(context, (), (ends_at(8.0), ends_at(8.0)), ())
+    _, after = _fit_from_starts(context, (), (candidate_with_test_error(8.0), candidate_with_test_error(8.0)), ())
     assert after.score.test[0] == end
     assert len(tried) == starts
 
@@ -131,7 +131,9 @@ def test_laws_are_fitted_from_the_model_s_own_numbers_where_the_balance_s_end_be
     ("given", "retuned", "plain"), [(1.0, 2.0, 1.0), (2.0, 1.0, 1.0), (1.0, np.nan, 1.0), (np.inf, 3.0, 3.0)]
 )
 def test_without_new_physics_stands_what_foretells_better(given, retuned, plain):
-    found = Explanation(ends_at(given), ends_at(retuned), ends_at(0.5), (), ())
+    found = Explanation(
+        candidate_with_test_error(given), candidate_with_test_error(retuned), candidate_with_test_error(0.5), (), ()
+    )
     assert found.plain.score.test[0] == plain
 
 
@@ -141,53 +143,58 @@ def test_without_new_physics_stands_what_foretells_better(given, retuned, plain)
 def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkeypatch, given, predicts, is_named):
     """Re-tuning followed what was fitted to, to 4; the law brings that back to 1.1."""
     law = SimpleNamespace(law=SimpleNamespace(effect="coulomb_friction"), place=0)
-    regression = SimpleNamespace(beside=SimpleNamespace(own=0))
+    regression = SimpleNamespace(base_terms=SimpleNamespace(driven_channel=0))
     balance = SimpleNamespace(named=(law,), search=SimpleNamespace(regression=regression))
     patched = {
-        "can_be_played": lambda own, weighed: True, "constants_of": lambda balances: SimpleNamespace(claims=()),
+        "can_be_simulated": lambda own, weighed: True, "constants_of": lambda balances: SimpleNamespace(claims=()),
         "refit_laws": lambda balances, named: named, "evaluate_fit": lambda *of: given, "refine": lambda *of: 4.0,
-        "final_errors": lambda *of: np.zeros(1), "_find_vague_law": lambda *of: None,
-        "_fit_from_starts": lambda *of: ([ends_at(1.1)], ends_at(1.1)), "explains_half": lambda *of: predicts,
-        "open_refinements": lambda *of: (),
+        "compute_final_errors": lambda *of: np.zeros(1), "_find_undetermined_law": lambda *of: None,
+        "_fit_from_starts": lambda *of: ([candidate_with_test_error(1.1)], candidate_with_test_error(1.1)),
+        "explains_half": lambda *of: predicts,
+        "find_open_refinements": lambda *of: (),
     }  # fmt: skip
     for name, stand_in in patched.items():
         monkeypatch.setattr(by_balance, name, stand_in)
     context = SimpleNamespace(
-        measure=None, whole=None, tuning=SimpleNamespace(names=()), candidate=ends_at, with_test_score=lambda each: each
+        measure=None,
+        whole=None,
+        tuning=SimpleNamespace(names=()),
+        candidate=candidate_with_test_error,
+        with_test_score=lambda each: each,
     )
     context.fit_to_all = lambda: context
     found = by_balance.search_by_balance(context, (balance,), False)
     assert (found is not None) == is_named
 
 
-def candidate(*names):
+def make_candidate(*names):
     hypothesis = SimpleNamespace(claims=names)
     score = SimpleNamespace(worst_channel=9.0, mean_log_error=9.0, test=np.array([9.0]))
     return SimpleNamespace(
         newest=names[-1] if names else "",
         fitted=SimpleNamespace(hypothesis=hypothesis),
         score=score,
-        held_out=float(np.log(9.0)),
+        held_out_error=float(np.log(9.0)),
     )
 
 
-def searched_to(*names):
-    retuned = candidate()
-    steps = tuple(candidate(*names[: place + 1]) for place in range(len(names)))
+def make_search_result(*names):
+    retuned = make_candidate()
+    steps = tuple(make_candidate(*names[: place + 1]) for place in range(len(names)))
     found = Explanation(retuned, retuned, steps[-1], (), steps)
     context = SimpleNamespace(whole=None, with_test_score=lambda each: each)
     return SearchResult(context, found, Judgement("partly_explained", True))
 
 
 @pytest.fixture
-def gains_half(monkeypatch):
+def half_held_out_gain(monkeypatch):
     monkeypatch.setattr(require_gain, "held_out_gain", lambda *_: HeldOutGain(0.5, 0.4, 0.6))
 
 
-@pytest.mark.usefixtures("gains_half")
+@pytest.mark.usefixtures("half_held_out_gain")
 @pytest.mark.parametrize("name", ["sensor_nonlinearity", "slew_limit", "transport_delay", "force_gain"])
 def test_what_bends_or_delays_beside_a_fitted_model_is_a_candidate(name):
-    seen = unname_doubtful_effects(searched_to(name))
+    seen = unname_doubtful_effects(make_search_result(name))
     assert seen.judgement == Judgement("unexplained", False)
     assert not seen.found.steps
     (told,) = seen.unconfirmed
@@ -206,29 +213,29 @@ def test_what_bends_or_delays_beside_a_fitted_model_is_a_candidate(name):
 def test_a_refinement_gives_way_to_its_special_case(held, named, place):
     laws = tuple(SimpleNamespace(effect=name, channel=0) for name in held)
     balance = SimpleNamespace(search=SimpleNamespace(regression=SimpleNamespace(laws=laws)))
-    bent = law_of_effect("position_dependent_friction", 5)
-    found = find_special_case([balance], [(0, law_of_effect(name, 7)) for name in named], (0, bent))
+    bent = make_judged_law("position_dependent_friction", 5)
+    found = find_special_case([balance], [(0, make_judged_law(name, 7)) for name in named], (0, bent))
     assert (found and (found[1].place, found[1].law.effect)) == (
         place if place is None else (place, "coulomb_friction")
     )
 
 
-def law_of_effect(name, place):
+def make_judged_law(name, place):
     law = SimpleNamespace(effect=name, channel=0)
     return JudgedLaw(place, law, {"level": 1.0}, 0.5, 0.4, 0.9, (), 1.0, "")
 
 
-@pytest.mark.usefixtures("gains_half")
+@pytest.mark.usefixtures("half_held_out_gain")
 @pytest.mark.parametrize("predicts", [True, False])
 def test_what_the_signal_itself_shows_keeps_its_name_unless_the_model_runs_away(monkeypatch, predicts):
-    monkeypatch.setattr(require_gain, "predicts_something", lambda *_: predicts)
-    seen = searched_to("sensor_clipping")
+    monkeypatch.setattr(require_gain, "predicts_motion", lambda *_: predicts)
+    seen = make_search_result("sensor_clipping")
     assert (unname_doubtful_effects(seen) is seen) == predicts
 
 
 def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
     monkeypatch.setattr(require_gain, "held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
-    assert unname_doubtful_effects(searched_to("slew_limit")).unconfirmed == ()
+    assert unname_doubtful_effects(make_search_result("slew_limit")).unconfirmed == ()
 
 
 @pytest.mark.parametrize(
@@ -238,11 +245,11 @@ def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
 def test_a_stop_is_played_on_whichever_side_of_zero_it_stands(position_m, side, pushing_at_m):
     values = _stop_values(side)(np.array([800.0]), (position_m,), 1.0)
     judged = SimpleNamespace(formula=None, law=SimpleNamespace(effect="end_stop", channel=0), values=values)
-    assert can_be_played(0, judged)
+    assert can_be_simulated(0, judged)
 
     (placed,) = hypothesis_of_judged(0, judged, None).list_placed_effects()
-    at, numbers = np.zeros(LENGTH), placed.effect.acts.pack(None, 0, placed.values)
+    at, numbers = np.zeros(LENGTH), placed.effect.action.pack(None, 0, placed.values)
     at[X] = at[X_FREE] = pushing_at_m
-    assert placed.effect.acts.law(numbers, np.zeros(1), at) == pytest.approx(-800.0 * (pushing_at_m - position_m))
+    assert placed.effect.action.law(numbers, np.zeros(1), at) == pytest.approx(-800.0 * (pushing_at_m - position_m))
     at[X] = at[X_FREE] = position_m - 0.01 * side
-    assert placed.effect.acts.law(numbers, np.zeros(1), at) == 0
+    assert placed.effect.action.law(numbers, np.zeros(1), at) == 0

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.confirm import decide_with_model as beside_given
-from analysis.diagnosis.confirm.balance_with_model import find_balances_beside_model
-from analysis.diagnosis.confirm.decide_with_model import objection
-from analysis.diagnosis.confirm.held_out_gain import explains_half, held_out_gain, predicts_something
+from analysis.diagnosis.confirm.balance_with_model import find_balances_with_model
+from analysis.diagnosis.confirm.decide_with_model import find_objection
+from analysis.diagnosis.confirm.held_out_gain import explains_half, held_out_gain, predicts_motion
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.search.time_budget import always
+from analysis.diagnosis.search.time_budget import unlimited_time
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -24,7 +24,7 @@ GIVEN = MechanicalModel(
 )  # fmt: skip
 
 
-def rubbing(level, mass=MASS):
+def record_friction(level, mass=MASS):
     seconds = np.arange(6000) / RATE_HZ
     lines = [(0.05, 2 * np.pi * 0.31), (0.02, 2 * np.pi * 0.83), (0.008, 2 * np.pi * 1.7)]
     x = sum(size * np.sin(w * seconds) for size, w in lines)
@@ -41,12 +41,12 @@ def rubbing(level, mass=MASS):
 
 
 @pytest.fixture(scope="module")
-def with_friction():
-    return find_balances_beside_model((rubbing(LEVEL),), GIVEN, frozenset(), always)[0]
+def friction_balance():
+    return find_balances_with_model((record_friction(LEVEL),), GIVEN, frozenset(), unlimited_time)[0]
 
 
-def test_what_a_given_model_lacks_is_named_by_the_balance(with_friction):
-    law = with_friction.named[0]
+def test_what_a_given_model_lacks_is_named_by_the_balance(friction_balance):
+    law = friction_balance.named[0]
     assert law.law.effect == "coulomb_friction"
     assert law.values["level"] == pytest.approx(LEVEL, rel=0.1)
     assert law.gain_low > 0.5
@@ -54,14 +54,14 @@ def test_what_a_given_model_lacks_is_named_by_the_balance(with_friction):
 
 @pytest.mark.parametrize("mass", [MASS, MASS + 0.05], ids=["as calibrated", "a standard deviation off"])
 def test_a_device_within_its_calibration_lacks_nothing(mass):
-    (balance,) = find_balances_beside_model((rubbing(0.0, mass),), GIVEN, frozenset(), always)
+    (balance,) = find_balances_with_model((record_friction(0.0, mass),), GIVEN, frozenset(), unlimited_time)
     assert balance.named == ()
     assert balance.linear < 0.05
 
 
-def test_a_calibrated_number_does_not_take_friction_on_itself(with_friction):
+def test_a_calibrated_number_does_not_take_friction_on_itself(friction_balance):
     """Fitted freely, damping would hold part of it; its prior keeps it within a few standard deviations."""
-    regression = with_friction.search.regression
+    regression = friction_balance.search.regression
     deviations = regression.weights(regression.columns_of(()))[1 : regression.base - 1]
     assert np.abs(deviations).max() < 10
     loose = replace(regression, prior=None)
@@ -71,7 +71,7 @@ def test_a_calibrated_number_does_not_take_friction_on_itself(with_friction):
     )
 
 
-def candidate(residuals, name="coulomb_friction", deviations=(0.0,)):
+def make_candidate(residuals, name="coulomb_friction", deviations=(0.0,)):
     claim = SimpleNamespace(effect=SimpleNamespace(name=name, simpler=()), spread="one", sites=(0,))
     hypothesis = SimpleNamespace(claims=(claim,))
     fitted = SimpleNamespace(residuals=(residuals,), hypothesis=hypothesis, deviations=np.array(deviations))
@@ -83,13 +83,13 @@ NOISE = np.random.default_rng(5).normal(size=(1600, 2))
 
 
 def test_a_gain_is_the_share_of_the_error_power_that_goes():
-    found = held_out_gain(MEASURE, candidate(NOISE), candidate(0.5 * NOISE))
+    found = held_out_gain(MEASURE, make_candidate(NOISE), make_candidate(0.5 * NOISE))
     assert (found.gain, found.low, found.high) == pytest.approx((0.75, 0.75, 0.75))
 
 
 def test_a_random_difference_has_a_gain_interval_around_zero():
     other = np.random.default_rng(6).normal(size=(1600, 2))
-    found = held_out_gain(MEASURE, candidate(NOISE), candidate(other))
+    found = held_out_gain(MEASURE, make_candidate(NOISE), make_candidate(other))
     assert found.low < 0 < found.high
 
 
@@ -103,14 +103,14 @@ POSITIONS = SimpleNamespace(response=SimpleNamespace(quantities=("position", "po
 def test_a_model_that_leaves_as_much_of_a_motion_as_its_mean_predicts_nothing(name, left, something):
     record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=3.0 + 2.0 * NOISE, recording=POSITIONS)
     measure = SimpleNamespace(name=name, records=(record,), unit=np.array([2.0, 2.0]), noise=np.full(2, 0.1))
-    assert predicts_something(measure, candidate(left * NOISE)) == something
+    assert predicts_motion(measure, make_candidate(left * NOISE)) == something
 
 
 @pytest.mark.parametrize(("left", "idle", "something"), [(0.5, 1e-3, True), (0.5, 0.0, True), (1.5, 1e-3, False)])
 def test_an_idle_channel_does_not_say_whether_a_model_predicts_something(left, idle, something):
     record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=NOISE * (1.0, idle), recording=POSITIONS)
     measure = SimpleNamespace(name="free simulation", records=(record,), unit=np.ones(2), noise=np.full(2, 0.01))
-    assert predicts_something(measure, candidate(NOISE * (left, 0.02))) == something
+    assert predicts_motion(measure, make_candidate(NOISE * (left, 0.02))) == something
 
 
 @pytest.mark.parametrize("name", ["free simulation", "predicted force"])
@@ -120,31 +120,31 @@ def test_an_idle_channel_does_not_say_whether_a_model_predicts_something(left, i
 def test_a_name_needs_a_model_that_explains_half_of_what_is_no_noise(name, left, noise, half):
     record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=3.0 + NOISE, recording=POSITIONS)
     measure = SimpleNamespace(name=name, records=(record,), unit=np.ones(2), noise=np.full(2, noise))
-    assert explains_half(measure, candidate(left * NOISE)) == half
+    assert explains_half(measure, make_candidate(left * NOISE)) == half
 
 
-def searched(after, rival=None):
+def make_search_result(after, rival=None):
     tuning = tuning_of(device(1), ("fx",))
     context = SimpleNamespace(whole=MEASURE, tuning=tuning, with_test_score=lambda each: each)
     rounds = ((after, *(() if rival is None else (rival,))),)
-    found = SimpleNamespace(steps=(after,), plain=candidate(NOISE), after=after, rounds=rounds)
+    found = SimpleNamespace(steps=(after,), plain=make_candidate(NOISE), after=after, rounds=rounds)
     return SimpleNamespace(context=context, found=found)
 
 
 @pytest.mark.parametrize(
     ("after", "rival", "said"),
     [
-        (candidate(0.3 * NOISE), None, ""),
-        (candidate(0.3 * NOISE), candidate(0.6 * NOISE, "backlash"), ""),
-        (candidate(0.3 * NOISE), candidate(0.3 * NOISE, "backlash"), "cannot distinguish it from backlash"),
-        (candidate(0.95 * NOISE), None, "and 30 % are required"),
-        (candidate(0.8 * NOISE), None, "the force balance does not confirm it"),
-        (candidate(1.2 * NOISE), None, "variation between stretches"),
-        (candidate(0.3 * NOISE, deviations=(4.0,)), None, "to the limit of its tolerance"),
+        (make_candidate(0.3 * NOISE), None, ""),
+        (make_candidate(0.3 * NOISE), make_candidate(0.6 * NOISE, "backlash"), ""),
+        (make_candidate(0.3 * NOISE), make_candidate(0.3 * NOISE, "backlash"), "cannot distinguish it from backlash"),
+        (make_candidate(0.95 * NOISE), None, "and 30 % are required"),
+        (make_candidate(0.8 * NOISE), None, "the force balance does not confirm it"),
+        (make_candidate(1.2 * NOISE), None, "variation between stretches"),
+        (make_candidate(0.3 * NOISE, deviations=(4.0,)), None, "to the limit of its tolerance"),
     ],
 )
 def test_a_rival_or_a_poor_prediction_is_an_objection_to_a_name(monkeypatch, after, rival, said):
     monkeypatch.setattr(beside_given, "only_refines", lambda other, best: False)
-    found = objection(searched(after, rival), ())
+    found = find_objection(make_search_result(after, rival), ())
     assert said in found
     assert bool(found) == bool(said)

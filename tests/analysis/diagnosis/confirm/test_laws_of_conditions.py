@@ -10,8 +10,8 @@ from analysis.diagnosis.balance.condition_laws import _formula
 from analysis.diagnosis.balance.motion import Condition
 from analysis.diagnosis.data.recorded_conditions import effects_under_conditions
 from analysis.diagnosis.diagnose_values import diagnose_values
-from analysis.diagnosis.prepare_recordings import prepare
-from analysis.diagnosis.result.wording import effect_title
+from analysis.diagnosis.prepare_recordings import prepare_recordings
+from analysis.diagnosis.result.wording import format_effect_title
 from equalizer.effects.discovered_law import Channels, condition_names
 from equalizer.effects.placing import PlacingError, place_effects, place_recorded_effects
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -26,12 +26,12 @@ TIME_S = np.arange(SAMPLES) / RATE_HZ
 MASS, DAMPING, STIFFNESS = 1.2, 3.0, 60.0
 
 
-def warming(seed: int) -> np.ndarray:
+def temperature_course(seed: int) -> np.ndarray:
     """degC"""
     return 20 + 30 * (1 - np.exp(-TIME_S / 8)) + 0.1 * np.random.default_rng(seed).standard_normal(SAMPLES)
 
 
-def rubbing_mass(friction_n: np.ndarray, condition: np.ndarray, seed: int) -> Recording:
+def record_rubbing_mass(friction_n: np.ndarray, condition: np.ndarray, seed: int) -> Recording:
     """Stepped in an eighth of a sample; the sign of the speed is smoothed within 1 mm/s."""
     random = np.random.default_rng(seed)
     tones = zip((4, 3, 3, 2), (0.7, 1.9, 4.3, 7.7), random.uniform(0, 6, 4), strict=True)
@@ -51,7 +51,7 @@ def rubbing_mass(friction_n: np.ndarray, condition: np.ndarray, seed: int) -> Re
     )  # fmt: skip
 
 
-def imposed_motion(seed: int) -> Recording:
+def record_imposed_motion(seed: int) -> Recording:
     random = np.random.default_rng(seed)
     x = sum(0.008 * np.sin(2 * np.pi * hz * TIME_S + random.uniform(0, 6)) for hz in (0.5, 1.1, 2.3))
     v = np.gradient(x, 1 / RATE_HZ)
@@ -66,11 +66,11 @@ def imposed_motion(seed: int) -> Recording:
 
 @pytest.mark.slow
 def test_friction_that_falls_with_the_temperature_is_named_and_played():
-    celsius = warming(1)
-    found = diagnose_values(rubbing_mass(2.5 - 0.04 * (celsius - 20), celsius + 273.15, 5)).diagnosis
+    celsius = temperature_course(1)
+    found = diagnose_values(record_rubbing_mass(2.5 - 0.04 * (celsius - 20), celsius + 273.15, 5)).diagnosis
     (effect,) = found.effects
     assert effect.class_[:2] == ("discovered_law", "condition_dependent_friction")
-    assert "dry friction that depends on the recorded condition" in effect_title(effect)
+    assert "dry friction that depends on the recorded condition" in format_effect_title(effect)
     assert effect.law is not None and set(effect.law.variables) == {"T", "vx"}
     level, change = (effect.parameters[name].value for name in ("p0", "p1"))
     assert level == pytest.approx(2.5 - 0.04 * (celsius.mean() - 20), rel=0.03)
@@ -80,14 +80,14 @@ def test_friction_that_falls_with_the_temperature_is_named_and_played():
 
 @pytest.mark.slow
 def test_friction_that_a_setting_changes_is_named_where_the_motion_is_imposed():
-    found = diagnose_values(imposed_motion(5)).diagnosis
+    found = diagnose_values(record_imposed_motion(5)).diagnosis
     assert found.effects[0].class_[:2] == ("discovered_law", "condition_dependent_friction")
     assert found.fit.test.after < 0.15 * found.fit.test.before
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_condition_that_does_nothing_is_not_named(seed):
-    found = diagnose_values(rubbing_mass(np.full(SAMPLES, 2.0), warming(seed), seed)).diagnosis
+    found = diagnose_values(record_rubbing_mass(np.full(SAMPLES, 2.0), temperature_course(seed), seed)).diagnosis
     names = {name for effect in found.effects for name in (effect.effect, *effect.class_)}
     assert names and not any(name.startswith("condition") for name in names)
 
@@ -99,7 +99,7 @@ def test_a_model_with_such_a_law_is_played_with_the_recording_s_condition_and_no
         "m", "position", np.eye(1), np.eye(1), 9 * np.eye(1), input=np.eye(1), output=np.eye(1),
         effects=(ModelEffect("discovered_law", "x", {}, law),),
     )  # fmt: skip
-    recording = rubbing_mass(np.zeros(SAMPLES), np.where(TIME_S < 4, 300.0, 301.0), 1)
+    recording = record_rubbing_mass(np.zeros(SAMPLES), np.where(TIME_S < 4, 300.0, 301.0), 1)
     placed = place_recorded_effects(model, recording)
     command = recording.command.samples
     bound = simulate_mechanism(model, command, RATE_HZ, effects_under_conditions(placed, recording))
@@ -137,7 +137,7 @@ def test_a_formula_with_a_condition_keeps_its_free_numbers_when_it_is_read_back(
 
 
 def test_conditions_that_not_all_recordings_hold_are_left_out_and_that_is_said():
-    first, second = (rubbing_mass(np.zeros(SAMPLES), warming(seed), seed) for seed in (1, 2))
-    ready = prepare((first, replace(second, condition=None)), ("a", "b"), True)
+    first, second = (record_rubbing_mass(np.zeros(SAMPLES), temperature_course(seed), seed) for seed in (1, 2))
+    ready = prepare_recordings((first, replace(second, condition=None)), ("a", "b"), True)
     assert all(each.condition is None for each in ready.recordings)
     assert "Not all recordings hold the same conditions" in " ".join(ready.remarks)

@@ -5,9 +5,9 @@ from functools import cache
 
 import numpy as np
 
-from analysis.diagnosis.contrast.compare import compare
-from analysis.diagnosis.contrast.decide import Decision, decide
-from analysis.diagnosis.reference.compare_with_reference import Contrast, contrast_of
+from analysis.diagnosis.contrast.decide import Decision, choose_fault
+from analysis.diagnosis.contrast.rank_faults import rank_faults
+from analysis.diagnosis.reference.compare_with_reference import Contrast, find_contrast
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
@@ -21,7 +21,7 @@ UNDONE = (
 """All that comes near dry friction."""
 
 
-def motion(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def make_motion(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Position, velocity, acceleration: a sum of sines up to 6 Hz."""
     random, t = np.random.default_rng(seed), np.arange(COUNT) / RATE_HZ
     found = np.zeros((3, COUNT))
@@ -34,9 +34,9 @@ def motion(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 @cache
-def recording(seed: int, change: str = "", level: float = 0.0) -> Recording:
+def record_rig(seed: int, change: str = "", level: float = 0.0) -> Recording:
     """Friction that is stronger at rest and on one side, a bent spring, model error that changes slowly."""
-    q, v, a = motion(seed)
+    q, v, a = make_motion(seed)
     random = np.random.default_rng(seed + 100)
     own = 1.2 * a + 3.0 * v + 80.0 * q + 9000.0 * q**3 + (1.0 + 0.6 * np.exp(-((v / 0.02) ** 2))) * np.tanh(v / 0.004)
     slow = np.convolve(random.normal(size=COUNT + SLOW), np.hanning(SLOW), "same")[:COUNT]
@@ -64,24 +64,24 @@ def time_left() -> bool:
 
 
 @cache
-def contrast(change: str = "", level: float = 0.0, without: tuple[str, ...] = (), seed: int = 2) -> Contrast:
+def make_contrast(change: str = "", level: float = 0.0, without: tuple[str, ...] = (), seed: int = 2) -> Contrast:
     """Of a recording with this change, beside a clean one; made once for all tests that ask."""
-    return contrast_of([recording(seed, change, level)], [recording(1)], frozenset(without), time_left)
+    return find_contrast([record_rig(seed, change, level)], [record_rig(1)], frozenset(without), time_left)
 
 
-def decision(faulty: Recording) -> Decision:
-    found = compare([faulty], [recording(1)], frozenset(), time_left)
+def decide_fault(faulty: Recording) -> Decision:
+    found = rank_faults([faulty], [record_rig(1)], frozenset(), time_left)
     assert found is not None
-    return decide(found, 1)
+    return choose_fault(found, 1)
 
 
-def read_as(seed: int, made) -> Recording:
+def change_reading(seed: int, made) -> Recording:
     """The device in order, its position read otherwise. made: of readings (n,)."""
-    whole = recording(seed)
+    whole = record_rig(seed)
     return replace(whole, response=replace(whole.response, samples=made(whole.response.samples[:, 0])[:, None]))
 
 
-def noisy(rms: float, seed: int = 2) -> Recording:
-    plain = recording(seed)
+def add_noise(rms: float, seed: int = 2) -> Recording:
+    plain = record_rig(seed)
     more = rms * np.random.default_rng(9).normal(size=plain.response.samples.shape)
     return replace(plain, response=replace(plain.response, samples=plain.response.samples + more))

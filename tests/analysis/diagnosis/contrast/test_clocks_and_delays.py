@@ -7,22 +7,22 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analysis.diagnosis.contrast.actuator_faults import AROUND, delays_to_try
+from analysis.diagnosis.contrast.actuator_faults import SIZE_RANGE, delays_to_try
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
 from analysis.diagnosis.contrast.bases import bases_of, compute_unexplained_share
-from analysis.diagnosis.contrast.compare import compare
 from analysis.diagnosis.contrast.compared_base import (
     FEWEST_ROWS,
     REACH,
     ComparedBase,
     compare_base,
-    rows_with_fault_undone,
+    undo_fault_in_rows,
 )
-from analysis.diagnosis.contrast.decide import decide
+from analysis.diagnosis.contrast.decide import choose_fault
 from analysis.diagnosis.contrast.fault import Rows
-from analysis.diagnosis.contrast.interpolation import noise_kept, resample, shift_samples
-from analysis.diagnosis.contrast.likely_delays import likely_clock_rates, likely_delays_s
+from analysis.diagnosis.contrast.interpolation import noise_gain, resample, shift_samples
+from analysis.diagnosis.contrast.likely_delays import suggest_clock_rates, suggest_delays_s
 from analysis.diagnosis.contrast.part import split_into_parts
+from analysis.diagnosis.contrast.rank_faults import rank_faults
 from analysis.diagnosis.contrast.sensor_faults import sensor_faults
 from analysis.diagnosis.settings import LEAST_FAULT_GAIN
 from equalizer.signals.recording import Recording
@@ -34,10 +34,10 @@ BEGIN = 3000
 
 @pytest.mark.slow
 def test_a_clock_that_ran_on_before_the_first_reading_is_named_with_its_rate(rig):
-    late = rig.read_as(2, lambda y: resample(y, np.arange(len(y)) * (1 + 2e-3)))
+    late = rig.change_reading(2, lambda y: resample(y, np.arange(len(y)) * (1 + 2e-3)))
     read = late.response.samples.copy()
     read[:BEGIN] = np.nan
-    found = rig.decision(replace(late, response=replace(late.response, samples=read)))
+    found = rig.decide_fault(replace(late, response=replace(late.response, samples=read)))
     assert found.named is not None
     assert found.named.fault.effect == "clock_drift"
     assert found.named.values["ppm"] == pytest.approx(2000, rel=0.2)
@@ -47,7 +47,7 @@ def test_each_delay_lies_within_reach_of_those_that_are_tried():
     slow = np.sin(2 * np.pi * 0.2 * np.arange(20_000) / 1000.0)
     tried = np.array(delays_to_try(slow, 1000.0))
     assert tried[-1] / tried[0] > 1000
-    assert np.all(tried[1:] * AROUND[0] <= 1.0001 * tried[:-1] * AROUND[1])
+    assert np.all(tried[1:] * SIZE_RANGE[0] <= 1.0001 * tried[:-1] * SIZE_RANGE[1])
 
 
 @pytest.mark.parametrize("by", [-20.5, 7.3])
@@ -67,7 +67,7 @@ POLES = np.exp([-0.01 + 0.02j, -0.01 - 0.02j, -0.02 + 0.05j, -0.02 - 0.05j])
 """Of a response 60 times slower than the samples: each changes it by 1e-5 of its size."""
 
 
-def oscillator(seed: int, late: int = 0, period: int = 6000) -> tuple[Recording, float]:
+def record_oscillator(seed: int, late: int = 0, period: int = 6000) -> tuple[Recording, float]:
     """A smooth response, read late beside its command, and what the command's next value does to it."""
     force = np.resize(np.random.default_rng(seed).normal(size=period), 6000)
     noise = 1e-3 * np.random.default_rng(seed + 100).normal(size=6000)
@@ -80,7 +80,7 @@ def oscillator(seed: int, late: int = 0, period: int = 6000) -> tuple[Recording,
     return recording, float(1 / read.std())
 
 
-def cut(recording: Recording, *lengths: int) -> list[Recording]:
+def cut_recording(recording: Recording, *lengths: int) -> list[Recording]:
     """Pieces of a recording, from its begin."""
     ends = np.cumsum((0, *lengths))
     return [
@@ -93,32 +93,36 @@ def cut(recording: Recording, *lengths: int) -> list[Recording]:
     ]
 
 
-def suggested_delay_s(faulty: list[Recording], step: int = 1, period: int = 6000) -> float:
+def median_suggested_delay_s(faulty: list[Recording], step: int = 1, period: int = 6000) -> float:
     """The middle of the delays that are suggested for these recordings; 0 if none is."""
-    clean = split_into_parts([oscillator(1, 0, period)[0]])
-    found = likely_delays_s([compare_base(AutoregressiveBase(0, 24, step, 1), clean, split_into_parts(faulty))])
+    clean = split_into_parts([record_oscillator(1, 0, period)[0]])
+    found = suggest_delays_s([compare_base(AutoregressiveBase(0, 24, step, 1), clean, split_into_parts(faulty))])
     return float(np.median(found)) if found else 0.0
 
 
 @pytest.mark.parametrize("step", [1, 4])
 @pytest.mark.parametrize("late", [0, 37, 402])
 def test_a_delay_is_suggested_to_a_part_of_a_row_however_narrow_its_valley_is(late, step):
-    assert suggested_delay_s([oscillator(2, late)[0]], step) == pytest.approx(late / 1000.0, abs=1e-4 * step)
+    assert median_suggested_delay_s([record_oscillator(2, late)[0]], step) == pytest.approx(
+        late / 1000.0, abs=1e-4 * step
+    )
 
 
 @pytest.mark.parametrize("short", [100, 200])
 def test_a_short_part_hides_no_delay(short):
     """Before, the shortest part said how far to look."""
-    assert suggested_delay_s(cut(oscillator(2, 400)[0], 5000, short)) == pytest.approx(0.4, abs=1e-3)
+    assert median_suggested_delay_s(cut_recording(record_oscillator(2, 400)[0], 5000, short)) == pytest.approx(
+        0.4, abs=1e-3
+    )
 
 
 @pytest.mark.parametrize("seed", range(2, 6))
 def test_a_periodic_command_gives_no_delay_of_whole_periods_more(seed):
-    late = oscillator(seed, 20, 500)[0]
-    assert suggested_delay_s([late], period=500) == pytest.approx(0.02, abs=1e-3)
+    late = record_oscillator(seed, 20, 500)[0]
+    assert median_suggested_delay_s([late], period=500) == pytest.approx(0.02, abs=1e-3)
 
 
-def by_other_clock(recording: Recording, rate: float, begins: tuple[int, ...] = (0,)) -> Recording:
+def resample_clock(recording: Recording, rate: float, begins: tuple[int, ...] = (0,)) -> Recording:
     """Readings at t (1 + rate); t counts anew at each begin."""
     read = recording.response.samples[:, 0]
     at = np.arange(len(read), dtype=np.float64)
@@ -127,44 +131,44 @@ def by_other_clock(recording: Recording, rate: float, begins: tuple[int, ...] = 
     return replace(recording, response=replace(recording.response, samples=resample(read, at)[:, None]))
 
 
-def streams_beside(faulty: list[Recording], period: int = 6000) -> list[ComparedBase]:
-    clean = split_into_parts([oscillator(1, 0, period)[0]])
+def compare_streams(faulty: list[Recording], period: int = 6000) -> list[ComparedBase]:
+    clean = split_into_parts([record_oscillator(1, 0, period)[0]])
     return [compare_base(AutoregressiveBase(0, 24, 1, 1), clean, split_into_parts(faulty))]
 
 
 @pytest.mark.parametrize("rate", [-0.03, -0.004, 0.02])
 def test_a_clock_rate_is_suggested_although_many_oscillations_pass(rate):
-    found = likely_clock_rates(streams_beside([by_other_clock(oscillator(2)[0], rate)]))
+    found = suggest_clock_rates(compare_streams([resample_clock(record_oscillator(2)[0], rate)]))
     assert min(abs(each.rate - rate) for each in found) < found[0].step == pytest.approx(0.25 / 6000, rel=0.05)
 
 
 def test_a_clock_that_begins_anew_with_each_part_is_told_from_one_that_runs_on():
-    whole = by_other_clock(oscillator(2)[0], -0.02, (0, 2500))
+    whole = resample_clock(record_oscillator(2)[0], -0.02, (0, 2500))
     parts = [{"start": 0, "stop": 2500}, {"start": 2500, "stop": 6000}]
-    found = likely_clock_rates(streams_beside([replace(whole, meta={"parts": parts})]))
+    found = suggest_clock_rates(compare_streams([replace(whole, meta={"parts": parts})]))
     anew = [each for each in found if not each.runs_on]
     assert min(abs(each.rate + 0.02) for each in anew) < anew[0].step == pytest.approx(0.25 / 3500, rel=0.05)
 
 
 @pytest.mark.parametrize("period", [500, 6000])
 def test_no_clock_rate_is_suggested_for_a_clock_in_order(period):
-    assert likely_clock_rates(streams_beside([oscillator(2, 0, period)[0]], period)) == ()
+    assert suggest_clock_rates(compare_streams([record_oscillator(2, 0, period)[0]], period)) == ()
 
 
 @pytest.mark.parametrize("rows", [20, 2 * REACH + 3])
 def test_parts_that_are_hardly_longer_than_the_filter_suggest_nothing(rows):
     """Their blocks were empty, and their times no numbers."""
-    (compared,) = streams_beside([oscillator(2, 40)[0]])
+    (compared,) = compare_streams([record_oscillator(2, 40)[0]])
     short = replace(compared, faulty=replace(compared.faulty, rows=tuple(part[:rows] for part in compared.faulty.rows)))
-    assert likely_clock_rates([short]) == () and likely_delays_s([short]) == ()
+    assert suggest_clock_rates([short]) == () and suggest_delays_s([short]) == ()
 
 
 @pytest.mark.slow
 def test_a_fast_clock_is_named_with_its_rate():
-    faulty = by_other_clock(oscillator(2)[0], -0.02)
-    found = compare([faulty], [oscillator(1)[0]], frozenset(), lambda: True)
+    faulty = resample_clock(record_oscillator(2)[0], -0.02)
+    found = rank_faults([faulty], [record_oscillator(1)[0]], frozenset(), lambda: True)
     assert found is not None
-    named = decide(found, 1).named
+    named = choose_fault(found, 1).named
     assert named is not None and named.fault.effect == "clock_drift"
     assert named.values["ppm"] == pytest.approx(-20_000, abs=3 * named.spread["ppm"])
     assert named.spread["ppm"] < 200
@@ -180,7 +184,7 @@ def test_interpolation_makes_prediction_errors_of_noise_smaller_by_what_is_said(
         return left.std()
 
     smaller = one_step_error(shift_samples(noise, by)[:, 0]) / one_step_error(noise[:, 0])
-    assert smaller == pytest.approx(noise_kept(by), rel=0.03)
+    assert smaller == pytest.approx(noise_gain(by), rel=0.03)
 
 
 @pytest.mark.slow
@@ -190,18 +194,18 @@ def test_noise_of_a_reading_is_neither_late_nor_bent(seed):
     readings and curves gained 0.3 by that."""
 
     def noisy(number: int, rms: float) -> Recording:
-        plain = oscillator(number)[0]
+        plain = record_oscillator(number)[0]
         more = rms * np.random.default_rng(number + 7).normal(size=plain.response.samples.shape)
         return replace(plain, response=replace(plain.response, samples=plain.response.samples + more))
 
-    found = compare([noisy(seed, 0.3)], [noisy(1, 0.1)], frozenset(), lambda: True)
+    found = rank_faults([noisy(seed, 0.3)], [noisy(1, 0.1)], frozenset(), lambda: True)
     assert found is not None
     gains = {each.fault.effect: each.gain for each in found.faults}
     for effect in ("logger_offset", "clock_drift", "sensor_nonlinearity", "sensor_asymmetry", "sensor_lag"):
         assert gains[effect] < LEAST_FAULT_GAIN
 
 
-def delayed(recording: Recording, command_rows: int, response_rows: int) -> Recording:
+def delay_recording(recording: Recording, command_rows: int, response_rows: int) -> Recording:
     def by(samples, rows):
         return np.concatenate([np.repeat(samples[:1], rows, axis=0), samples[: len(samples) - rows]])
 
@@ -216,8 +220,8 @@ def delayed(recording: Recording, command_rows: int, response_rows: int) -> Reco
 def test_a_late_reading_that_hides_an_error_of_the_clean_set_explains_the_difference(rig):
     """The drive of this device is late as well: late readings make the faulty set's errors smaller than the clean
     one's, and undoing them makes them larger. That counted against it: it explained 42 %."""
-    clean, faulty = delayed(rig.recording(1), 1, 0), delayed(rig.recording(2), 1, 1)
-    found = compare([faulty], [clean], frozenset(), lambda: True)
+    clean, faulty = delay_recording(rig.record_rig(1), 1, 0), delay_recording(rig.record_rig(2), 1, 1)
+    found = rank_faults([faulty], [clean], frozenset(), lambda: True)
     assert found is not None
     (late,) = [each for each in found.faults if each.fault.effect == "logger_offset"]
     assert late.values["offset"] == pytest.approx(1 / rig.RATE_HZ, rel=0.5)
@@ -228,9 +232,9 @@ def test_a_late_reading_that_hides_an_error_of_the_clean_set_explains_the_differ
 @pytest.mark.parametrize("late", [37, 393])
 def test_a_long_delay_is_named_with_an_interval_that_holds_it(late):
     """Half of a delay of many oscillations, undone, was taken for a delay of half its length."""
-    found = compare([oscillator(2, late)[0]], [oscillator(1)[0]], frozenset(), lambda: True)
+    found = rank_faults([record_oscillator(2, late)[0]], [record_oscillator(1)[0]], frozenset(), lambda: True)
     assert found is not None
-    named = decide(found, 1).named
+    named = choose_fault(found, 1).named
     assert named is not None and named.fault.effect in ("transport_delay", "logger_offset")
     (seconds,), (error,) = named.values.values(), named.spread.values()
     assert abs(seconds - late / 1000.0) < 2 * error < 0.01
@@ -238,7 +242,7 @@ def test_a_long_delay_is_named_with_an_interval_that_holds_it(late):
 
 def test_a_smooth_response_is_predicted_as_well_as_its_past_allows():
     """Products of readings that are so alike left three times the error."""
-    late, innovation = oscillator(1, 400)
+    late, innovation = record_oscillator(1, 400)
     parts = split_into_parts([late])
     compared = compare_base(AutoregressiveBase(0, 24, 1, 1), parts, parts)
     assert compared.clean.scale * compared.columns[0] == pytest.approx(innovation, rel=0.1)
@@ -247,12 +251,12 @@ def test_a_smooth_response_is_predicted_as_well_as_its_past_allows():
 
 def test_sensor_faults_of_a_response_with_hardly_any_noise_can_be_undone():
     """Errors of 1e-8 of its size are beyond products of values in double precision, and not of second differences."""
-    parts = split_into_parts([oscillator(2)[0]])
-    compared = compare_base(AutoregressiveBase(0, 24, 1, 1), split_into_parts([oscillator(1)[0]]), parts)
+    parts = split_into_parts([record_oscillator(2)[0]])
+    compared = compare_base(AutoregressiveBase(0, 24, 1, 1), split_into_parts([record_oscillator(1)[0]]), parts)
     gains = [fault for fault in sensor_faults(0, "x", parts, Rows(1, (), 0.0, ())) if fault.effect == "sensor_gain"]
     for variant in gains[0].variants:
-        undone = rows_with_fault_undone(compared, compared.faulty, gains[0], variant)
-        assert compared.grams(compared.faulty, undone).is_well_conditioned(variant)
+        undone = undo_fault_in_rows(compared, compared.faulty, gains[0], variant)
+        assert compared.compute_grams(compared.faulty, undone).is_well_conditioned(variant)
 
 
 def test_a_slow_response_is_compared_by_as_many_rows_as_it_takes():
@@ -261,7 +265,7 @@ def test_a_slow_response_is_compared_by_as_many_rows_as_it_takes():
     random = np.random.default_rng(1)
     parts = [
         split_into_parts([replace(each, response=replace(each.response, samples=(slow + noise)[:, None]))])
-        for each in (oscillator(1)[0], oscillator(2)[0])
+        for each in (record_oscillator(1)[0], record_oscillator(2)[0])
         for noise in [1e-4 * random.normal(size=6000)]
     ]
     (base,), _ = next(bases_of(parts[0], parts[1]))

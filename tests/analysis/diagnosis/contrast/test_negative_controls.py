@@ -5,31 +5,31 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.contrast.compare import compare
-from analysis.diagnosis.contrast.decide import decide
+from analysis.diagnosis.contrast.decide import choose_fault
+from analysis.diagnosis.contrast.rank_faults import rank_faults
 from equalizer.signals.recording import Recording
 
 
 @pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_another_recording_of_the_same_device_names_nothing(rig, seed):
-    found = rig.contrast(seed=seed).decision
+    found = rig.make_contrast(seed=seed).decision
     assert found is not None and found.named is None
 
 
 @pytest.mark.slow
 def test_a_fault_that_may_sit_on_either_of_two_axes_is_not_named(rig):
-    found = rig.contrast("added_mass", 0.3).comparison
+    found = rig.make_contrast("added_mass", 0.3).comparison
     assert found is not None
-    best = decide(found, 1).named
+    best = choose_fault(found, 1).named
     assert best is not None
     twin = replace(best, fault=replace(best.fault, axis="fy", site=1))
-    answer = decide(replace(found, faults=(best, twin)), 1)
+    answer = choose_fault(replace(found, faults=(best, twin)), 1)
     assert answer.named is None
-    assert "fy" in answer.others[0][1]
+    assert "fy" in answer.unnamed[0][1]
 
 
 def test_an_effect_that_is_not_to_be_considered_is_not_named(rig):
-    found = rig.contrast("added_mass", 0.3, ("added_mass",)).decision
+    found = rig.make_contrast("added_mass", 0.3, ("added_mass",)).decision
     assert found is not None
     assert found.named is None or found.named.fault.effect != "added_mass"
 
@@ -40,29 +40,29 @@ def test_a_body_alone_cannot_tell_a_mass_from_a_gain(rig):
     random = np.random.default_rng(5)
 
     def body(seed: int, mass: float) -> Recording:
-        _, _, a = rig.motion(seed)
-        plain = rig.recording(seed)
+        _, _, a = rig.make_motion(seed)
+        plain = rig.record_rig(seed)
         force = mass * a + 0.02 * a.std() * random.normal(size=rig.COUNT)
         return replace(plain, command=replace(plain.command, samples=force[:, None]))
 
-    found = compare([body(2, 1.6)], [body(1, 1.2)], frozenset(), rig.time_left)
+    found = rank_faults([body(2, 1.6)], [body(1, 1.2)], frozenset(), rig.time_left)
     assert found is not None
-    answer = decide(found, 1)
-    names = {law.fault.effect for law, _ in answer.others} if answer.named is None else set(answer.alike)
+    answer = choose_fault(found, 1)
+    names = {law.fault.effect for law, _ in answer.unnamed} if answer.named is None else set(answer.equivalents)
     assert {"force_gain", "sensor_gain"} <= names | {"" if answer.named is None else answer.named.fault.effect}
 
 
 def test_recordings_of_rest_and_of_motion_are_not_compared(rig):
     """What a device does at rest is foretold by no recording of its motion."""
-    resting = rig.read_as(2, lambda y: 0.01 * y)
-    assert compare([resting], [rig.recording(1)], frozenset(), rig.time_left) is None
-    assert compare([rig.recording(1)], [resting], frozenset(), rig.time_left) is None
+    resting = rig.change_reading(2, lambda y: 0.01 * y)
+    assert rank_faults([resting], [rig.record_rig(1)], frozenset(), rig.time_left) is None
+    assert rank_faults([rig.record_rig(1)], [resting], frozenset(), rig.time_left) is None
 
 
 def test_what_is_cut_short_ends_with_what_it_has(rig):
-    found = compare([rig.recording(2, "added_mass", 0.3)], [rig.recording(1)], frozenset(), lambda: False)
+    found = rank_faults([rig.record_rig(2, "added_mass", 0.3)], [rig.record_rig(1)], frozenset(), lambda: False)
     assert found is not None and not found.complete
-    assert decide(found, 1).named is None
+    assert choose_fault(found, 1).named is None
 
 
 def test_a_balance_that_cannot_be_solved_leaves_the_other_base_to_compare_by(rig, monkeypatch):
@@ -70,6 +70,6 @@ def test_a_balance_that_cannot_be_solved_leaves_the_other_base_to_compare_by(rig
         raise np.linalg.LinAlgError("singular matrix")
 
     monkeypatch.setattr("analysis.diagnosis.contrast.bases.force_base", unsolvable)
-    monkeypatch.setattr("analysis.diagnosis.contrast.bases.likely_step", lambda parts: 1)
-    found = compare([rig.recording(2)], [rig.recording(1)], frozenset(), lambda: False)
+    monkeypatch.setattr("analysis.diagnosis.contrast.bases.choose_decimation_step", lambda parts: 1)
+    found = rank_faults([rig.record_rig(2)], [rig.record_rig(1)], frozenset(), lambda: False)
     assert found is not None and not found.by_force

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
-from analysis.diagnosis.contrast.compare import compare
-from analysis.diagnosis.contrast.decide import decide
+from analysis.diagnosis.contrast.decide import choose_fault
 from analysis.diagnosis.contrast.fault import Rows
 from analysis.diagnosis.contrast.part import split_into_parts
+from analysis.diagnosis.contrast.rank_faults import rank_faults
 from analysis.diagnosis.settings import BALANCE_HOLDS, CONTRAST_BLOCKS
 from equalizer.signals.signal import FloatArray
 
@@ -25,31 +25,31 @@ from equalizer.signals.signal import FloatArray
     ],
 )
 def test_what_came_since_is_named_with_its_place_and_number(rig, change, level, number, place):
-    found = rig.contrast(change, level).decision
+    found = rig.make_contrast(change, level).decision
     assert found is not None and found.named is not None
     assert (found.named.fault.effect, found.named.fault.place) == (change, place)
     assert found.named.values[number] == pytest.approx(level, rel=0.15)
 
 
 def test_a_law_that_holds_the_named_one_takes_nothing_from_its_probability(rig):
-    found = rig.contrast("coulomb_friction", 0.6).decision
+    found = rig.make_contrast("coulomb_friction", 0.6).decision
     assert found is not None and found.named is not None
     assert found.named.fault.effect == "coulomb_friction"
-    assert "asymmetric_friction" not in found.alike
+    assert "asymmetric_friction" not in found.equivalents
     assert found.probability > 0.9
 
 
 def test_the_error_is_that_of_the_faulty_recording_however_many_clean_ones_there_are(rig):
     """Scaled by its own error, what is left of a set is at least as much as a description of its own leaves: also where
     there is no time to undo a fault."""
-    for clean in ([rig.recording(1)], [rig.recording(seed) for seed in (1, 3, 4, 5)]):
-        found = compare([rig.recording(2, "viscous_damping", 2.0)], clean, frozenset(), lambda: False)
+    for clean in ([rig.record_rig(1)], [rig.record_rig(seed) for seed in (1, 3, 4, 5)]):
+        found = rank_faults([rig.record_rig(2, "viscous_damping", 2.0)], clean, frozenset(), lambda: False)
         assert found is not None
         assert found.faulty_samples == pytest.approx(found.samples / (1 + len(clean)), rel=0.01)
-        assert 1.0 <= found.plain[:CONTRAST_BLOCKS].sum() / found.faulty_samples < 2.0
+        assert 1.0 <= found.errors[:CONTRAST_BLOCKS].sum() / found.faulty_samples < 2.0
 
 
-def behind(gap: float):
+def read_through_gap(gap: float):
     """A reading that is driven through a gap."""
 
     def made(y: FloatArray) -> FloatArray:
@@ -64,27 +64,27 @@ def behind(gap: float):
 
 @pytest.mark.slow
 def test_play_before_a_sensor_is_named_with_its_gap(rig):
-    found = rig.decision(rig.read_as(2, behind(0.008)))
+    found = rig.decide_fault(rig.change_reading(2, read_through_gap(0.008)))
     assert found.named is not None and found.named.fault.effect == "sensor_play"
     assert found.named.values["gap"] == pytest.approx(0.008, rel=0.2)
 
 
 @pytest.mark.slow
 def test_a_drift_that_began_before_the_recording_is_no_offset(rig):
-    found = rig.decision(rig.read_as(2, lambda y: y + 0.04 * np.linspace(0.4, 1.0, len(y))))
+    found = rig.decide_fault(rig.change_reading(2, lambda y: y + 0.04 * np.linspace(0.4, 1.0, len(y))))
     assert found.named is not None and found.named.fault.effect == "sensor_drift"
 
 
 @pytest.mark.slow
 def test_an_offset_is_no_drift(rig):
-    found = rig.decision(rig.read_as(2, lambda y: y + 0.05))
+    found = rig.decide_fault(rig.change_reading(2, lambda y: y + 0.05))
     assert found.named is not None
-    names = {found.named.fault.effect, *found.alike}
+    names = {found.named.fault.effect, *found.equivalents}
     assert {"sensor_offset", "force_offset"} <= names and not {"sensor_drift", "clock_drift"} & names
 
 
 def test_a_drive_that_follows_slowly_is_named(rig):
-    plain = rig.recording(2)
+    plain = rig.record_rig(2)
     force, limit = plain.command.samples[:, 0].copy(), 40.0 / rig.RATE_HZ
     held = int(rig.RATE_HZ / 2)
     asked = np.repeat(force[::held], held)
@@ -106,10 +106,10 @@ def test_a_drive_that_follows_slowly_is_named(rig):
 @pytest.mark.slow
 def test_a_fault_that_upsets_the_balance_of_forces_is_undone_in_it(rig):
     """With it, 43 % of that recording's forces are left over: more than a balance may leave that is to be used."""
-    plain = rig.recording(2)
+    plain = rig.record_rig(2)
     asked = plain.command.samples + 8.0 * np.sign(plain.command.samples)
-    found = compare(
-        [replace(plain, command=replace(plain.command, samples=asked))], [rig.recording(1)], frozenset(), rig.time_left
+    found = rank_faults(
+        [replace(plain, command=replace(plain.command, samples=asked))], [rig.record_rig(1)], frozenset(), rig.time_left
     )
     assert found is not None and found.by_force and found.faulty_share > BALANCE_HOLDS
     assert found.faults[0].fault.effect == "force_deadband"
@@ -123,10 +123,10 @@ def test_a_mass_of_a_device_of_a_few_nanograms_is_named_too(rig):
     def of_nano(whole):
         return replace(whole, command=replace(whole.command, samples=1e-11 * whole.command.samples))
 
-    found = compare(
-        [of_nano(rig.recording(2, "added_mass", 0.3))], [of_nano(rig.recording(1))], frozenset(), lambda: True
+    found = rank_faults(
+        [of_nano(rig.record_rig(2, "added_mass", 0.3))], [of_nano(rig.record_rig(1))], frozenset(), lambda: True
     )
     assert found is not None
-    named = decide(found, 1).named
+    named = choose_fault(found, 1).named
     assert named is not None and named.fault.effect == "added_mass"
     assert named.values["mass"] == pytest.approx(0.3e-11, rel=0.15)

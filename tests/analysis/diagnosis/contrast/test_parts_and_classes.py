@@ -7,18 +7,18 @@ import pytest
 
 from analysis.diagnosis.contrast.bases import bases_of
 from analysis.diagnosis.contrast.compared_base import REACH, ComparedBase, UndoneRows, compare_base
-from analysis.diagnosis.contrast.decide import decide
+from analysis.diagnosis.contrast.decide import choose_fault
 from analysis.diagnosis.contrast.part import split_into_parts
 
 
 @pytest.fixture(scope="module")
-def compared(rig) -> ComparedBase:
-    clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
+def compared_base(rig) -> ComparedBase:
+    clean, other = split_into_parts([rig.record_rig(1)]), split_into_parts([rig.record_rig(2)])
     return compare_base(next(bases_of(clean, other))[0][0], clean, other)
 
 
 def test_the_ends_of_a_part_and_what_lies_beside_a_gap_do_not_count(rig):
-    clean = split_into_parts([rig.recording(1)])
+    clean = split_into_parts([rig.record_rig(1)])
     gap = np.arange(rig.COUNT) == 2500
     with_gap = replace(clean[0], known=clean[0].known & ~gap)
     (mask,) = compare_base(next(bases_of(clean, ()))[0][0], (with_gap,), clean).clean.masks
@@ -33,45 +33,45 @@ def test_sparse_losses_leave_most_rows_to_compare_by(lost, rig):
     """Before, each took 33 rows, and a comparison without rows ended the diagnosis."""
     random = np.random.default_rng(1)
     gone = np.arange(rig.COUNT) % 30 == 0 if lost == "every 30th" else random.random(rig.COUNT) < 0.1
-    clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
+    clean, other = split_into_parts([rig.record_rig(1)]), split_into_parts([rig.record_rig(2)])
     lossy = replace(other[0], known=other[0].known & ~gone)
     compared = compare_base(next(bases_of(clean, other))[0][0], clean, (lossy,))
     assert compared.faulty.count > 0.8 * compared.clean.count
 
 
 def test_a_side_with_too_few_rows_is_not_compared(rig):
-    clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
+    clean, other = split_into_parts([rig.record_rig(1)]), split_into_parts([rig.record_rig(2)])
     bare = replace(other[0], known=np.arange(rig.COUNT) < 60)
     with pytest.raises(ValueError, match="too few samples"):
         compare_base(next(bases_of(clean, other))[0][0], clean, (bare,))
 
 
-def test_what_undoing_a_fault_loses_stays_as_it_was(compared):
-    rows = tuple(np.zeros_like(part) for part in compared.faulty.rows)
+def test_what_undoing_a_fault_loses_stays_as_it_was(compared_base):
+    rows = tuple(np.zeros_like(part) for part in compared_base.faulty.rows)
     half = tuple(np.arange(len(part)) < len(part) // 2 for part in rows)
-    blocks = compared.grams(compared.faulty, [UndoneRows(rows, half)]).undo_sizes(np.ones(1))
-    plain = compared.grams(compared.faulty, []).blocks
+    blocks = compared_base.compute_grams(compared_base.faulty, [UndoneRows(rows, half)]).undo_sizes(np.ones(1))
+    plain = compared_base.compute_grams(compared_base.faulty, []).blocks
     assert np.allclose(blocks[:8], plain[:8])
     assert np.abs(blocks[-8:]).max() < 1e-3 * np.abs(plain[-8:]).max()
 
 
 @pytest.mark.parametrize(("times", "belongs"), [((0.99, 0.99), True), ((0.85, 1.15), False)])
 def test_a_law_that_holds_the_named_one_is_of_its_class_where_it_leaves_less_everywhere(rig, times, belongs):
-    found = rig.contrast("coulomb_friction", 0.6).comparison
+    found = rig.make_contrast("coulomb_friction", 0.6).comparison
     assert found is not None
-    best = decide(found, 1).named
+    best = choose_fault(found, 1).named
     assert best is not None and best.fault.effect == "coulomb_friction"
     fault = replace(best.fault, effect="asymmetric_friction", simpler=("coulomb_friction",))
     finer = replace(best, fault=fault, errors=best.errors * np.resize(times, len(best.errors)))
-    answer = decide(replace(found, faults=(finer, best)), 1)
+    answer = choose_fault(replace(found, faults=(finer, best)), 1)
     assert answer.named is best
-    assert ("asymmetric_friction" in answer.alike) == belongs
+    assert ("asymmetric_friction" in answer.equivalents) == belongs
 
 
 def test_what_is_as_good_but_not_sure_itself_is_of_the_class(rig):
-    found = rig.contrast("coulomb_friction", 0.6).comparison
+    found = rig.make_contrast("coulomb_friction", 0.6).comparison
     assert found is not None
-    best = decide(found, 1).named
+    best = choose_fault(found, 1).named
     assert best is not None
     none = {name: 0.0 for name in best.values}
     for low, belongs in ((0.05, True), (-0.05, False)):
@@ -82,15 +82,15 @@ def test_what_is_as_good_but_not_sure_itself_is_of_the_class(rig):
             gain_low=low,
             errors=1.001 * best.errors,
         )
-        assert ("cogging" in decide(replace(found, faults=(best, other)), 1).alike) == belongs
+        assert ("cogging" in choose_fault(replace(found, faults=(best, other)), 1).equivalents) == belongs
 
 
 def test_a_fault_that_makes_all_errors_of_its_set_larger_shows_in_its_gain(rig):
-    found = rig.contrast("coulomb_friction", 0.6).comparison
+    found = rig.make_contrast("coulomb_friction", 0.6).comparison
     assert found is not None
     best = found.faults[0]
-    assert best.gain_low > 0.1 > 1.6 * best.apart
-    swallowed = replace(found, samples=int(found.plain.sum()))
+    assert best.gain_low > 0.1 > 1.6 * best.control_excess
+    swallowed = replace(found, samples=int(found.errors.sum()))
     assert not swallowed.differ
     assert swallowed.differ_but_for(best)
     assert not swallowed.differ_but_for(replace(best, gain_low=0.01))
@@ -98,9 +98,9 @@ def test_a_fault_that_makes_all_errors_of_its_set_larger_shows_in_its_gain(rig):
 
 @pytest.mark.parametrize(("varies", "named"), [(False, True), (True, False)])
 def test_what_changes_in_the_course_of_a_recording_does_not_count_for_gaining_everywhere(rig, varies, named):
-    found = rig.contrast("coulomb_friction", 0.6).comparison
+    found = rig.make_contrast("coulomb_friction", 0.6).comparison
     assert found is not None
     best = found.faults[0]
-    alike = replace(best, fault=replace(best.fault, varies=varies), apart=10.0, gain_low=0.9 * best.gain)
+    alike = replace(best, fault=replace(best.fault, varies=varies), control_excess=10.0, gain_low=0.9 * best.gain)
     assert not found.differ_but_for(alike)
-    assert (decide(replace(found, faults=(alike,)), 1).named is not None) == named
+    assert (choose_fault(replace(found, faults=(alike,)), 1).named is not None) == named

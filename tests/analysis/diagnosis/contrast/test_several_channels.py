@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analysis.diagnosis.contrast.compare import compare
-from analysis.diagnosis.contrast.decide import decide
+from analysis.diagnosis.contrast.decide import choose_fault
+from analysis.diagnosis.contrast.rank_faults import rank_faults
 from analysis.diagnosis.result.contrast_findings import _name_fault
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -14,7 +14,7 @@ from equalizer.signals.unit_system import LINEAR
 RATE_HZ = 500.0
 
 
-def two_drives(seed: int, gain: float = 1.0) -> Recording:
+def record_two_drives(seed: int, gain: float = 1.0) -> Recording:
     """Two drives push one body; the second gives `gain` of what it is commanded."""
     random, count, dt = np.random.default_rng(seed), 3000, 1 / RATE_HZ / 4
     drives = lfilter([0.05], [1.0, -0.95], random.standard_normal((count, 2)), axis=0)
@@ -35,10 +35,10 @@ def two_drives(seed: int, gain: float = 1.0) -> Recording:
 @pytest.mark.slow
 @pytest.mark.parametrize("gain", [0.6, pytest.param(1.4, marks=pytest.mark.slow)])
 def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(rig, gain):
-    faulty = two_drives(3, gain)
-    found = compare([faulty], [two_drives(4)], frozenset(), rig.time_left)
+    faulty = record_two_drives(3, gain)
+    found = rank_faults([faulty], [record_two_drives(4)], frozenset(), rig.time_left)
     assert found is not None and not found.by_force
-    answer = decide(found, 1)
+    answer = choose_fault(found, 1)
     assert answer.named is not None
     named = _name_fault(answer.named, answer, faulty, LINEAR)
     assert (named.effect, named.axis) == ("force_gain", "y")
@@ -47,12 +47,12 @@ def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(r
 
 @pytest.mark.slow
 def test_two_drives_of_one_body_in_order_name_nothing(rig):
-    found = compare([two_drives(5)], [two_drives(4)], frozenset(), rig.time_left)
+    found = rank_faults([record_two_drives(5)], [record_two_drives(4)], frozenset(), rig.time_left)
     assert found is not None
-    assert decide(found, 1).named is None
+    assert choose_fault(found, 1).named is None
 
 
-def in_turns(seed: int, late: FloatArray) -> Recording:
+def record_late_masses(seed: int, late: FloatArray) -> Recording:
     """Two masses on springs, read late: by how many samples, per sixth of the recording."""
     random = np.random.default_rng(seed)
     push = lfilter([0.1], [1.0, -0.9], random.standard_normal((3000, 2)), axis=0)
@@ -69,9 +69,11 @@ def in_turns(seed: int, late: FloatArray) -> Recording:
 
 @pytest.mark.slow
 def test_a_logger_that_reads_all_channels_late_is_named_once(rig):
-    found = compare([in_turns(2, np.full(6, 2.0))], [in_turns(1, np.zeros(6))], frozenset(), rig.time_left)
+    found = rank_faults(
+        [record_late_masses(2, np.full(6, 2.0))], [record_late_masses(1, np.zeros(6))], frozenset(), rig.time_left
+    )
     assert found is not None
-    answer = decide(found, 2)
+    answer = choose_fault(found, 2)
     assert answer.named is not None
     assert (answer.named.fault.effect, answer.named.fault.axis) == ("logger_offset", "")
     assert answer.named.values["offset"] == pytest.approx(2 / RATE_HZ, rel=0.25)
@@ -79,7 +81,10 @@ def test_a_logger_that_reads_all_channels_late_is_named_once(rig):
 
 @pytest.mark.slow
 def test_a_logger_that_is_late_now_and_then_in_both_sets_is_not_named(rig):
-    faulty, clean = in_turns(2, np.array([0, 2, 1, 2, 0, 2.0])), in_turns(1, np.array([0, 0, 2, 0, 1, 0.0]))
-    found = compare([faulty], [clean], frozenset(), rig.time_left)
+    faulty, clean = (
+        record_late_masses(2, np.array([0, 2, 1, 2, 0, 2.0])),
+        record_late_masses(1, np.array([0, 0, 2, 0, 1, 0.0])),
+    )
+    found = rank_faults([faulty], [clean], frozenset(), rig.time_left)
     assert found is not None
-    assert decide(found, 2).named is None
+    assert choose_fault(found, 2).named is None

@@ -7,43 +7,43 @@ from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.forces.rigid_model import rigid_model
 from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from analysis.diagnosis.reference import learn_model_error
-from analysis.diagnosis.reference.compare_with_reference import Contrast, contrast_of
+from analysis.diagnosis.reference.compare_with_reference import Contrast, find_contrast
 from analysis.diagnosis.result.contrast_findings import NOT_COMPARED, add_contrast
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 
 
 @pytest.mark.slow
 def test_a_fault_that_the_comparison_cannot_undo_is_left_open(rig):
-    found = rig.contrast("coulomb_friction", 0.6, rig.UNDONE)
-    assert found.left_open
+    found = rig.make_contrast("coulomb_friction", 0.6, rig.UNDONE)
+    assert found.is_unexplained
     assert not set(rig.UNDONE) & set(found.tested_effects)
     assert "added_mass" in found.tested_effects
 
 
 def test_nothing_is_left_open_where_a_fault_is_named(rig):
-    found = rig.contrast("coulomb_friction", 0.6)
-    assert not found.left_open
+    found = rig.make_contrast("coulomb_friction", 0.6)
+    assert not found.is_unexplained
     assert found.comparison is not None and found.comparison.complete
 
 
 @pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_nothing_is_left_open_between_recordings_of_the_same_device(rig, seed):
-    assert not rig.contrast(seed=seed).left_open
+    assert not rig.make_contrast(seed=seed).is_unexplained
 
 
 def test_the_comparison_overrules_a_search_that_leaves_more_than_noise_and_has_not_its_fault(rig):
-    found = rig.contrast("coulomb_friction", 0.6)
-    assert found.contradicts(frozenset({"extra_mode", "constant_force"}), explained=False)
-    assert found.contradicts(frozenset(), explained=False)
-    assert not found.contradicts(frozenset({"extra_mode", "coulomb_friction"}), explained=False)
-    assert not found.contradicts(frozenset({"extra_mode"}), explained=True)
+    found = rig.make_contrast("coulomb_friction", 0.6)
+    assert found.contradicts(frozenset({"extra_mode", "constant_force"}), residual_is_noise=False)
+    assert found.contradicts(frozenset(), residual_is_noise=False)
+    assert not found.contradicts(frozenset({"extra_mode", "coulomb_friction"}), residual_is_noise=False)
+    assert not found.contradicts(frozenset({"extra_mode"}), residual_is_noise=True)
 
 
 def test_where_nothing_sets_the_sets_apart_only_what_was_not_compared_is_named(rig):
-    found = rig.contrast(seed=2)
-    assert found.contradicts(frozenset({"coulomb_friction"}), explained=True)
-    assert not found.contradicts(frozenset({"pose_dependent_inertia"}), explained=True)
-    assert not found.contradicts(frozenset(), explained=False)
+    found = rig.make_contrast(seed=2)
+    assert found.contradicts(frozenset({"coulomb_friction"}), residual_is_noise=True)
+    assert not found.contradicts(frozenset({"pose_dependent_inertia"}), residual_is_noise=True)
+    assert not found.contradicts(frozenset(), residual_is_noise=False)
 
 
 @pytest.mark.slow
@@ -55,9 +55,9 @@ def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_
         raise NothingLearned("they were measured otherwise")
 
     monkeypatch.setattr(learn_model_error, "learn_model_error", teaches_nothing)
-    clean = rig.recording(1)
+    clean = rig.record_rig(1)
     settings = DiagnosisSettings(without=rig.UNDONE, clean=(clean,))
-    faulty = rig.recording(2, "coulomb_friction", 0.6)
+    faulty = rig.record_rig(2, "coulomb_friction", 0.6)
     found = diagnose([faulty], rigid_model([clean], "given"), settings, map, lambda said, share: None)
     assert len(asked) == 2
     assert found.diagnosis.verdict == "unexplained"
@@ -65,5 +65,5 @@ def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_
     assert not found.diagnosis.effects
     assert not {NOT_COMPARED, OUT_OF_TIME} & set(found.remarks)
     assert NOT_COMPARED in add_contrast(found, Contrast(None, None, None, None), faulty, 5.0).remarks
-    part = contrast_of([faulty], [clean], frozenset(), lambda: False)
+    part = find_contrast([faulty], [clean], frozenset(), lambda: False)
     assert OUT_OF_TIME in add_contrast(found, part, faulty, 5.0).remarks

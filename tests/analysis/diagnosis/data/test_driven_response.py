@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analysis.diagnosis.data.driven_response import response_significance
+from analysis.diagnosis.data.driven_response import compute_response_significance
 from analysis.diagnosis.settings import ANSWER_DEVIATIONS
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -12,7 +12,7 @@ from equalizer.signals.signal import Signal
 RATE_HZ = 500.0
 
 
-def recording(command, response) -> Recording:
+def make_recording(command, response) -> Recording:
     names = "xyz"[: command.shape[1]]
     return Recording(
         "bench",
@@ -31,7 +31,7 @@ def test_noise_of_any_colour_answers_nothing(colour, seed):
         "walk": np.cumsum(white, axis=0),
         "narrow": lfilter([1.0], [1.0, -1.8, 0.98], white, axis=0),
     }[colour]
-    sure = response_significance([recording(rng.standard_normal((12_000, 3)), noise)])
+    sure = compute_response_significance([make_recording(rng.standard_normal((12_000, 3)), noise)])
     assert sure is not None and sure < ANSWER_DEVIATIONS
 
 
@@ -39,13 +39,16 @@ def test_one_channel_that_answers_weakly_is_enough():
     rng = np.random.default_rng(1)
     command, response = rng.standard_normal((12_000, 3)), rng.standard_normal((12_000, 3))
     response[:, 1] += 0.3 * command[:, 2]
-    sure = response_significance([recording(command, response)])
+    sure = compute_response_significance([make_recording(command, response)])
     assert sure is not None and sure > 2 * ANSWER_DEVIATIONS
 
 
 def test_a_recording_too_short_for_it_is_not_judged():
     rng = np.random.default_rng(1)
-    assert response_significance([recording(rng.standard_normal((100, 1)), rng.standard_normal((100, 1)))]) is None
+    assert (
+        compute_response_significance([make_recording(rng.standard_normal((100, 1)), rng.standard_normal((100, 1)))])
+        is None
+    )
 
 
 def test_gaps_in_the_response_are_left_out():
@@ -53,7 +56,7 @@ def test_gaps_in_the_response_are_left_out():
     command = rng.standard_normal((12_000, 1))
     response = 2 * command
     response[3000:5000] = np.nan
-    sure = response_significance([recording(command, response)])
+    sure = compute_response_significance([make_recording(command, response)])
     assert sure is not None and sure > ANSWER_DEVIATIONS
 
 
@@ -65,12 +68,12 @@ def test_a_slow_force_beside_friction_below_the_commands_noise_is_no_noise(seed)
     speed = 150 * np.clip(3 * np.sin(2 * np.pi * seconds / 6.3), -1, 1) * (seconds > 0)
     current = 9 * np.sign(speed) + 8 * rng.standard_normal(5000)
     position = np.cumsum(speed)[:, None] / RATE_HZ
-    sure = response_significance([recording(current[:, None], position)])
+    sure = compute_response_significance([make_recording(current[:, None], position)])
     assert sure is None or sure >= ANSWER_DEVIATIONS
 
 
 def test_every_labelled_case_answers_its_commands(shared):
     from study.store.formats.recording_file import read_recording
 
-    sure = response_significance([read_recording(shared / "cases" / "open-05.h5")])
+    sure = compute_response_significance([read_recording(shared / "cases" / "open-05.h5")])
     assert sure is not None and sure > 10 * ANSWER_DEVIATIONS

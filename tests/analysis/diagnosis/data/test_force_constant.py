@@ -10,7 +10,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
 
-def recorded(unit: str = "A", moved: str = "rad") -> Recording:
+def make_recording(unit: str = "A", moved: str = "rad") -> Recording:
     samples = np.arange(8.0)[:, None]
     return Recording(
         "motor",
@@ -20,14 +20,14 @@ def recorded(unit: str = "A", moved: str = "rad") -> Recording:
 
 
 def test_amperes_become_newton_metres():
-    found, said = with_force_constant(recorded(), (0.05,))
+    found, said = with_force_constant(make_recording(), (0.05,))
     assert (found.command.quantity, found.command.unit) == ("torque", "N m")
     assert np.array_equal(found.command.samples[:, 0], 0.05 * np.arange(8.0))
     assert said == "The commands were multiplied by the torque constant that was stated, 0.05 N m per A."
 
 
 def test_the_part_that_was_decided_goes_with_it():
-    given = recorded()
+    given = make_recording()
     found, _ = with_force_constant(replace(given, excitation=given.command), (0.05,))
     assert np.array_equal(found.excitation.samples, found.command.samples)
 
@@ -39,4 +39,4 @@ def test_the_part_that_was_decided_goes_with_it():
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused(unit, moved, constants, said):
     with pytest.raises(NoForceConstant, match=said):
-        with_force_constant(recorded(unit, moved), constants)
+        with_force_constant(make_recording(unit, moved), constants)

@@ -12,7 +12,7 @@ RATE_HZ, LONG = 1000.0, 1000
 LEVELS_N = (0.5, 1.5, 3.0)
 
 
-def three_levels() -> Recording:
+def record_three_levels() -> Recording:
     random = np.random.default_rng(1)
     samples = random.standard_normal((len(LEVELS_N) * LONG, 1))
     segments = tuple(
@@ -27,14 +27,14 @@ def three_levels() -> Recording:
 
 
 def test_the_middle_level_is_chosen_by_and_every_level_is_tested_by():
-    (one,) = observe_parts([three_levels()], 1)
+    (one,) = observe_parts([record_three_levels()], 1)
     assert np.flatnonzero(one.choose)[[0, -1]].tolist() == [LONG, LONG + 3 * LONG // 4 - 1]
     assert [int(one.test[k * LONG : (k + 1) * LONG].sum()) for k in range(3)] == [LONG // 4] * 3
     assert one.fit[:LONG].any() and one.fit[2 * LONG :].any()
 
 
 def test_where_the_middle_level_was_lost_some_of_what_is_left_is_chosen_by():
-    whole = three_levels()
+    whole = record_three_levels()
     lost = whole.response.samples.copy()
     lost[LONG : 2 * LONG] = np.nan
     recording = replace(whole, response=replace(whole.response, samples=lost))

@@ -24,7 +24,7 @@ def recordings(diagnosed):
     return bare, replace(bare, response=response, position=position)
 
 
-def worst(recording, model):
+def largest_error(recording, model):
     """In units of the noise."""
     measure = measure_of([recording], model).measure
     (left,) = measure.residuals(model, ())
@@ -33,9 +33,9 @@ def worst(recording, model):
 
 def test_a_recording_with_a_weight_agrees_with_a_model_that_is_told_of_it(recordings, diagnosed):
     model, (bare, heavy) = diagnosed.device(1), recordings
-    assert worst(bare, model) < 1.2
-    assert worst(heavy, model) > 5.0
-    assert worst(replace(heavy, meta={"added_mass_kg": ADDED_KG}), model) < 1.2
+    assert largest_error(bare, model) < 1.2
+    assert largest_error(heavy, model) > 5.0
+    assert largest_error(replace(heavy, meta={"added_mass_kg": ADDED_KG}), model) < 1.2
 
 
 def test_the_weight_of_one_recording_is_not_that_of_another(recordings, diagnosed):

@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import f as f_distribution
 from scipy.stats import ncf
 
-from analysis.diagnosis.data.spectral_lines import excess, noncentral_f_sf
+from analysis.diagnosis.data.spectral_lines import excess_power, noncentral_f_sf
 
 
 @pytest.mark.parametrize("lines", [2, 20, 200])
@@ -34,12 +34,12 @@ def test_power_beyond_noise_is_recovered_and_noise_alone_is_not_found():
     random = np.random.default_rng(1)
     noise = np.full(400, 2.0)
     alone = 2.0 * random.exponential(size=(300, 400))
-    p_values = np.array([excess(power, noise, 1e6)[2] for power in alone])
+    p_values = np.array([excess_power(power, noise, 1e6)[2] for power in alone])
     assert 0.01 < np.mean(p_values < 0.05) < 0.1
-    power, limit, p_value = excess(alone[0] + 1.0, noise, 1e6)
+    power, limit, p_value = excess_power(alone[0] + 1.0, noise, 1e6)
     assert power == pytest.approx(400, abs=2 * limit)
     assert p_value < 1e-6
 
 
 def test_nothing_is_found_on_no_lines():
-    assert excess(np.empty(0), np.empty(0), 10.0) == (0.0, 0.0, 1.0)
+    assert excess_power(np.empty(0), np.empty(0), 10.0) == (0.0, 0.0, 1.0)

@@ -12,17 +12,17 @@ from analysis.diagnosis.discovery.beam import best_sums
 from analysis.diagnosis.discovery.discover import discover
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
-from analysis.diagnosis.discovery.law_of_sum import law_of_sum, laws_of
-from analysis.diagnosis.discovery.matched_filter import views_of
+from analysis.diagnosis.discovery.law_of_sum import convert_sum_to_law, list_fitted_laws
+from analysis.diagnosis.discovery.matched_filter import build_views
 from analysis.diagnosis.discovery.screen_terms import products_of
 from analysis.diagnosis.discovery.snap_exponents import simplify_powers
 from analysis.diagnosis.discovery.validation import SAME_KIND
 from analysis.diagnosis.discovery.view_terms import view_terms
-from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.result.wording import summary_lines
+from analysis.diagnosis.result.wording import write_summary_lines
 from analysis.diagnosis.search.verdict import SearchResult, judge
-from analysis.diagnosis.search_by_simulation import has_law
+from analysis.diagnosis.search_by_simulation import names_discovered_law
 from analysis.diagnosis.settings import LAW_PLACEBO
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.laws.evaluate import evaluate
@@ -32,7 +32,7 @@ from tests.lawful import PLAN, arena_of, law, recorded
 DRAG = law("-p0*abs(vx)**1.5*sign(vx)", 3.0)
 
 
-def quiet(said, share):
+def ignore_progress(said, share):
     pass
 
 
@@ -40,10 +40,10 @@ def always():
     return True
 
 
-def found_in(recording):
+def discover_laws(recording):
     context, known = arena_of(recording)
-    found = discover(context, known, quiet, always)
-    return None if found is None else laws_of(found.found.after.fitted.hypothesis)
+    found = discover(context, known, ignore_progress, always)
+    return None if found is None else list_fitted_laws(found.explanation.after.fitted.hypothesis)
 
 
 @pytest.mark.parametrize("seed", [1])
@@ -59,7 +59,7 @@ def found_in(recording):
     ],
 )
 def test_a_law_is_found_with_its_numbers(true, shape, seed):
-    laws = found_in(recorded((true,), seed))
+    laws = discover_laws(recorded((true,), seed))
     assert laws is not None
     assert laws[0].expression == shape
     sign = -1.0 if true.expression.startswith("-") else 1.0
@@ -70,7 +70,7 @@ def test_a_law_is_found_with_its_numbers(true, shape, seed):
 def test_an_attraction_is_found_where_the_axis_was(seed=5):
     """Its place and exponent are hardly known apart; its force is, within 5 %."""
     recording = recorded((law("p0*(1/abs(p1 - x)**2 - 1/p1**2)", 5e-4, 0.07),), seed)
-    laws = found_in(recording)
+    laws = discover_laws(recording)
     assert laws is not None
     x = recording.position.samples[:, 0]
     true = 5e-4 * ((0.07 - x) ** -2 - 0.07**-2)
@@ -83,35 +83,35 @@ def test_an_attraction_is_found_where_the_axis_was(seed=5):
 
 @pytest.mark.parametrize("seed", [3, 4])
 def test_nothing_is_found_where_nothing_is_missing(seed):
-    assert found_in(recorded((), seed)) is None
+    assert discover_laws(recorded((), seed)) is None
 
 
 @pytest.mark.slow
 def test_ten_times_the_noise_leaves_the_law(seed=6):
-    laws = found_in(recorded((DRAG,), seed, noise=10.0))
+    laws = discover_laws(recorded((DRAG,), seed, noise=10.0))
     assert laws is not None
     assert "vx" in laws[0].variables
 
 
-def joined(recording):
+def search_any_law(recording):
     context, known = arena_of(recording)
-    return LawSearch(quiet, always).add_any(SearchResult(context, known, judge(known)))
+    return LawSearch(ignore_progress, always).add_any(SearchResult(context, known, judge(known)))
 
 
 def test_a_proved_law_explains(seed=7):
-    seen = joined(recorded((DRAG,), seed))
+    seen = search_any_law(recorded((DRAG,), seed))
     assert seen.judgement.verdict == "explained"
     assert [claim.effect.name for claim in seen.found.after.fitted.hypothesis.claims] == ["discovered_law"]
-    assert has_law(seen)
+    assert names_discovered_law(seen)
     assert "stronger commands and another kind of command" in seen.remarks[0]
     assert "Beyond vx = ±" in seen.remarks[0]
 
 
 def test_without_a_test_of_another_kind_a_law_is_a_candidate(seed=8):
     plan = (*PLAN[:3], ("multisine", 1.5, "test"))
-    seen = joined(recorded((DRAG,), seed, plan=plan))
+    seen = search_any_law(recorded((DRAG,), seed, plan=plan))
     assert not seen.judgement.named
-    law = laws_of(seen.unconfirmed[0].hypothesis)[0]
+    law = list_fitted_laws(seen.unconfirmed[0].hypothesis)[0]
     assert law is not None
     assert "abs(vx)**1.5" in law.expression
     assert SAME_KIND in seen.unconfirmed[0].why_not
@@ -121,12 +121,12 @@ def test_without_a_test_of_another_kind_a_law_is_a_candidate(seed=8):
 def test_a_shuffled_force_holds_no_law(seed=9):
     context, known = arena_of(recorded((DRAG,), seed))
     fitted = known.retuned.fitted
-    view = views_of(
-        context.measure, context.tuning, evaluate_fit(context.measure, context.tuning, fitted.deviations, NOTHING)
+    view = build_views(
+        context.measure, context.tuning, evaluate_fit(context.measure, context.tuning, fitted.deviations, NO_EFFECTS)
     )[0]
     found = best_sums(products_of(view), view_terms(view), always)
     best = found.sums[0]
-    assert best.cross_validated / best.without < LAW_PLACEBO * (1 - found.placebo)
+    assert best.cross_validated / best.base_error < LAW_PLACEBO * (1 - found.placebo)
     assert any("vx" not in each.variables for each in found.sums)  # the grammar without it was asked
 
 
@@ -135,7 +135,7 @@ def test_axes_are_called_as_the_recording_does():
     recording = recorded((), 3)
     named = replace(recording, command=replace(recording.command, channels=("fy",)))
     drag = Sum(0, (Term("abs(vx)*x*fx"),), (-2.0,), 1.0, 9.0, 0.0, ())
-    law = law_of_sum(drag, named)
+    law = convert_sum_to_law(drag, named)
     assert (law.axis, law.variables) == ("y", ("fy", "vy", "y"))
 
 
@@ -161,10 +161,10 @@ def test_a_diagnosis_says_the_law(seed=10):
     """The catalogue's own law is struck out: its formula is found."""
     recording = recorded((law("-p0*vx*abs(vx)", 5.0),), seed)
     without = tuple(effect.name for effect in CATALOGUE if effect.name not in ("amplifier_lag", "sensor_lag"))
-    found = diagnose([recording], device(1), DiagnosisSettings(without=without, discovery=True), map, quiet)
+    found = diagnose([recording], device(1), DiagnosisSettings(without=without, discovery=True), map, ignore_progress)
     law_found = found.diagnosis.effects[0].law
     assert found.diagnosis.verdict == "explained"
     assert law_found is not None
     assert law_found.variables == ("vx",)
     assert found.diagnosis.effects[0].parameters["p0"].value == pytest.approx(-5.0, rel=0.02)
-    assert f"F = {law_found.expression} N" in " ".join(summary_lines(found))
+    assert f"F = {law_found.expression} N" in " ".join(write_summary_lines(found))

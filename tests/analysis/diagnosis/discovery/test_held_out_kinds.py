@@ -10,7 +10,7 @@ from equalizer.signals.signal import Signal
 SAMPLES = 1000
 
 
-def said(*segments: tuple[str, float, tuple[int, ...], str]) -> tuple[str, ...]:
+def describe_held_out(*segments: tuple[str, float, tuple[int, ...], str]) -> tuple[str, ...]:
     """Of a recording of equal segments: (kind, peak, driven axes, role)."""
     random = np.random.default_rng(1)
     command = np.zeros((SAMPLES * len(segments), 2))
@@ -25,20 +25,20 @@ def said(*segments: tuple[str, float, tuple[int, ...], str]) -> tuple[str, ...]:
 
 
 def test_ends_of_the_same_segments_are_no_other_kind():
-    assert said(("multisine", 1.0, (0,), ""), ("multisine", 2.0, (0,), "")) == ()
-    assert said(("multisine", 1.0, (0,), "")) == ()
+    assert describe_held_out(("multisine", 1.0, (0,), ""), ("multisine", 2.0, (0,), "")) == ()
+    assert describe_held_out(("multisine", 1.0, (0,), "")) == ()
 
 
 def test_rest_tells_nothing():
-    assert said(("rest", 0.0, (), ""), ("multisine", 1.0, (0,), ""), ("multisine", 2.0, (0,), "")) == ()
+    assert describe_held_out(("rest", 0.0, (), ""), ("multisine", 1.0, (0,), ""), ("multisine", 2.0, (0,), "")) == ()
 
 
 def test_louder_joint_and_other_commands_are_reported():
     fitted = ("multisine", 1.0, (0,), "fit"), ("multisine", 1.0, (1,), "fit")
-    assert said(*fitted, ("multisine", 3.0, (0,), "test")) == ("stronger commands",)
-    assert "axes driven together" in said(*fitted, ("multisine", 0.9, (0, 1), "test"))
-    assert "another kind of command" in said(*fitted, ("sweep", 0.9, (0,), "test"))
+    assert describe_held_out(*fitted, ("multisine", 3.0, (0,), "test")) == ("stronger commands",)
+    assert "axes driven together" in describe_held_out(*fitted, ("multisine", 0.9, (0, 1), "test"))
+    assert "another kind of command" in describe_held_out(*fitted, ("sweep", 0.9, (0,), "test"))
 
 
 def test_without_anything_to_fit_nothing_is_reported():
-    assert said(("sweep", 1.0, (0,), "test")) == ()
+    assert describe_held_out(("sweep", 1.0, (0,), "test")) == ()

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.discovery.add_laws import LawSearch, may_stand_for_a_law, weigh_laws
+from analysis.diagnosis.discovery.add_laws import LawSearch, check_laws, may_approximate_law
 from analysis.diagnosis.discovery.discover import discover
-from analysis.diagnosis.discovery.law_of_sum import laws_of
-from analysis.diagnosis.discovery.validation import does_as_well_with_less
+from analysis.diagnosis.discovery.law_of_sum import list_fitted_laws
+from analysis.diagnosis.discovery.validation import is_shorter_and_as_good
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
@@ -20,7 +20,7 @@ from tests.lawful import arena_of, law, recorded
 CUBIC = 4e4
 
 
-def quiet(said, share):
+def ignore_progress(said, share):
     pass
 
 
@@ -28,16 +28,16 @@ def always():
     return True
 
 
-def claim(name, **values):
+def make_hypothesis(name, **values):
     return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 @pytest.fixture(scope="module")
-def hardened():
+def hardening_context():
     return arena_of(recorded((law("-p0*x**3", CUBIC),), 3))
 
 
-def named(of, *claims, fitted=True):
+def make_named_search(of, *claims, fitted=True):
     """As if the search had named these."""
     context, known = of
     whole = None
@@ -48,81 +48,92 @@ def named(of, *claims, fitted=True):
     return replace(known, after=context.with_test_score(step), steps=(step,), rounds=((step,),))
 
 
-def travelled(of):
+def largest_travel(of):
     return max(float(np.ptp(record.recording.position.samples)) for record in of[0].whole.records)
 
 
 @pytest.fixture(scope="module")
-def rippled(hardened):
+def rippled_search(hardening_context):
     """A ripple of little more than one pitch in the place of a cube."""
-    pitch = 0.9 * travelled(hardened)
-    return named(hardened, claim("cogging", amplitude=0.2, pitch=pitch, phase=0.0))
+    pitch = 0.9 * largest_travel(hardening_context)
+    return make_named_search(hardening_context, make_hypothesis("cogging", amplitude=0.2, pitch=pitch, phase=0.0))
 
 
-def test_a_ripple_that_is_not_seen_twice_may_be_another_curve(hardened, rippled):
-    assert may_stand_for_a_law(hardened[0], rippled)
-    short = named(hardened, claim("cogging", amplitude=0.2, pitch=travelled(hardened) / 8, phase=0.0), fitted=False)
-    assert not may_stand_for_a_law(hardened[0], short)
+def test_a_ripple_that_is_not_seen_twice_may_be_another_curve(hardening_context, rippled_search):
+    assert may_approximate_law(hardening_context[0], rippled_search)
+    short = make_named_search(
+        hardening_context,
+        make_hypothesis("cogging", amplitude=0.2, pitch=largest_travel(hardening_context) / 8, phase=0.0),
+        fitted=False,
+    )
+    assert not may_approximate_law(hardening_context[0], short)
 
 
-def test_several_forces_on_one_axis_may_be_one_law_and_a_force_and_a_sensor_may_not(hardened):
-    cube, drag = claim("hardening_stiffness", k3=CUBIC), claim("quadratic_damping", coefficient=0.1)
-    assert may_stand_for_a_law(hardened[0], named(hardened, cube, drag))
-    assert not may_stand_for_a_law(hardened[0], named(hardened, cube))
-    assert not may_stand_for_a_law(hardened[0], named(hardened, cube, claim("sensor_gain", gain=1.01)))
-
-
-@pytest.mark.slow
-def test_an_exponent_that_was_rounded_counts_as_a_number(hardened):
-    context, _ = hardened
-    cube, drag = claim("hardening_stiffness", k3=CUBIC), claim("quadratic_damping", coefficient=0.1)
-    two = named(hardened, cube, drag)
-    found = discover(context, two, quiet, always, 1)
-    assert len(found.found.after.fitted.hypothesis.parameters) < len(two.after.fitted.hypothesis.parameters) == 2
-    assert not does_as_well_with_less(context, found, two.after)
+def test_several_forces_on_one_axis_may_be_one_law_and_a_force_and_a_sensor_may_not(hardening_context):
+    cube, drag = make_hypothesis("hardening_stiffness", k3=CUBIC), make_hypothesis("quadratic_damping", coefficient=0.1)
+    assert may_approximate_law(hardening_context[0], make_named_search(hardening_context, cube, drag))
+    assert not may_approximate_law(hardening_context[0], make_named_search(hardening_context, cube))
+    assert not may_approximate_law(
+        hardening_context[0], make_named_search(hardening_context, cube, make_hypothesis("sensor_gain", gain=1.01))
+    )
 
 
 @pytest.mark.slow
-def test_the_shorter_law_takes_the_place_of_names_that_fit(hardened):
-    context, _ = hardened
-    cube, stop = claim("hardening_stiffness", k3=CUBIC), claim("end_stop", position=1.0, stiffness=1e3, opposite=1.0)
-    names = named(hardened, cube, stop)
+def test_an_exponent_that_was_rounded_counts_as_a_number(hardening_context):
+    context, _ = hardening_context
+    cube, drag = make_hypothesis("hardening_stiffness", k3=CUBIC), make_hypothesis("quadratic_damping", coefficient=0.1)
+    two = make_named_search(hardening_context, cube, drag)
+    found = discover(context, two, ignore_progress, always, 1)
+    assert len(found.explanation.after.fitted.hypothesis.parameters) < len(two.after.fitted.hypothesis.parameters) == 2
+    assert not is_shorter_and_as_good(context, found, two.after)
+
+
+@pytest.mark.slow
+def test_the_shorter_law_takes_the_place_of_names_that_fit(hardening_context):
+    context, _ = hardening_context
+    cube, stop = (
+        make_hypothesis("hardening_stiffness", k3=CUBIC),
+        make_hypothesis("end_stop", position=1.0, stiffness=1e3, opposite=1.0),
+    )
+    names = make_named_search(hardening_context, cube, stop)
     assert judge(names).verdict == "explained"
-    said = LawSearch(quiet, always).add_any(SearchResult(context, names, judge(names)))
-    (found,) = laws_of(said.found.after.fitted.hypothesis)
+    said = LawSearch(ignore_progress, always).add_any(SearchResult(context, names, judge(names)))
+    (found,) = list_fitted_laws(said.found.after.fitted.hypothesis)
     assert found.expression.endswith("x**3")
     assert found.numbers[0] == pytest.approx(-CUBIC, rel=0.02)
     assert said.judgement.verdict == "explained"
 
 
-def test_a_name_that_is_as_short_stays(hardened):
-    context, _ = hardened
-    cube = named(hardened, claim("hardening_stiffness", k3=CUBIC))
+def test_a_name_that_is_as_short_stays(hardening_context):
+    context, _ = hardening_context
+    cube = make_named_search(hardening_context, make_hypothesis("hardening_stiffness", k3=CUBIC))
     result = SearchResult(context, cube, judge(cube))
-    assert LawSearch(quiet, always).add_any(result) is result
-    found = discover(context, cube, quiet, always, 1)
-    assert not does_as_well_with_less(context, found, cube.after)
+    assert LawSearch(ignore_progress, always).add_any(result) is result
+    found = discover(context, cube, ignore_progress, always, 1)
+    assert not is_shorter_and_as_good(context, found, cube.after)
 
 
 @pytest.mark.slow
-def test_a_law_whose_rivals_were_not_fitted_is_a_candidate(hardened):
-    context, _ = hardened
-    names = named(hardened, claim("quadratic_damping", coefficient=0.1))
-    found = discover(context, names, quiet, always)
+def test_a_law_whose_rivals_were_not_fitted_is_a_candidate(hardening_context):
+    context, _ = hardening_context
+    names = make_named_search(hardening_context, make_hypothesis("quadratic_damping", coefficient=0.1))
+    found = discover(context, names, ignore_progress, always)
     begun = replace(found, rounds=tuple(replace(each, complete=False) for each in found.rounds))
     for discovery, is_named in ((found, True), (begun, False)):
-        said = weigh_laws(SearchResult(context, names, judge(names)), discovery, always)
-        assert any(law is not None for law in laws_of(said.found.after.fitted.hypothesis)) == is_named
+        said = check_laws(SearchResult(context, names, judge(names)), discovery, always)
+        assert any(law is not None for law in list_fitted_laws(said.found.after.fitted.hypothesis)) == is_named
     assert any("time ended" in each.why_not for each in said.unconfirmed)
 
 
 @pytest.mark.slow
-def test_a_search_whose_time_ends_within_a_fit_keeps_what_it_has(hardened):
-    context, known = hardened
-    kept = [discover(context, known, quiet, CountedBudget(questions)) for questions in (1, 50, 80, 160, 100_000)]
+def test_a_search_whose_time_ends_within_a_fit_keeps_what_it_has(hardening_context):
+    context, known = hardening_context
+    kept = [
+        discover(context, known, ignore_progress, CountedBudget(questions)) for questions in (1, 50, 80, 160, 100_000)
+    ]
     assert kept[0] is None
     assert all(each.complete for each in kept[-1].rounds)
     cut = [found for found in kept[1:-1] if found is not None]
     assert cut
     assert any(not each.rounds[-1].complete for each in cut)
-    assert all(each.found.after.fitted.cost < known.retuned.fitted.cost for each in cut)
+    assert all(each.explanation.after.fitted.cost < known.retuned.fitted.cost for each in cut)

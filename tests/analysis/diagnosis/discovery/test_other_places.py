@@ -7,21 +7,21 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.discovery.antisymmetric_pairs import (
-    antisymmetric_pairs,
-    as_pair,
-    is_taken_by_coupling,
-    with_equal_halves,
+    can_coupling_imitate,
+    convert_to_pair,
+    find_antisymmetric_pairs,
+    make_antisymmetric,
 )
 from analysis.diagnosis.discovery.discover import discover
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
-from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum, law_of_sum, laws_of
-from analysis.diagnosis.discovery.matched_filter import views_of
+from analysis.diagnosis.discovery.law_of_sum import convert_sum_to_hypothesis, convert_sum_to_law, list_fitted_laws
+from analysis.diagnosis.discovery.matched_filter import build_views
 from analysis.diagnosis.discovery.view_terms import terms_of_readings
-from analysis.diagnosis.document import Candidate, diagnosis_from_json, found_law
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
+from analysis.diagnosis.document import Candidate, diagnosis_from_json, make_found_law
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.result.candidates import beside_given
+from analysis.diagnosis.result.candidates import add_balances_to_search
 from equalizer.effects.discovered_law import Channels, law_effect, law_parameters, law_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.laws.law import Law
@@ -31,7 +31,7 @@ from tests.diagnosed import recorded as recorded_on_axes
 from tests.lawful import arena_of, law, recorded
 
 
-def quiet(said, share):
+def ignore_progress(said, share):
     pass
 
 
@@ -39,16 +39,16 @@ def test_a_force_that_grows_with_time_is_no_coupling_of_axes():
     drift = Law("p0*t", (0.1,), (), "force", "x")
     claim = Claim(law_effect(drift), "one", (0,))
     fitted = SimpleNamespace(hypothesis=hypothesis_of_claim(claim, [law_values(drift)]))
-    assert not is_taken_by_coupling(None, fitted, ("fx", "fy"))
+    assert not can_coupling_imitate(None, fitted, ("fx", "fy"))
 
 
 def always():
     return True
 
 
-def found_in(recording, model=None):
+def discover_laws(recording, model=None):
     context, known = arena_of(recording, model)
-    return context, discover(context, known, quiet, always)
+    return context, discover(context, known, ignore_progress, always)
 
 
 @pytest.mark.parametrize("seed", [1])
@@ -62,16 +62,16 @@ def found_in(recording, model=None):
     ],
 )
 def test_laws_of_commands_and_readings_are_found_where_they_act(true, shape, seed):
-    _, found = found_in(recorded((true,), seed))
+    _, found = discover_laws(recorded((true,), seed))
     assert found is not None
-    said = laws_of(found.found.after.fitted.hypothesis)
+    said = list_fitted_laws(found.explanation.after.fitted.hypothesis)
     assert len(said) == 1
     assert said[0] is not None
     assert (said[0].acts_on, said[0].expression) == (true.acts_on, shape)
     assert said[0].numbers[-1] == pytest.approx(true.numbers[0], rel=0.05)
 
 
-def whirl(size, sign=-1.0):
+def whirl_forces(size, sign=-1.0):
     """Forces of each axis on the other: antisymmetric, or by `sign` 1 symmetric."""
     channels = Channels(("fx", "fy"), ("ax", "ay"))
     laws = (Law("p0*vy", (size,), (), "force", "x"), Law("p0*vx", (sign * size,), (), "force", "y"))
@@ -80,78 +80,82 @@ def whirl(size, sign=-1.0):
 
 @pytest.mark.slow
 def test_a_gyroscopic_pair_is_one_law_of_two_axes(seed=4):
-    _, found = found_in(recorded_on_axes(2, whirl(0.6), seed), device(2))
+    _, found = discover_laws(recorded_on_axes(2, whirl_forces(0.6), seed), device(2))
     assert found is not None
-    laws = laws_of(found.found.after.fitted.hypothesis)
+    laws = list_fitted_laws(found.explanation.after.fitted.hypothesis)
     assert [each and each.expression for each in laws] == ["p0*vy", "p0*vx"]
     assert [each.numbers[0] for each in laws if each is not None] == pytest.approx([0.6, -0.6], rel=0.02)
-    assert len(found.found.rounds) == len(found.found.steps) == 2
+    assert len(found.explanation.rounds) == len(found.explanation.steps) == 2
 
 
 def test_a_pair_has_equal_halves_and_is_told_from_one_force_only_by_the_calibration(seed=4):
-    recording = recorded_on_axes(2, whirl(0.6), seed)
+    recording = recorded_on_axes(2, whirl_forces(0.6), seed)
     context, known = arena_of(recording, device(2))
     measure, tuning = context.measure, context.tuning
-    fitted = evaluate_fit(measure, tuning, known.retuned.fitted.deviations, NOTHING)
-    pairs = list(antisymmetric_pairs(views_of(measure, tuning, fitted)))
+    fitted = evaluate_fit(measure, tuning, known.retuned.fitted.deviations, NO_EFFECTS)
+    pairs = list(find_antisymmetric_pairs(build_views(measure, tuning, fitted)))
     pair = min(pairs, key=lambda each: each.cross_validated)
     assert pair.variables == ("vx", "vy")
-    assert pair.cross_validated - 1 < 0.1 * (pair.without - 1)
+    assert pair.cross_validated - 1 < 0.1 * (pair.base_error - 1)
     uneven = replace(pair, factors=(0.7,), partner=replace(pair.partner, factors=(-0.5,)))
-    begun = evaluate_fit(measure, tuning, fitted.deviations, hypothesis_of_sum(uneven, recording))
-    even = with_equal_halves(measure, tuning, begun)
-    assert [each.numbers[0] for each in laws_of(even.hypothesis) if each is not None] == pytest.approx([0.6, -0.6])
+    begun = evaluate_fit(measure, tuning, fitted.deviations, convert_sum_to_hypothesis(uneven, recording))
+    even = make_antisymmetric(measure, tuning, begun)
+    assert [each.numbers[0] for each in list_fitted_laws(even.hypothesis) if each is not None] == pytest.approx(
+        [0.6, -0.6]
+    )
     apart = even.residuals[0] - begun.residuals[0]
     assert np.sqrt(np.mean(apart**2)) < 1e-3 * np.sqrt(np.mean((fitted.residuals[0] - begun.residuals[0]) ** 2))
     single = replace(pair, factors=(1.2,), partner=None)
-    one = evaluate_fit(measure, tuning, fitted.deviations, hypothesis_of_sum(single, recording))
-    assert as_pair(measure, tuning, (one, single), pair) is None  # the coupled parameter cannot take 0.6 N s/m
+    one = evaluate_fit(measure, tuning, fitted.deviations, convert_sum_to_hypothesis(single, recording))
+    assert convert_to_pair(measure, tuning, (one, single), pair) is None  # the coupled parameter cannot take 0.6 N s/m
     inputs = recording.command.channels
-    assert not is_taken_by_coupling(tuning, even, inputs)
+    assert not can_coupling_imitate(tuning, even, inputs)
     loose = replace(tuning, deviation=100 * tuning.deviation)
-    assert is_taken_by_coupling(loose, even, inputs)
+    assert can_coupling_imitate(loose, even, inputs)
 
 
 def test_one_force_is_a_pair_of_half_its_size_beside_the_models_coupling(seed=4):
-    recording = recorded_on_axes(2, whirl(0.6), seed)
+    recording = recorded_on_axes(2, whirl_forces(0.6), seed)
     context, known = arena_of(recording, replace(device(2), tolerance=Tolerance(0.0003, 0.3, 0.8, 0.01)))
     measure, tuning = context.measure, context.tuning
     pair = Sum(0, (Term("vy"),), (0.6,), 1.0, 9.0, 0.0, (), partner=Sum(1, (Term("vx"),), (-0.6,), 1.0, 9.0, 0.0, ()))
     single = replace(pair, factors=(1.2,), partner=None)
     deviations = np.zeros(len(tuning.names))
-    one = evaluate_fit(measure, tuning, deviations, hypothesis_of_sum(single, recording))
-    found = as_pair(measure, tuning, (one, single), pair)
+    one = evaluate_fit(measure, tuning, deviations, convert_sum_to_hypothesis(single, recording))
+    found = convert_to_pair(measure, tuning, (one, single), pair)
     assert found is not None
-    assert [each.numbers[0] for each in laws_of(found.hypothesis) if each is not None] == pytest.approx([0.6, -0.6])
+    assert [each.numbers[0] for each in list_fitted_laws(found.hypothesis) if each is not None] == pytest.approx(
+        [0.6, -0.6]
+    )
     assert found.deviations[tuning.names.index("damping fx fy")] == pytest.approx(-0.6 / 0.3)
     spread = np.std(one.residuals[0] - known.retuned.fitted.residuals[0][: len(one.residuals[0])])
     assert np.std(found.residuals[0] - one.residuals[0]) < 1e-3 * spread
 
 
 def test_one_force_alone_may_always_be_half_the_models_own(seed=4):
-    recording = recorded_on_axes(2, whirl(0.6)[:1], seed)
+    recording = recorded_on_axes(2, whirl_forces(0.6)[:1], seed)
     context, known = arena_of(recording, device(2))
-    alone = hypothesis_of_sum(Sum(0, (Term("vy"),), (0.6,), 1.0, 9.0, 0.0, ()), recording)
+    alone = convert_sum_to_hypothesis(Sum(0, (Term("vy"),), (0.6,), 1.0, 9.0, 0.0, ()), recording)
     fitted = evaluate_fit(context.measure, context.tuning, known.retuned.fitted.deviations, alone)
-    assert is_taken_by_coupling(context.tuning, fitted, recording.command.channels)
+    assert can_coupling_imitate(context.tuning, fitted, recording.command.channels)
 
 
 def test_a_coupled_damper_is_no_pair(seed=4):
     """Both axes push each other alike: a parameter of the model, whose tolerance allows it."""
     model = replace(device(2), tolerance=Tolerance(0.0003, 0.3, 0.8, 0.01))
-    assert found_in(recorded_on_axes(2, whirl(0.6, sign=1.0), seed), model)[1] is None
+    assert discover_laws(recorded_on_axes(2, whirl_forces(0.6, sign=1.0), seed), model)[1] is None
 
 
 def test_a_force_of_commands_alone_is_a_law_of_the_command():
     def law_with(shape, acts_on="force"):
-        return law_of_sum(Sum(0, (Term(shape),), (2.0,), 1.0, 9.0, 0.0, (), acts_on), recording)
+        return convert_sum_to_law(Sum(0, (Term(shape),), (2.0,), 1.0, 9.0, 0.0, (), acts_on), recording)
 
     recording = recorded((), 3)
     assert (law_with("fx**2").acts_on, law_with("fx**2").expression) == ("command", "fx + p0*fx**2")
     assert law_with("fx*lag(fx**2, 2)").acts_on == "force"
     assert law_with("fx*x").acts_on == "force"
     velocity = replace(recording, response=replace(recording.response, quantity="velocity", channels=("vx",)))
-    read = law_of_sum(Sum(0, (Term("ax**2"),), (2.0,), 1.0, 9.0, 0.0, (), "response"), velocity)
+    read = convert_sum_to_law(Sum(0, (Term("ax**2"),), (2.0,), 1.0, 9.0, 0.0, (), "response"), velocity)
     assert (read.expression, read.axis) == ("vx + p0*vx**2", "x")
 
 
@@ -176,7 +180,7 @@ def test_candidates_keep_both_laws_of_a_pair():
         {"verdict": "unexplained", "mismatch": [mismatch], "effects": [], "retuned": {}, "remainder": [],
          "fit": {"fit": errors, "test": errors}, "error": "free simulation", "next_experiment": None}
     )  # fmt: skip
-    pair = [found_law(each) for each in (law("p0*vy", 0.6), replace(law("p0*vx", -0.6), axis="y"))]
+    pair = [make_found_law(each) for each in (law("p0*vy", 0.6), replace(law("p0*vx", -0.6), axis="y"))]
     said = [Candidate("discovered_law", "mechanism", each.axis, {}, 0.5, 0.5, "no", law=each) for each in pair]
     again = (*said, said[0])
-    assert beside_given(nothing_named, (), again, ("fx", "fy")).candidates == tuple(said)
+    assert add_balances_to_search(nothing_named, (), again, ("fx", "fy")).candidates == tuple(said)

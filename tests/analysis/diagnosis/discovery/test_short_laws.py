@@ -5,13 +5,13 @@ from dataclasses import replace
 import pytest
 
 import analysis.diagnosis.discovery.discover as discover_module
-from analysis.diagnosis.discovery.add_laws import LawSearch, is_short
+from analysis.diagnosis.discovery.add_laws import LawSearch, is_short_description
 from analysis.diagnosis.discovery.discover import Discovery, Round
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
-from analysis.diagnosis.discovery.law_of_sum import laws_of
+from analysis.diagnosis.discovery.law_of_sum import list_fitted_laws
 from analysis.diagnosis.search.guard import Guard
-from analysis.diagnosis.search.search import Beyond, search_effects
+from analysis.diagnosis.search.search import FurtherSearches, search_effects
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import Judgement, SearchResult, judge
 from analysis.diagnosis.settings import LAW_ALONE_LEAVES
@@ -27,38 +27,38 @@ def always():
     return True
 
 
-def searched(recording, with_laws=True):
+def search_laws(recording, with_laws=True):
     said: list[str] = []
 
     def progress(what, share):
         said.append(what)
 
     laws = LawSearch(progress, always)
-    beyond = Beyond(laws.add_short, at_end=laws.add_any) if with_laws else Beyond()
+    beyond = FurtherSearches(laws.add_short, at_end=laws.add_any) if with_laws else FurtherSearches()
     result = search_effects(arena_of(recording)[0], CATALOGUE, progress, always, beyond)
     return result, said
 
 
-def names_of(result):
+def effect_names(result):
     return {claim.effect.name for claim in result.found.after.fitted.hypothesis.claims}
 
 
 @pytest.mark.slow
 def test_a_law_that_explains_ends_the_search_before_a_second_effect(seed=11):
-    result, said = searched(recorded((DRAG_15,), seed))
+    result, said = search_laws(recorded((DRAG_15,), seed))
     assert result.judgement.verdict == "explained"
-    (found,) = laws_of(result.found.after.fitted.hypothesis)
+    (found,) = list_fitted_laws(result.found.after.fitted.hypothesis)
     assert "abs(vx)**1.5" in found.expression
     assert "looking for the first effect" in said
     assert "looking for the second effect" not in said
-    assert "looking for the second effect" in searched(recorded((DRAG_15,), seed), with_laws=False)[1]
+    assert "looking for the second effect" in search_laws(recorded((DRAG_15,), seed), with_laws=False)[1]
 
 
 @pytest.mark.slow
 def test_two_effects_keep_their_names(seed=12):
     """Laws are asked for before the second; a sum of both terms would be no shorter."""
-    result, said = searched(recorded((CUBE, DRAG_2), seed))
-    assert names_of(result) == {"hardening_stiffness", "quadratic_damping"}
+    result, said = search_laws(recorded((CUBE, DRAG_2), seed))
+    assert effect_names(result) == {"hardening_stiffness", "quadratic_damping"}
     assert result.judgement.verdict == "explained"
     assert "looking for a law outside the catalogue" in said
 
@@ -66,8 +66,8 @@ def test_two_effects_keep_their_names(seed=12):
 @pytest.mark.parametrize("seed", [pytest.param(13, marks=pytest.mark.slow), 20])
 def test_an_effect_that_fits_keeps_its_name(seed):
     """Of seed 13 the held-out samples leave enough to look for a law: it is the same formula, and no better."""
-    result, said = searched(recorded((CUBE,), seed))
-    assert names_of(result) == {"hardening_stiffness"}
+    result, said = search_laws(recorded((CUBE,), seed))
+    assert effect_names(result) == {"hardening_stiffness"}
     assert result.judgement.verdict == "explained"
     assert ("looking for a law outside the catalogue" in said) == (seed == 13)
 
@@ -79,7 +79,7 @@ def test_the_same_samples_are_searched_for_laws_once(seed=14):
     laws = LawSearch(lambda what, share: said.append(what), always)
     once, again = (laws.add_any(SearchResult(context, known, judge(known))) for _ in range(2))
     assert said.count("looking for a law outside the catalogue") == 1
-    assert laws_of(once.found.after.fitted.hypothesis) == laws_of(again.found.after.fitted.hypothesis)
+    assert list_fitted_laws(once.found.after.fitted.hypothesis) == list_fitted_laws(again.found.after.fitted.hypothesis)
 
 
 @pytest.mark.parametrize("hears", [True, pytest.param(False, marks=pytest.mark.slow)])
@@ -94,8 +94,8 @@ def test_out_of_time_over_a_pair_the_law_that_leaves_a_part_is_kept(hears, seed=
         named = Judgement("partly_explained", True)
         return SearchResult(context, found.found, named) if hears else result
 
-    result = search_effects(context, CATALOGUE, lambda what, share: None, lambda: not asked, Beyond(short))
-    assert ("discovered_law" in names_of(result)) == hears
+    result = search_effects(context, CATALOGUE, lambda what, share: None, lambda: not asked, FurtherSearches(short))
+    assert ("discovered_law" in effect_names(result)) == hears
     assert OUT_OF_TIME in result.remarks
 
 
@@ -107,8 +107,8 @@ def test_a_law_that_leaves_a_part_gives_way_to_names_that_explain(seed=12):
     def short(result):
         return replace(result, judgement=Judgement("partly_explained", True))
 
-    result = search_effects(context, CATALOGUE, lambda what, share: None, always, Beyond(short))
-    assert names_of(result) == {"hardening_stiffness", "quadratic_damping"}
+    result = search_effects(context, CATALOGUE, lambda what, share: None, always, FurtherSearches(short))
+    assert effect_names(result) == {"hardening_stiffness", "quadratic_damping"}
 
 
 @pytest.mark.slow
@@ -133,15 +133,15 @@ def test_a_screen_that_leaves_too_much_costs_no_fit(monkeypatch, leaves, begun, 
     monkeypatch.setattr(discover_module, "LAW_ALONE_LEAVES", leaves)
     monkeypatch.setattr(discover_module, "fit_sums", fit_sums)
     context, known = arena_of(recorded((CUBE, DRAG_2), seed))
-    assert discover_module.discover(context, known, lambda what, share: None, always, alone=True) is None
+    assert discover_module.discover(context, known, lambda what, share: None, always, single_term=True) is None
     assert bool(fits) == begun
 
 
-def of_sums(*sums):
+def make_discovery(*sums):
     return Discovery(None, tuple(Round((), (each,), 0.0) for each in sums))
 
 
-def sum_of(axis, *shapes, partner=None):
+def make_sum(axis, *shapes, partner=None):
     terms = tuple(Term(shape) for shape in shapes)
     return Sum(axis, terms, (1.0,) * len(terms), 1.0, 9.0, 0.0, (), partner=partner)
 
@@ -149,17 +149,17 @@ def sum_of(axis, *shapes, partner=None):
 @pytest.mark.parametrize(
     ("sums", "short"),
     [
-        ((sum_of(0, "abs(vx)*vx"),), True),
-        ((sum_of(0, "abs(vx)*vx", "x**3"),), False),
-        ((sum_of(0, "sqrt(vx**2 + vy**2)*vx"), sum_of(1, "sqrt(vx**2 + vy**2)*vy")), True),
-        ((sum_of(0, "abs(vx)*vx"), sum_of(1, "abs(vy)*vy")), False),
-        ((sum_of(0, "vx*sin(t)"), sum_of(1, "vy*sin(t)")), False),
-        ((sum_of(0, "vy", partner=sum_of(1, "vx")),), True),
-        ((sum_of(0, "vx*y"), sum_of(0, "x*vy")), False),
+        ((make_sum(0, "abs(vx)*vx"),), True),
+        ((make_sum(0, "abs(vx)*vx", "x**3"),), False),
+        ((make_sum(0, "sqrt(vx**2 + vy**2)*vx"), make_sum(1, "sqrt(vx**2 + vy**2)*vy")), True),
+        ((make_sum(0, "abs(vx)*vx"), make_sum(1, "abs(vy)*vy")), False),
+        ((make_sum(0, "vx*sin(t)"), make_sum(1, "vy*sin(t)")), False),
+        ((make_sum(0, "vy", partner=make_sum(1, "vx")),), True),
+        ((make_sum(0, "vx*y"), make_sum(0, "x*vy")), False),
     ],
 )
 def test_short_is_one_term_or_one_on_each_axis_that_depends_on_another(sums, short):
-    assert is_short(of_sums(*sums)) is short
+    assert is_short_description(make_discovery(*sums)) is short
 
 
 def test_a_law_search_that_crashes_keeps_what_the_catalogue_names(seed=12):
@@ -168,9 +168,10 @@ def test_a_law_search_that_crashes_keeps_what_the_catalogue_names(seed=12):
 
     context, _ = arena_of(recorded((CUBE, DRAG_2), seed))
     guarded = replace(context, guard=Guard(on=True))
-    result = search_effects(guarded, CATALOGUE, lambda what, share: None, always, Beyond(crashes, at_end=crashes))
-    assert names_of(result) == {"hardening_stiffness", "quadratic_damping"}
+    searches = FurtherSearches(crashes, at_end=crashes)
+    result = search_effects(guarded, CATALOGUE, lambda what, share: None, always, searches)
+    assert effect_names(result) == {"hardening_stiffness", "quadratic_damping"}
     (said,) = guarded.guard.sentences
     assert said.startswith("A law outside the catalogue was left out")
     with pytest.raises(ValueError, match="broadcast"):
-        search_effects(context, CATALOGUE, lambda what, share: None, always, Beyond(crashes))
+        search_effects(context, CATALOGUE, lambda what, share: None, always, FurtherSearches(crashes))

@@ -16,13 +16,13 @@ MASS, DRAG, LEVEL, NOISE = 4.0, 12.0, 3.0, 2e-6
 KP, KV = 900.0, 160.0
 
 
-def model(stiffness: float = 0.0, quantity: str = "position") -> MechanicalModel:
+def make_model(stiffness: float = 0.0, quantity: str = "position") -> MechanicalModel:
     one = [[1.0]]
     loose = Tolerance(0.1, 2.0, 1.0, None)
     return MechanicalModel("carriage", quantity, [[4.05]], [[13.0]], [[stiffness]], one, one, tolerance=loose)
 
 
-def course(seconds: float, seed: int) -> np.ndarray:
+def random_course(seconds: float, seed: int) -> np.ndarray:
     """A smooth random force or place, (n,), rms 1, with rests at its ends."""
     rng = np.random.default_rng(seed)
     t = np.arange(int(seconds * RATE_HZ)) / RATE_HZ
@@ -31,7 +31,7 @@ def course(seconds: float, seed: int) -> np.ndarray:
     return whole / whole.std() * np.clip(np.minimum(t, t[::-1]) / 0.4, 0, 1)
 
 
-def moved(drive: np.ndarray, controlled: bool, level: float = LEVEL) -> tuple[np.ndarray, np.ndarray]:
+def simulate_plant(drive: np.ndarray, controlled: bool, level: float = LEVEL) -> tuple[np.ndarray, np.ndarray]:
     """Position and force, (n,) each. drive: the force, or the place that a controller aims at."""
     x = v = 0.0
     positions, forces, step = np.empty(len(drive)), np.empty(len(drive)), 1 / RATE_HZ / FINE
@@ -47,8 +47,8 @@ def moved(drive: np.ndarray, controlled: bool, level: float = LEVEL) -> tuple[np
     return positions, forces
 
 
-def recording(drive: np.ndarray, controlled: bool, level: float = LEVEL, seed: int = 1) -> Recording:
-    x, force = moved(drive, controlled, level)
+def record_plant(drive: np.ndarray, controlled: bool, level: float = LEVEL, seed: int = 1) -> Recording:
+    x, force = simulate_plant(drive, controlled, level)
     x = x + NOISE * np.random.default_rng(seed).standard_normal(len(x))
     half = len(x) * 2 // 3
     roles = (Segment(0, half, "slow", role="fit"), Segment(half, len(x), "slow", role="test"))
@@ -61,6 +61,6 @@ def recording(drive: np.ndarray, controlled: bool, level: float = LEVEL, seed: i
     return Recording("carriage", command, seen, excitation=aimed, segments=roles)
 
 
-def found(given: Recording, *names: str):
+def diagnose_plant(given: Recording, *names: str):
     others = tuple(effect.name for effect in CATALOGUE if effect.name not in names)
-    return diagnose([given], model(), DiagnosisSettings(without=others), map, lambda said, share: None)
+    return diagnose([given], make_model(), DiagnosisSettings(without=others), map, lambda said, share: None)

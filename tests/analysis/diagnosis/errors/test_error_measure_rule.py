@@ -9,50 +9,64 @@ from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.errors.error_measure_rule import choose_measure, is_self_stable
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import Signal
-from tests.analysis.diagnosis.errors.drifting_plant import RATE_HZ, model
+from tests.analysis.diagnosis.errors.drifting_plant import RATE_HZ, make_model
 
 
-def test_the_rule_keeps_free_simulation_for_plants_that_hold_themselves(held: Recording, drifting: Recording) -> None:
-    for each in (held, drifting):
-        assert choose_measure(observe_parts([each], 1), model(stiffness=400.0)).measure == "free simulation"
+def test_the_rule_keeps_free_simulation_for_plants_that_hold_themselves(
+    controlled_recording: Recording, drifting_recording: Recording
+) -> None:
+    for each in (controlled_recording, drifting_recording):
+        assert choose_measure(observe_parts([each], 1), make_model(stiffness=400.0)).measure == "free simulation"
 
 
-def test_the_rule_takes_forces_where_a_model_grows_within_a_window(drifting: Recording) -> None:
-    choice = choose_measure(observe_parts([drifting], 1), model(stiffness=-400.0))
+def test_the_rule_takes_forces_where_a_model_grows_within_a_window(drifting_recording: Recording) -> None:
+    choice = choose_measure(observe_parts([drifting_recording], 1), make_model(stiffness=-400.0))
     assert choice.measure == "predicted force"
-    assert "a controller must have held" in choice.why
-    felt = replace(drifting, response=replace(drifting.response, quantity="acceleration", unit="m/s^2"))
-    choice = choose_measure(observe_parts([felt], 1), model(stiffness=-400.0, quantity="acceleration"))
+    assert "a controller must have held" in choice.reason
+    felt = replace(
+        drifting_recording, response=replace(drifting_recording.response, quantity="acceleration", unit="m/s^2")
+    )
+    choice = choose_measure(observe_parts([felt], 1), make_model(stiffness=-400.0, quantity="acceleration"))
     assert choice.measure == "windows"
 
 
-def test_the_rule_takes_windows_where_a_recording_begins_in_motion(drifting: Recording) -> None:
-    moving = replace(drifting, response=replace(drifting.response, samples=drifting.response.samples + 0.3))
-    choice = choose_measure(observe_parts([moving], 1), model(stiffness=400.0))
+def test_the_rule_takes_windows_where_a_recording_begins_in_motion(drifting_recording: Recording) -> None:
+    moving = replace(
+        drifting_recording,
+        response=replace(drifting_recording.response, samples=drifting_recording.response.samples + 0.3),
+    )
+    choice = choose_measure(observe_parts([moving], 1), make_model(stiffness=400.0))
     assert choice.measure == "free simulation"
     late = replace(
-        drifting, command=drifting.command.part(900, 4900), response=drifting.response.part(900, 4900), segments=()
+        drifting_recording,
+        command=drifting_recording.command.part(900, 4900),
+        response=drifting_recording.response.part(900, 4900),
+        segments=(),
     )
-    choice = choose_measure(observe_parts([late], 1), model(stiffness=400.0))
+    choice = choose_measure(observe_parts([late], 1), make_model(stiffness=400.0))
     assert choice.measure == "windows"
-    assert "does not begin at rest" in choice.why
+    assert "does not begin at rest" in choice.reason
 
 
-def test_the_rule_takes_windows_under_a_controller_where_accelerations_alone_were_measured(held: Recording) -> None:
-    felt = replace(held, response=replace(held.response, quantity="acceleration", unit="m/s^2"))
-    choice = choose_measure(observe_parts([felt], 1), model(quantity="acceleration"))
+def test_the_rule_takes_windows_under_a_controller_where_accelerations_alone_were_measured(
+    controlled_recording: Recording,
+) -> None:
+    felt = replace(
+        controlled_recording, response=replace(controlled_recording.response, quantity="acceleration", unit="m/s^2")
+    )
+    choice = choose_measure(observe_parts([felt], 1), make_model(quantity="acceleration"))
     assert choice.measure == "windows"
 
 
 def test_what_holds_itself_comes_to_rest_within_a_third_of_the_recording() -> None:
-    assert is_self_stable(model(400.0), 10.0)
-    assert not is_self_stable(model(400.0), 0.5)
-    assert not is_self_stable(model(0.0), 10.0)
+    assert is_self_stable(make_model(400.0), 10.0)
+    assert not is_self_stable(make_model(400.0), 0.5)
+    assert not is_self_stable(make_model(0.0), 10.0)
 
 
-def test_feedback_is_seen_by_the_excitation_beside_the_command(held: Recording) -> None:
-    assert is_in_closed_loop(held)
-    assert not is_in_closed_loop(replace(held, excitation=held.command))
+def test_feedback_is_seen_by_the_excitation_beside_the_command(controlled_recording: Recording) -> None:
+    assert is_in_closed_loop(controlled_recording)
+    assert not is_in_closed_loop(replace(controlled_recording, excitation=controlled_recording.command))
 
 
 def test_feedback_is_seen_without_an_excitation_where_responses_make_the_command() -> None:
@@ -64,19 +78,19 @@ def test_feedback_is_seen_without_an_excitation_where_responses_make_the_command
         u[k] = -3.0 * x[k] - 0.5 * x[k - 1] + 0.01 * push[k]
         if k + 1 < n:
             x[k + 1] = 0.9 * x[k] + 0.1 * u[k] + 0.2 * rng.standard_normal()
-    looped = _plain(u, x)
+    looped = _make_recording(u, x)
     assert is_in_closed_loop(looped)
     assert not is_in_closed_loop(replace(looped, hold=Hold.BAND_LIMITED))
 
 
-def test_a_free_command_is_not_taken_for_feedback(drifting: Recording) -> None:
+def test_a_free_command_is_not_taken_for_feedback(drifting_recording: Recording) -> None:
     rng = np.random.default_rng(3)
     u = rng.standard_normal(4000)
     x = np.convolve(u, 0.9 ** np.arange(60))[: len(u)]
-    assert not is_in_closed_loop(_plain(u, np.append(0.0, x[:-1])))
-    assert not is_in_closed_loop(drifting)
+    assert not is_in_closed_loop(_make_recording(u, np.append(0.0, x[:-1])))
+    assert not is_in_closed_loop(drifting_recording)
 
 
-def _plain(u: np.ndarray, x: np.ndarray) -> Recording:
+def _make_recording(u: np.ndarray, x: np.ndarray) -> Recording:
     command = Signal(u[:, None], RATE_HZ, "force", "N", ("x",))
     return Recording("loop", command, Signal(x[:, None], RATE_HZ, "position", "m", ("x",)))

@@ -11,21 +11,21 @@ from equalizer.plant.linear_simulation import growth_rate
 from equalizer.plant.mechanical_model import MechanicalModel
 
 
-def model(damping, stiffness):
+def make_model(damping, stiffness):
     one = [[1.0]]
     return MechanicalModel("one", "position", one, [[damping]], [[stiffness]], one, one)
 
 
-def test_noise_alone_stands_at_one(arena_of):
-    measure = arena_of().whole
-    score = fit_score(measure, measure.residuals(arena_of().tuning.model, ()))
+def test_noise_alone_stands_at_one(make_context):
+    measure = make_context().whole
+    score = fit_score(measure, measure.residuals(make_context().tuning.model, ()))
     for part in (score.fit, score.choose, score.test):
         assert part == pytest.approx(np.ones(2), abs=0.06)
 
 
-def test_only_its_own_samples_count_for_each_part(arena_of):
-    measure = arena_of().whole
-    (left,) = measure.residuals(arena_of().tuning.model, ())
+def test_only_its_own_samples_count_for_each_part(make_context):
+    measure = make_context().whole
+    (left,) = measure.residuals(make_context().tuning.model, ())
     (record,) = measure.records
     louder = left.copy()
     louder[record.test] *= 10
@@ -34,13 +34,13 @@ def test_only_its_own_samples_count_for_each_part(arena_of):
     assert other.test == pytest.approx(10 * one.test)
 
 
-def test_where_nothing_was_sealed_nothing_is_reported(arena_of):
-    measure = arena_of().measure
-    assert np.isnan(fit_score(measure, measure.residuals(arena_of().tuning.model, ())).test).all()
+def test_where_nothing_was_sealed_nothing_is_reported(make_context):
+    measure = make_context().measure
+    assert np.isnan(fit_score(measure, measure.residuals(make_context().tuning.model, ())).test).all()
 
 
-def test_recordings_count_by_their_samples(arena_of):
-    (record,) = arena_of().whole.records
+def test_recordings_count_by_their_samples(make_context):
+    (record,) = make_context().whole.records
     long, short = np.ones((len(record.command), 1)), np.full((10, 1), 3.0)
     cut = replace(record, fit=record.fit[:10], choose=record.choose[:10], test=record.test[:10])
     masks = [np.ones(len(long), dtype=bool), np.ones(10, dtype=bool)]
@@ -49,8 +49,8 @@ def test_recordings_count_by_their_samples(arena_of):
 
 
 @pytest.mark.parametrize(("quantity", "expected"), [("velocity", np.hypot(5.0, 1.0)), ("position", 1.0)])
-def test_takes_at_their_own_speeds_differ_by_their_means_and_encoders_begin_anywhere(arena_of, quantity, expected):
-    (record,) = arena_of().whole.records
+def test_takes_at_their_own_speeds_differ_by_their_means_and_encoders_begin_anywhere(make_context, quantity, expected):
+    (record,) = make_context().whole.records
     n, channels = record.measured.shape
     response = replace(record.recording.response, quantity=quantity)
     ripple = np.tile(np.where(np.arange(n) % 2, 1.0, -1.0)[:, None], (1, channels))
@@ -72,9 +72,9 @@ def test_the_worst_channel_and_the_mean_of_all():
     ("damping", "stiffness", "grows"), [(2.0, 100.0, False), (0.0, 0.0, False), (-2.0, 100.0, True)]
 )
 def test_a_model_that_gains_energy_runs_away(damping, stiffness, grows):
-    assert is_unstable_within(model(damping, stiffness), 10.0) == grows
+    assert is_unstable_within(make_model(damping, stiffness), 10.0) == grows
 
 
 def test_the_rate_is_that_of_the_slowest_motion():
-    assert growth_rate(model(2.0, 100.0)) == pytest.approx(-1.0)
-    assert growth_rate(model(0.0, -4.0)) == pytest.approx(2.0)
+    assert growth_rate(make_model(2.0, 100.0)) == pytest.approx(-1.0)
+    assert growth_rate(make_model(0.0, -4.0)) == pytest.approx(2.0)

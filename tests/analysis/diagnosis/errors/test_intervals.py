@@ -34,14 +34,14 @@ class StraightLine:
     """Channel 0 answers to the effect's number and to the model's, each along a row of its own."""
 
     records: tuple[Observed, ...]
-    rows: np.ndarray
+    response_rows: np.ndarray
     noise: np.ndarray
     unit: np.ndarray
     name: str = "straight line"
 
     def residuals(self, model, effects):
         force = effects[0].values["force"]
-        predicted = self.rows[0] * force + self.rows[1] * (model.stiffness[0, 0] - 100.0)
+        predicted = self.response_rows[0] * force + self.response_rows[1] * (model.stiffness[0, 0] - 100.0)
         return (self.records[0].measured - predicted[:, None],)
 
 
@@ -53,18 +53,18 @@ TUNING = Tuning(
 PUSHED = hypothesis_of_claim(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}])
 
 
-def rows(seed):
+def response_rows(seed):
     """Slow, like what a mechanism answers."""
     random = np.random.default_rng([seed, 1])
     return lfilter([1.0], [1.0, -0.95], random.standard_normal((2, SAMPLES)), axis=1)
 
 
-def measured(seed, colour, strength):
+def make_measure(seed, colour, strength):
     """What the line answers with the truth, and coloured errors on it."""
     white = np.random.default_rng([seed, 2]).standard_normal(SAMPLES)
     errors = strength * lfilter([np.sqrt(1 - colour**2)], [1.0, -colour], white)
     n = np.ones(SAMPLES, dtype=bool)
-    known = rows(seed)
+    known = response_rows(seed)
     # The calibration is one draw, too, from what it says of itself.
     own = np.random.default_rng([seed, 3]).standard_normal()
     samples = (known[0] * FORCE_N + known[1] * own + errors)[:, None]
@@ -74,16 +74,16 @@ def measured(seed, colour, strength):
     return StraightLine((record,), known, np.ones(1), np.ones(1)), own
 
 
-def all_of(measure, found):
+def all_sensitivities(measure, found):
     return sensitivity_to_all(measure, TUNING, found.deviations, found.hypothesis)
 
 
 def fitted_and_errors(seed, colour, strength):
-    measure, own = measured(seed, colour, strength)
+    measure, own = make_measure(seed, colour, strength)
     start = evaluate_fit(measure, TUNING, np.zeros(1), PUSHED)
     known = sensitivity(measure, TUNING, np.zeros(1), PUSHED)
     found = fit(measure, TUNING, start, known, 4)
-    return found, standard_errors(measure, found, all_of(measure, found)), own
+    return found, standard_errors(measure, found, all_sensitivities(measure, found)), own
 
 
 @pytest.mark.parametrize(("colour", "strength"), [(0.0, 1.0), (0.9, 1.0), (0.9, 6.0)])
@@ -115,19 +115,21 @@ def test_the_same_record_gives_the_same_interval():
 SEGMENTS, VARIES = 8, 0.15
 
 
-def of_segments(seed, varies, count=SEGMENTS):
+def measure_of_segments(seed, varies, count=SEGMENTS):
     """White errors, and a force that varies from segment to segment by a share, as that of an inexact law does."""
-    measure, _ = measured(seed, 0.0, 1.0)
+    measure, _ = make_measure(seed, 0.0, 1.0)
     (record,), length = measure.records, SAMPLES // count
     random = np.random.default_rng([seed, 4])
     share = np.repeat(varies * random.standard_normal(count), length)
-    samples = record.measured + (FORCE_N * measure.rows[0, : len(share)] * share)[:, None]
+    samples = record.measured + (FORCE_N * measure.response_rows[0, : len(share)] * share)[:, None]
     segments = tuple(Segment(k * length, (k + 1) * length, "multisine", 1.0, 0) for k in range(count))
     record = replace(record, measured=samples, recording=replace(record.recording, segments=segments))
     varied = replace(measure, records=(record,))
     known = sensitivity(varied, TUNING, np.zeros(1), PUSHED)
     found = fit(varied, TUNING, evaluate_fit(varied, TUNING, np.zeros(1), PUSHED), known, 4)
-    noise, between = (errors(varied, found, all_of(varied, found)) for errors in (standard_errors, segment_errors))
+    noise, between = (
+        errors(varied, found, all_sensitivities(varied, found)) for errors in (standard_errors, segment_errors)
+    )
     of, at = found.hypothesis.parameters[0], found.hypothesis.point[0]
     return [
         of.value(at - 1.96 * error) <= FORCE_N <= of.value(at + 1.96 * error)
@@ -137,14 +139,14 @@ def of_segments(seed, varies, count=SEGMENTS):
 
 @pytest.mark.parametrize(("varies", "noise_holds"), [(VARIES, (0.0, 0.75)), (0.0, (0.88, 1.0))])
 def test_segments_show_what_varies_between_them(varies, noise_holds):
-    held = np.mean([of_segments(seed, varies) for seed in range(DRAWS)], axis=0)
+    held = np.mean([measure_of_segments(seed, varies) for seed in range(DRAWS)], axis=0)
     assert noise_holds[0] <= held[0] <= noise_holds[1]
     assert held[1] >= 0.88
 
 
 def test_the_jackknife_is_that_of_fits_without_each_segment():
     """The model is a straight line, so that one step is exact: each fit is repeated without a segment."""
-    measure, _ = measured(3, 0.0, 1.0)
+    measure, _ = make_measure(3, 0.0, 1.0)
     (record,), length = measure.records, SAMPLES // SEGMENTS
     segments = tuple(Segment(k * length, (k + 1) * length, "multisine", 1.0, 0) for k in range(SEGMENTS))
     record = replace(record, recording=replace(record.recording, segments=segments))
@@ -160,52 +162,54 @@ def test_the_jackknife_is_that_of_fits_without_each_segment():
         start = evaluate_fit(fewer, TUNING, whole.deviations, whole.hypothesis)
         forces.append(fit(fewer, TUNING, start, there, 8).hypothesis.point[0])
     expected = np.sqrt((SEGMENTS - 1) / SEGMENTS * np.sum((np.array(forces) - np.mean(forces)) ** 2))
-    assert segment_errors(measure, whole, all_of(measure, whole))[1] == pytest.approx(expected, rel=0.02)
+    assert segment_errors(measure, whole, all_sensitivities(measure, whole))[1] == pytest.approx(expected, rel=0.02)
 
 
 def test_one_segment_has_no_jackknife():
-    measure, _ = measured(3, 0.0, 1.0)
+    measure, _ = make_measure(3, 0.0, 1.0)
     known = sensitivity(measure, TUNING, np.zeros(1), PUSHED)
     found = fit(measure, TUNING, evaluate_fit(measure, TUNING, np.zeros(1), PUSHED), known, 4)
-    assert segment_errors(measure, found, all_of(measure, found)) is None
+    assert segment_errors(measure, found, all_sensitivities(measure, found)) is None
 
 
 PERIOD = 500
 """Samples; eight of them are played."""
 
 
-def of_periods(seed, period=PERIOD, lacking=1.0):
+def measure_of_periods(seed, period=PERIOD, lacking=1.0):
     """White errors and, in each period again, what the model cannot reproduce."""
-    measure, _ = measured(seed, 0.0, 1.0)
+    measure, _ = make_measure(seed, 0.0, 1.0)
     (record,) = measure.records
     row = np.tile(
         lfilter([1.0], [1.0, -0.95], np.random.default_rng([seed, 5]).standard_normal(period)), SAMPLES // period
     )
     again = lfilter([1.0], [1.0, -0.9], np.random.default_rng([seed, 6]).standard_normal(period))
     lacks = lacking * np.tile(again, SAMPLES // period)
-    rows_of = np.stack([row, measure.rows[1]])
-    samples = record.measured + ((rows_of[0] - measure.rows[0]) * FORCE_N + lacks)[:, None]
+    rows_of = np.stack([row, measure.response_rows[1]])
+    samples = record.measured + ((rows_of[0] - measure.response_rows[0]) * FORCE_N + lacks)[:, None]
     segments = (Segment(0, SAMPLES, "multisine", 1.0, period),)
     recording = replace(
         record.recording, segments=segments, response=replace(record.recording.response, samples=samples)
     )
-    repeated = replace(measure, records=(replace(record, measured=samples, recording=recording),), rows=rows_of)
+    repeated = replace(
+        measure, records=(replace(record, measured=samples, recording=recording),), response_rows=rows_of
+    )
     known = sensitivity(repeated, TUNING, np.zeros(1), PUSHED)
     found = fit(repeated, TUNING, evaluate_fit(repeated, TUNING, np.zeros(1), PUSHED), known, 4)
-    error = standard_errors(repeated, found, all_of(repeated, found))[1]
+    error = standard_errors(repeated, found, all_sensitivities(repeated, found))[1]
     of, at = found.hypothesis.parameters[0], found.hypothesis.point[0]
     return of.value(at - 1.96 * error) <= FORCE_N <= of.value(at + 1.96 * error)
 
 
 def test_what_repeats_with_the_drive_is_not_counted_as_often_as_it_repeats():
     """Each period alone would give half the errors' width again; few clusters hold a little less than they say."""
-    assert 0.8 <= np.mean([of_periods(seed) for seed in range(DRAWS)]) <= 0.99
+    assert 0.8 <= np.mean([measure_of_periods(seed) for seed in range(DRAWS)]) <= 0.99
 
 
 @pytest.mark.parametrize("period", [100, 200, 500])
 def test_periods_of_few_stretches_do_not_make_the_intervals_narrow(period):
     """Scores sum to zero at the minimum: one or two clusters would tell next to nothing of the noise."""
-    assert np.mean([of_periods(seed, period, 0.0) for seed in range(DRAWS)]) >= 0.88
+    assert np.mean([measure_of_periods(seed, period, 0.0) for seed in range(DRAWS)]) >= 0.88
 
 
 @dataclass(frozen=True)
@@ -213,18 +217,18 @@ class Jumping(StraightLine):
     """Channel 0 answers to the jump of a dead band alone, which cannot be below zero."""
 
     def residuals(self, model, effects):
-        return (self.records[0].measured - (self.rows[0] * effects[0].values["jump"])[:, None],)
+        return (self.records[0].measured - (self.response_rows[0] * effects[0].values["jump"])[:, None],)
 
 
 def test_a_number_at_its_bound_has_no_error_there_and_leaves_it_where_the_data_ask_for_it():
-    measure, _ = measured(3, 0.0, 1.0)
+    measure, _ = make_measure(3, 0.0, 1.0)
     (record,) = measure.records
-    samples = (measure.rows[0] * FORCE_N)[:, None] + np.random.default_rng(8).standard_normal((SAMPLES, 1))
-    jumping = Jumping((replace(record, measured=samples),), *parts_of(measure))
+    samples = (measure.response_rows[0] * FORCE_N)[:, None] + np.random.default_rng(8).standard_normal((SAMPLES, 1))
+    jumping = Jumping((replace(record, measured=samples),), *measure_parts(measure))
     plain = hypothesis_of_claim(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": 0.1, "jump": 0.0}])
     begun = evaluate_fit(jumping, TUNING, np.zeros(1), plain)
-    assert standard_errors(jumping, begun, all_of(jumping, begun))[-1] == 0.0
-    found, known = finish_fit(jumping, TUNING, begun, lambda at: all_of(jumping, at), lambda: True)
+    assert standard_errors(jumping, begun, all_sensitivities(jumping, begun))[-1] == 0.0
+    found, known = finish_fit(jumping, TUNING, begun, lambda at: all_sensitivities(jumping, at), lambda: True)
     jump, error = found.hypothesis.list_placed_effects()[0].values["jump"], standard_errors(jumping, found, known)[-1]
     assert error > 0.0
     assert jump == pytest.approx(FORCE_N, abs=0.03)
@@ -240,7 +244,7 @@ class TwoMasses(StraightLine):
         mass = 1.0 + effects[0].values["mass"] + 0.1 * (model.stiffness[0, 0] - 100.0)
         frequency = np.fft.rfftfreq(SAMPLES, 1 / RATE_HZ) / 20.0
         answer = 1.0 / (1.0 - mass * frequency**2 + 1j * frequency / self.quality)
-        played = np.fft.irfft(np.fft.rfft(self.rows[0]) * answer, SAMPLES)
+        played = np.fft.irfft(np.fft.rfft(self.response_rows[0]) * answer, SAMPLES)
         return (self.records[0].measured - 10.0 * played[:, None],)
 
 
@@ -248,9 +252,9 @@ class TwoMasses(StraightLine):
 def test_two_numbers_that_act_alike_are_parted_by_the_calibration_alone(quality):
     """Begun far off along the valley, where the sum is right and the model's number off by three standard deviations.
     Longer steps would count the resonance's curvature as information: a sixth of the error at the sharpest."""
-    measure, _ = measured(3, 0.0, 1.0)
+    measure, _ = make_measure(3, 0.0, 1.0)
     (record,) = measure.records
-    silent = TwoMasses((replace(record, measured=np.zeros((SAMPLES, 1))),), *parts_of(measure), quality=quality)
+    silent = TwoMasses((replace(record, measured=np.zeros((SAMPLES, 1))),), *measure_parts(measure), quality=quality)
     added = hypothesis_of_claim(Claim(EFFECTS["added_mass"], "one", (0,)), [{"mass": 0.4}])
     (played,) = silent.residuals(MODEL, added.list_placed_effects())
     samples = np.random.default_rng(7).standard_normal((SAMPLES, 1)) - played
@@ -271,5 +275,5 @@ def test_two_numbers_that_act_alike_are_parted_by_the_calibration_alone(quality)
     assert finish_fit(alike, TUNING, found, at, lambda: True)[0].cost > found.cost - 0.1 / SAMPLES
 
 
-def parts_of(measure):
-    return measure.rows, measure.noise, measure.unit
+def measure_parts(measure):
+    return measure.response_rows, measure.noise, measure.unit

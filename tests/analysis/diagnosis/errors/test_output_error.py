@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit, fit, residuals_to_fit, sensitivity, solve_bounded_step
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.settings import RETUNING_BOUND
@@ -13,106 +13,113 @@ from equalizer.effects.effect import PlacedEffect
 FRICTION_N, LAG_S = 0.2, 1.5e-3
 
 
-def alone(name, values):
+def make_hypothesis(name, values):
     return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
-def recovered(context, hypothesis):
+def fit_hypothesis(context, hypothesis):
     zero = np.zeros(len(context.tuning.names))
     start = evaluate_fit(context.measure, context.tuning, zero, hypothesis)
-    known = sensitivity(context.measure, context.tuning, zero, NOTHING)
+    known = sensitivity(context.measure, context.tuning, zero, NO_EFFECTS)
     return refine(context, fit(context.measure, context.tuning, start, known, 4))
 
 
 @pytest.fixture(scope="module")
-def rubbing_arena(arena_of):
-    return arena_of((PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": FRICTION_N}),))
+def friction_context(make_context):
+    return make_context((PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": FRICTION_N}),))
 
 
-def off(tuning, **deviations):
+def make_deviations(tuning, **deviations):
     at = np.zeros(len(tuning.names))
     for name, value in deviations.items():
         at[tuning.names.index(name.replace("_", " "))] = value
     return at
 
 
-def test_the_model_s_own_numbers_are_found(arena_of):
-    truth = arena_of()
-    wrong = off(truth.tuning, mass_fx=-2.0, damping_fx=1.5, stiffness_fx=-1.0)
-    context = arena_of(given=truth.tuning.tune(wrong))
-    found = recovered(context, NOTHING)
+def test_the_model_s_own_numbers_are_found(make_context):
+    truth = make_context()
+    wrong = make_deviations(truth.tuning, mass_fx=-2.0, damping_fx=1.5, stiffness_fx=-1.0)
+    context = make_context(given=truth.tuning.tune(wrong))
+    found = fit_hypothesis(context, NO_EFFECTS)
     assert found.deviations == pytest.approx(-wrong, abs=0.15)
     assert context.candidate(found).score.worst_channel < 1.03
 
 
-def test_a_number_that_fits_as_it_is_stays(arena_of):
-    found = recovered(arena_of(), NOTHING)
+def test_a_number_that_fits_as_it_is_stays(make_context):
+    found = fit_hypothesis(make_context(), NO_EFFECTS)
     assert np.abs(found.deviations).max() < 0.2
 
 
 @pytest.mark.parametrize("start", [0.05, 0.6])
-def test_friction_is_found_from_far_away(rubbing_arena, start):
-    found = recovered(rubbing_arena, alone("coulomb_friction", {"level": start}))
+def test_friction_is_found_from_far_away(friction_context, start):
+    found = fit_hypothesis(friction_context, make_hypothesis("coulomb_friction", {"level": start}))
     assert found.hypothesis.list_placed_effects()[0].values["level"] == pytest.approx(FRICTION_N, rel=2e-3)
-    assert rubbing_arena.candidate(found).score.worst_channel < 1.03
+    assert friction_context.candidate(found).score.worst_channel < 1.03
 
 
-def test_two_effects_are_found_at_once(arena_of):
+def test_two_effects_are_found_at_once(make_context):
     truth = (
         PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": FRICTION_N}),
         PlacedEffect(EFFECTS["amplifier_lag"], (0,), {"time_constant": LAG_S}),
     )
-    both = combine(alone("coulomb_friction", {"level": 0.1}), alone("amplifier_lag", {"time_constant": 1e-3}))
-    rubs, lags = recovered(arena_of(truth), both).hypothesis.list_placed_effects()
+    both = combine(
+        make_hypothesis("coulomb_friction", {"level": 0.1}), make_hypothesis("amplifier_lag", {"time_constant": 1e-3})
+    )
+    rubs, lags = fit_hypothesis(make_context(truth), both).hypothesis.list_placed_effects()
     assert rubs.values["level"] == pytest.approx(FRICTION_N, rel=5e-3)
     assert lags.values["time_constant"] == pytest.approx(LAG_S, rel=5e-3)
 
 
-def test_a_wrong_law_does_not_come_down_to_the_noise(rubbing_arena):
-    found = recovered(rubbing_arena, alone("hardening_stiffness", {"k3": 1e4}))
-    assert rubbing_arena.candidate(found).score.worst_channel > 3
+def test_a_wrong_law_does_not_come_down_to_the_noise(friction_context):
+    found = fit_hypothesis(friction_context, make_hypothesis("hardening_stiffness", {"k3": 1e4}))
+    assert friction_context.candidate(found).score.worst_channel > 3
 
 
-def test_a_fit_is_never_worse_than_its_start(rubbing_arena):
-    zero = np.zeros(len(rubbing_arena.tuning.names))
-    known = sensitivity(rubbing_arena.measure, rubbing_arena.tuning, zero, NOTHING)
+def test_a_fit_is_never_worse_than_its_start(friction_context):
+    zero = np.zeros(len(friction_context.tuning.names))
+    known = sensitivity(friction_context.measure, friction_context.tuning, zero, NO_EFFECTS)
     for level in (1e-3, 0.2, 3.0):
         start = evaluate_fit(
-            rubbing_arena.measure, rubbing_arena.tuning, zero, alone("coulomb_friction", {"level": level})
+            friction_context.measure,
+            friction_context.tuning,
+            zero,
+            make_hypothesis("coulomb_friction", {"level": level}),
         )
-        assert fit(rubbing_arena.measure, rubbing_arena.tuning, start, known, 3).cost <= start.cost
+        assert fit(friction_context.measure, friction_context.tuning, start, known, 3).cost <= start.cost
 
 
-def test_the_same_start_gives_the_same_fit(rubbing_arena):
-    one, other = (recovered(rubbing_arena, alone("coulomb_friction", {"level": 0.1})) for _ in range(2))
+def test_the_same_start_gives_the_same_fit(friction_context):
+    one, other = (
+        fit_hypothesis(friction_context, make_hypothesis("coulomb_friction", {"level": 0.1})) for _ in range(2)
+    )
     assert one.cost == other.cost and np.array_equal(one.deviations, other.deviations)
 
 
-def test_numbers_stay_within_what_calibration_and_physics_allow(arena_of):
-    truth = arena_of()
-    far = off(truth.tuning, mass_fx=-9.0)
-    found = recovered(arena_of(given=truth.tuning.tune(far)), NOTHING)
+def test_numbers_stay_within_what_calibration_and_physics_allow(make_context):
+    truth = make_context()
+    far = make_deviations(truth.tuning, mass_fx=-9.0)
+    found = fit_hypothesis(make_context(given=truth.tuning.tune(far)), NO_EFFECTS)
     assert found.deviations[0] == pytest.approx(RETUNING_BOUND)
     assert np.abs(found.deviations).max() <= RETUNING_BOUND
 
 
-def test_sealed_samples_are_not_fitted_to(rubbing_arena):
-    left = evaluate_fit(rubbing_arena.measure, rubbing_arena.tuning, np.zeros(3), NOTHING).residuals
-    (record,) = rubbing_arena.measure.records
-    assert len(residuals_to_fit(rubbing_arena.measure, left)) == record.fit.sum() * record.measured.shape[1]
+def test_sealed_samples_are_not_fitted_to(friction_context):
+    left = evaluate_fit(friction_context.measure, friction_context.tuning, np.zeros(3), NO_EFFECTS).residuals
+    (record,) = friction_context.measure.records
+    assert len(residuals_to_fit(friction_context.measure, left)) == record.fit.sum() * record.measured.shape[1]
     assert not record.test.any()
 
 
-def test_a_sensitivity_predicts_the_effect_of_a_small_change(arena_of):
-    context = arena_of()
+def test_a_sensitivity_predicts_the_effect_of_a_small_change(make_context):
+    context = make_context()
     zero = np.zeros(len(context.tuning.names))
-    known = sensitivity(context.measure, context.tuning, zero, NOTHING)
-    step = off(context.tuning, damping_fx=0.05)
+    known = sensitivity(context.measure, context.tuning, zero, NO_EFFECTS)
+    step = make_deviations(context.tuning, damping_fx=0.05)
     base, there = (
         residuals_to_fit(context.measure, context.measure.residuals(context.tuning.tune(at), ())) for at in (zero, step)
     )
     assert base - there == pytest.approx(step @ known.columns, abs=0.02 * np.abs(base - there).max())
-    assert known.squares == pytest.approx(known.columns @ known.columns.T)
+    assert known.gram == pytest.approx(known.columns @ known.columns.T)
 
 
 def test_a_step_within_bounds_is_the_best_one():
@@ -134,7 +141,7 @@ def test_a_step_within_bounds_is_the_best_one():
         assert cost(step) <= nothing + 1e-12
 
 
-class RanAway:
+class DivergingMeasure:
     """A measure whose simulation diverges as soon as a parameter of the model moves."""
 
     def __init__(self, measure, size):
@@ -145,11 +152,11 @@ class RanAway:
 
 
 @pytest.mark.parametrize("size", [1e200, np.inf])
-def test_a_simulation_that_ran_away_is_the_worst_of_fits(rubbing_arena, size):
-    zero = np.zeros(len(rubbing_arena.tuning.names))
-    known = sensitivity(rubbing_arena.measure, rubbing_arena.tuning, zero, NOTHING)
-    measure = RanAway(rubbing_arena.measure, size)
-    start = evaluate_fit(measure, rubbing_arena.tuning, zero, alone("coulomb_friction", {"level": 0.1}))
+def test_a_simulation_that_ran_away_is_the_worst_of_fits(friction_context, size):
+    zero = np.zeros(len(friction_context.tuning.names))
+    known = sensitivity(friction_context.measure, friction_context.tuning, zero, NO_EFFECTS)
+    measure = DivergingMeasure(friction_context.measure, size)
+    start = evaluate_fit(measure, friction_context.tuning, zero, make_hypothesis("coulomb_friction", {"level": 0.1}))
     assert start.cost == np.inf
-    assert fit(measure, rubbing_arena.tuning, start, known, 2) is start
-    assert not sensitivity(measure, rubbing_arena.tuning, zero, NOTHING).columns.any()
+    assert fit(measure, friction_context.tuning, start, known, 2) is start
+    assert not sensitivity(measure, friction_context.tuning, zero, NO_EFFECTS).columns.any()

@@ -10,21 +10,23 @@ from analysis.diagnosis.errors.choose_measure import measure_of
 from equalizer.signals.joining import join
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
-from tests.analysis.diagnosis.errors.drifting_plant import RATE_HZ, model
+from tests.analysis.diagnosis.errors.drifting_plant import RATE_HZ, make_model
 
 
-def test_parts_made_one_after_another_are_compared_apart(held: Recording) -> None:
-    n = len(held)
-    both = join([held, held], {"parts": [{"start": 0, "stop": n}, {"start": n, "stop": 2 * n}]})
-    one, two = measure_of([both], model()).measure, measure_of([held], model()).measure
+def test_parts_made_one_after_another_are_compared_apart(controlled_recording: Recording) -> None:
+    n = len(controlled_recording)
+    both = join(
+        [controlled_recording, controlled_recording], {"parts": [{"start": 0, "stop": n}, {"start": n, "stop": 2 * n}]}
+    )
+    one, two = measure_of([both], make_model()).measure, measure_of([controlled_recording], make_model()).measure
     assert len(one.records) == 2
-    assert np.allclose(one.residuals(model(), ())[1], two.residuals(model(), ())[0], atol=1e-6)
-    assert names_of_parts([both, held], ("a", "b")) == ("a, part 1", "a, part 2", "b")
+    assert np.allclose(one.residuals(make_model(), ())[1], two.residuals(make_model(), ())[0], atol=1e-6)
+    assert names_of_parts([both, controlled_recording], ("a", "b")) == ("a, part 1", "a, part 2", "b")
 
 
-def test_a_recording_for_the_test_spares_the_others(held: Recording) -> None:
-    fitted = replace(held, segments=(Segment(0, len(held), "slow", role="fit"),))
-    tested = replace(held, segments=(Segment(0, len(held), "slow", role="test"),))
+def test_a_recording_for_the_test_spares_the_others(controlled_recording: Recording) -> None:
+    fitted = replace(controlled_recording, segments=(Segment(0, len(controlled_recording), "slow", role="fit"),))
+    tested = replace(controlled_recording, segments=(Segment(0, len(controlled_recording), "slow", role="test"),))
     one, other = observe_parts([fitted, tested], 1)
     assert not one.test.any() and (one.fit | one.choose).all()
     assert other.test.all() and not (other.fit | other.choose).any()
@@ -32,18 +34,18 @@ def test_a_recording_for_the_test_spares_the_others(held: Recording) -> None:
     assert alone.fit.any() and alone.choose.any() and alone.test.any()
 
 
-def test_an_imposed_motion_is_turned_round(held: Recording) -> None:
-    x, force = held.response, held.command
+def test_an_imposed_motion_is_turned_round(controlled_recording: Recording) -> None:
+    x, force = controlled_recording.response, controlled_recording.command
     speed = Signal(np.gradient(x.samples, 1 / RATE_HZ, axis=0), RATE_HZ, "velocity", "m/s", ("x",))
-    turned = as_force_driven(Recording("rack", speed, force, x, segments=held.segments))
+    turned = as_force_driven(Recording("rack", speed, force, x, segments=controlled_recording.segments))
     assert turned.command is force and turned.response is speed
-    assert as_force_driven(held) is held
-    chosen = measure_of([turned], model(quantity="velocity"))
+    assert as_force_driven(controlled_recording) is controlled_recording
+    chosen = measure_of([turned], make_model(quantity="velocity"))
     assert chosen.measure.name == "predicted force"
     assert "imposed" in chosen.remarks[0]
 
 
-def test_decisions_are_made_by_the_first_periods_of_many(drifting: Recording) -> None:
-    repeated = replace(drifting, segments=(Segment(0, 6000, "multisine", 1.0, 500, "fit"),))
+def test_decisions_are_made_by_the_first_periods_of_many(drifting_recording: Recording) -> None:
+    repeated = replace(drifting_recording, segments=(Segment(0, 6000, "multisine", 1.0, 500, "fit"),))
     (record,) = observe_parts([repeated], 1)
     assert np.flatnonzero(record.fit | record.choose)[-1] < 4 * 500

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit, fit, sensitivity
 from analysis.diagnosis.errors.tuning import tuning_of
 from equalizer.plant.mechanical_model import Tolerance
 
 
-class Straight:
+class LinearMeasure:
     """A measure whose errors are straight lines in mass, damping and stiffness, zero at `best`."""
 
     def __init__(self, measure, best):
@@ -31,37 +31,37 @@ class Straight:
         return tuple(found)
 
 
-def fitted(arena, start, best):
+def fit_parameters(context, start, best):
     """Mass, damping and stiffness that a fit finds."""
     mass, damping, stiffness = (np.array([[each]]) for each in start)
-    plant = replace(arena.tuning.model, mass=mass, damping=damping, stiffness=stiffness)
+    plant = replace(context.tuning.model, mass=mass, damping=damping, stiffness=stiffness)
     plant = replace(plant, tolerance=Tolerance(*(10 * abs(each) for each in best)))
-    tuning, measure = tuning_of(plant, ("fx",)), Straight(arena.measure, np.array(best))
+    tuning, measure = tuning_of(plant, ("fx",)), LinearMeasure(context.measure, np.array(best))
     zero = np.zeros(3)
-    known = sensitivity(measure, tuning, zero, NOTHING)
-    found = tuning.tune(fit(measure, tuning, evaluate_fit(measure, tuning, zero, NOTHING), known, 6).deviations)
+    known = sensitivity(measure, tuning, zero, NO_EFFECTS)
+    found = tuning.tune(fit(measure, tuning, evaluate_fit(measure, tuning, zero, NO_EFFECTS), known, 6).deviations)
     return [float(each[0, 0]) for each in (found.mass, found.damping, found.stiffness)]
 
 
 @pytest.fixture(scope="module")
-def arena(arena_of):
-    return arena_of()
+def context(make_context):
+    return make_context()
 
 
-def test_numbers_within_reach_are_found(arena):
-    assert fitted(arena, (0.1, 1.0, 100.0), (0.2, 3.0, 150.0)) == pytest.approx((0.2, 3.0, 150.0), rel=1e-3)
+def test_numbers_within_reach_are_found(context):
+    assert fit_parameters(context, (0.1, 1.0, 100.0), (0.2, 3.0, 150.0)) == pytest.approx((0.2, 3.0, 150.0), rel=1e-3)
 
 
-def test_a_mass_that_is_best_below_zero_does_not_hold_the_other_numbers_back(arena):
-    mass, damping, stiffness = fitted(arena, (1e-3, 1.0, 100.0), (-1.0, 3.0, 150.0))
+def test_a_mass_that_is_best_below_zero_does_not_hold_the_other_numbers_back(context):
+    mass, damping, stiffness = fit_parameters(context, (1e-3, 1.0, 100.0), (-1.0, 3.0, 150.0))
     assert mass > 0
     assert damping > 2.0 and stiffness > 120.0
 
 
-def test_a_model_that_grows_by_itself_may_still_be_fitted(arena):
-    assert fitted(arena, (0.1, 1.0, -50.0), (0.2, 3.0, -20.0)) == pytest.approx((0.2, 3.0, -20.0), rel=1e-3)
+def test_a_model_that_grows_by_itself_may_still_be_fitted(context):
+    assert fit_parameters(context, (0.1, 1.0, -50.0), (0.2, 3.0, -20.0)) == pytest.approx((0.2, 3.0, -20.0), rel=1e-3)
 
 
-def test_no_step_leads_from_a_model_that_decays_to_one_that_grows(arena):
-    *_, stiffness = fitted(arena, (0.1, 1.0, 50.0), (0.1, 1.0, -50.0))
+def test_no_step_leads_from_a_model_that_decays_to_one_that_grows(context):
+    *_, stiffness = fit_parameters(context, (0.1, 1.0, 50.0), (0.1, 1.0, -50.0))
     assert stiffness > -1e-2

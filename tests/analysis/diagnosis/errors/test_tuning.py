@@ -8,14 +8,14 @@ from scipy.linalg import eigh
 
 from analysis.diagnosis.errors.tuning import DAMPING_PER_MODES, tuning_of
 from analysis.diagnosis.settings import UNSTATED_SHARE
-from equalizer.plant.linear_simulation import linear_steps
+from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
 
 MASS_KG, HANGING_KG, HANGING_HZ = 0.25, 0.02, 90.0
 KNOWN = Tolerance(0.004, 0.3, 6.0, 0.01)
 
 
-def hanging(axes=2, tolerance=KNOWN):
+def make_hanging_model(axes=2, tolerance=KNOWN):
     """Each axis a mass on a spring, and on the first one another mass on a spring."""
     spring = HANGING_KG * (2 * np.pi * HANGING_HZ) ** 2
     damper = 2 * 0.03 * np.sqrt(spring * HANGING_KG)
@@ -26,16 +26,18 @@ def hanging(axes=2, tolerance=KNOWN):
     damping = np.diag([4.0] * axes + [0.0]) + damper * np.outer(joint, joint)
     stiffness = np.diag([130.0] * axes + [0.0]) + spring * np.outer(joint, joint)
     seen = np.eye(axes, n)
-    return MechanicalModel("hanging", "acceleration", mass, damping, stiffness, seen.T, seen, tolerance=tolerance)
+    return MechanicalModel(
+        "make_hanging_model", "acceleration", mass, damping, stiffness, seen.T, seen, tolerance=tolerance
+    )
 
 
-def opened(model):
+def open_tuning(model):
     return tuning_of(model, ("fx", "fy", "fz")[: model.inputs])
 
 
-def moved(model, **deviations):
+def tune_model(model, **deviations):
     """The model with deviations by name, spaces as underscores."""
-    tuning = opened(model)
+    tuning = open_tuning(model)
     at = np.zeros(len(tuning.names))
     for name, value in deviations.items():
         at[tuning.names.index(name.replace("_", " "))] = value
@@ -50,14 +52,14 @@ def held_frequencies_hz(model):
 
 
 def test_no_deviation_gives_the_same_model():
-    model = hanging()
-    same = moved(model)
+    model = make_hanging_model()
+    same = tune_model(model)
     for name in ("mass", "damping", "stiffness"):
         assert getattr(same, name) == pytest.approx(getattr(model, name), rel=1e-9, abs=1e-9)
 
 
 def test_no_deviation_gives_the_same_model_in_other_coordinates():
-    model, random = hanging(), np.random.default_rng(3)
+    model, random = make_hanging_model(), np.random.default_rng(3)
     turn = random.normal(size=(3, 3))
     other = replace(
         model,
@@ -67,7 +69,7 @@ def test_no_deviation_gives_the_same_model_in_other_coordinates():
         input=turn.T @ model.input,
         output=model.output @ turn,
     )
-    same = moved(other)
+    same = tune_model(other)
     for name in ("mass", "damping", "stiffness"):
         assert getattr(same, name) == pytest.approx(getattr(other, name), rel=1e-7, abs=1e-7)
 
@@ -76,8 +78,8 @@ def test_no_deviation_gives_the_same_model_in_other_coordinates():
     ("what", "matrix", "size"), [("mass", "mass", 0.004), ("damping", "damping", 0.3), ("stiffness", "stiffness", 6.0)]
 )
 def test_a_changed_number_moves_its_own_matrix_alone(what, matrix, size):
-    model = hanging()
-    other = moved(model, **{f"{what}_fy": 2.0})
+    model = make_hanging_model()
+    other = tune_model(model, **{f"{what}_fy": 2.0})
     wanted = np.zeros((3, 3))
     wanted[1, 1] = 2 * size
     for name in ("mass", "damping", "stiffness"):
@@ -86,24 +88,24 @@ def test_a_changed_number_moves_its_own_matrix_alone(what, matrix, size):
 
 
 def test_two_axes_are_coupled_alike_both_ways():
-    model = hanging()
-    change = moved(model, mass_fx_fy=1.0).mass - model.mass
+    model = make_hanging_model()
+    change = tune_model(model, mass_fx_fy=1.0).mass - model.mass
     assert change[:2, :2] == pytest.approx(np.array([[0.0, 0.004], [0.004, 0.0]]), abs=1e-10)
 
 
 def test_a_mode_s_frequency_changes_by_the_share_that_it_says():
-    model = hanging()
-    (name,) = (name for name in opened(model).names if name.startswith("frequency"))
+    model = make_hanging_model()
+    (name,) = (name for name in open_tuning(model).names if name.startswith("frequency"))
     assert name == f"frequency of the mode at {HANGING_HZ:.3g} Hz"
-    assert held_frequencies_hz(moved(model, **{name: 2.0})) == pytest.approx([1.02 * HANGING_HZ])
-    lost = moved(model, **{name: 2.0})
+    assert held_frequencies_hz(tune_model(model, **{name: 2.0})) == pytest.approx([1.02 * HANGING_HZ])
+    lost = tune_model(model, **{name: 2.0})
     ratio = lost.damping[2, 2] / np.sqrt(lost.stiffness[2, 2] * lost.mass[2, 2])
     assert ratio == pytest.approx(model.damping[2, 2] / np.sqrt(model.stiffness[2, 2] * model.mass[2, 2]))
 
 
 def test_a_mode_s_mass_is_added_to_the_axis_it_is_attached_to():
-    model = hanging()
-    other = moved(model, **{f"mass of the mode at {HANGING_HZ:.3g} Hz": 3.0})
+    model = make_hanging_model()
+    other = tune_model(model, **{f"mass of the mode at {HANGING_HZ:.3g} Hz": 3.0})
     assert held_frequencies_hz(other) == pytest.approx([HANGING_HZ])
     static = np.array([1.0, 0.0, 1.0])
     assert static @ (other.mass - model.mass) @ static == pytest.approx(0.03 * HANGING_KG)
@@ -112,13 +114,13 @@ def test_a_mode_s_mass_is_added_to_the_axis_it_is_attached_to():
 
 
 def test_a_mode_s_damping_is_known_less_well_than_its_frequency():
-    model = hanging()
-    other = moved(model, **{f"damping of the mode at {HANGING_HZ:.3g} Hz": 1.0})
+    model = make_hanging_model()
+    other = tune_model(model, **{f"damping of the mode at {HANGING_HZ:.3g} Hz": 1.0})
     assert other.damping[2, 2] == pytest.approx(model.damping[2, 2] * (1 + 0.01 * DAMPING_PER_MODES))
 
 
 def test_every_number_is_named_sized_and_of_a_unit():
-    tuning = opened(hanging())
+    tuning = open_tuning(make_hanging_model())
     assert len(tuning.names) == len(set(tuning.names)) == len(tuning.deviation) == len(tuning.units) == 3 * 3 + 3
     assert dict(zip(tuning.names, tuning.units, strict=True))["damping fx fy"] == "N s/m"
     ones = dict(zip(tuning.names, tuning.values(np.ones(len(tuning.names))), strict=True))
@@ -126,11 +128,16 @@ def test_every_number_is_named_sized_and_of_a_unit():
 
 
 def test_a_lever_s_numbers_are_of_a_lever():
-    assert set(opened(replace(hanging(), rotational=True)).units) == {"kg m^2", "N m s/rad", "N m/rad", "1"}
+    assert set(open_tuning(replace(make_hanging_model(), rotational=True)).units) == {
+        "kg m^2",
+        "N m s/rad",
+        "N m/rad",
+        "1",
+    }
 
 
 def test_where_no_tolerance_is_stated_a_tenth_is_taken():
-    tuning = opened(hanging(tolerance=None))
+    tuning = open_tuning(make_hanging_model(tolerance=None))
     sizes = dict(zip(tuning.names, tuning.deviation, strict=True))
     assert sizes["stiffness fx"] == pytest.approx(UNSTATED_SHARE * 130.0)
     assert sizes["mass fx fy"] == pytest.approx(UNSTATED_SHARE * (MASS_KG + HANGING_KG))
@@ -138,29 +145,29 @@ def test_where_no_tolerance_is_stated_a_tenth_is_taken():
 
 def test_a_mass_that_is_none_is_refused():
     with pytest.raises(MechanicalModelError, match="positive definite"):
-        moved(hanging(), mass_fx=-80.0)
+        tune_model(make_hanging_model(), mass_fx=-80.0)
 
 
 def test_a_rigid_model_has_no_modes_to_tune():
-    model = hanging()
+    model = make_hanging_model()
     rigid = replace(model, mass=np.eye(2), damping=np.eye(2), stiffness=np.eye(2), input=np.eye(2), output=np.eye(2))
-    assert len(opened(rigid).names) == 9
+    assert len(open_tuning(rigid).names) == 9
 
 
 def test_small_deviations_move_the_response_in_a_straight_line():
-    model, tuning = hanging(), opened(hanging())
-    bare = linear_steps(model, 1e-3).advance
+    model, tuning = make_hanging_model(), open_tuning(make_hanging_model())
+    bare = discretise_model(model, 1e-3).advance
     for number in range(len(tuning.names)):
         at = np.zeros(len(tuning.names))
         at[number] = 1e-3
-        up, down = (linear_steps(tuning.tune(sign * at), 1e-3).advance - bare for sign in (1.0, -1.0))
+        up, down = (discretise_model(tuning.tune(sign * at), 1e-3).advance - bare for sign in (1.0, -1.0))
         assert np.abs(up).max() > 0
         assert up == pytest.approx(-down, abs=1e-2 * np.abs(up).max())
 
 
 @pytest.mark.parametrize(("name", "lowest"), [("mass fx", 62.5), ("damping fx", 13.4), ("stiffness fx", 21.7)])
 def test_a_model_is_possible_until_a_matrix_becomes_indefinite(name, lowest):
-    tuning = tuning_of(hanging(1), ("fx",))
+    tuning = tuning_of(make_hanging_model(1), ("fx",))
     deviations = np.zeros(len(tuning.names))
     deviations[tuning.names.index(name)] = -0.9 * lowest
     assert tuning.is_possible(deviations)

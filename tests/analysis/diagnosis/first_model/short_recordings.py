@@ -8,13 +8,13 @@ from equalizer.signals.signal import Signal
 RATE_HZ = 100.0
 
 
-def smooth(count, seed, width=25):
+def smooth_noise(count, seed, width=25):
     noise = np.random.default_rng(seed).standard_normal(count + width)
     course = np.convolve(noise, np.hanning(width), "same")[:count]
     return course / course.std()
 
 
-def of(command, response):
+def make_recording(command, response):
     """Each a list of (name, quantity, unit, samples)."""
 
     def signal(channels):
@@ -24,7 +24,7 @@ def of(command, response):
     return Recording("form", signal(command), signal(response))
 
 
-def speed_of(push, mass=0.05, damping=0.3):
+def simulate_speed(push, mass=0.05, damping=0.3):
     """(n,): in fine steps."""
     speed, found = 0.0, []
     for force in push:

@@ -8,10 +8,10 @@ import pytest
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
 from equalizer.signals.recording import Hold
-from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, of, smooth, speed_of
+from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, make_recording, simulate_speed, smooth_noise
 
 
-def position_of(push, mass=0.05, damping=0.3, stiffness=20.0):
+def simulate_position(push, mass=0.05, damping=0.3, stiffness=20.0):
     """(n,): of a body on a spring, in fine steps."""
     place = speed = 0.0
     found = []
@@ -24,13 +24,15 @@ def position_of(push, mass=0.05, damping=0.3, stiffness=20.0):
 
 
 @pytest.mark.parametrize(
-    ("course", "quantity"), [(speed_of, "velocity"), (position_of, "position")], ids=["motor", "body on a spring"]
+    ("course", "quantity"),
+    [(simulate_speed, "velocity"), (simulate_position, "position")],
+    ids=["motor", "body on a spring"],
 )
 @pytest.mark.parametrize("unit", ["1", "V"])
 def test_a_response_of_which_nothing_says_what_it_is_is_taken_for_what_its_course_suggests(course, quantity, unit):
-    push = smooth(4000, 3, width=9)
+    push = smooth_noise(4000, 3, width=9)
     own = "voltage" if unit == "V" else "1"
-    recording = of([("u", own, unit, push)], [("y", own, unit, course(push))])
+    recording = make_recording([("u", own, unit, push)], [("y", own, unit, course(push))])
 
     (found,), said = one_motion_per_force((recording,))
 
@@ -42,27 +44,27 @@ def test_a_response_of_which_nothing_says_what_it_is_is_taken_for_what_its_cours
 
 
 def test_what_an_imposed_motion_meets_is_a_force_where_nothing_says_so():
-    place = smooth(2000, 5)
-    recording = of([("x", "position", "m", place)], [("y", "1", "1", 3 * place)])
+    place = smooth_noise(2000, 5)
+    recording = make_recording([("x", "position", "m", place)], [("y", "1", "1", 3 * place)])
 
     (found,), _ = one_motion_per_force((recording,))
 
     assert found.response.quantities == ("force",)
 
 
-def turned(recording):
+def reverse_command(recording):
     return replace(recording, command=replace(recording.command, samples=-recording.command.samples))
 
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("friction", [0.0, 0.4])
 def test_a_command_that_is_counted_against_its_motion_is_turned_round(seed, friction):
-    push = smooth(2000, seed)
-    speed = speed_of(np.sign(push) * np.maximum(np.abs(push) - friction, 0.0))
-    recording = of([("u", "force", "N", push)], [("v", "velocity", "m/s", speed)])
+    push = smooth_noise(2000, seed)
+    speed = simulate_speed(np.sign(push) * np.maximum(np.abs(push) - friction, 0.0))
+    recording = make_recording([("u", "force", "N", push)], [("v", "velocity", "m/s", speed)])
 
     assert one_motion_per_force((recording,)) == ((recording,), ())
-    (found,), (said,) = one_motion_per_force((turned(recording),))
+    (found,), (said,) = one_motion_per_force((reverse_command(recording),))
     np.testing.assert_array_equal(found.command.samples, recording.command.samples)
     assert said.startswith("u is counted against the motion")
 
@@ -70,10 +72,10 @@ def test_a_command_that_is_counted_against_its_motion_is_turned_round(seed, fric
 @pytest.mark.parametrize("hold", [Hold.BAND_LIMITED, Hold.LINEAR])
 def test_what_was_decided_beforehand_is_turned_with_the_command(hold):
     """It tells of a controller where the command alone cannot."""
-    push, decided = smooth(2000, 1), smooth(2000, 2)
-    recording = of([("u", "force", "N", push)], [("v", "velocity", "m/s", speed_of(push))])
+    push, decided = smooth_noise(2000, 1), smooth_noise(2000, 2)
+    recording = make_recording([("u", "force", "N", push)], [("v", "velocity", "m/s", simulate_speed(push))])
     beside = replace(recording.command, samples=decided[:, None])
-    recording = replace(turned(recording), hold=hold, excitation=replace(beside, samples=-beside.samples))
+    recording = replace(reverse_command(recording), hold=hold, excitation=replace(beside, samples=-beside.samples))
 
     (found,), _ = one_motion_per_force((recording,))
 
@@ -83,10 +85,10 @@ def test_what_was_decided_beforehand_is_turned_with_the_command(hold):
 
 
 def test_what_was_decided_beforehand_is_summed_with_the_commands():
-    first, second = smooth(2000, 1), smooth(2000, 2)
-    recording = of(
+    first, second = smooth_noise(2000, 1), smooth_noise(2000, 2)
+    recording = make_recording(
         [("u1", "force", "N", first), ("u2", "force", "N", second)],
-        [("v", "velocity", "m/s", speed_of(first + 0.5 * second))],
+        [("v", "velocity", "m/s", simulate_speed(first + 0.5 * second))],
     )
 
     (found,), _ = one_motion_per_force((replace(recording, excitation=recording.command),))
@@ -99,25 +101,25 @@ def test_a_loop_without_time_tells_which_way_a_force_is_counted(seed):
     """A spring with play, pulled to and fro: rising and falling branches."""
     way = np.concatenate([np.linspace(0, 1, 300), np.linspace(1, -1, 600), np.linspace(-1, 0, 300)])
     pulled = 20 * way + 3 * np.sign(np.gradient(way)) + 0.1 * np.random.default_rng(seed).standard_normal(1200)
-    recording = of([("u", "force", "N", pulled)], [("x", "position", "m", way)])
+    recording = make_recording([("u", "force", "N", pulled)], [("x", "position", "m", way)])
     recording = replace(recording, meta={"time": "unknown"})
 
     assert one_motion_per_force((recording,))[1] == ()
-    (found,), _ = one_motion_per_force((turned(recording),))
+    (found,), _ = one_motion_per_force((reverse_command(recording),))
     np.testing.assert_array_equal(found.command.samples, recording.command.samples)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_command_that_moves_nothing_and_a_spring_alone_are_left_as_they_are(seed):
-    push = smooth(2000, seed)
-    for moved in (smooth(2000, seed + 100), -push):
-        recording = of([("u", "force", "N", push)], [("x", "position", "m", moved)])
+    push = smooth_noise(2000, seed)
+    for moved in (smooth_noise(2000, seed + 100), -push):
+        recording = make_recording([("u", "force", "N", push)], [("x", "position", "m", moved)])
         assert one_motion_per_force((recording,)) == ((recording,), ())
 
 
 def test_of_an_imposed_motion_the_measured_force_is_turned_round():
-    push = smooth(2000, 1)
-    recording = of([("v", "velocity", "m/s", speed_of(push))], [("f", "force", "N", -push)])
+    push = smooth_noise(2000, 1)
+    recording = make_recording([("v", "velocity", "m/s", simulate_speed(push))], [("f", "force", "N", -push)])
 
     (found,), _ = one_motion_per_force((recording,))
     np.testing.assert_array_equal(found.response.samples[:, 0], push)

@@ -20,7 +20,7 @@ TURN_RAD_PER_S2 = 38.0
 SPRING, DAMPING = 40.0, 0.15
 
 
-def decay(acceleration, start: float, seconds: float, seed: int) -> np.ndarray:
+def simulate_decay(acceleration, start: float, seconds: float, seed: int) -> np.ndarray:
     """(n,): position from rest at `start`, by semi-implicit Euler steps of a sixteenth of a sample, with noise."""
     count, step_s = int(seconds * RATE_HZ), 1 / (RATE_HZ * FINER)
     q, v, found = start, 0.0, np.zeros(count)
@@ -32,7 +32,7 @@ def decay(acceleration, start: float, seconds: float, seed: int) -> np.ndarray:
     return found + NOISE_RAD * np.random.default_rng(seed).standard_normal(count)
 
 
-def recording(*decays: np.ndarray) -> Recording:
+def make_recording(*decays: np.ndarray) -> Recording:
     """The decays one after the other, as parts of one recording."""
     ends = np.cumsum([len(each) for each in decays])
     parts = [
@@ -46,26 +46,31 @@ def recording(*decays: np.ndarray) -> Recording:
     )  # fmt: skip
 
 
-def names_of(found) -> set[str]:
+def effect_names(found) -> set[str]:
     return {name for effect in found.diagnosis.effects for name in (effect.effect, *effect.class_)}
 
 
-def pendulum(q: float, v: float) -> float:
+def pendulum_acceleration(q: float, v: float) -> float:
     return -TURN_RAD_PER_S2 * np.sin(q) - DAMPING * v
 
 
-def rubbing(q: float, v: float) -> float:
+def friction_acceleration(q: float, v: float) -> float:
     return -SPRING * q - DAMPING * v - 0.8 * np.tanh(v / 0.01)
 
 
-def linear(q: float, v: float) -> float:
+def linear_acceleration(q: float, v: float) -> float:
     return -SPRING * q - DAMPING * v
 
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_weight_of_a_pendulum_is_named_from_its_decays(seed):
-    found = diagnose_values(recording(decay(pendulum, 1.6, 12, seed), decay(pendulum, 0.9, 12, seed + 10)))
-    assert "gravity_torque" in names_of(found)
+    found = diagnose_values(
+        make_recording(
+            simulate_decay(pendulum_acceleration, 1.6, 12, seed),
+            simulate_decay(pendulum_acceleration, 0.9, 12, seed + 10),
+        )
+    )
+    assert "gravity_torque" in effect_names(found)
     assert found.diagnosis.fit.test.after < 0.3 * found.diagnosis.fit.test.retuned
     # Its two parameters make one: spring and weight together hold the small motion.
     (weight,) = (each for each in found.diagnosis.effects if each.effect == "gravity_torque")
@@ -76,51 +81,55 @@ def test_the_weight_of_a_pendulum_is_named_from_its_decays(seed):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_dry_friction_is_named_from_a_decay(seed):
-    found = diagnose_values(recording(decay(rubbing, 1.0, 8, seed)))
+    found = diagnose_values(make_recording(simulate_decay(friction_acceleration, 1.0, 8, seed)))
     (friction,) = found.diagnosis.effects
-    assert "coulomb_friction" in names_of(found)
+    assert "coulomb_friction" in effect_names(found)
     assert friction.parameters["level"].value == pytest.approx(0.8, rel=0.25)
 
 
 def test_a_decay_in_an_unknown_unit_is_read_as_a_position_and_named():
     """As of a photodiode that a swinging mirror shines on: its parameters are in no unit."""
-    counted = recording(decay(rubbing, 1.0, 8, 3))
+    counted = make_recording(simulate_decay(friction_acceleration, 1.0, 8, 3))
     response = replace(counted.response, quantity="1", unit="1", channels=("diode",))
     unknown = replace(counted, response=response)
-    assert "coulomb_friction" in names_of(diagnose_values(unknown))
+    assert "coulomb_friction" in effect_names(diagnose_values(unknown))
     assert "diode measures; it was taken for a position that moves freely" in one_motion_per_force([unknown])[1][0]
 
 
 @pytest.mark.parametrize(("quantity", "unit"), [("temperature", "K"), ("current", "A")])
 def test_what_is_no_motion_is_not_read_as_a_position(quantity, unit):
-    cooled = recording(decay(rubbing, 1.0, 8, 3))
+    cooled = make_recording(simulate_decay(friction_acceleration, 1.0, 8, 3))
     with pytest.raises(NothingToDiagnose, match="the command never changes"):
         diagnose_values(replace(cooled, response=replace(cooled.response, quantity=quantity, unit=unit)))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_linear_decay_names_nothing(seed):
-    found = diagnose_values(recording(decay(linear, 1.0, 12, seed), decay(linear, 0.4, 12, seed + 10)))
-    assert names_of(found) == set()
+    found = diagnose_values(
+        make_recording(
+            simulate_decay(linear_acceleration, 1.0, 12, seed), simulate_decay(linear_acceleration, 0.4, 12, seed + 10)
+        )
+    )
+    assert effect_names(found) == set()
     assert found.diagnosis.fit.test.retuned < 0.1
 
 
 def test_a_standing_command_with_accelerations_alone_is_refused_with_a_way_on():
-    swing = recording(decay(linear, 1.0, 8, 1))
+    swing = make_recording(simulate_decay(linear_acceleration, 1.0, 8, 1))
     response = Signal(swing.response.samples, RATE_HZ, "angular acceleration", "rad/s^2", ("alpha",))
     with pytest.raises(NothingToDiagnose, match="a free motion, measured as positions or speeds"):
         diagnose_values(replace(swing, response=response))
 
 
 def test_commands_that_differ_between_recordings_drive():
-    swing = recording(decay(linear, 1.0, 8, 1))
+    swing = make_recording(simulate_decay(linear_acceleration, 1.0, 8, 1))
     pushed = replace(swing, command=replace(swing.command, samples=swing.command.samples + 2.0))
     assert is_free_motion((swing, swing)) and not is_free_motion((swing, pushed))
 
 
 def test_a_command_that_is_missing_where_the_motion_is_drives_nothing():
     """As importing 0 x angle makes it, where samples of the angle are missing."""
-    swing = recording(decay(linear, 1.0, 8, 1))
+    swing = make_recording(simulate_decay(linear_acceleration, 1.0, 8, 1))
     gaps = swing.command.samples.copy()
     gaps[100:103] = np.nan
     read, said = read_free_motion((replace(swing, command=replace(swing.command, samples=gaps)),))
@@ -128,7 +137,7 @@ def test_a_command_that_is_missing_where_the_motion_is_drives_nothing():
 
 
 def test_a_first_model_of_a_decay_has_damping_and_spring_per_unit_of_mass():
-    read, _ = read_free_motion((recording(decay(linear, 1.0, 12, 1)),))
+    read, _ = read_free_motion((make_recording(simulate_decay(linear_acceleration, 1.0, 12, 1)),))
     choice = choose_structure(read, None, lambda share: None)
     assert choice.fit.kind == "mass-spring"
     numbers = {number.name: number.value for number in choice.fit.parameters}
@@ -139,11 +148,11 @@ def test_a_first_model_of_a_decay_has_damping_and_spring_per_unit_of_mass():
 
 def test_a_rotor_that_runs_down_is_a_motor():
     noise = NOISE_RAD * np.random.default_rng(1).standard_normal(int(8 * RATE_HZ))
-    read, _ = read_free_motion((recording(spun_down() + noise),))
+    read, _ = read_free_motion((make_recording(rotor_angle() + noise),))
     assert choose_structure(read, None, lambda share: None).fit.kind == "motor"
 
 
-def spun_down() -> np.ndarray:
+def rotor_angle() -> np.ndarray:
     """(n,): turned so far, rad, by a rotor that loses half of its speed per second."""
     time_s = np.arange(int(8 * RATE_HZ)) / RATE_HZ
     return 60.0 * (1 - np.exp(-0.5 * time_s))

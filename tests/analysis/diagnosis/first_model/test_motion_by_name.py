@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.first_model.infer_quantity import name_motion
-from tests.analysis.diagnosis.first_model.short_recordings import of, smooth, speed_of
+from tests.analysis.diagnosis.first_model.short_recordings import make_recording, simulate_speed, smooth_noise
 
-PUSH = smooth(4000, 1)
-PLACE = np.cumsum(speed_of(PUSH)) / 500
+PUSH = smooth_noise(4000, 1)
+PLACE = np.cumsum(simulate_speed(PUSH)) / 500
 PLAIN = ("1", "1")
 
 
-def named(*channels):
+def named_quantities(*channels):
     """Quantities of the responses, and what is said. channels: name, quantity, unit, samples."""
-    (found,), said = name_motion((of([("u", "voltage", "V", PUSH)], list(channels)),))
+    (found,), said = name_motion((make_recording([("u", "voltage", "V", PUSH)], list(channels)),))
     return found.response.quantities, said
 
 
@@ -23,9 +23,9 @@ def named(*channels):
      ("yaw_rate", "velocity"), ("VELOCIDAD", "velocity"), ("Drehzahl", "velocity"), ("vitesse", "velocity"),
      ("angle", "angle"), ("Ángulo", "angle"), ("Winkel", "angle"), ("accX", "acceleration"), ("posición", "position")],
 )  # fmt: skip
-@pytest.mark.parametrize("course", [PLACE, speed_of(PUSH)], ids=["of a position", "of a speed"])
+@pytest.mark.parametrize("course", [PLACE, simulate_speed(PUSH)], ids=["of a position", "of a speed"])
 def test_a_clear_name_counts_more_than_the_course(name, quantity, course):
-    quantities, said = named((name, *PLAIN, course))
+    quantities, said = named_quantities((name, *PLAIN, course))
     assert quantities == (quantity,)
     assert said.startswith(f"From the name alone, {name} was taken for a")
     assert quantity in said and "state that in the map (quantity)" in said
@@ -33,17 +33,19 @@ def test_a_clear_name_counts_more_than_the_course(name, quantity, course):
 
 @pytest.mark.parametrize("name", ["y", "tacho", "CH1", "current", "temperature"])
 def test_another_name_leaves_it_to_the_course(name):
-    quantities, said = named((name, *PLAIN, PLACE))
+    quantities, said = named_quantities((name, *PLAIN, PLACE))
     assert quantities == ("position",)
     assert f"The recording does not state what {name} measures" in said
 
 
 def test_what_a_name_says_of_several_is_said_of_each_and_the_others_stay_open():
-    quantities, said = named(("speed", *PLAIN, speed_of(PUSH)), ("angle", *PLAIN, PLACE), ("CH3", *PLAIN, PLACE))
+    quantities, said = named_quantities(
+        ("speed", *PLAIN, simulate_speed(PUSH)), ("angle", *PLAIN, PLACE), ("CH3", *PLAIN, PLACE)
+    )
     assert quantities == ("velocity", "angle", "1")
     assert "speed was taken for a velocity and angle was taken for an angle" in said
 
 
 @pytest.mark.parametrize(("quantity", "unit"), [("velocity", "m/s"), ("position", "m")])
 def test_a_stated_quantity_counts_more_than_the_name(quantity, unit):
-    assert named(("angle", quantity, unit, PLACE)) == ((quantity,), "")
+    assert named_quantities(("angle", quantity, unit, PLACE)) == ((quantity,), "")

@@ -5,26 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.motion import motion_signal
-from analysis.diagnosis.data.driven_response import response_significance
+from analysis.diagnosis.balance.motion import find_motion_signal
+from analysis.diagnosis.data.driven_response import compute_response_significance
 from analysis.diagnosis.data.measured_motion import all_as_force_driven
 from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
 from analysis.diagnosis.settings import ANSWER_DEVIATIONS
-from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, of, smooth, speed_of
+from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, make_recording, simulate_speed, smooth_noise
 
 
 def test_a_plain_recording_stays_as_it_is():
-    push = smooth(2000, 1)
-    recording = of([("u", "force", "N", push)], [("v", "velocity", "m/s", speed_of(push))])
+    push = smooth_noise(2000, 1)
+    recording = make_recording([("u", "force", "N", push)], [("v", "velocity", "m/s", simulate_speed(push))])
 
     assert one_motion_per_force((recording,)) == ((recording,), ())
 
 
 def test_a_temperature_among_the_commands_is_a_condition():
-    push, heat = smooth(2000, 1), np.linspace(20, 50, 2000)
-    recording = of(
+    push, heat = smooth_noise(2000, 1), np.linspace(20, 50, 2000)
+    recording = make_recording(
         [("u", "torque", "N m", push), ("T", "temperature", "degC", heat)],
-        [("w", "angular velocity", "rad/s", speed_of(push))],
+        [("w", "angular velocity", "rad/s", simulate_speed(push))],
     )
 
     (found,), (said,) = one_motion_per_force((recording,))
@@ -36,10 +36,10 @@ def test_a_temperature_among_the_commands_is_a_condition():
 
 
 def test_two_commands_of_one_motion_become_one():
-    first, second = smooth(4000, 1), smooth(4000, 2)
-    recording = of(
+    first, second = smooth_noise(4000, 1), smooth_noise(4000, 2)
+    recording = make_recording(
         [("u1", "voltage", "V", first), ("u2", "voltage", "V", second)],
-        [("w", "angular velocity", "rad/s", speed_of(first + 0.4 * second))],
+        [("w", "angular velocity", "rad/s", simulate_speed(first + 0.4 * second))],
     )
 
     (found,), (said,) = one_motion_per_force((recording,))
@@ -51,10 +51,10 @@ def test_two_commands_of_one_motion_become_one():
 
 @pytest.mark.parametrize("level", [0.0, 0.5, 50.0])
 def test_a_command_that_never_changes_is_left_out_and_the_others_are_summed(level):
-    first, second = smooth(4000, 1), smooth(4000, 2)
-    recording = of(
+    first, second = smooth_noise(4000, 1), smooth_noise(4000, 2)
+    recording = make_recording(
         [("u1", "force", "N", first), ("u2", "force", "N", second), ("u3", "force", "N", np.full(4000, level))],
-        [("v", "velocity", "m/s", speed_of(first + 0.4 * second))],
+        [("v", "velocity", "m/s", simulate_speed(first + 0.4 * second))],
     )
 
     command = recording.command.samples.copy()
@@ -75,11 +75,11 @@ def test_a_command_that_never_changes_is_left_out_and_the_others_are_summed(leve
 @pytest.mark.parametrize("share", [0.0, 1e-4])
 def test_of_two_commands_with_a_constant_sum_the_difference_drives(share):
     """share: of the drive, that both have in common by chance, as by rounding."""
-    push = smooth(4000, 1)
+    push = smooth_noise(4000, 1)
     hum = share * push.std() * np.random.default_rng(4).standard_normal(4000)
-    recording = of(
+    recording = make_recording(
         [("left", "force", "N", 50 + push + hum), ("right", "force", "N", 50 - push + hum)],
-        [("v", "velocity", "m/s", speed_of(push + 40 * push.std()))],
+        [("v", "velocity", "m/s", simulate_speed(push + 40 * push.std()))],
     )
 
     (found,), _ = one_motion_per_force((recording,))
@@ -90,10 +90,10 @@ def test_of_two_commands_with_a_constant_sum_the_difference_drives(share):
 
 def test_a_command_that_never_changes_is_left_out_with_the_motion_of_its_axis():
     """A device of two axes of which only the first was driven."""
-    push = smooth(2000, 1)
-    recording = of(
+    push = smooth_noise(2000, 1)
+    recording = make_recording(
         [("fx", "force", "N", push), ("fy", "force", "N", np.zeros(2000))],
-        [("x", "velocity", "m/s", speed_of(push)), ("y", "velocity", "m/s", 1e-3 * smooth(2000, 3))],
+        [("x", "velocity", "m/s", simulate_speed(push)), ("y", "velocity", "m/s", 1e-3 * smooth_noise(2000, 3))],
     )
 
     (found,), said = one_motion_per_force((recording,))
@@ -105,10 +105,10 @@ def test_a_command_that_never_changes_is_left_out_with_the_motion_of_its_axis():
 
 
 def test_of_motions_of_several_kinds_the_lowest_is_kept():
-    push = smooth(2000, 1)
-    speed = speed_of(push)
+    push = smooth_noise(2000, 1)
+    speed = simulate_speed(push)
     angle = np.cumsum(speed) / RATE_HZ
-    recording = of(
+    recording = make_recording(
         [("u", "torque", "N m", push)],
         [("q", "angle", "rad", angle), ("w", "angular velocity", "rad/s", speed), ("i", "current", "A", push)],
     )
@@ -120,8 +120,10 @@ def test_of_motions_of_several_kinds_the_lowest_is_kept():
 
 
 def test_of_several_forces_along_one_motion_the_strongest_is_balanced():
-    way = smooth(2000, 1)
-    recording = of([("q", "displacement", "m", way)], [("a", "force", "N", 2 * way), ("b", "force", "N", 5 * way)])
+    way = smooth_noise(2000, 1)
+    recording = make_recording(
+        [("q", "displacement", "m", way)], [("a", "force", "N", 2 * way), ("b", "force", "N", 5 * way)]
+    )
 
     formed, (said,) = one_motion_per_force((recording,))
     (driven,) = all_as_force_driven(formed)
@@ -132,17 +134,19 @@ def test_of_several_forces_along_one_motion_the_strongest_is_balanced():
 
 def test_a_channel_without_a_single_number_is_no_motion_and_no_force():
     """Without a warning, which would be an error here."""
-    push, none = smooth(2000, 1), np.full(2000, np.nan)
-    moved = of([("f", "force", "N", push)], [("x", "position", "m", none), ("y", "position", "m", push)])
-    assert (moving := motion_signal(moved)) is not None
+    push, none = smooth_noise(2000, 1), np.full(2000, np.nan)
+    moved = make_recording([("f", "force", "N", push)], [("x", "position", "m", none), ("y", "position", "m", push)])
+    assert (moving := find_motion_signal(moved)) is not None
     assert moving.channels == ("y",)
-    pushed = of([("x", "position", "m", push)], [("f1", "force", "N", none), ("f2", "force", "N", push)])
+    pushed = make_recording([("x", "position", "m", push)], [("f1", "force", "N", none), ("f2", "force", "N", push)])
     assert one_motion_per_force((pushed,))[0][0].response.channels == ("f2",)
 
 
 def test_one_force_along_two_imposed_motions_keeps_both():
-    way, far = smooth(2000, 1), smooth(2000, 2)
-    recording = of([("q", "displacement", "m", way), ("r", "displacement", "m", far)], [("f", "force", "N", way - far)])
+    way, far = smooth_noise(2000, 1), smooth_noise(2000, 2)
+    recording = make_recording(
+        [("q", "displacement", "m", way), ("r", "displacement", "m", far)], [("f", "force", "N", way - far)]
+    )
 
     (driven,) = all_as_force_driven(one_motion_per_force((recording,))[0])
 
@@ -153,18 +157,20 @@ def test_one_force_along_two_imposed_motions_keeps_both():
 def test_the_sign_of_an_absolute_speed_is_restored(seed):
     rng = np.random.default_rng(seed)
     push = np.repeat(rng.uniform(-2, 2, 25), 20)
-    speed = speed_of(push, mass=0.1)
+    speed = simulate_speed(push, mass=0.1)
     seen = np.abs(speed) + 0.005 * speed.std() * rng.standard_normal(len(speed))
 
-    (found,), (said,) = one_motion_per_force((of([("u", "voltage", "V", push)], [("w", "speed", "m/s", seen)]),))
+    (found,), (said,) = one_motion_per_force(
+        (make_recording([("u", "voltage", "V", push)], [("w", "speed", "m/s", seen)]),)
+    )
 
     assert np.linalg.norm(found.response.samples[:, 0] - speed) < 0.1 * np.linalg.norm(speed)
     assert "sensor measures the absolute value only" in said
 
 
 def test_a_speed_in_one_direction_is_not_taken_for_an_absolute_speed():
-    push = 3.0 + np.abs(smooth(1000, 3))
-    recording = of([("u", "voltage", "V", push)], [("w", "speed", "m/s", speed_of(push))])
+    push = 3.0 + np.abs(smooth_noise(1000, 3))
+    recording = make_recording([("u", "voltage", "V", push)], [("w", "speed", "m/s", simulate_speed(push))])
 
     assert one_motion_per_force((recording,)) == ((recording,), ())
 
@@ -172,10 +178,10 @@ def test_a_speed_in_one_direction_is_not_taken_for_an_absolute_speed():
 def test_a_device_whose_memory_is_longer_than_a_stretch_answers_its_command():
     rng = np.random.default_rng(5)
     push = np.repeat(rng.uniform(-2, 2, 25), 20)
-    moved = of([("u", "voltage", "V", push)], [("w", "speed", "m/s", speed_of(push, mass=0.3))])
+    moved = make_recording([("u", "voltage", "V", push)], [("w", "speed", "m/s", simulate_speed(push, mass=0.3))])
     other = replace(moved, response=replace(moved.response, samples=rng.standard_normal((len(push), 1))))
 
-    sure, unsure = response_significance([moved]), response_significance([other])
+    sure, unsure = compute_response_significance([moved]), compute_response_significance([other])
 
     assert sure is None or sure >= ANSWER_DEVIATIONS
     assert unsure is not None

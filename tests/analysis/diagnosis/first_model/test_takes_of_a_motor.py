@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.first_model.model_from_balance import share_within
+from analysis.diagnosis.first_model.model_from_balance import law_power_share_in_band
 
 RATE_HZ, SAMPLES = 100.0, 1000
 
 
-def balance_of(*courses):
+def make_balance(*courses):
     """A balance with one named law, whose force in each take is a course."""
     regression = SimpleNamespace(
         columns_of=lambda laws: list(laws), weights=lambda columns: np.ones(1), base=0, places=[slice(0, 1)],
@@ -25,4 +25,6 @@ def balance_of(*courses):
 )
 def test_only_a_law_that_differs_between_takes_has_power_below_their_band(levels, share):
     ripple = 0.1 * np.where(np.arange(SAMPLES) % 2, 1.0, -1.0)
-    assert share_within([balance_of(*(level + ripple for level in levels))], 2.0) == pytest.approx(share, abs=1e-6)
+    assert law_power_share_in_band([make_balance(*(level + ripple for level in levels))], 2.0) == pytest.approx(
+        share, abs=1e-6
+    )

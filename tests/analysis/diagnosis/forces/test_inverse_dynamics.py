@@ -10,10 +10,10 @@ from analysis.diagnosis.errors.choose_measure import measure_by_force
 from analysis.diagnosis.forces.inverse_dynamics import band_motion, compute_required_force
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.simulation.along_motion import force_along
 from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
+from equalizer.effects.simulation.forces_along_motion import effect_forces_along_motion
 from equalizer.effects.simulation.simulator import simulate_mechanism
-from equalizer.plant.linear_simulation import LinearSteps, linear_steps
+from equalizer.plant.linear_simulation import LinearSteps, discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import filter_low_pass
 from equalizer.signals.recording import Recording
@@ -23,18 +23,18 @@ RATE_HZ = 1000.0
 TIME_S = np.arange(4000) / RATE_HZ
 
 
-def body(mass: float = 2.0, damping: float = 5.0, stiffness: float = 300.0, quantity: str = "position"):
-    return MechanicalModel("body", quantity, [[mass]], [[damping]], [[stiffness]], [[1.0]], [[1.0]])
+def make_body(mass: float = 2.0, damping: float = 5.0, stiffness: float = 300.0, quantity: str = "position"):
+    return MechanicalModel("make_body", quantity, [[mass]], [[damping]], [[stiffness]], [[1.0]], [[1.0]])
 
 
-def _breaks_down(*_of: object) -> None:
+def _raise_singular(*_of: object) -> None:
     raise np.linalg.LinAlgError("singular")
 
 
 def test_a_sine_needs_the_force_of_the_books() -> None:
     omega = 2 * np.pi * 2.0
     x = 0.03 * np.sin(omega * TIME_S)
-    needed = compute_required_force(body(), band_motion(x[:, None], RATE_HZ, 50.0))
+    needed = compute_required_force(make_body(), band_motion(x[:, None], RATE_HZ, 50.0))
     wanted = (300.0 - 2.0 * omega**2) * x + 5.0 * 0.03 * omega * np.cos(omega * TIME_S)
     inside = slice(200, -200)
     assert np.allclose(needed.force[inside, 0], wanted[inside], atol=2e-3 * np.abs(wanted).max())
@@ -43,7 +43,7 @@ def test_a_sine_needs_the_force_of_the_books() -> None:
 
 def test_a_steady_slide_needs_its_damping_and_spring() -> None:
     x = 0.1 + 0.2 * TIME_S
-    needed = compute_required_force(body(), band_motion(x[:, None], RATE_HZ, 50.0))
+    needed = compute_required_force(make_body(), band_motion(x[:, None], RATE_HZ, 50.0))
     assert np.allclose(needed.force[:, 0], 300.0 * x + 5.0 * 0.2, atol=1e-6)
     assert np.allclose(needed.axis_velocity, 0.2, atol=1e-6)
 
@@ -72,10 +72,10 @@ def test_a_band_limited_signal_keeps_its_place_and_comes_late_when_asked() -> No
 def test_friction_along_a_motion_is_that_of_the_simulation() -> None:
     rubbing = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 1.5}),)
     force = 12.0 * np.sin(2 * np.pi * 1.3 * TIME_S)[:, None]
-    played = simulate_mechanism(body(), force, RATE_HZ, rubbing)
+    played = simulate_mechanism(make_body(), force, RATE_HZ, rubbing)
     velocity = played.axis_velocity
     motion = played.axis_position, velocity, np.gradient(velocity, 1 / RATE_HZ, axis=0)
-    along = force_along(body(), rubbing, motion, (force, played.axis_force), RATE_HZ)
+    along = effect_forces_along_motion(make_body(), rubbing, motion, (force, played.axis_force), RATE_HZ)
     sliding = np.abs(velocity[:, 0]) > 0.02
     assert np.allclose(along[sliding], played.axis_force[sliding], atol=1e-3)
 
@@ -84,7 +84,7 @@ def test_what_sticks_answers_to_what_pushes_against_it() -> None:
     rubbing = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 1.5}),)
     still = np.zeros((400, 1))
     pushing = np.linspace(0.0, 3.0, 400)[:, None]
-    along = force_along(body(), rubbing, (still, still, still), (pushing, pushing), RATE_HZ)
+    along = effect_forces_along_motion(make_body(), rubbing, (still, still, still), (pushing, pushing), RATE_HZ)
     settled = slice(50, None)
     assert np.allclose(along[settled], -np.minimum(pushing, 1.5)[settled], atol=0.05)
 
@@ -98,10 +98,10 @@ def test_without_a_mass_friction_follows_the_motion_and_not_what_is_missing(name
     omega = 2 * np.pi * 1.3
     x, v = (0.03 * course[:, None] for course in (np.sin(omega * TIME_S), omega * np.cos(omega * TIME_S)))
     missing = 5.0 * np.sin(2 * np.pi * 0.9 * TIME_S)[:, None]
-    light = body(mass=1e-6, damping=0.0)
+    light = make_body(mass=1e-6, damping=0.0)
     commands = 300.0 * x + missing
 
-    along = force_along(
+    along = effect_forces_along_motion(
         light, (PlacedEffect(EFFECTS[name], (0,), values),), (x, v, -(omega**2) * x), (commands, missing), RATE_HZ
     )
 
@@ -117,15 +117,15 @@ def test_the_smoother_finds_motion_and_missing_force_of_a_drifting_plant(
 ) -> None:
     """by_doubling: where that breaks down, an ordered Schur form finds the same."""
     if not by_doubling:
-        monkeypatch.setattr(motion_smoother, "_steady_covariance", _breaks_down)
-    plant = body(stiffness=0.0 if quantity != "acceleration" else 300.0, quantity=quantity)
+        monkeypatch.setattr(motion_smoother, "_steady_covariance", _raise_singular)
+    plant = make_body(stiffness=0.0 if quantity != "acceleration" else 300.0, quantity=quantity)
     rng = np.random.default_rng(4)
     force = 3.0 * np.sin(2 * np.pi * 1.1 * TIME_S)[:, None]
     missing = 0.5 * np.sin(2 * np.pi * 2.3 * TIME_S + 1.0)[:, None]
     played = simulate_mechanism(plant, force + missing, RATE_HZ)
     noise = 1e-4 * played.response.std()
     seen = Signal(played.response + noise * rng.standard_normal(played.response.shape), RATE_HZ, quantity, "1", ("x",))
-    recording = Recording("body", Signal(force, RATE_HZ, "force", "N", ("x",)), seen)
+    recording = Recording("make_body", Signal(force, RATE_HZ, "force", "N", ("x",)), seen)
     found = smooth_motion(plant, observe(recording, 1), force, np.array([noise]))
     inside = slice(500, -100)
     assert np.std((found.missing_force - missing)[inside]) < 0.2 * np.std(missing)
@@ -133,16 +133,16 @@ def test_the_smoother_finds_motion_and_missing_force_of_a_drifting_plant(
 
 
 def test_a_smoother_of_what_is_not_finite_says_that_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(motion_smoother, "linear_steps", _without_numbers)
+    monkeypatch.setattr(motion_smoother, "discretise_model", _steps_of_nan)
     recording = Recording(
-        "body", *(Signal(np.ones((50, 1)), RATE_HZ, what, "1", ("x",)) for what in ("force", "position"))
+        "make_body", *(Signal(np.ones((50, 1)), RATE_HZ, what, "1", ("x",)) for what in ("force", "position"))
     )
     with pytest.raises(np.linalg.LinAlgError):
-        smooth_motion(body(), observe(recording, 1), np.ones((50, 1)), np.array([1.0]))
+        smooth_motion(make_body(), observe(recording, 1), np.ones((50, 1)), np.array([1.0]))
 
 
-def _without_numbers(model: MechanicalModel, step_s: float) -> LinearSteps:
-    steps = linear_steps(model, step_s)
+def _steps_of_nan(model: MechanicalModel, step_s: float) -> LinearSteps:
+    steps = discretise_model(model, step_s)
     return replace(steps, advance=np.full_like(steps.advance, np.nan))
 
 

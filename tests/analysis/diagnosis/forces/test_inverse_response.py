@@ -11,7 +11,7 @@ RATE_HZ = 1000.0
 LINES = np.linspace(0.0, RATE_HZ / 2, 5001)
 
 
-def device(coupling_n_s_per_m: float) -> MechanicalModel:
+def make_device(coupling_n_s_per_m: float) -> MechanicalModel:
     """A motor, a handle behind a cable, and a body that hangs on the handle, along each of two axes."""
     k, c = np.array([[9000.0, -9000.0, 0.0], [-9000.0, 9800.0, -500.0], [0.0, -500.0, 500.0]]), coupling_n_s_per_m
     damping = np.array([[4.0 + c, -c, 0.0], [-c, 3.0 + c, -0.4], [0.0, -0.4, 0.4]])
@@ -26,7 +26,7 @@ def device(coupling_n_s_per_m: float) -> MechanicalModel:
 
 @pytest.mark.parametrize("coupling", [0.0, 8.0])
 def test_all_lines_follow_from_a_few(coupling):
-    model = device(coupling)
+    model = make_device(coupling)
     wanted, found = inverse_response(model, LINES), fast_inverse_response(model, len(LINES), RATE_HZ / 2)(LINES)
     for part in (slice(0, 2), slice(2, 4)):
         scale = np.abs(wanted[:, part]).max(axis=(1, 2), keepdims=True)
@@ -35,6 +35,6 @@ def test_all_lines_follow_from_a_few(coupling):
 
 
 def test_where_few_lines_do_not_determine_the_others_all_are_solved_for(monkeypatch):
-    monkeypatch.setattr(module, "zeros_of", lambda model, largest: np.array([-3.0 + 40.0j]))
-    found = fast_inverse_response(device(8.0), len(LINES), RATE_HZ / 2)(LINES)
-    assert np.array_equal(found, inverse_response(device(8.0), LINES))
+    monkeypatch.setattr(module, "transmission_zeros", lambda model, largest: np.array([-3.0 + 40.0j]))
+    found = fast_inverse_response(make_device(8.0), len(LINES), RATE_HZ / 2)(LINES)
+    assert np.array_equal(found, inverse_response(make_device(8.0), LINES))

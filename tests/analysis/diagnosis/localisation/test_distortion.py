@@ -6,20 +6,20 @@ import pytest
 from analysis.diagnosis.data.spectral_lines import detection_lines, hold_length
 from analysis.diagnosis.localisation.distortion import find_distortions
 from analysis.diagnosis.localisation.level_trends import level_trends
-from analysis.diagnosis.noise.noise_floor import noise_floor
+from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
 from analysis.diagnosis.settings import DISTORTION_P
 
 
-def found_in(recording):
-    return find_distortions(recording, noise_floor(recording))
+def distortions_of(recording):
+    return find_distortions(recording, estimate_noise_floor(recording))
 
 
-def whole(trends, output, input):
+def whole_band_trends(trends, output, input):
     return {t.kind: t for t in trends if t.whole_band and t.output == output and t.input == input}
 
 
 def test_a_clean_device_has_no_distortion(device):
-    cells = found_in(device().recorded()).cells
+    cells = distortions_of(device().recorded()).cells
     assert len(cells) > 200
     assert np.mean([cell.p_value < 0.05 for cell in cells]) < 0.08
     assert not any(trend.present for trend in level_trends(cells))
@@ -27,7 +27,7 @@ def test_a_clean_device_has_no_distortion(device):
 
 def test_invented_odd_distortion_is_recovered_with_its_size(device):
     bench = device(cubic=0.02, levels=(1.0, 2.0, 4.0), noise=0.01, axes=1)
-    cells = [c for c in found_in(bench.recorded()).cells if c.whole_band and c.quantity == "acceleration"]
+    cells = [c for c in distortions_of(bench.recorded()).cells if c.whole_band and c.quantity == "acceleration"]
     for cell in (c for c in cells if c.kind == "odd"):
         command, segments = bench.command(1)
         segment = next(s for s in segments if s.amplitude == cell.amplitude)
@@ -45,8 +45,8 @@ def test_invented_odd_distortion_is_recovered_with_its_size(device):
 
 
 def test_odd_distortion_that_rises_is_distinguished_from_friction_that_falls(device):
-    rising = whole(level_trends(found_in(device(cubic=0.02, axes=1).recorded()).cells), "ax", "fx")
-    falling = whole(level_trends(found_in(device(coulomb=0.3, axes=1).recorded()).cells), "ax", "fx")
+    rising = whole_band_trends(level_trends(distortions_of(device(cubic=0.02, axes=1).recorded()).cells), "ax", "fx")
+    falling = whole_band_trends(level_trends(distortions_of(device(coulomb=0.3, axes=1).recorded()).cells), "ax", "fx")
     assert rising["odd"].level_dependence in ("rises", "rises from nothing")
     assert falling["odd"].level_dependence == "falls"
     assert falling["odd"].db_per_doubling == pytest.approx(-6, abs=1.5)
@@ -55,30 +55,32 @@ def test_odd_distortion_that_rises_is_distinguished_from_friction_that_falls(dev
 
 
 def test_even_distortion_falls_on_even_lines(device):
-    found = whole(level_trends(found_in(device(square=0.05, axes=1).recorded()).cells), "ax", "fx")
+    found = whole_band_trends(level_trends(distortions_of(device(square=0.05, axes=1).recorded()).cells), "ax", "fx")
     assert found["even"].present
     assert found["even"].db_per_doubling == pytest.approx(6, abs=1.5)
     assert not found["odd"].present
 
 
 def test_a_device_that_sways_varies_between_periods(device):
-    found = whole(level_trends(found_in(device(swaying=0.3, axes=1, noise=0.01).recorded()).cells), "ax", "fx")
+    found = whole_band_trends(
+        level_trends(distortions_of(device(swaying=0.3, axes=1, noise=0.01).recorded()).cells), "ax", "fx"
+    )
     assert found["varying"].present
     assert found["varying"].level_dependence == "stays"
 
 
 def test_a_multisine_without_silent_odd_lines_says_so(device):
-    found = found_in(device(full=True, cubic=0.02).recorded())
+    found = distortions_of(device(full=True, cubic=0.02).recorded())
     assert {cell.kind for cell in found.cells} == {"varying"}
     assert any("There are no silent (undriven) lines" in remark for remark in found.remarks)
 
 
 def test_what_a_recording_cannot_tell_is_reported(device):
     recording = device(levels=(1.0,), axes=1).recorded()
-    assert any("one level only" in remark for remark in found_in(recording).remarks)
+    assert any("one level only" in remark for remark in distortions_of(recording).remarks)
     single = replace(recording, segments=tuple(replace(s, period=0) for s in recording.segments))
-    assert "Nothing is periodic" in found_in(single).remarks[0]
-    bare = found_in(replace(recording, position=None))
+    assert "Nothing is periodic" in distortions_of(single).remarks[0]
+    bare = distortions_of(replace(recording, position=None))
     assert {cell.quantity for cell in bare.cells} == {"acceleration"}
 
 
@@ -98,8 +100,12 @@ def test_distortion_that_a_feedback_brings_back_is_not_counted_twice(device):
         excitation=recording.command,
     )
     plain = replace(disturbed, command=recording.command)
-    even = [c for c in found_in(disturbed).cells if c.kind == "even" and c.whole_band and c.quantity == "acceleration"]
-    blamed = [c for c in found_in(plain).cells if c.kind == "even" and c.whole_band and c.quantity == "acceleration"]
+    even = [
+        c for c in distortions_of(disturbed).cells if c.kind == "even" and c.whole_band and c.quantity == "acceleration"
+    ]
+    blamed = [
+        c for c in distortions_of(plain).cells if c.kind == "even" and c.whole_band and c.quantity == "acceleration"
+    ]
     assert blamed[0].p_value < 1e-6
     assert even[0].p_value > 1e-3
 
@@ -127,8 +133,8 @@ def test_images_of_a_held_command_are_no_driven_lines():
 def test_the_shared_cases_show_the_signature_of_their_effect(shared, number, output, input, kind, level_dependence):
     from study.store.formats.recording_file import read_recording
 
-    found = whole(
-        level_trends(found_in(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells), output, input
+    found = whole_band_trends(
+        level_trends(distortions_of(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells), output, input
     )
     assert found[kind].level_dependence == level_dependence
 
@@ -137,5 +143,5 @@ def test_the_shared_cases_show_the_signature_of_their_effect(shared, number, out
 def test_linear_shared_cases_have_no_distortion(shared, number):
     from study.store.formats.recording_file import read_recording
 
-    trends = level_trends(found_in(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells)
+    trends = level_trends(distortions_of(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells)
     assert not any(trend.present for trend in trends)

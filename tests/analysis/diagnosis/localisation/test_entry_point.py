@@ -3,16 +3,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.localisation.entry_point import Entry, entry_point, sensor_rule
+from analysis.diagnosis.localisation.entry_point import Entry, compare_sensors, rank_entries
 from analysis.diagnosis.localisation.mismatch_cells import Prediction
 from analysis.diagnosis.localisation.residual_spectra import ResidualSpectra, residual_spectra
-from analysis.diagnosis.noise.noise_floor import noise_floor
+from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
 
 FREQUENCY_HZ = np.arange(2.0, 120.0, 0.5)
 NOISE = np.array([1e-3, 1e-3, 1e-7, 1e-7]) ** 2
 
 
-def directions():
+def response_directions():
     """(lines, 4, 2): accelerations and positions of two axes that hear each other through a spring."""
     omega = 2 * np.pi * FREQUENCY_HZ
     mass, damping = np.diag([0.2, 0.3]), np.diag([2.0, 3.0])
@@ -22,8 +22,8 @@ def directions():
     return np.concatenate([-(omega**2)[:, None, None] * compliance, compliance], axis=1)
 
 
-def entries():
-    g, unit = directions(), np.eye(4, dtype=complex)[None]
+def make_entries():
+    g, unit = response_directions(), np.eye(4, dtype=complex)[None]
     return [
         Entry("force x", "mechanism", "x", g[:, :, :1]),
         Entry("force y", "mechanism", "y", g[:, :, 1:]),
@@ -35,7 +35,7 @@ def entries():
     ]
 
 
-def spectra_of(direction, seed=1, size=0.05, experiments=3):
+def simulate_spectra(direction, seed=1, size=0.05, experiments=3):
     """direction: (lines, 4, k)"""
     random = np.random.default_rng(seed)
 
@@ -51,16 +51,16 @@ def spectra_of(direction, seed=1, size=0.05, experiments=3):
 @pytest.mark.parametrize("number", range(7))
 @pytest.mark.parametrize("seed", range(3))
 def test_the_entry_that_made_the_residual_wins(number, seed):
-    true = entries()[number]
+    true = make_entries()[number]
     direction = np.broadcast_to(true.directions, (len(FREQUENCY_HZ), 4, true.directions.shape[2]))
-    best = entry_point(spectra_of(direction, seed), entries()).ranking[0]
-    assert true.name in (best.name, *best.alike)
+    best = rank_entries(simulate_spectra(direction, seed), make_entries()).ranking[0]
+    assert true.name in (best.name, *best.equivalents)
     assert best.p_value == 1.0
 
 
 def test_entries_with_one_direction_are_said_to_be_alike():
-    ranking = entry_point(spectra_of(directions()[:, :, :1]), entries()).ranking
-    assert {ranking[0].name, *ranking[0].alike} == {"force x", "drive x"}
+    ranking = rank_entries(simulate_spectra(response_directions()[:, :, :1]), make_entries()).ranking
+    assert {ranking[0].name, *ranking[0].equivalents} == {"force x", "drive x"}
     assert ranking[1].p_value == 1.0
     others = [each for each in ranking if each.name in ("force y", "sensor ax", "sensor ay")]
     assert all(other.p_value < 1e-3 for other in others)
@@ -68,27 +68,29 @@ def test_entries_with_one_direction_are_said_to_be_alike():
 
 
 def test_noise_alone_has_no_entry():
-    found = entry_point(spectra_of(directions(), size=0.0), entries())
+    found = rank_entries(simulate_spectra(response_directions(), size=0.0), make_entries())
     assert found.lines < 0.05 * 3 * len(FREQUENCY_HZ)
     silent = ResidualSpectra(FREQUENCY_HZ, np.zeros((1, len(FREQUENCY_HZ), 4), complex), np.ones((1, 236, 4)), 2)
-    assert entry_point(silent, entries()).ranking == ()
+    assert rank_entries(silent, make_entries()).ranking == ()
 
 
 def test_position_clean_but_acceleration_off_means_the_sensor():
-    sensor = spectra_of(np.broadcast_to(np.eye(4, dtype=complex)[None, :, :1], (len(FREQUENCY_HZ), 4, 1)), size=0.5)
-    moved = spectra_of(directions()[:, :, :1])
-    assert sensor_rule(sensor, 2).verdict == "response sensor"
-    assert sensor_rule(moved, 2).verdict == "motion"
-    assert sensor_rule(spectra_of(directions(), size=1e-6), 2).verdict == "undecided"
+    sensor = simulate_spectra(
+        np.broadcast_to(np.eye(4, dtype=complex)[None, :, :1], (len(FREQUENCY_HZ), 4, 1)), size=0.5
+    )
+    moved = simulate_spectra(response_directions()[:, :, :1])
+    assert compare_sensors(sensor, 2).verdict == "response sensor"
+    assert compare_sensors(moved, 2).verdict == "motion"
+    assert compare_sensors(simulate_spectra(response_directions(), size=1e-6), 2).verdict == "undecided"
     without = ResidualSpectra(FREQUENCY_HZ, moved.residual[:, :, :2], moved.noise[:, :, :2], 2)
-    assert sensor_rule(without, 2) is None
+    assert compare_sensors(without, 2) is None
 
 
 def test_without_position_the_rule_is_silent_and_directions_still_speak():
-    spectra = spectra_of(directions()[:, :, 1:])
+    spectra = simulate_spectra(response_directions()[:, :, 1:])
     bare = ResidualSpectra(FREQUENCY_HZ, spectra.residual[:, :, :2], spectra.noise[:, :, :2], 2)
-    forces = [Entry(e.name, e.place, e.axis, e.directions[:, :2]) for e in entries()[:2]]
-    found = entry_point(bare, forces)
+    forces = [Entry(e.name, e.place, e.axis, e.directions[:, :2]) for e in make_entries()[:2]]
+    found = rank_entries(bare, forces)
     assert found.rule is None
     assert found.ranking[0].name == "force y"
 
@@ -96,7 +98,7 @@ def test_without_position_the_rule_is_silent_and_directions_still_speak():
 def test_directions_of_another_shape_are_refused():
     wrong = Entry("force x", "mechanism", "x", np.ones((7, 4, 1), complex))
     with pytest.raises(ValueError, match="the directions of 'force x' must have shape"):
-        entry_point(spectra_of(directions()), [wrong])
+        rank_entries(simulate_spectra(response_directions()), [wrong])
 
 
 def test_a_recordings_residual_is_taken_over_the_driven_band(device):
@@ -104,7 +106,7 @@ def test_a_recordings_residual_is_taken_over_the_driven_band(device):
     recording = bench.recorded()
     command, segments = bench.command(1)
     truth = Prediction(*bench.linear(command, segments))
-    floor = noise_floor(recording)
+    floor = estimate_noise_floor(recording)
     spectra = residual_spectra(recording, truth, floor, model_error=0.0)
     assert spectra.residual.shape == (6, len(spectra.frequency_hz), 4)
     assert (spectra.frequency_hz[[0, -1]] == [3, 197]).all()
@@ -123,7 +125,7 @@ def test_what_is_not_periodic_is_taken_in_windows(device):
     command, segments = bench.command(1)
     swept = replace(recording, segments=tuple(replace(s, period=0, kind="sweep") for s in segments))
     spectra = residual_spectra(
-        swept, Prediction(*bench.linear(command, segments)), noise_floor(recording), model_error=0.0
+        swept, Prediction(*bench.linear(command, segments)), estimate_noise_floor(recording), model_error=0.0
     )
     assert len(spectra.residual) == 12
     assert np.mean(np.abs(spectra.residual) ** 2 / spectra.noise) == pytest.approx(1, abs=0.05)

@@ -15,8 +15,8 @@ MOVED, AT_SENSOR = SensorRule("motion", 50.0, 49.0), SensorRule("response sensor
 RUBS = StateRegion("velocity", "v", "sign", 0.86, 1.0, 1e-5, "by the sign of v")
 
 
-def test_friction_is_a_force_along_its_axis_tied_to_the_sign_of_velocity(friction_found):
-    local = friction_found.local
+def test_friction_is_a_force_along_its_axis_tied_to_the_sign_of_velocity(friction_findings):
+    local = friction_findings.localisation
     assert local.entry.ranking[0].name == "a force along x"
     assert local.entry.rule.verdict == "motion"
     for stage in ("before", "retuned"):
@@ -26,12 +26,12 @@ def test_friction_is_a_force_along_its_axis_tied_to_the_sign_of_velocity(frictio
     assert not local.states["after"]
 
 
-def test_rows_of_the_document_say_the_state(friction_found):
-    assert "by the sign of v" in {row.state for row in friction_found.diagnosis.mismatch}
+def test_rows_of_the_document_say_the_state(friction_findings):
+    assert "by the sign of v" in {row.state for row in friction_findings.diagnosis.mismatch}
 
 
-def test_distortion_is_told_per_channel_and_level(friction_found):
-    cells = friction_found.local.distortions.cells
+def test_distortion_is_told_per_channel_and_level(friction_findings):
+    cells = friction_findings.localisation.distortions.cells
     assert {cell.amplitude for cell in cells} == {0.5, 1.5, 3.0}
     assert {"ax", "x"} <= {cell.output for cell in cells}
 
@@ -70,7 +70,7 @@ def test_states_are_said_with_share_and_chance():
     assert states_sentence([]) == ""
 
 
-def test_the_page_gets_both_sentences(friction_found):
-    entry, states = localisation_sentences(friction_found.local)
+def test_the_page_gets_both_sentences(friction_findings):
+    entry, states = localisation_sentences(friction_findings.localisation)
     assert entry.startswith("The mismatch after re-tuning enters as a force along x")
     assert "by the sign of v" in states

@@ -5,37 +5,37 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.localisation.mismatch_maps import STRETCHES, _p_value_of_noise
+from analysis.diagnosis.localisation.mismatch_maps import STRETCHES, _test_against_noise
 
 LENGTH = 50 * STRETCHES
 
 
-def p_value(sizes: np.ndarray, seed: int = 1) -> float:
+def noise_p_value(sizes: np.ndarray, seed: int = 1) -> float:
     """sizes: (stretches,), rms of what is left in each, over the noise."""
     left = np.random.default_rng(seed).standard_normal((LENGTH, 1)) * np.repeat(sizes, 50)[:, None]
     every, nothing = np.ones(LENGTH, dtype=bool), np.zeros(LENGTH, dtype=bool)
     measure = SimpleNamespace(
         records=(SimpleNamespace(fit=every, choose=nothing, test=nothing),), unit=np.ones(1), noise=np.ones(1)
     )
-    return _p_value_of_noise(measure, SimpleNamespace(residuals=(left,)), 0)
+    return _test_against_noise(measure, SimpleNamespace(residuals=(left,)), 0)
 
 
 def test_a_few_stretches_that_err_by_far_are_p_value_of_noise():
     sizes = np.full(STRETCHES, 0.1)
     sizes[-2:] = 30.0, 100.0
-    assert p_value(sizes) < 1e-6
+    assert noise_p_value(sizes) < 1e-6
 
 
 def test_a_little_more_in_all_stretches_is_p_value_of_noise():
-    assert p_value(np.full(STRETCHES, 1.3)) < 1e-3
+    assert noise_p_value(np.full(STRETCHES, 1.3)) < 1e-3
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_noise_is_no_p_value_of_noise(seed):
-    assert p_value(np.ones(STRETCHES), seed) > 0.02
+    assert noise_p_value(np.ones(STRETCHES), seed) > 0.02
 
 
 def test_a_single_stretch_of_twice_the_noise_is_none():
     sizes = np.ones(STRETCHES)
     sizes[3] = 2.0
-    assert p_value(sizes) > 0.02
+    assert noise_p_value(sizes) > 0.02

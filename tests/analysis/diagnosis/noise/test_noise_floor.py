@@ -3,19 +3,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.noise.noise_floor import noise_floor
-from analysis.diagnosis.noise.repeat_noise import _no_more_than_rest
+from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
+from analysis.diagnosis.noise.repeat_noise import _limit_to_rest_noise
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
 
-def without_periods(recording: Recording) -> Recording:
+def remove_periods(recording: Recording) -> Recording:
     return replace(recording, segments=tuple(replace(s, period=0) for s in recording.segments))
 
 
 def test_invented_noise_is_recovered_from_repeats(device):
-    floor = noise_floor(device(noise=0.05, position_noise=5e-6).recorded())
-    assert floor.how == "repeats"
+    floor = estimate_noise_floor(device(noise=0.05, position_noise=5e-6).recorded())
+    assert floor.method == "repeats"
     assert floor.response_rms == pytest.approx(0.05, rel=0.02)
     assert floor.position_rms == pytest.approx(5e-6, rel=0.02)
     assert floor.response.density.mean(axis=0) == pytest.approx(0.05**2, rel=0.04)
@@ -25,24 +25,24 @@ def test_invented_noise_is_recovered_from_repeats(device):
 
 
 def test_noise_and_distortion_that_repeats_are_not_confused(device):
-    floor = noise_floor(device(cubic=0.01, square=0.05).recorded())
+    floor = estimate_noise_floor(device(cubic=0.01, square=0.05).recorded())
     assert floor.response_rms == pytest.approx(0.05, rel=0.02)
 
 
 def test_rounding_is_part_of_the_noise(device):
-    fine = noise_floor(device(position_noise=1e-6, step=1e-5, levels=(1.0, 2.0)).recorded())
+    fine = estimate_noise_floor(device(position_noise=1e-6, step=1e-5, levels=(1.0, 2.0)).recorded())
     assert fine.position_rms == pytest.approx(np.sqrt(1e-12 + 1e-10 / 12), rel=0.05)
     assert (fine.position.rounding > 0.4 * 1e-10 / 12).all()
 
 
 def test_a_device_that_varies_does_not_raise_the_floor(device):
-    floor = noise_floor(device(swaying=0.2).recorded())
+    floor = estimate_noise_floor(device(swaying=0.2).recorded())
     assert floor.response_rms == pytest.approx(0.05, rel=0.1)
     assert any(any(segment.varies) for segment in floor.response.segments)
     assert any("differ between periods" in remark for remark in floor.remarks)
 
 
-def with_losses(recording):
+def lose_samples(recording):
     lost = np.random.default_rng(5).random(len(recording.response.samples)) < 0.01
     lost[0] = False
     kept = np.maximum.accumulate(np.where(lost, 0, np.arange(len(lost))))
@@ -54,7 +54,7 @@ def test_lines_below_the_noise_at_rest_stay_there_where_segments_vary(device):
     density = np.full((500, 2), 10 * 0.05**2)
     density[:250] = 0.01 * 0.05**2
     varied = np.array([True, False])
-    floor, above = _no_more_than_rest(recording, recording.response.samples, density, np.full(2, 1000.0), varied)
+    floor, above = _limit_to_rest_noise(recording, recording.response.samples, density, np.full(2, 1000.0), varied)
     assert above.tolist() == [True, False]
     assert (floor[:250] == density[:250]).all()
     assert floor[250:, 0] == pytest.approx(0.05**2, rel=0.1)
@@ -63,17 +63,17 @@ def test_lines_below_the_noise_at_rest_stay_there_where_segments_vary(device):
 
 def test_losses_in_every_segment_do_not_bias_the_noise_at_rest(device):
     recording = device(rest=3000, levels=(1.0, 2.0, 4.0)).recorded()
-    floor = noise_floor(with_losses(recording))
+    floor = estimate_noise_floor(lose_samples(recording))
     assert all(floor.response.more_than_rest)
     assert floor.response_rms == pytest.approx(0.05, rel=0.03)
-    assert noise_floor(recording).response_rms == pytest.approx(0.05, rel=0.03)
+    assert estimate_noise_floor(recording).response_rms == pytest.approx(0.05, rel=0.03)
 
 
 def test_a_density_follows_coloured_noise(device):
     recording = device(noise=0.0).recorded()
     white = 0.05 * np.random.default_rng(3).standard_normal(recording.response.samples.shape)
     red = white + np.vstack([np.zeros((1, 2)), white[:-1]])
-    floor = noise_floor(
+    floor = estimate_noise_floor(
         replace(recording, response=replace(recording.response, samples=recording.response.samples + red))
     )
     low, high = floor.frequency_hz < 100, floor.frequency_hz > 400
@@ -83,15 +83,15 @@ def test_a_density_follows_coloured_noise(device):
 
 
 def test_without_repeats_noise_is_heard_at_rest(device):
-    floor = noise_floor(without_periods(device(rest=3000).recorded()))
-    assert floor.how == "rest"
+    floor = estimate_noise_floor(remove_periods(device(rest=3000).recorded()))
+    assert floor.method == "rest"
     assert floor.response_rms == pytest.approx(0.05, rel=0.03)
     assert "at rest" in floor.remarks[0]
 
 
 def test_without_repeats_or_rest_noise_is_heard_above_the_driven_band(device):
-    floor = noise_floor(without_periods(device(rest=0).recorded()))
-    assert floor.how == "quiet band"
+    floor = estimate_noise_floor(remove_periods(device(rest=0).recorded()))
+    assert floor.method == "quiet band"
     assert floor.response_rms == pytest.approx(0.05, rel=0.05)
     assert "above the driven band" in floor.remarks[0]
 
@@ -103,12 +103,12 @@ def test_a_gap_is_not_heard_as_noise():
     lost = heard.copy()
     lost[6000:6200] = np.nan
     whole, gap = (
-        noise_floor(
+        estimate_noise_floor(
             Recording("gap", Signal(slow, 1000.0, "force", "N", ("fx",)), Signal(each, 1000.0, "position", "m", ("x",)))
         )
         for each in (heard, lost)
     )
-    assert whole.how == gap.how == "quiet band"
+    assert whole.method == gap.method == "quiet band"
     assert whole.response_rms == pytest.approx(1e-3, rel=0.1)
     assert gap.response_rms == pytest.approx(1e-3, rel=0.1)
 
@@ -116,16 +116,16 @@ def test_a_gap_is_not_heard_as_noise():
 def test_at_a_rate_of_few_samples_per_window_no_rest_is_heard(device):
     found = device(rest=3000).recorded()
     slow = {side: replace(getattr(found, side), sample_rate_hz=4.0) for side in ("command", "response", "position")}
-    assert noise_floor(replace(found, **slow)).how == "repeats"
-    assert noise_floor(without_periods(replace(found, **slow))).how != "rest"
+    assert estimate_noise_floor(replace(found, **slow)).method == "repeats"
+    assert estimate_noise_floor(remove_periods(replace(found, **slow))).method != "rest"
 
 
 def test_where_nothing_is_quiet_the_noise_is_not_known():
     random = np.random.default_rng(4)
     command = Signal(random.standard_normal((4000, 1)), 1000.0, "force", "N", ("fx",))
     response = Signal(random.standard_normal((4000, 1)), 1000.0, "acceleration", "m/s^2", ("ax",))
-    floor = noise_floor(Recording("loud", command, response, segments=(Segment(0, 4000, "noise", 1.0),)))
-    assert not floor.known
+    floor = estimate_noise_floor(Recording("loud", command, response, segments=(Segment(0, 4000, "noise", 1.0),)))
+    assert not floor.is_known
     assert np.isnan(floor.response_rms).all()
     assert floor.position_rms is None
     assert "not known" in floor.remarks[0]
@@ -135,7 +135,7 @@ def test_where_nothing_is_quiet_the_noise_is_not_known():
 def test_the_noise_of_the_shared_cases_is_found(shared, number):
     from study.store.formats.recording_file import read_recording
 
-    floor = noise_floor(read_recording(shared / "cases" / f"open-{number:02d}.h5"))
+    floor = estimate_noise_floor(read_recording(shared / "cases" / f"open-{number:02d}.h5"))
     assert floor.response_rms == pytest.approx([0.042, 0.042, 0.083], rel=0.03)
     assert floor.position_rms == pytest.approx([np.hypot(4e-6, 1e-5 / np.sqrt(12))] * 3, rel=0.03)
 
@@ -143,18 +143,18 @@ def test_the_noise_of_the_shared_cases_is_found(shared, number):
 def test_rattling_in_every_segment_does_not_pass_for_noise(shared):
     from study.store.formats.recording_file import read_recording
 
-    floor = noise_floor(read_recording(shared / "cases" / "open-03.h5"))
+    floor = estimate_noise_floor(read_recording(shared / "cases" / "open-03.h5"))
     assert floor.response_rms == pytest.approx([0.042, 0.042, 0.083], rel=0.05)
     assert "at rest" in " ".join(floor.remarks)
 
 
 def test_a_reading_that_stands_still_at_rest_does_not_tell_its_noise(device):
     """An encoder's: a noise of zero would make every error infinitely large."""
-    recording = without_periods(device(rest=3000).recorded())
+    recording = remove_periods(device(rest=3000).recorded())
     moving = np.zeros((len(recording), 1), dtype=bool)
     for segment in recording.segments:
         moving[segment.start : segment.stop + 250] = True
     still = replace(recording.response, samples=np.where(moving, recording.response.samples, 0.0))
-    floor = noise_floor(replace(recording, response=still))
-    assert floor.how != "rest"
+    floor = estimate_noise_floor(replace(recording, response=still))
+    assert floor.method != "rest"
     assert (floor.response.density > 0).all()

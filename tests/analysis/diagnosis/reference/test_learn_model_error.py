@@ -7,11 +7,11 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned, clean_floor_sentence
 from analysis.diagnosis.reference.learn_model_error import (
     learn_model_error,
-    require_alike,
+    require_same_measure,
 )
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
@@ -22,35 +22,37 @@ LAG = PlacedEffect(BY_NAME["amplifier_lag"], (0,), {"time_constant": 0.0008})
 RUBBING = PlacedEffect(BY_NAME["coulomb_friction"], (0,), {"level": 0.05})
 
 
-def quiet(what, share):
+def ignore_progress(what, share):
     pass
 
 
 @pytest.fixture(scope="module")
-def clean(diagnosed):
+def clean_recordings(diagnosed):
     """Of a device with a lag that its model does not know."""
     return tuple(diagnosed.recorded(1, (LAG,), seed=seed) for seed in (11, 12))
 
 
 @pytest.fixture(scope="module")
-def found_in(diagnosed):
+def diagnose_recording(diagnosed):
     def found(recording, clean=()):
         without = tuple(name for name in BY_NAME if name not in AMONG)
-        return diagnose([recording], diagnosed.device(1), DiagnosisSettings(without, clean=clean), map, quiet)
+        return diagnose([recording], diagnosed.device(1), DiagnosisSettings(without, clean=clean), map, ignore_progress)
 
     return found
 
 
-def named(found):
+def effect_names(found):
     return [effect.effect for effect in found.diagnosis.effects]
 
 
 @pytest.mark.slow
-def test_what_an_intact_device_differs_by_is_named_only_without_clean_recordings(diagnosed, clean, found_in):
+def test_what_an_intact_device_differs_by_is_named_only_without_clean_recordings(
+    diagnosed, clean_recordings, diagnose_recording
+):
     same = diagnosed.recorded(1, (LAG,), seed=4)
-    assert named(found_in(same)) == ["amplifier_lag"]
-    known = found_in(same, clean)
-    assert (named(known), known.diagnosis.verdict) == ([], "no_mismatch")
+    assert effect_names(diagnose_recording(same)) == ["amplifier_lag"]
+    known = diagnose_recording(same, clean_recordings)
+    assert (effect_names(known), known.diagnosis.verdict) == ([], "no_mismatch")
     assert not any(cell.significant for cell in known.maps["before"])
     assert known.remarks[0].startswith(
         "The difference between a device without faults and its re-tuned model was estimated from 2 clean"
@@ -58,9 +60,9 @@ def test_what_an_intact_device_differs_by_is_named_only_without_clean_recordings
 
 
 @pytest.mark.slow
-def test_what_is_larger_is_named_still_and_by_itself(diagnosed, clean, found_in):
-    found = found_in(diagnosed.recorded(1, (LAG, RUBBING), seed=5), clean)
-    assert (named(found), found.diagnosis.verdict) == (["coulomb_friction"], "explained")
+def test_what_is_larger_is_named_still_and_by_itself(diagnosed, clean_recordings, diagnose_recording):
+    found = diagnose_recording(diagnosed.recorded(1, (LAG, RUBBING), seed=5), clean_recordings)
+    assert (effect_names(found), found.diagnosis.verdict) == (["coulomb_friction"], "explained")
     (effect,) = found.diagnosis.effects
     assert effect.parameters["level"].value == pytest.approx(0.05, rel=0.05)
     assert any(cell.significant for cell in found.maps["before"])
@@ -69,38 +71,42 @@ def test_what_is_larger_is_named_still_and_by_itself(diagnosed, clean, found_in)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [6, pytest.param(7, marks=pytest.mark.slow)])
-def test_a_hum_below_the_learned_model_error_is_named(diagnosed, clean, seed):
+def test_a_hum_below_the_learned_model_error_is_named(diagnosed, clean_recordings, seed):
     """At a frequency where it differs by little; the same without a hum is no mismatch."""
     without = tuple(name for name in BY_NAME if name not in (*AMONG, "mains_hum"))
     sound = diagnosed.recorded(1, (LAG,), seed=seed)
-    left = learn_model_error(clean, diagnosed.device(1), (sound,), map, quiet).floor.channels[0]
+    left = learn_model_error(clean_recordings, diagnosed.device(1), (sound,), map, ignore_progress).floor.channels[0]
     tone = 0.4 * left * sound.response.samples.std() * np.sqrt(2)
     hum = PlacedEffect(BY_NAME["mains_hum"], (0,), {"amplitude": tone, "frequency": 50.02, "phase": 0.3})
     humming = diagnosed.recorded(1, (LAG, hum), seed=seed)
-    settings = DiagnosisSettings(without, clean=clean)
-    found, nothing = (diagnose([each], diagnosed.device(1), settings, map, quiet) for each in (humming, sound))
-    assert (named(found), named(nothing)) == (["mains_hum"], [])
+    settings = DiagnosisSettings(without, clean=clean_recordings)
+    found, nothing = (
+        diagnose([each], diagnosed.device(1), settings, map, ignore_progress) for each in (humming, sound)
+    )
+    assert (effect_names(found), effect_names(nothing)) == (["mains_hum"], [])
     assert found.diagnosis.effects[0].parameters["amplitude"].value == pytest.approx(tone, rel=0.3)
 
 
-def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, clean):
-    learned = learn_model_error(clean, diagnosed.device(1), (diagnosed.recorded(1, (LAG,), seed=4),), map, quiet)
+def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, clean_recordings):
+    learned = learn_model_error(
+        clean_recordings, diagnosed.device(1), (diagnosed.recorded(1, (LAG,), seed=4),), map, ignore_progress
+    )
     lag, rubbing = (
         hypothesis_of_claim(Claim(placed.effect, "one", (0,)), [{**placed.values}]) for placed in (LAG, RUBBING)
     )
-    assert learned.references.gain_on_clean(lag).mean() > 0.2
-    assert learned.references.gain_on_clean(rubbing).mean() < 0.01
-    assert not learned.references.gain_on_clean(NOTHING).any()
-    assert learned.references.hold(combine(rubbing, lag), 1)
-    assert not learned.references.hold(combine(rubbing, lag), 0)
+    assert learned.references.compute_clean_gain(lag).mean() > 0.2
+    assert learned.references.compute_clean_gain(rubbing).mean() < 0.01
+    assert not learned.references.compute_clean_gain(NO_EFFECTS).any()
+    assert learned.references.is_present_on_clean(combine(rubbing, lag), 1)
+    assert not learned.references.is_present_on_clean(combine(rubbing, lag), 0)
     idle = Claim(BY_NAME["end_stop"], "one", (0,))  # never reached
     stop = hypothesis_of_claim(idle, [{"position": 10.0, "stiffness": 1e3, "opposite": 0.0}])
-    assert not learned.references.hold(stop, 0)
+    assert not learned.references.is_present_on_clean(stop, 0)
 
 
 def test_a_device_equal_to_its_model_teaches_hardly_any_error(diagnosed):
     sound, other = (diagnosed.recorded(1, (), seed=seed) for seed in (11, 12))
-    floor = learn_model_error((sound,), diagnosed.device(1), (other,), map, quiet).floor
+    floor = learn_model_error((sound,), diagnosed.device(1), (other,), map, ignore_progress).floor
     assert max(floor.channels) < 0.01
     assert (floor.error, floor.recordings, floor.beyond) == ("free simulation", 1, 2.0)
 
@@ -111,16 +117,16 @@ def test_the_shares_of_a_channel_are_those_of_the_mismatch(diagnosed):
     samples = sound.response.samples.copy()
     samples[::3] *= 1.03
     odd = replace(sound, response=replace(sound.response, samples=samples))
-    learned = learn_model_error((odd,), diagnosed.device(1), (sound,), map, quiet)
+    learned = learn_model_error((odd,), diagnosed.device(1), (sound,), map, ignore_progress)
     # A third of the samples; the model takes the mean of it, a hundredth, on itself.
     assert learned.floor.channels[0] == pytest.approx(0.03 * np.sqrt(1 / 3 * 2 / 3), rel=0.35)
 
 
 def test_recordings_that_can_only_be_compared_otherwise_teach_nothing():
-    require_alike("windows of 1 s", "windows of 1 s")
+    require_same_measure("windows of 1 s", "windows of 1 s")
     said = r"can only be compared by free simulation, those to diagnose by predicted force, so their errors"
     with pytest.raises(NothingLearned, match=said):
-        require_alike("free simulation", "predicted force")
+        require_same_measure("free simulation", "predicted force")
 
 
 def test_what_was_learned_is_reported_and_where_it_is_much_that_too():

@@ -14,7 +14,7 @@ from analysis.diagnosis.result.candidate_wording import (
 )
 from analysis.diagnosis.result.ceiling_wording import describe_ceiling
 from analysis.diagnosis.result.findings import BalanceErrors
-from analysis.diagnosis.result.wording import effect_title, inseparable_sentence, verdict_sentence
+from analysis.diagnosis.result.wording import describe_equivalents, describe_verdict, format_effect_title
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 
 ERRORS = Errors(0.5, 0.36, 0.36, 0.02)
@@ -27,19 +27,19 @@ STICKY = Candidate(
 NAMED = NamedEffect("coulomb_friction", "mechanism", "x", 0.9, 0.68, {"level": Estimate(0.211, "N", (0.20, 0.22))})
 
 
-def diagnosis(verdict, candidates, effects=()):
+def make_diagnosis(verdict, candidates, effects=()):
     place = Mismatch("ax", "fx", (8.0, 16.0), 0.5, None, 0.8, 1e-9)
     left = (place,) if verdict == "partly_explained" else ()
     fit = Fit(ERRORS, ERRORS)
     return Diagnosis(verdict, (place,), effects, {}, left, fit, "free simulation", None, candidates)
 
 
-def of_class(effect, *others, **changes):
+def effect_of_class(effect, *others, **changes):
     return replace(NAMED, effect=effect, class_=(effect, *others), **changes)
 
 
 def test_where_nothing_is_named_the_verdict_says_the_best_candidate_with_its_numbers_and_why_not():
-    said = verdict_sentence(diagnosis("unexplained", (DRY, STICKY)), device=DEVICE)
+    said = describe_verdict(make_diagnosis("unexplained", (DRY, STICKY)), device=DEVICE)
     assert said.endswith(
         "Best candidate, not confirmed: dry friction on the x drive, 0.211 N. It would explain 40 % of the error's "
         "power on held-out data, 62 % of what all laws together explain. Reason not to name it: the main part is "
@@ -48,12 +48,15 @@ def test_where_nothing_is_named_the_verdict_says_the_best_candidate_with_its_num
 
 
 def test_no_candidate_is_said_to_be_best_where_something_is_named_or_nothing_is_there():
-    assert "candidate" not in verdict_sentence(diagnosis("unexplained", ()), device=DEVICE)
-    assert best_candidate_sentence(diagnosis("partly_explained", (DRY,), (NAMED,)), DEVICE) == ""
+    assert "candidate" not in describe_verdict(make_diagnosis("unexplained", ()), device=DEVICE)
+    assert best_candidate_sentence(make_diagnosis("partly_explained", (DRY,), (NAMED,)), DEVICE) == ""
 
 
 def test_each_candidate_is_said_once():
-    nothing, something = diagnosis("unexplained", (DRY, STICKY)), diagnosis("partly_explained", (STICKY,), (NAMED,))
+    nothing, something = (
+        make_diagnosis("unexplained", (DRY, STICKY)),
+        make_diagnosis("partly_explained", (STICKY,), (NAMED,)),
+    )
     (other,) = candidate_sentences(nothing, DEVICE)
     assert other.startswith("Not confirmed: viscoelastic relaxation of a spring on the x drive, ")
     assert "120 N/m, time constant 20.0 ms." in other
@@ -62,7 +65,7 @@ def test_each_candidate_is_said_once():
 
 def test_sentences_are_few_however_many_candidates_there_are():
     many = tuple(replace(STICKY, effect=name) for name in ("cogging", "backlash", "end_stop", "constant_force"))
-    assert len(candidate_sentences(diagnosis("partly_explained", many, (NAMED,)), DEVICE)) == SENTENCES
+    assert len(candidate_sentences(make_diagnosis("partly_explained", many, (NAMED,)), DEVICE)) == SENTENCES
 
 
 def test_numbers_have_units_only_where_the_device_is_known():
@@ -82,28 +85,28 @@ def test_laws_beyond_the_vocabulary_have_nouns_and_units(effect):
 
 
 def test_a_class_is_called_by_what_its_laws_have_in_common():
-    friction = of_class("coulomb_friction", "stribeck_friction", "presliding_hysteresis")
-    assert effect_title(friction, True) == "friction (dry friction, or 2 laws like it) on the x drive"
-    assert inseparable_sentence(friction) == (
+    friction = effect_of_class("coulomb_friction", "stribeck_friction", "presliding_hysteresis")
+    assert format_effect_title(friction, True) == "friction (dry friction, or 2 laws like it) on the x drive"
+    assert describe_equivalents(friction) == (
         "Friction whose law these data do not determine: dry friction, friction that is larger at rest (Stribeck) or "
         "dry friction with elastic presliding would each explain it equally well on held-out data. The parameters "
         "are those of dry friction."
     )
-    late = of_class(
+    late = effect_of_class(
         "amplifier_lag", "transport_delay", place="actuator", parameters={"time_constant": Estimate(1e-3, "s")}
     )
-    assert effect_title(late) == "a late command: lag or delay in the x actuator"
+    assert format_effect_title(late) == "a late command: lag or delay in the x actuator"
 
 
 def test_a_class_of_different_kinds_and_rivals_as_good_are_listed():
-    mixed = of_class("coulomb_friction", "backlash", rivals=(Rival("stribeck_friction", 0.3, True, ""),))
-    assert effect_title(mixed, True) == "dry friction on the x drive"
+    mixed = effect_of_class("coulomb_friction", "backlash", rivals=(Rival("stribeck_friction", 0.3, True, ""),))
+    assert format_effect_title(mixed, True) == "dry friction on the x drive"
     assert "play (backlash) or friction that is larger at rest (Stribeck) would" in class_sentence(mixed)
 
 
 def test_an_effect_without_a_class_is_called_by_its_own_name():
-    assert class_sentence(NAMED) == inseparable_sentence(NAMED) == ""
-    assert effect_title(NAMED) == "dry friction on the x drive"
+    assert class_sentence(NAMED) == describe_equivalents(NAMED) == ""
+    assert format_effect_title(NAMED) == "dry friction on the x drive"
 
 
 def test_the_share_of_the_ceiling_is_one_of_powers():

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.result.error_table import held_out_stands_still
+from analysis.diagnosis.result.error_table import is_held_out_still
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -17,14 +17,14 @@ NOISE = np.array([0.05])
 LAST_QUARTER = (Segment(0, 3000, "noise", role="fit"), Segment(3000, N, "noise", role="test"))
 
 
-def turning(speed):
+def record_wheel(speed):
     read = speed.reshape(N, -1)
     push = Signal(np.zeros(read.shape), 100.0, "torque", "N m", tuple(f"drive{k}" for k in range(read.shape[1])))
     names = tuple(f"speed{k}" for k in range(read.shape[1]))
     return Recording("wheel", push, Signal(read, 100.0, "velocity", "rad/s", names))
 
 
-def stops_at(sample, seed=3):
+def stopping_speed(sample, seed=3):
     speed = 3 * np.abs(np.sin(np.arange(N) / 50)) + 0.05 * np.random.default_rng(seed).standard_normal(N)
     speed[sample:] = 0.0
     return speed
@@ -32,17 +32,17 @@ def stops_at(sample, seed=3):
 
 @pytest.mark.parametrize(("stop", "still"), [(MOVING, True), (N, False)])
 def test_held_out_samples_at_rest_hold_no_motion(stop, still):
-    marked = replace(turning(stops_at(stop)), segments=LAST_QUARTER)
-    assert held_out_stands_still(observe_parts([marked], 1), NOISE) == still
+    marked = replace(record_wheel(stopping_speed(stop)), segments=LAST_QUARTER)
+    assert is_held_out_still(observe_parts([marked], 1), NOISE) == still
 
 
 def test_without_segments_what_is_held_out_moves():
-    assert not held_out_stands_still(observe_parts([turning(stops_at(MOVING))], 1), NOISE)
+    assert not is_held_out_still(observe_parts([record_wheel(stopping_speed(MOVING))], 1), NOISE)
 
 
 def test_a_steady_speed_is_a_motion_though_its_reading_does_not_change():
-    speed = np.where(np.arange(N) < MOVING, stops_at(N), 2.0)
-    assert not held_out_stands_still(observe_parts([turning(speed)], 1), NOISE)
+    speed = np.where(np.arange(N) < MOVING, stopping_speed(N), 2.0)
+    assert not is_held_out_still(observe_parts([record_wheel(speed)], 1), NOISE)
 
 
 @pytest.mark.parametrize(
@@ -51,13 +51,13 @@ def test_a_steady_speed_is_a_motion_though_its_reading_does_not_change():
 )  # fmt: skip
 def test_an_idle_axis_that_only_holds_noise_does_not_move(stop, size, still):
     small = size * np.sin(np.arange(N) / 50) + NOISE * np.random.default_rng(8).standard_normal(N)
-    shot = turning(np.stack([stops_at(stop), small], axis=1))
-    assert held_out_stands_still(observe_parts([shot], 1), np.repeat(NOISE, 2)) == still
+    shot = record_wheel(np.stack([stopping_speed(stop), small], axis=1))
+    assert is_held_out_still(observe_parts([shot], 1), np.repeat(NOISE, 2)) == still
 
 
 def test_where_nothing_moves_at_all_nothing_stands_still():
     noise = NOISE * np.random.default_rng(8).standard_normal(N)
-    assert not held_out_stands_still(observe_parts([turning(noise)], 1), NOISE)
+    assert not is_held_out_still(observe_parts([record_wheel(noise)], 1), NOISE)
 
 
 @pytest.mark.slow

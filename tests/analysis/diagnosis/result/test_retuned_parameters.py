@@ -7,9 +7,9 @@ import numpy as np
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.retuned_parameters import (
     MovedParameter,
-    all_parameters,
+    describe_doubtful_parameters,
     describe_retuning,
-    doubtful_sentences,
+    list_parameters,
 )
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -19,10 +19,10 @@ MOVED = MovedParameter("damping fx", 0.35, "N s/m", 2.1)
 def test_numbers_of_the_model_that_moved_too_far_are_doubted():
     assert describe_retuning(()) == ""
     assert describe_retuning((MOVED,) * 6).endswith("(2.1 standard deviations) and 2 more.")
-    assert doubtful_sentences((MOVED,)) == ()
-    (far,) = doubtful_sentences((replace(MOVED, deviations=-3.4),))
+    assert describe_doubtful_parameters((MOVED,)) == ()
+    (far,) = describe_doubtful_parameters((replace(MOVED, deviations=-3.4),))
     assert far.startswith("The damping fx was moved by 3.4 standard deviations of its calibration: either")
-    (edge,) = doubtful_sentences((replace(MOVED, deviations=4.0, at_bound=True),))
+    (edge,) = describe_doubtful_parameters((replace(MOVED, deviations=4.0, at_bound=True),))
     assert "of its calibration, to the limit of its allowed range: either" in edge
 
 
@@ -31,8 +31,8 @@ def test_a_model_that_was_fitted_here_has_no_calibration_to_leave():
         "In the final fit, these parameters of the first model changed by more than the tolerance of the first fit: "
         "damping fx +0.350 N s/m."
     )
-    assert doubtful_sentences((replace(MOVED, deviations=-3.4),), fitted=True) == ()
-    (edge,) = doubtful_sentences((replace(MOVED, deviations=4.0, at_bound=True),), fitted=True)
+    assert describe_doubtful_parameters((replace(MOVED, deviations=-3.4),), fitted=True) == ()
+    (edge,) = describe_doubtful_parameters((replace(MOVED, deviations=4.0, at_bound=True),), fitted=True)
     assert "calibration" not in edge and edge.startswith("These parameters of the first model reached the limit")
 
 
@@ -41,7 +41,7 @@ def test_many_doubtful_numbers_are_counted_in_one_sentence():
         *(replace(MOVED, deviations=4.0, at_bound=True) for _ in range(8)),
         *(replace(MOVED, deviations=-3.5) for _ in range(3)),
     )
-    (said,) = doubtful_sentences(moved)
+    (said,) = describe_doubtful_parameters(moved)
     assert said.startswith("11 parameters were moved by 3 standard deviations of their calibration or more, 8 of them")
 
 
@@ -50,11 +50,11 @@ def test_a_parameter_is_at_the_bound_of_its_own_search():
     tuning = tuning_of(MechanicalModel("m", "velocity", eye, eye, eye, eye, eye), ("fx",))
     deviations = np.zeros(len(tuning.names))
     deviations[0] = -tuning.bound
-    assert [each.at_bound for each in all_parameters(tuning, deviations)][:2] == [True, False]
+    assert [each.at_bound for each in list_parameters(tuning, deviations)][:2] == [True, False]
     wider = tuning.with_wider_bound()
-    assert not any(each.at_bound for each in all_parameters(wider, deviations))
+    assert not any(each.at_bound for each in list_parameters(wider, deviations))
     deviations[0] = -wider.bound
-    assert all_parameters(wider, deviations)[0].at_bound
+    assert list_parameters(wider, deviations)[0].at_bound
 
 
 def test_a_relative_change_is_read_as_per_cent():

@@ -10,14 +10,14 @@ from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.result.retuned_parameters import MovedParameter, describe_raised_error
 from analysis.diagnosis.result.wording import (
     confirmation_sentence,
-    effect_sentence,
-    effect_title,
-    inseparable_sentence,
-    next_experiment_sentence,
-    remainder_sentence,
-    rival_sentences,
-    share_sentence,
-    verdict_sentence,
+    describe_effect,
+    describe_equivalents,
+    describe_next_experiment,
+    describe_remainder,
+    describe_rivals,
+    describe_share,
+    describe_verdict,
+    format_effect_title,
 )
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
@@ -39,12 +39,12 @@ DRY = NamedEffect(
 MOVED = MovedParameter("damping fx", 0.35, "N s/m", 2.1)
 
 
-def diagnosis(verdict, effects=(), mismatch=(PLACE,), remainder=(), errors=ERRORS, next_=None):
+def make_diagnosis(verdict, effects=(), mismatch=(PLACE,), remainder=(), errors=ERRORS, next_=None):
     return Diagnosis(verdict, mismatch, effects, {}, remainder, Fit(errors, errors), "free simulation", next_)
 
 
 def test_an_effect_is_named_with_its_place_number_and_signature():
-    sentence = effect_sentence(DRY, "the missing force flips its sign with the velocity")
+    sentence = describe_effect(DRY, "the missing force flips its sign with the velocity")
     assert sentence == (
         "Dry friction on the x drive, 0.21 N [0.20, 0.22]: the missing force flips its sign with the velocity."
     )
@@ -56,7 +56,7 @@ def test_every_effect_of_the_vocabulary_has_a_name_that_people_use_and_reads_out
     assert "_" not in noun_of(name.name)
     numbers = {p.name: Estimate(0.1234, p.unit_in(LINEAR, "m/s^2")) for p in name.parameters}
     effect = NamedEffect(name.name, name.place, "x", 1.0, 1.0, numbers)
-    sentence = effect_sentence(effect, "this is seen")
+    sentence = describe_effect(effect, "this is seen")
     assert "12" in sentence.split(":")[0]
     assert "_" not in sentence
     assert "{" not in sentence
@@ -82,7 +82,7 @@ def test_a_signature_of_the_catalogue_ends_the_sentence_that_names_it(effect):
 
 def test_an_effect_without_words_is_called_by_its_own_name():
     effect = NamedEffect("odd_thing", "mechanism", None, 1.0, 1.0, {"size": Estimate(0.5, "N")})
-    assert effect_sentence(effect) == "Odd thing on all drives, 0.500 N."
+    assert describe_effect(effect) == "Odd thing on all drives, 0.500 N."
 
 
 @pytest.mark.parametrize(
@@ -123,23 +123,23 @@ def test_a_stop_on_the_far_side_of_zero_says_from_where_it_is_reached():
 
 
 def test_the_verdict_names_what_is_missing_and_what_it_brings():
-    assert verdict_sentence(diagnosis("explained", (DRY,))) == (
+    assert describe_verdict(make_diagnosis("explained", (DRY,))) == (
         "Missing in the model: dry friction on the x drive. The error on held-out data falls from 36 % of the signal "
         "(re-tuned without it) to 2.66 % (with it), 1.00 times what noise alone would leave (2.65 %)."
     )
 
 
 def test_the_verdict_says_where_more_is_missing():
-    said = verdict_sentence(diagnosis("partly_explained", (DRY,), remainder=(PLACE,)))
+    said = describe_verdict(make_diagnosis("partly_explained", (DRY,), remainder=(PLACE,)))
     assert said.startswith("Missing in the model: dry friction on the x drive, but that is not all.")
     assert said.endswith("and a mismatch remains.")
 
 
 def test_no_mismatch_remains_where_none_is_reported():
     noise = replace(PLACE, p_value=0.4)
-    left = diagnosis("partly_explained", (DRY,), remainder=(noise,), errors=Errors(0.5, 0.36, 0.0026, 0.0114))
-    said = verdict_sentence(left)
-    assert remainder_sentence(left) == "No significant mismatch remains."
+    left = make_diagnosis("partly_explained", (DRY,), remainder=(noise,), errors=Errors(0.5, 0.36, 0.0026, 0.0114))
+    said = describe_verdict(left)
+    assert describe_remainder(left) == "No significant mismatch remains."
     assert "a mismatch remains" not in said
     assert "not all" not in said
     assert said.endswith("only repeated periods of the excitation could show that nothing else is missing.")
@@ -147,15 +147,15 @@ def test_no_mismatch_remains_where_none_is_reported():
 
 def test_an_error_is_not_counted_in_noise_that_no_repeats_show():
     device = Device(True, LINEAR, "quiet band")
-    said = verdict_sentence(diagnosis("partly_explained", (DRY,), remainder=(PLACE,)), device=device)
+    said = describe_verdict(make_diagnosis("partly_explained", (DRY,), remainder=(PLACE,)), device=device)
     assert "times" not in said
     assert "noise at the level measured above the driven band would leave 2.65 %" in said
-    unknown = verdict_sentence(diagnosis("unexplained"), device=Device(True, LINEAR, "unknown"))
+    unknown = describe_verdict(make_diagnosis("unexplained"), device=Device(True, LINEAR, "unknown"))
     assert "what noise alone would leave is not known" in unknown
 
 
 def test_wrong_parameters_are_another_answer_than_missing_physics():
-    said = verdict_sentence(diagnosis("parameters"), (MOVED,))
+    said = describe_verdict(make_diagnosis("parameters"), (MOVED,))
     assert said.startswith(
         "No physics is missing; parameters of the model are wrong: damping fx +0.350 N s/m (2.1 standard deviations)."
     )
@@ -164,55 +164,55 @@ def test_wrong_parameters_are_another_answer_than_missing_physics():
 
 def test_without_a_mismatch_the_model_is_confirmed():
     clean = Errors(0.027, 0.027, 0.027, 0.0265)
-    assert verdict_sentence(diagnosis("no_mismatch", mismatch=(), errors=clean)) == (
+    assert describe_verdict(make_diagnosis("no_mismatch", mismatch=(), errors=clean)) == (
         "The model agrees with the device: as given, its error on held-out data is 2.7 % of the signal, 1.02 times "
         "what noise alone would leave (2.65 %)."
     )
 
 
 def test_a_mismatch_without_a_name_gets_none():
-    said = verdict_sentence(diagnosis("unexplained"))
+    said = describe_verdict(make_diagnosis("unexplained"))
     assert said.startswith("Model and device disagree, and no effect of the catalogue explains it.")
     assert not any(words.noun in said for words in EFFECT_WORDS.values())
 
 
 def test_unknown_errors_and_unknown_noise_are_reported():
     unknown = Errors(None, None, None, None)
-    assert "is not known" in verdict_sentence(diagnosis("explained", (DRY,), errors=unknown))
-    assert "is not known" in verdict_sentence(diagnosis("no_mismatch", mismatch=(), errors=unknown))
+    assert "is not known" in describe_verdict(make_diagnosis("explained", (DRY,), errors=unknown))
+    assert "is not known" in describe_verdict(make_diagnosis("no_mismatch", mismatch=(), errors=unknown))
     quiet = replace(ERRORS, noise=None)
-    assert verdict_sentence(diagnosis("explained", (DRY,), errors=quiet)).endswith(
+    assert describe_verdict(make_diagnosis("explained", (DRY,), errors=quiet)).endswith(
         "; what noise alone would leave is not known."
     )
 
 
 def test_an_error_that_does_not_fall_is_not_said_to():
     worse = Errors(0.3, 0.3, 0.31, 0.02)
-    assert "goes from 30 % of the signal" in verdict_sentence(diagnosis("explained", (DRY,), errors=worse))
+    assert "goes from 30 % of the signal" in describe_verdict(make_diagnosis("explained", (DRY,), errors=worse))
 
 
 def test_rivals_come_with_why_they_were_passed_over():
-    assert rival_sentences(DRY) == ("Viscous damping (probability < 0.01): it leaves 4.1 times the noise.",)
+    assert describe_rivals(DRY) == ("Viscous damping (probability < 0.01): it leaves 4.1 times the noise.",)
 
 
 def test_of_two_that_cannot_be_told_apart_both_are_named():
-    assert inseparable_sentence(DRY) == (
+    assert describe_equivalents(DRY) == (
         "These data do not distinguish dry friction from friction that is larger at rest (Stribeck): both are named "
         "(probabilities: dry friction 0.68, friction that is larger at rest (Stribeck) 0.30)."
     )
-    assert inseparable_sentence(replace(DRY, rivals=())) == ""
+    assert describe_equivalents(replace(DRY, rivals=())) == ""
 
 
 def test_share_and_probability_are_reported():
-    assert share_sentence(DRY) == (
+    assert describe_share(DRY) == (
         "It accounts for 90 % of the mismatch after re-tuning; the probability that this effect is the cause is 0.68."
     )
 
 
 def test_what_is_left_is_named_by_its_first_places():
-    assert remainder_sentence(diagnosis("explained", (DRY,))) == "No significant mismatch remains."
+    assert describe_remainder(make_diagnosis("explained", (DRY,))) == "No significant mismatch remains."
     places = tuple(replace(PLACE, share=share) for share in (0.8, 0.1, 0.3, 0.2, 0.05))
-    said = remainder_sentence(diagnosis("partly_explained", (DRY,), remainder=places))
+    said = describe_remainder(make_diagnosis("partly_explained", (DRY,), remainder=places))
     assert said.startswith(
         "Still unexplained: ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the mismatch (p < 0.0001); "
     )
@@ -222,14 +222,14 @@ def test_what_is_left_is_named_by_its_first_places():
 def test_the_next_recording_says_what_it_would_tell_apart():
     wanted = NextExperiment("hapteq record slow.toml --out slow.h5", ("coulomb_friction", "stribeck_friction"),
                             "only slow motion shows the hump")  # fmt: skip
-    assert next_experiment_sentence(diagnosis("explained", (DRY,), next_=wanted)) == (
+    assert describe_next_experiment(make_diagnosis("explained", (DRY,), next_=wanted)) == (
         "The recording that would distinguish dry friction from friction that is larger at rest (Stribeck): hapteq "
         "record slow.toml --out slow.h5. Only slow motion shows the hump."
     )
-    assert next_experiment_sentence(diagnosis("explained", (DRY,))) == (
+    assert describe_next_experiment(make_diagnosis("explained", (DRY,))) == (
         "No further recording was found that would distinguish what these data do not."
     )
-    assert next_experiment_sentence(diagnosis("explained", (replace(DRY, rivals=()),))) == ""
+    assert describe_next_experiment(make_diagnosis("explained", (replace(DRY, rivals=()),))) == ""
 
 
 @pytest.mark.parametrize(
@@ -259,19 +259,19 @@ def test_held_out_data_that_do_not_confirm_are_said_not_to():
 
 
 def test_the_title_of_an_effect_stands_alone():
-    assert effect_title(DRY) == "dry friction on the x drive"
+    assert format_effect_title(DRY) == "dry friction on the x drive"
 
 
 def test_faults_of_a_whole_sensor_need_no_place():
     turned = NamedEffect("sensor_misalignment", "sensor", None, 1.0, 0.98, {"degrees": Estimate(8.7, "deg")})
-    assert effect_title(turned) == "a turned sensor"
-    assert effect_title(replace(turned, effect="sensor_gain", parameters={"gain": Estimate(1.1, "1")})) == (
+    assert format_effect_title(turned) == "a turned sensor"
+    assert format_effect_title(replace(turned, effect="sensor_gain", parameters={"gain": Estimate(1.1, "1")})) == (
         "a wrong sensor gain in all channels"
     )
 
 
 def test_numbers_that_are_off_by_little_are_said_to_be():
-    said = verdict_sentence(diagnosis("parameters"))
+    said = describe_verdict(make_diagnosis("parameters"))
     assert said.startswith(
         "No physics is missing; parameters of the model are wrong, each within its calibration's standard deviation. "
         "The"

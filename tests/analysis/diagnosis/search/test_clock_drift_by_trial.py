@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analysis.diagnosis.search.starting_hypotheses import clock_drift_by_trial
+from analysis.diagnosis.search.starting_hypotheses import search_clock_drift
 from equalizer.effects.catalogue import CATALOGUE
-from equalizer.effects.simulation.interpolated_response import read_other_times
+from equalizer.effects.simulation.interpolated_response import resample_response
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits
 
@@ -39,17 +39,17 @@ def evidence() -> Evidence:
 
 @pytest.mark.parametrize("ppm", [-3000.0, 900.0])
 def test_its_rate_is_nearly_found(evidence, ppm):
-    drifted = replace(evidence, response=read_other_times(evidence.response, 1 + 1e-6 * ppm, 0.0, 0.0))
-    starts = clock_drift_by_trial(CATALOGUE, drifted)
+    drifted = replace(evidence, response=resample_response(evidence.response, 1 + 1e-6 * ppm, 0.0, 0.0))
+    starts = search_clock_drift(CATALOGUE, drifted)
     assert {start.claims[0].effect.name for start in starts} == {"clock_drift"}
     # To a fraction of the period by which it is off at the end.
     assert starts[0].list_placed_effects()[0].values["ppm"] == pytest.approx(ppm, abs=600)
 
 
 def test_a_clock_that_runs_right_is_not_suggested(evidence):
-    assert clock_drift_by_trial(CATALOGUE, evidence) == ()
+    assert search_clock_drift(CATALOGUE, evidence) == ()
 
 
 def test_nor_is_what_may_not_be_named(evidence):
-    drifted = replace(evidence, response=read_other_times(evidence.response, 1.003, 0.0, 0.0))
-    assert clock_drift_by_trial([each for each in CATALOGUE if each.name != "clock_drift"], drifted) == ()
+    drifted = replace(evidence, response=resample_response(evidence.response, 1.003, 0.0, 0.0))
+    assert search_clock_drift([each for each in CATALOGUE if each.name != "clock_drift"], drifted) == ()

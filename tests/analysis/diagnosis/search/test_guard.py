@@ -10,30 +10,30 @@ from analysis.diagnosis.search.time_budget import OutOfTimeError
 from equalizer.effects.catalogue import EFFECTS
 
 
-def broken(*arguments):
+def raise_value_error(*arguments):
     raise ValueError("operands could not be broadcast together")
 
 
-BROKEN = replace(EFFECTS["backlash"], starts=broken)
+BROKEN = replace(EFFECTS["backlash"], starts=raise_value_error)
 RUBS = EFFECTS["coulomb_friction"]
 
 
-def quiet(what, share):
+def ignore_progress(what, share):
     return None
 
 
-def test_the_others_are_searched_and_the_crash_is_reported(diagnosed, arena_of):
-    context = replace(arena_of(diagnosed.RUBBING), guard=Guard(on=True))
-    found = explain(context, [BROKEN, RUBS], quiet)
+def test_the_others_are_searched_and_the_crash_is_reported(diagnosed, make_context):
+    context = replace(make_context(diagnosed.RUBBING), guard=Guard(on=True))
+    found = explain(context, [BROKEN, RUBS], ignore_progress)
     assert found.after.newest == "coulomb_friction"
     (said,) = context.guard.sentences
     assert said.startswith("Play (backlash) was left out")
     assert "its starting values" in said and "operands could not be broadcast" in said
 
 
-def test_without_the_guard_a_crash_is_an_error(diagnosed, arena_of):
+def test_without_the_guard_a_crash_is_an_error(diagnosed, make_context):
     with pytest.raises(ValueError, match="broadcast"):
-        explain(arena_of(diagnosed.RUBBING), [BROKEN, RUBS], quiet)
+        explain(make_context(diagnosed.RUBBING), [BROKEN, RUBS], ignore_progress)
 
 
 def test_each_item_that_crashes_is_dropped_and_named_once():
@@ -41,21 +41,24 @@ def test_each_item_that_crashes_is_dropped_and_named_once():
     effects = [EFFECTS["backlash"], RUBS, EFFECTS["backlash"]]
 
     def work(effect):
-        return broken() if effect.name == "backlash" else effect.name
+        return raise_value_error() if effect.name == "backlash" else effect.name
 
-    assert list(guard.over(map, "its fit")(work, effects)) == ["coulomb_friction"]
+    assert list(guard.wrap(map, "its fit")(work, effects)) == ["coulomb_friction"]
     assert len(guard.crashes) == 2 and len(guard.sentences) == 1
-    assert guard.part("coulomb_friction", "the final check", broken, "instead") == "instead"
+    assert guard.run("coulomb_friction", "the final check", raise_value_error, "instead") == "instead"
     assert len(guard.sentences) == 2
 
 
 def test_of_pieces_beside_each_other_the_crashed_one_is_replaced_and_said():
-    pieces = [Part("the black box", "its fit", broken, "none"), Part("the curves", "their making", lambda: 7, 0)]
+    pieces = [
+        Part("the black box", "its fit", raise_value_error, "none"),
+        Part("the curves", "their making", lambda: 7, 0),
+    ]
     guard = Guard(on=True)
-    assert guard.parts(map, pieces) == ["none", 7]
+    assert guard.run_parts(map, pieces) == ["none", 7]
     assert len(guard.sentences) == 1 and guard.sentences[0].startswith("The black box was left out")
     with pytest.raises(ValueError, match="broadcast"):
-        Guard().parts(map, pieces)
+        Guard().run_parts(map, pieces)
 
 
 def test_a_search_that_ends_for_lack_of_time_is_no_crash():
@@ -64,5 +67,5 @@ def test_a_search_that_ends_for_lack_of_time_is_no_crash():
 
     guard = Guard(on=True)
     with pytest.raises(OutOfTimeError):
-        guard.part("backlash", "its fit", late, None)
+        guard.run("backlash", "its fit", late, None)
     assert guard.sentences == ()

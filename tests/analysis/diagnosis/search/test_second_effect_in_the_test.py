@@ -9,20 +9,20 @@ from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.search import search
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.search.time_budget import OUT_OF_TIME, OutOfTimeError, always
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME, OutOfTimeError, unlimited_time
 from analysis.diagnosis.search.verdict import Judgement
 from equalizer.effects.catalogue import EFFECTS
-from study.evaluation.challenge.draw_bank import case_of, draw
+from study.evaluation.challenge.draw_bank import draw_case_plan, generate_case
 
 SEED, SLOW_SENSOR_AND_HARDENING = 99100, 102
 
 
 @pytest.fixture(scope="module")
 def case():
-    return case_of(draw(SEED, SLOW_SENSOR_AND_HARDENING), "sledge")
+    return generate_case(draw_case_plan(SEED, SLOW_SENSOR_AND_HARDENING), "sledge")
 
 
-def names(case, time_left=always):
+def diagnose_names(case, time_left=unlimited_time):
     settings = DiagnosisSettings(discovery=False, time_left=time_left)
     found = diagnose([case.recording], case.model, settings, map, lambda what, share: None)
     return found.diagnosis.verdict, {effect.effect for effect in found.diagnosis.effects}, found.remarks
@@ -31,7 +31,7 @@ def names(case, time_left=always):
 @pytest.mark.slow
 def test_it_is_found_in_a_part_of_the_test_and_confirmed_by_the_rest(case):
     assert {truth.effect for truth in case.truth} == {"sensor_lag", "hardening_stiffness"}
-    verdict, named, remarks = names(case)
+    verdict, named, remarks = diagnose_names(case)
     assert (verdict, named) == ("explained", {"sensor_lag", "hardening_stiffness"})
     assert search.MILDER_TEST_USED in remarks
 
@@ -44,7 +44,7 @@ def test_where_the_time_ends_with_the_opened_part_the_first_alone_is_named_and_t
         return find(*given)
 
     monkeypatch.setattr(search, "_find_with_opened", find_late)
-    verdict, named, remarks = names(case, lambda: not opened)
+    verdict, named, remarks = diagnose_names(case, lambda: not opened)
     assert (verdict, named) == ("partly_explained", {"sensor_lag"})
     assert len(opened) == 1 and OUT_OF_TIME in remarks
 
@@ -60,11 +60,11 @@ def test_time_that_ends_there_hides_no_mismatch_of_the_held_out_samples(case, mo
     context = SearchContext(measure.shorten(), measure, tuning, map)
     found = search.search_effects(context, [EFFECTS["sensor_lag"]], lambda what, share: None)
     assert found.judgement == Judgement("unexplained", False)
-    assert search.NOT_SHOWN in found.remarks and OUT_OF_TIME in found.remarks
+    assert search.TEST_ONLY in found.remarks and OUT_OF_TIME in found.remarks
 
 
 @pytest.mark.slow
 def test_without_that_look_the_first_alone_is_named(case, monkeypatch):
     monkeypatch.setattr(search, "_adds_confirmed", lambda *of: False)
-    verdict, named, _ = names(case)
+    verdict, named, _ = diagnose_names(case)
     assert (verdict, named) == ("partly_explained", {"sensor_lag"})

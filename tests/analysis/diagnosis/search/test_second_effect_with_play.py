@@ -1,17 +1,25 @@
 """The strength of a second effect is searched over a decade and a half, and fits end in order and in time."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import analysis.diagnosis.search.second_effect_with_play as second_effect
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.impacts import explain_impacts
+from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.time_budget import CountedBudget
-from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.coulomb_friction import EFFECT as DRY
+from equalizer.effects.effect import PlacedEffect
 
-PLAY = SimpleNamespace(hypothesis=NOTHING, deviations=np.zeros(0), cost=9.0)
+PLAY = SimpleNamespace(hypothesis=NO_EFFECTS, deviations=np.zeros(0), cost=9.0)
 VIEW = SimpleNamespace(map_=map)
 
 
@@ -45,6 +53,14 @@ def test_a_strength_is_found_from_a_wrong_start(true_level, true_n):
     assert fit.cost == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("changes", [{"parameters": ()}, {"parameters": (replace(DRY.parameters[0], fixed=True),)}])
+def test_an_effect_without_a_free_strength_keeps_its_start(true_level, changes):
+    effect = replace(DRY, **changes)
+    hypothesis = hypothesis_of_claim(Claim(effect, "one", (0,)), [{"level": 0.5}])
+    fit = second_effect._search_strength(VIEW, PLAY, hypothesis)
+    assert fit.hypothesis.list_placed_effects()[0].values == {"level": 0.5}
+
+
 def test_an_effect_that_does_not_vanish_at_zero_keeps_its_start(true_level):
     gain = EFFECTS["sensor_gain"]
     assert gain.parameters[0].none != 0
@@ -55,14 +71,32 @@ def test_an_effect_that_does_not_vanish_at_zero_keeps_its_start(true_level):
 
 def test_starts_end_in_time_and_what_was_evaluated_is_kept(true_level, monkeypatch):
     monkeypatch.setattr(second_effect, "replace", lambda view, **changes: view)
-    suggested = [friction(1.0)] * (3 * second_effect.BATCH)
+    suggested = [friction(1.0)] * (3 * second_effect.BATCH_SIZE)
     starts, complete = second_effect._evaluate_starts(VIEW, PLAY, suggested, CountedBudget(1))
-    assert (len(starts), complete) == (2 * second_effect.BATCH, False)
+    assert (len(starts), complete) == (2 * second_effect.BATCH_SIZE, False)
     starts, complete = second_effect._evaluate_starts(VIEW, PLAY, suggested, CountedBudget(9))
     assert (len(starts), complete) == (len(suggested), True)
 
 
 def test_of_each_effect_only_its_best_start_is_kept(true_level):
     starts = [second_effect.evaluate_hypothesis(VIEW, PLAY.deviations, friction(level)) for level in (3.0, 1.1, 2.0)]
-    (best,) = second_effect._best_per_effect(starts)
+    (best,) = second_effect._select_best_per_effect(starts)
     assert level_of(best) == pytest.approx(1.1)
+
+
+@pytest.mark.slow
+def test_a_dead_band_that_no_waveform_shows_is_named_with_play(diagnosed):
+    play = {"gap": 5e-5, "motor_mass": 0.06, "contact_stiffness": 2e5, "contact_damping": 5.0}
+    effects = [
+        PlacedEffect(EFFECTS["backlash"], (1,), play),
+        PlacedEffect(EFFECTS["force_deadband"], (1,), {"width": 0.3, "jump": 0.0}),
+    ]
+    chosen = measure_of([diagnosed.recorded(2, effects)], diagnosed.device(2))
+    tuning = tuning_of(diagnosed.device(2), ("fx", "fy"))
+    context = SearchContext(chosen.measure.shorten(), chosen.measure, tuning, map)
+    unchanged = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
+    given = context.with_test_score(context.candidate(unchanged))
+    found = explain_impacts(context, Explanation(given, given, given, (), ()), chosen.floors, CATALOGUE)
+    assert [claim.effect.name for claim in found.after.fitted.hypothesis.claims] == ["backlash", "force_deadband"]
+    width_n = found.after.fitted.hypothesis.list_placed_effects()[-1].values["width"]
+    assert width_n == pytest.approx(0.3, rel=0.15)

@@ -4,23 +4,23 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.parsimony import share_of_mismatch
-from analysis.diagnosis.search.verdict import confirms_addition, judge, shares_taken
+from analysis.diagnosis.search.parsimony import compute_mismatch_share
+from analysis.diagnosis.search.verdict import compute_step_shares, confirms_addition, judge
 
 RUBS = "coulomb_friction"
 
 
-def search(before, retuned, after=None):
+def make_explanation(before, retuned, after=None):
     return Explanation(before, retuned, retuned if after is None else after, (), ())
 
 
-def test_a_model_that_fits_as_given_has_no_mismatch(standing_at):
-    judged = judge(search(standing_at(1.02), standing_at(1.01)))
+def test_a_model_that_fits_as_given_has_no_mismatch(make_candidate):
+    judged = judge(make_explanation(make_candidate(1.02), make_candidate(1.01)))
     assert (judged.verdict, judged.named) == ("no_mismatch", False)
 
 
-def test_a_model_that_fits_once_re_tuned_lacked_parameters_alone(standing_at):
-    judged = judge(search(standing_at(9.0), standing_at(1.02)))
+def test_a_model_that_fits_once_re_tuned_lacked_parameters_alone(make_candidate):
+    judged = judge(make_explanation(make_candidate(9.0), make_candidate(1.02)))
     assert (judged.verdict, judged.named) == ("parameters", False)
 
 
@@ -34,69 +34,77 @@ def test_a_model_that_fits_once_re_tuned_lacked_parameters_alone(standing_at):
         (5.0, "unexplained"),
     ],
 )
-def test_what_is_said_of_an_effect_hangs_on_what_it_leaves(standing_at, left, verdict):
-    judged = judge(search(standing_at(30.0), standing_at(10.0), standing_at(left, RUBS)))
+def test_what_is_said_of_an_effect_hangs_on_what_it_leaves(make_candidate, left, verdict):
+    judged = judge(make_explanation(make_candidate(30.0), make_candidate(10.0), make_candidate(left, RUBS)))
     assert (judged.verdict, judged.named) == (verdict, verdict != "unexplained")
 
 
-def test_an_effect_that_takes_the_bulk_of_a_great_mismatch_is_named_beside_a_remainder(standing_at):
-    judged = judge(search(standing_at(900.0), standing_at(900.0), standing_at(90.0, RUBS)))
+def test_an_effect_that_takes_the_bulk_of_a_great_mismatch_is_named_beside_a_remainder(make_candidate):
+    judged = judge(make_explanation(make_candidate(900.0), make_candidate(900.0), make_candidate(90.0, RUBS)))
     assert (judged.verdict, judged.named) == ("partly_explained", True)
 
 
-def test_the_worst_channel_counts(standing_at):
-    before, retuned = standing_at((30.0, 30.0)), standing_at((10.0, 10.0))
-    assert judge(search(before, retuned, standing_at((1.0, 1.1), RUBS))).verdict == "explained"
-    assert judge(search(before, retuned, standing_at((1.0, 1.5), RUBS))).verdict == "partly_explained"
+def test_the_worst_channel_counts(make_candidate):
+    before, retuned = make_candidate((30.0, 30.0)), make_candidate((10.0, 10.0))
+    assert judge(make_explanation(before, retuned, make_candidate((1.0, 1.1), RUBS))).verdict == "explained"
+    assert judge(make_explanation(before, retuned, make_candidate((1.0, 1.5), RUBS))).verdict == "partly_explained"
 
 
-def test_a_law_that_is_not_quite_exact_explains_a_great_mismatch(standing_at):
-    assert judge(search(standing_at(60.0), standing_at(60.0), standing_at(1.25, RUBS))).verdict == "explained"
-    assert judge(search(standing_at(60.0), standing_at(60.0), standing_at(1.35, RUBS))).verdict == "partly_explained"
+def test_a_law_that_is_not_quite_exact_explains_a_great_mismatch(make_candidate):
+    assert (
+        judge(make_explanation(make_candidate(60.0), make_candidate(60.0), make_candidate(1.25, RUBS))).verdict
+        == "explained"
+    )
+    assert (
+        judge(make_explanation(make_candidate(60.0), make_candidate(60.0), make_candidate(1.35, RUBS))).verdict
+        == "partly_explained"
+    )
 
 
 @pytest.mark.parametrize(("sealed", "verdict"), [(1.4, "explained"), (1.7, "partly_explained")])
-def test_what_was_never_looked_at_must_be_explained_too(standing_at, sealed, verdict):
-    judged = judge(search(standing_at(30.0), standing_at(10.0), standing_at(1.02, RUBS, test=sealed)))
+def test_what_was_never_looked_at_must_be_explained_too(make_candidate, sealed, verdict):
+    judged = judge(
+        make_explanation(make_candidate(30.0), make_candidate(10.0), make_candidate(1.02, RUBS, test=sealed))
+    )
     assert (judged.verdict, judged.named) == (verdict, True)
 
 
-def test_where_nothing_was_found_a_mismatch_stays_unexplained(standing_at):
-    assert judge(search(standing_at(30.0), standing_at(10.0))).verdict == "unexplained"
+def test_where_nothing_was_found_a_mismatch_stays_unexplained(make_candidate):
+    assert judge(make_explanation(make_candidate(30.0), make_candidate(10.0))).verdict == "unexplained"
 
 
-def test_sealed_samples_take_a_name_away_that_they_do_not_confirm(standing_at):
-    retuned, after = standing_at(10.0), standing_at(1.02, RUBS, test=9.5)
-    assert judge(search(standing_at(30.0), retuned, after)).verdict == "unexplained"
+def test_sealed_samples_take_a_name_away_that_they_do_not_confirm(make_candidate):
+    retuned, after = make_candidate(10.0), make_candidate(1.02, RUBS, test=9.5)
+    assert judge(make_explanation(make_candidate(30.0), retuned, after)).verdict == "unexplained"
 
 
-def test_sealed_samples_that_hardly_show_the_mismatch_take_nothing_away(standing_at):
-    retuned, after = standing_at(10.0, test=1.02), standing_at(1.02, RUBS, test=1.03)
-    assert judge(search(standing_at(30.0), retuned, after)).verdict == "explained"
+def test_sealed_samples_that_hardly_show_the_mismatch_take_nothing_away(make_candidate):
+    retuned, after = make_candidate(10.0, test=1.02), make_candidate(1.02, RUBS, test=1.03)
+    assert judge(make_explanation(make_candidate(30.0), retuned, after)).verdict == "explained"
 
 
-def test_where_nothing_was_sealed_nothing_is_taken_away(standing_at):
-    retuned, after = standing_at(10.0, test=np.nan), standing_at(1.02, RUBS, test=np.nan)
-    assert judge(search(standing_at(30.0), retuned, after)).verdict == "explained"
+def test_where_nothing_was_sealed_nothing_is_taken_away(make_candidate):
+    retuned, after = make_candidate(10.0, test=np.nan), make_candidate(1.02, RUBS, test=np.nan)
+    assert judge(make_explanation(make_candidate(30.0), retuned, after)).verdict == "explained"
 
 
-def test_sealed_samples_never_give_a_name(standing_at):
-    judged = judge(search(standing_at(30.0), standing_at(10.0), standing_at(9.9, RUBS, test=1.0)))
+def test_sealed_samples_never_give_a_name(make_candidate):
+    judged = judge(make_explanation(make_candidate(30.0), make_candidate(10.0), make_candidate(9.9, RUBS, test=1.0)))
     assert judged.verdict == "unexplained"
 
 
-def test_the_share_is_that_of_the_logarithm_and_stays_between_nothing_and_all(standing_at):
-    assert share_of_mismatch(standing_at(100.0), standing_at(10.0)) == pytest.approx(0.5, abs=0.01)
-    assert share_of_mismatch(standing_at(10.0), standing_at(20.0)) == 0.0
-    assert share_of_mismatch(standing_at(10.0), standing_at(0.9)) == 1.0
-    assert share_of_mismatch(standing_at(1.0), standing_at(0.9)) == 0.0
+def test_the_share_is_that_of_the_logarithm_and_stays_between_nothing_and_all(make_candidate):
+    assert compute_mismatch_share(make_candidate(100.0), make_candidate(10.0)) == pytest.approx(0.5, abs=0.01)
+    assert compute_mismatch_share(make_candidate(10.0), make_candidate(20.0)) == 0.0
+    assert compute_mismatch_share(make_candidate(10.0), make_candidate(0.9)) == 1.0
+    assert compute_mismatch_share(make_candidate(1.0), make_candidate(0.9)) == 0.0
 
 
-def test_what_two_effects_take_adds_up_to_what_both_take(standing_at):
-    bare, steps = standing_at(30.0), (standing_at(10.0, RUBS), standing_at(1.05, RUBS, "sensor_lag"))
-    shares = shares_taken(bare, steps)
+def test_what_two_effects_take_adds_up_to_what_both_take(make_candidate):
+    bare, steps = make_candidate(30.0), (make_candidate(10.0, RUBS), make_candidate(1.05, RUBS, "sensor_lag"))
+    shares = compute_step_shares(bare, steps)
     assert 0 < shares[0] < shares[1]
-    assert sum(shares) == pytest.approx(share_of_mismatch(bare, steps[1]))
+    assert sum(shares) == pytest.approx(compute_mismatch_share(bare, steps[1]))
 
 
 @pytest.mark.parametrize(
@@ -112,7 +120,7 @@ def test_what_two_effects_take_adds_up_to_what_both_take(standing_at):
     ids=["taken", "hardly taken", "worse in one of six", "nothing to take", "ran away", "nothing held out"],
 )
 def test_an_effect_is_added_to_a_name_where_the_worst_held_out_channel_says_so(
-    standing_at, without, with_it, confirmed
+    make_candidate, without, with_it, confirmed
 ):
-    left = [standing_at(1.0, RUBS, test=test) for test in (without, with_it)]
+    left = [make_candidate(1.0, RUBS, test=test) for test in (without, with_it)]
     assert confirms_addition(*left) is confirmed

@@ -8,34 +8,34 @@ import pytest
 from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import gather_evidence
 from analysis.diagnosis.search.explain import retune_alone
-from analysis.diagnosis.search.starting_hypotheses import within_data
+from analysis.diagnosis.search.starting_hypotheses import is_newest_within_data
 from equalizer.effects.catalogue import EFFECTS
 
 
 @pytest.fixture(scope="module")
-def evidence(diagnosed, arena_of):
-    context = arena_of(diagnosed.RUBBING)
+def evidence(diagnosed, make_context):
+    context = make_context(diagnosed.RUBBING)
     return gather_evidence(context.measure, context.tuning, retune_alone(context))[0]
 
 
-def claim(name, **values):
+def make_hypothesis(name, **values):
     return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 def test_a_ripple_repeats_within_the_travel(evidence):
     travel = float(np.ptp(evidence.axis_position[evidence.used > 0]))
-    assert within_data(claim("cogging", amplitude=0.1, pitch=0.5 * travel, phase=0.0), evidence)
-    assert not within_data(claim("cogging", amplitude=0.1, pitch=1.5 * travel, phase=0.0), evidence)
+    assert is_newest_within_data(make_hypothesis("cogging", amplitude=0.1, pitch=0.5 * travel, phase=0.0), evidence)
+    assert not is_newest_within_data(make_hypothesis("cogging", amplitude=0.1, pitch=1.5 * travel, phase=0.0), evidence)
 
 
 def test_a_limit_lies_within_the_commands(evidence):
     most = float(np.abs(evidence.command[evidence.used > 0]).max())
-    assert within_data(claim("force_saturation", limit=0.9 * most), evidence)
-    assert not within_data(claim("force_saturation", limit=1.1 * most), evidence)
+    assert is_newest_within_data(make_hypothesis("force_saturation", limit=0.9 * most), evidence)
+    assert not is_newest_within_data(make_hypothesis("force_saturation", limit=1.1 * most), evidence)
 
 
 def test_other_numbers_are_let_through(evidence):
-    assert within_data(claim("coulomb_friction", level=1e3), evidence)
+    assert is_newest_within_data(make_hypothesis("coulomb_friction", level=1e3), evidence)
 
 
 @pytest.mark.parametrize(("driven_hz", "hums"), [(7.3, True), (25.0, False), (10.0, False)])

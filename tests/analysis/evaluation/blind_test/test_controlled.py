@@ -9,39 +9,39 @@ CELL = Mismatch("ax", "fx", (1.0, 5.0), None, None, 0.5, 0.001)
 ERRORS = Errors(0.5, 0.3, 0.1, 0.1)
 
 
-def pushed(force, axis="x", probability=0.9):
+def diagnosis_of_push(force, axis="x", probability=0.9):
     effect = NamedEffect("constant_force", "mechanism", axis, 0.9, probability, {"force": Estimate(force, "N")})
     return Diagnosis("explained", (CELL,), (effect,), {}, (), Fit(ERRORS, ERRORS), "free simulation", None)
 
 
-def unnamed(verdict):
+def diagnosis_without_effect(verdict):
     return Diagnosis(verdict, (CELL,), (), {}, (), Fit(ERRORS, ERRORS), "free simulation", None)
 
 
 @pytest.mark.parametrize(
     ("claim", "answers", "held"),
     [
-        ("no name", [unnamed("unexplained")], True),
+        ("no name", [diagnosis_without_effect("unexplained")], True),
         ("no name", [None], True),
-        ("no name", [pushed(1.0)], False),
-        ("no name", [pushed(1.0, probability=0.3)], True),
-        ("not explained", [unnamed("unexplained")], True),
-        ("not explained", [pushed(1.0)], False),
-        ("nothing", [unnamed("parameters")], True),
-        ("nothing", [unnamed("unexplained")], False),
+        ("no name", [diagnosis_of_push(1.0)], False),
+        ("no name", [diagnosis_of_push(1.0, probability=0.3)], True),
+        ("not explained", [diagnosis_without_effect("unexplained")], True),
+        ("not explained", [diagnosis_of_push(1.0)], False),
+        ("nothing", [diagnosis_without_effect("parameters")], True),
+        ("nothing", [diagnosis_without_effect("unexplained")], False),
         ("nothing", [None], False),
-        ("same", [pushed(1.0), pushed(1.1)], True),
-        ("same", [pushed(1.0), pushed(1.0, "y")], False),
-        ("same", [unnamed("unexplained"), unnamed("unexplained")], False),
-        ("same", [pushed(1.0), None], False),
-        ("same but axes", [pushed(1.0), pushed(1.0, "q0")], True),
-        ("axis exchanged", [pushed(1.0), pushed(1.0, "y")], True),
-        ("axis exchanged", [pushed(1.0), pushed(1.0)], False),
-        ("axis exchanged", [pushed(1.0, None), pushed(1.0, "y")], False),
-        ("axis exchanged", [pushed(1.0), unnamed("unexplained")], False),
-        ("opposite", [pushed(1.0), pushed(-1.001)], True),
-        ("opposite", [pushed(1.0), pushed(1.0)], False),
-        ("opposite", [pushed(1.0), unnamed("unexplained")], False),
+        ("same", [diagnosis_of_push(1.0), diagnosis_of_push(1.1)], True),
+        ("same", [diagnosis_of_push(1.0), diagnosis_of_push(1.0, "y")], False),
+        ("same", [diagnosis_without_effect("unexplained"), diagnosis_without_effect("unexplained")], False),
+        ("same", [diagnosis_of_push(1.0), None], False),
+        ("same but axes", [diagnosis_of_push(1.0), diagnosis_of_push(1.0, "q0")], True),
+        ("axis exchanged", [diagnosis_of_push(1.0), diagnosis_of_push(1.0, "y")], True),
+        ("axis exchanged", [diagnosis_of_push(1.0), diagnosis_of_push(1.0)], False),
+        ("axis exchanged", [diagnosis_of_push(1.0, None), diagnosis_of_push(1.0, "y")], False),
+        ("axis exchanged", [diagnosis_of_push(1.0), diagnosis_without_effect("unexplained")], False),
+        ("opposite", [diagnosis_of_push(1.0), diagnosis_of_push(-1.001)], True),
+        ("opposite", [diagnosis_of_push(1.0), diagnosis_of_push(1.0)], False),
+        ("opposite", [diagnosis_of_push(1.0), diagnosis_without_effect("unexplained")], False),
     ],
 )
 def test_a_claim_of_a_control_holds_for_the_expected_answers_alone(claim, answers, held):
@@ -49,7 +49,7 @@ def test_a_claim_of_a_control_holds_for_the_expected_answers_alone(claim, answer
 
 
 def test_answers_are_said_in_words():
-    said = judge_control("a control", "same", [pushed(1.0), None]).said
+    said = judge_control("a control", "same", [diagnosis_of_push(1.0), None]).said
     assert said == ("explained: constant_force of x", "no answer")
 
 

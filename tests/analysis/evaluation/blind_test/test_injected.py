@@ -2,13 +2,13 @@
 
 import pytest
 
-from analysis.evaluation.blind_test.injected import DETECTABLE, injected_figures, read_outcome, tallies
+from analysis.evaluation.blind_test.injected import DETECTABLE, make_tallies, read_outcome, score_injections
 from analysis.reports.injected_section import figure_text, kind_of, make_injected_section
 
 PLACES = {"sensor_lag": "sensor", "sensor_gain": "sensor", "amplifier_lag": "actuator", "added_mass": "mechanism"}
 
 
-def outcome(effects=("sensor_lag",), named=("sensor_lag",), rivals=(), change=3.0):
+def make_outcome(effects=("sensor_lag",), named=("sensor_lag",), rivals=(), change=3.0):
     label = {
         "recording": "rig",
         "effects": list(effects),
@@ -24,8 +24,8 @@ def outcome(effects=("sensor_lag",), named=("sensor_lag",), rivals=(), change=3.
     return read_outcome(label, {"seconds": 2.0, "diagnosis": {"verdict": "partly_explained", "effects": said}})
 
 
-def by_name(outcomes):
-    return {injected_figure.name: injected_figure for injected_figure in injected_figures(outcomes)}
+def figures_by_name(outcomes):
+    return {injected_figure.name: injected_figure for injected_figure in score_injections(outcomes)}
 
 
 @pytest.mark.parametrize(
@@ -40,19 +40,19 @@ def by_name(outcomes):
     ],
 )
 def test_what_is_said_of_a_fault_is_judged_by_its_worst_name(named, rivals, judged):
-    assert outcome(named=named, rivals=rivals).judged == judged
+    assert make_outcome(named=named, rivals=rivals).answer_class == judged
 
 
 def test_of_two_faults_one_may_be_left_open():
     both = ("added_mass", "sensor_gain")
-    assert outcome(both, ("added_mass",)).judged == "named"
-    assert outcome(both, ("amplifier_lag",)).judged == "wrong"
-    assert kind_of(outcome(both)) == "two at once"
+    assert make_outcome(both, ("added_mass",)).answer_class == "named"
+    assert make_outcome(both, ("amplifier_lag",)).answer_class == "wrong"
+    assert kind_of(make_outcome(both)) == "two at once"
 
 
 def test_nothing_injected_is_right_where_nothing_is_named():
-    assert outcome(effects=(), named=()).right
-    assert outcome(effects=()).judged == "wrong"
+    assert make_outcome(effects=(), named=()).right
+    assert make_outcome(effects=()).answer_class == "wrong"
 
 
 def test_an_answer_that_failed_is_no_right_answer():
@@ -64,23 +64,28 @@ def test_an_answer_that_failed_is_no_right_answer():
 
 def test_only_detectable_faults_are_asked_for():
     outcomes = [
-        outcome(),
-        outcome(named=()),
-        outcome(change=0.5 / DETECTABLE),
-        outcome(named=(), change=0.99 * DETECTABLE),
-        outcome(change=None),
-        outcome((), ()),
+        make_outcome(),
+        make_outcome(named=()),
+        make_outcome(change=0.5 / DETECTABLE),
+        make_outcome(named=(), change=0.99 * DETECTABLE),
+        make_outcome(change=None),
+        make_outcome((), ()),
     ]
-    figures = by_name(outcomes)
+    figures = figures_by_name(outcomes)
     asked = figures["detectable faults named, or in the class"]
     assert (asked.hits, asked.of) == (2, 3)
     assert figures["nothing injected, nothing named"].hits == 1
-    assert figure_text(by_name([])["nothing injected, nothing named"]) == "none was drawn"
-    (row,) = tallies(outcomes, kind_of)
-    assert (row.what, row.drawn, row.counts) == ("sensor_lag", 5, (2, 0, 0, 0, 1))
+    assert figure_text(figures_by_name([])["nothing injected, nothing named"]) == "none was drawn"
+    (row,) = make_tallies(outcomes, kind_of)
+    assert (row.name, row.fault_count, row.counts) == ("sensor_lag", 5, (2, 0, 0, 0, 1))
 
 
 def test_every_miss_and_every_wrong_story_is_listed():
-    said = [outcome(), outcome(named=("sensor_gain",)), outcome((), ("added_mass",)), outcome(named=(), change=1.0)]
+    said = [
+        make_outcome(),
+        make_outcome(named=("sensor_gain",)),
+        make_outcome((), ("added_mass",)),
+        make_outcome(named=(), change=1.0),
+    ]
     listed = make_injected_section(said).tables[-1]
     assert [row[1] for row in listed.rows] == ["sensor_lag", "nothing"]

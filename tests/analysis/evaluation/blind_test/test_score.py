@@ -4,13 +4,18 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
-from analysis.evaluation.blind_test.calibration import calibration
+from analysis.evaluation.blind_test.calibration import compute_calibration
 from analysis.evaluation.blind_test.confidence_intervals import pool_share, share, statistic
-from analysis.evaluation.blind_test.detection import classify_outcome, detection_strips, ideal_threshold, shares_by_size
+from analysis.evaluation.blind_test.detection import (
+    classify_outcome,
+    compute_ideal_threshold,
+    compute_rates_by_size,
+    make_detection_strips,
+)
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
-from analysis.evaluation.blind_test.score import is_miss, score
-from analysis.evaluation.blind_test.wording import answer_text, describe_concealed, figure_text
+from analysis.evaluation.blind_test.score import compute_score, is_wrong_answer
+from analysis.evaluation.blind_test.wording import describe_answer, describe_concealed, format_figure
 from analysis.figures.blind_test_pictures import blind_test_pictures
 from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test_report
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -19,7 +24,7 @@ CELL = Mismatch("ax", "fx", (1.0, 5.0), None, None, 0.5, 0.001)
 ERRORS = Errors(0.5, 0.3, 0.1, 0.1)
 
 
-def named(effect, value=1.0, ci95=(0.9, 1.1), probability=0.9, inseparable=(), axis="x"):
+def make_named_effect(effect, value=1.0, ci95=(0.9, 1.1), probability=0.9, inseparable=(), axis="x"):
     known = EFFECTS_BY_NAME[effect]
     rivals = tuple(Rival(name, 0.05, True, "as good") for name in inseparable)
     return NamedEffect(
@@ -27,12 +32,12 @@ def named(effect, value=1.0, ci95=(0.9, 1.1), probability=0.9, inseparable=(), a
     )
 
 
-def said(verdict, *effects):
+def make_diagnosis(verdict, *effects):
     remainder = (CELL,) if verdict == "partly_explained" else ()
     return Diagnosis(verdict, (CELL,), effects, {}, remainder, Fit(ERRORS, ERRORS), "free simulation", None)
 
 
-def outcome(kind="single", concealed=("coulomb_friction",), answer=None, bank="main", retuned=5.0, **more):
+def make_outcome(kind="single", concealed=("coulomb_friction",), answer=None, bank="main", retuned=5.0, **more):
     hidden = tuple(
         Concealed(name, getattr(EFFECTS_BY_NAME.get(name), "place", "mechanism"), "x", {"level": 1.0, "damping": 1.0})
         for name in concealed
@@ -50,29 +55,31 @@ def outcome(kind="single", concealed=("coulomb_friction",), answer=None, bank="m
     return Outcome(kind=kind, bank=bank, concealed=hidden, diagnosis=answer, channel_errors=found, **(fixed | more))
 
 
-RIGHT = outcome(answer=said("explained", named("coulomb_friction")))
-WRONG = outcome(answer=said("explained", named("viscous_damping", probability=0.6)))
-IN_SET = outcome(answer=said("explained", named("viscous_damping", inseparable=("coulomb_friction",))))
-UNSEEN = outcome(answer=said("parameters"), retuned=1.1, adds=1.0)
-ALARM = outcome("nothing", (), said("explained", named("cogging")), strengths=())
-CLEAN = outcome("nothing", (), said("parameters"), strengths=())
-OUTSIDE = outcome("outside", ("creep",), said("unexplained"))
-TAKEN_IN = outcome("outside", ("creep",), said("explained", named("cogging")))
-WITHOUT = outcome("without", answer=said("unexplained"))
-PAIR = outcome(
+RIGHT = make_outcome(answer=make_diagnosis("explained", make_named_effect("coulomb_friction")))
+WRONG = make_outcome(answer=make_diagnosis("explained", make_named_effect("viscous_damping", probability=0.6)))
+IN_SET = make_outcome(
+    answer=make_diagnosis("explained", make_named_effect("viscous_damping", inseparable=("coulomb_friction",)))
+)
+UNSEEN = make_outcome(answer=make_diagnosis("parameters"), retuned=1.1, adds=1.0)
+ALARM = make_outcome("nothing", (), make_diagnosis("explained", make_named_effect("cogging")), strengths=())
+CLEAN = make_outcome("nothing", (), make_diagnosis("parameters"), strengths=())
+OUTSIDE = make_outcome("outside", ("creep",), make_diagnosis("unexplained"))
+TAKEN_IN = make_outcome("outside", ("creep",), make_diagnosis("explained", make_named_effect("cogging")))
+WITHOUT = make_outcome("without", answer=make_diagnosis("unexplained"))
+PAIR = make_outcome(
     "pair",
     ("coulomb_friction", "viscous_damping"),
-    said("partly_explained", named("coulomb_friction")),
+    make_diagnosis("partly_explained", make_named_effect("coulomb_friction")),
     strengths=(1, 1),
 )
-BROKEN = outcome()
-GUESSED = outcome(answer=said("explained", named("cogging")), retuned=1.1, adds=0.4)
-PARTLY = outcome("without", answer=said("partly_explained", named("stribeck_friction")))
+BROKEN = make_outcome()
+GUESSED = make_outcome(answer=make_diagnosis("explained", make_named_effect("cogging")), retuned=1.1, adds=0.4)
+PARTLY = make_outcome("without", answer=make_diagnosis("partly_explained", make_named_effect("stribeck_friction")))
 ALL = (RIGHT, WRONG, IN_SET, UNSEEN, GUESSED, ALARM, CLEAN, OUTSIDE, TAKEN_IN, WITHOUT, PARTLY, PAIR, BROKEN)
 
 
-def figure(outcomes, name):
-    return next(each for each in score(outcomes).figures if each.name == name)
+def find_figure(outcomes, name):
+    return next(each for each in compute_score(outcomes).figures if each.name == name)
 
 
 @pytest.mark.parametrize(
@@ -94,26 +101,28 @@ def figure(outcomes, name):
     ],
 )
 def test_shares_count_what_their_names_say(name, hits, of):
-    found = figure(ALL, name)
+    found = find_figure(ALL, name)
     assert (found.hits, found.of) == (hits, of)
 
 
 def test_every_answer_that_is_not_as_it_should_be_is_listed():
-    assert {id(miss) for miss in score(ALL).misses} == {
+    assert {id(miss) for miss in compute_score(ALL).misses} == {
         id(o) for o in (WRONG, IN_SET, GUESSED, ALARM, TAKEN_IN, PARTLY, PAIR, BROKEN)
     }
 
 
 def test_what_cannot_be_seen_is_no_miss_and_what_broke_down_is_one():
-    assert not is_miss(UNSEEN)
-    assert is_miss(BROKEN)
+    assert not is_wrong_answer(UNSEEN)
+    assert is_wrong_answer(BROKEN)
 
 
 def test_a_right_name_on_another_axis_is_a_miss_where_there_are_several():
-    there = said("explained", named("coulomb_friction", axis="y"))
-    assert is_miss(outcome(answer=there))
-    assert not is_miss(outcome(answer=there, axes=("x",)))
-    assert not is_miss(outcome(answer=said("explained", named("coulomb_friction", axis=None))))
+    there = make_diagnosis("explained", make_named_effect("coulomb_friction", axis="y"))
+    assert is_wrong_answer(make_outcome(answer=there))
+    assert not is_wrong_answer(make_outcome(answer=there, axes=("x",)))
+    assert not is_wrong_answer(
+        make_outcome(answer=make_diagnosis("explained", make_named_effect("coulomb_friction", axis=None)))
+    )
 
 
 def test_what_hangs_together_is_resampled_together():
@@ -126,49 +135,53 @@ def test_what_hangs_together_is_resampled_together():
 
 def test_shares_of_nothing_have_no_value():
     assert share("none", [], bool).value is None
-    assert figure_text(share("none", [], bool)) == "none drawn"
+    assert format_figure(share("none", [], bool)) == "none drawn"
     assert statistic("none", [], np.median).value is None
 
 
 def test_an_interval_holds_its_share():
     found = share("half", [True, False] * 50, bool)
     assert found.low < 0.5 < found.high
-    assert figure_text(found).startswith("50.0 % [40, 60]")
+    assert format_figure(found).startswith("50.0 % [40, 60]")
 
 
 def test_probabilities_that_mean_what_they_say_have_no_error():
-    honest = [outcome(answer=said("explained", named("coulomb_friction", probability=0.75)))] * 30
-    honest += [outcome(answer=said("explained", named("cogging", probability=0.75)))] * 10
+    honest = [
+        make_outcome(answer=make_diagnosis("explained", make_named_effect("coulomb_friction", probability=0.75)))
+    ] * 30
+    honest += [make_outcome(answer=make_diagnosis("explained", make_named_effect("cogging", probability=0.75)))] * 10
     mixed = [honest[k] for k in np.random.default_rng(1).permutation(40)]
-    assert calibration(mixed).error == pytest.approx(0.0, abs=1e-12)  # in any order of the ties
-    boasting = calibration([WRONG] * 20)
+    assert compute_calibration(mixed).error == pytest.approx(0.0, abs=1e-12)  # in any order of the ties
+    boasting = compute_calibration([WRONG] * 20)
     assert boasting.error == pytest.approx(0.6)
     assert len(boasting.bins) == 10
 
 
 def test_each_draw_becomes_a_mark_of_its_effect():
-    strips = detection_strips([RIGHT, WRONG, IN_SET, UNSEEN])
+    strips = make_detection_strips([RIGHT, WRONG, IN_SET, UNSEEN])
     assert [strip.effect for strip in strips] == ["coulomb_friction"]
     assert sorted(how for _, how in strips[0].draws) == ["in the set", "invisible", "missed", "right"]
     assert classify_outcome(BROKEN) == "missed"
 
 
 def test_an_ideal_observer_sees_an_effect_from_where_it_adds_three_quarters_of_the_noise():
-    drawn = [outcome(adds=0.075 * 100**strength, strengths=(strength,)) for strength in (0.0, 0.2, 0.7, 1.0)]
-    assert ideal_threshold(drawn) == pytest.approx(0.5)
-    assert ideal_threshold([outcome(adds=9.0, strengths=(s,)) for s in (0.0, 0.5, 1.0)]) is None  # it does not grow
-    assert ideal_threshold(drawn[:2]) is None
-    assert detection_strips(drawn)[0].ideal_threshold == pytest.approx(0.5)
+    drawn = [make_outcome(adds=0.075 * 100**strength, strengths=(strength,)) for strength in (0.0, 0.2, 0.7, 1.0)]
+    assert compute_ideal_threshold(drawn) == pytest.approx(0.5)
+    assert (
+        compute_ideal_threshold([make_outcome(adds=9.0, strengths=(s,)) for s in (0.0, 0.5, 1.0)]) is None
+    )  # it does not grow
+    assert compute_ideal_threshold(drawn[:2]) is None
+    assert make_detection_strips(drawn)[0].ideal_threshold == pytest.approx(0.5)
 
 
 def test_larger_effects_come_later():
-    drawn = [outcome(answer=said("parameters"), adds=float(k), retuned=1.0) for k in range(40)]
-    sizes = [part.adds for part in shares_by_size(drawn)]
+    drawn = [make_outcome(answer=make_diagnosis("parameters"), adds=float(k), retuned=1.0) for k in range(40)]
+    sizes = [part.median_change for part in compute_rates_by_size(drawn)]
     assert sizes == sorted(sizes) and len(sizes) == 10
 
 
 def test_the_page_lists_misses_before_figures_and_shows_all_pictures():
-    whole = score(ALL)
+    whole = compute_score(ALL)
     pictures = blind_test_pictures(ALL, whole.calibration)
     assert [picture.name for picture in pictures] == ["detection", "detection-by-size", "confusion", "reliability"]
     both = ("sensor_lag", "logger_offset")
@@ -184,10 +197,10 @@ def test_the_page_lists_misses_before_figures_and_shows_all_pictures():
 
 
 def test_a_bank_of_nothing_has_no_pictures():
-    assert blind_test_pictures([CLEAN], calibration([CLEAN])) == ()
+    assert blind_test_pictures([CLEAN], compute_calibration([CLEAN])) == ()
 
 
 def test_sentences_say_truth_and_answer():
     assert describe_concealed(PAIR) == "coulomb_friction of x + viscous_damping of x"
-    assert answer_text(WRONG) == "explained: viscous_damping of x (0.60)"
+    assert describe_answer(WRONG) == "explained: viscous_damping of x (0.60)"
     assert describe_concealed(CLEAN) == "nothing"

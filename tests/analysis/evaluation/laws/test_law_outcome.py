@@ -20,7 +20,7 @@ DRAG = FreshMotion(COLUMNS, {"y": -3.0 * np.abs(V) ** 1.5 * np.sign(V)}, False, 
 TRUTH = TrueLaw("drag of a power", "-k |v|^a sgn v", ("y",), ("force",), (("vy",),), False, {"k": 3.0, "a": 1.5})
 
 
-def said(expression, verdict="explained", acts_on="force", key="effects"):
+def make_diagnosis(expression, verdict="explained", acts_on="force", key="effects"):
     law = {"expression": expression, "variables": sorted(law_of(expression, acts_on, "y").variables),
            "acts_on": acts_on, "axis": "y"}  # fmt: skip
     entry = {"effect": "discovered_law", "place": "mechanism", "axis": "y", "law": law}
@@ -36,10 +36,11 @@ def said(expression, verdict="explained", acts_on="force", key="effects"):
     )  # fmt: skip
 
 
-def outcome(expression, errors=(0.01, 0.2), **how):
+def make_outcome(expression, errors=(0.01, 0.2), **how):
     return LawOutcome(
         number=1, seed=2, kind="law", concealed=TRUTH.law, axes=("y",), truth=TRUTH, adds=10.0,
-        diagnosis=said(expression, **how), channel_errors={"retuned": {"ay": 9.0}}, seconds=3.0, errors=errors,
+        diagnosis=make_diagnosis(expression, **how), channel_errors={"retuned": {"ay": 9.0}}, seconds=3.0,
+        errors=errors,
     )  # fmt: skip
 
 
@@ -72,27 +73,27 @@ def test_a_law_that_is_not_finite_has_an_infinite_error():
 
 
 def test_structure_asks_for_variables_axis_place_and_memory():
-    right = outcome("-3.0*abs(vy)**1.5*sign(vy)")
+    right = make_outcome("-3.0*abs(vy)**1.5*sign(vy)")
     assert right.structured
     assert right.close
     assert not right.close_louder
     assert not right.missed
     for wrong in ("-3.0*abs(vy)*y", "-3.0*lag(vy, 0.01)"):
-        assert not outcome(wrong).structured
-        assert outcome(wrong).wrongly_explained
-    assert not outcome("0.9*fy", acts_on="command").structured
+        assert not make_outcome(wrong).structured
+        assert make_outcome(wrong).wrongly_explained
+    assert not make_outcome("0.9*fy", acts_on="command").structured
 
 
 def test_an_unnamed_candidate_does_not_count_as_a_wrong_explanation():
-    held = outcome("-3.0*abs(vy)*y", verdict="unexplained", key="candidates")
+    held = make_outcome("-3.0*abs(vy)*y", verdict="unexplained", key="candidates")
     assert not held.wrongly_explained
     assert held.missed
 
 
 def test_a_law_on_a_null_is_false():
-    null = replace(outcome("1.0*vy*abs(vy)"), kind="nothing", truth=None)
+    null = replace(make_outcome("1.0*vy*abs(vy)"), kind="nothing", truth=None)
     assert null.false_law
     assert null.missed
-    figures = {each.name: each for each in law_score([null, outcome("-3.0*abs(vy)**1.5*sign(vy)")]).figures}
+    figures = {each.name: each for each in law_score([null, make_outcome("-3.0*abs(vy)**1.5*sign(vy)")]).figures}
     assert figures["a law named where nothing is missing"].hits == 1
     assert figures["structure right and named"].value == 1.0

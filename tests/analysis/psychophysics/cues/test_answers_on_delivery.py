@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from analysis.psychophysics.cues.answers_on_delivery import RELYING, answers_on_delivery
+from analysis.psychophysics.cues.answers_on_delivery import CUE_ONLY_SLOPE, answers_on_delivery
 from analysis.psychophysics.cues.cue_findings import cue_findings, cue_warnings
 from analysis.psychophysics.cues.delivered_cues import Cue, select_delivered_trials
 
 TRIALS = 60
 
 
-def answered(template, seed, *, scatter_db, by_strength, noise_db=1.0, people=4):
+def simulate_answers(template, seed, *, scatter_db, by_strength, noise_db=1.0, people=4):
     """Trials at 25 Hz on five levels. by_strength: weight of the cue in units of a participant who uses nothing else;
     direction is felt with d' of 1.6 at the middle level, and more where the stimulus is stronger."""
     random = np.random.default_rng(seed)
@@ -40,7 +40,7 @@ def template(simulate):
     return simulate(0.5, np.random.default_rng(1))[0]
 
 
-def slope_of(trials):
+def strength_regression(trials):
     (group,) = select_delivered_trials(trials)
     (found,) = (each for each in answers_on_delivery(group) if each.cue is Cue.INTENSITY)
     return found
@@ -48,9 +48,9 @@ def slope_of(trials):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_participant_who_goes_by_strength_is_found_with_the_slope_of_his_noise(template, seed):
-    trials = answered(template, seed, scatter_db=1.5, by_strength=1.0)
-    found = slope_of(trials)
-    assert found.lower < RELYING < found.upper
+    trials = simulate_answers(template, seed, scatter_db=1.5, by_strength=1.0)
+    found = strength_regression(trials)
+    assert found.lower < CUE_ONLY_SLOPE < found.upper
     assert found.lower > 0.5
     assert found.is_conclusive
     said = cue_warnings(cue_findings(trials))[-1]
@@ -59,26 +59,29 @@ def test_a_participant_who_goes_by_strength_is_found_with_the_slope_of_his_noise
 
 def test_feeling_directions_better_when_they_are_stronger_is_not_taken_for_the_cue(template):
     """The share of p below 5 % over 200 studies in which strength helps, but tells nothing: binomial, 4 errors."""
-    p = [slope_of(answered(template, seed, scatter_db=1.5, by_strength=0.0, people=2)).p for seed in range(200)]
+    p = [
+        strength_regression(simulate_answers(template, seed, scatter_db=1.5, by_strength=0.0, people=2)).p
+        for seed in range(200)
+    ]
     assert np.mean(np.array(p) < 0.05) == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 / 200))
 
 
 def test_a_device_that_repeats_itself_cannot_tell_and_says_so(template):
-    still = slope_of(answered(template, 3, scatter_db=0.0, by_strength=1.0))
+    still = strength_regression(simulate_answers(template, 3, scatter_db=0.0, by_strength=1.0))
     assert still.slope is None and not still.is_conclusive
-    little = slope_of(answered(template, 3, scatter_db=0.02, by_strength=1.0))
+    little = strength_regression(simulate_answers(template, 3, scatter_db=0.02, by_strength=1.0))
     assert not little.is_conclusive
-    assert little.upper - little.lower > RELYING
+    assert little.upper - little.lower > CUE_ONLY_SLOPE
 
 
 def test_who_is_always_right_shows_nothing(template):
-    trials = answered(template, 4, scatter_db=1.5, by_strength=0.0)
+    trials = simulate_answers(template, 4, scatter_db=1.5, by_strength=0.0)
     sure = [replace(trial, answer=trial.direction_shown, correct=True) for trial in trials]
-    assert not slope_of(sure).is_conclusive
-    assert slope_of(sure).p > 0.9
+    assert not strength_regression(sure).is_conclusive
+    assert strength_regression(sure).p > 0.9
 
 
-def roved(template, seed, by_strength):
+def simulate_roved_answers(template, seed, by_strength):
     """Levels drawn from 6 dB; harmonics with a floor, which fall beside a stronger stimulus and tell nothing."""
     random = np.random.default_rng(seed)
     trials = []
@@ -100,5 +103,5 @@ def roved(template, seed, by_strength):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_strength_of_a_roved_study_does_not_accuse_the_spectrum_that_follows_it(template, seed):
-    assert roved(template, seed, by_strength=True) == {Cue.INTENSITY: True, Cue.SPECTRUM: False}
-    assert roved(template, seed, by_strength=False) == {Cue.INTENSITY: False, Cue.SPECTRUM: False}
+    assert simulate_roved_answers(template, seed, by_strength=True) == {Cue.INTENSITY: True, Cue.SPECTRUM: False}
+    assert simulate_roved_answers(template, seed, by_strength=False) == {Cue.INTENSITY: False, Cue.SPECTRUM: False}

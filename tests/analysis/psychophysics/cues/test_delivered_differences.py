@@ -8,14 +8,14 @@ import pytest
 from analysis.psychophysics.cues.cue_ability import INTERNAL_NOISE_DB, same_level_difference
 from analysis.psychophysics.cues.cue_findings import cue_findings, cue_warnings
 from analysis.psychophysics.cues.delivered_cues import Cue, cue_gaps, select_delivered_trials
-from analysis.psychophysics.study_analysis import analyse_study, anova_document
+from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
 from analysis.reports.study_report import render_study_report
 
 SCATTER_DB = 0.3
 ABLE_N = (0.4, 0.4, 0.4, 0.4, 0.4)
 
 
-def delivered(trials, planted_db, cue=Cue.INTENSITY, at_hz=25.0, seed=5, per_newton=4.0):
+def deliver(trials, planted_db, cue=Cue.INTENSITY, at_hz=25.0, seed=5, per_newton=4.0):
     """As a device delivers them: scattered from trial to trial, direction 1 by `planted_db` more at one frequency."""
     random = np.random.default_rng(seed)
     found = []
@@ -35,7 +35,7 @@ def delivered(trials, planted_db, cue=Cue.INTENSITY, at_hz=25.0, seed=5, per_new
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("cue", list(Cue))
 def test_a_planted_mismatch_of_3_db_is_named_where_it_is_and_nowhere_else(simulate_study, seed, cue):
-    found = cue_findings(delivered(simulate_study(4, ABLE_N, seed), 3.0, cue, seed=seed))
+    found = cue_findings(deliver(simulate_study(4, ABLE_N, seed), 3.0, cue, seed=seed))
     assert [(each.cue, each.frequency_hz) for each in found if each.noticed_by] == [(cue, 25.0)]
     (named,) = (each for each in found if each.noticed_by)
     assert named.difference_db == pytest.approx(3.0, abs=0.2)
@@ -48,15 +48,15 @@ def test_a_planted_mismatch_of_3_db_is_named_where_it_is_and_nowhere_else(simula
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
 def test_a_tenth_of_a_decibel_is_not_named_though_it_is_told_from_none(simulate_study, seed):
-    trials = delivered(simulate_study(4, ABLE_N, seed), 0.1, seed=seed)
+    trials = deliver(simulate_study(4, ABLE_N, seed), 0.1, seed=seed)
     found = cue_findings(trials)
     assert cue_warnings(found) == ()
-    exact = cue_findings(delivered_exactly(trials, 0.1))
+    exact = cue_findings(deliver_exactly(trials, 0.1))
     assert exact[0].people[0].lower_db == pytest.approx(exact[0].people[0].upper_db) == pytest.approx(0.1)
     assert cue_warnings(exact) == ()
 
 
-def delivered_exactly(trials, difference_db):
+def deliver_exactly(trials, difference_db):
     return [
         replace(trial, delivered_mps2=4.0 * trial.level_n * 10 ** ((trial.direction_shown == 1) * difference_db / 20))
         for trial in trials
@@ -128,7 +128,7 @@ def test_without_measurements_nothing_is_said(simulate_study):
 
 
 def test_trials_without_harmonics_are_counted_and_the_others_are_judged(simulate_study, protocol):
-    whole = delivered(simulate_study(4, ABLE_N, 1), 3.0, Cue.SPECTRUM, seed=6)
+    whole = deliver(simulate_study(4, ABLE_N, 1), 3.0, Cue.SPECTRUM, seed=6)
     at_25 = [number for number, trial in enumerate(whole) if trial.frequency_hz == 25.0]
     some = list(whole)
     for number in at_25[::20]:
@@ -151,18 +151,18 @@ def test_trials_without_harmonics_are_counted_and_the_others_are_judged(simulate
     assert [said in warning and "45 Hz" not in warning for warning in analysis.warnings].count(True) == 1
     page = render_study_report(analysis, (), {}, "today")
     assert page.count(said) == 2 and f"{said} and coupling at 45 Hz in any trial" in page
-    assert {"frequency_hz": 25.0, "cue": "spectrum", "missing": lost, "trials": len(at_25)} in anova_document(analysis)[
-        "cue_gaps"
-    ]
+    assert {"frequency_hz": 25.0, "cue": "spectrum", "missing": lost, "trials": len(at_25)} in make_anova_document(
+        analysis
+    )["cue_gaps"]
 
 
 def test_the_report_and_the_document_name_the_planted_mismatch(simulate_study, protocol):
     trials = simulate_study(4, ABLE_N, 1)
     pages = {}
     for planted_db in (3.0, 0.1):
-        analysis = analyse_study(delivered(trials, planted_db, seed=6), protocol)
+        analysis = analyse_study(deliver(trials, planted_db, seed=6), protocol)
         pages[planted_db] = render_study_report(analysis, (), {}, "today")
-        assert len(anova_document(analysis)["cues"]) == 15
+        assert len(make_anova_document(analysis)["cues"]) == 15
     assert all("Was direction the cue?" in page for page in pages.values())
     said = "The two directions differed in more than their direction"
     assert pages[3.0].count(said) == 2 and "intensity at 25 Hz" in pages[3.0]

@@ -10,7 +10,7 @@ from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, T
 from analysis.psychophysics.hierarchy.likelihood import TrialLikelihood
 from analysis.psychophysics.hierarchy.objective import Objective, Prior
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
-from tests.analysis.conftest import PUBLISHED, simulated_run
+from tests.analysis.conftest import PUBLISHED, simulate_run
 
 CROWD = Crowd((5.0, 25.0, 45.0), (0.4, 0.9, 2.5))
 SHARES = {
@@ -42,7 +42,7 @@ def test_a_share_runs_from_lapse_to_lapse():
 
 def test_the_likelihood_is_the_sum_over_trials():
     rng = np.random.default_rng(2)
-    trials = simulated_run(0.9, rng, frequency_hz=15.0, subject="a") + simulated_run(2.0, rng, frequency_hz=35.0)
+    trials = simulate_run(0.9, rng, frequency_hz=15.0, subject="a") + simulate_run(2.0, rng, frequency_hz=35.0)
     answers = count_answers(trials, (15.0, 35.0))
     assert answers.trials == len(trials)
     assert answers.subjects == ("a", "s01")
@@ -103,7 +103,7 @@ def test_information_is_what_the_curvature_is_on_average(answers):
 @pytest.mark.parametrize("family", list(Family))
 def test_the_gradient_of_the_marginal_likelihood_is_exact(answers, family):
     objective = Objective(answers, family, Prior())
-    at = objective.begin + 0.1 * np.random.default_rng(0).standard_normal(len(objective.begin))
+    at = objective.start + 0.1 * np.random.default_rng(0).standard_normal(len(objective.start))
     _, gradient = objective(at)
     steps = 1e-4 * np.eye(len(at))
     plain = [(objective(at + step)[0] - objective(at - step)[0]) / 2e-4 for step in steps]
@@ -118,7 +118,7 @@ def test_the_marginal_likelihood_is_the_integral(answers):
     parts = ("run", "level_db", "side", "right", "wrong")
     alone = replace(answers, subjects=answers.subjects[:1], **{name: getattr(answers, name)[chosen] for name in parts})
     objective = Objective(alone, Family.WEIBULL, Prior())
-    numbers = objective.begin
+    numbers = objective.start
     value = objective.marginal.evaluate(numbers)[0][0]
     rng, n = np.random.default_rng(5), 20_000
     k = 3

@@ -28,7 +28,7 @@ def fit():
 
 
 @pytest.fixture(scope="module")
-def drawn(fit):
+def posterior_draws(fit):
     """Latent numbers of all people at the population of the fit: theta (draws, n, k) and raw (draws, n, k + 3)."""
     import jax
     from numpyro.infer import MCMC, NUTS
@@ -36,7 +36,7 @@ def drawn(fit):
     numpyro.enable_x64()
     known = fit.parameters[:K], fit.parameters[LOG_SDS], fit.parameters[K + 2], expit(fit.parameters[K + 5])
     chain = MCMC(
-        NUTS(lambda: people(fit.answers, *known), target_accept_prob=0.9),
+        NUTS(lambda: sample_people(fit.answers, *known), target_accept_prob=0.9),
         num_warmup=1000,
         num_samples=DRAWS,
         progress_bar=False,
@@ -45,7 +45,7 @@ def drawn(fit):
     return {name: np.asarray(values) for name, values in chain.get_samples().items()}
 
 
-def people(answers, means, logs, slope, lapse):
+def sample_people(answers, means, logs, slope, lapse):
     import jax.numpy as jnp
     from jax.scipy.special import ndtr, ndtri
     from numpyro import distributions as dist
@@ -62,29 +62,29 @@ def people(answers, means, logs, slope, lapse):
     numpyro.factor("answers", (answers.right * jnp.log(p) + answers.wrong * jnp.log1p(-p)).sum())
 
 
-def test_thresholds_of_people_are_those_that_a_sampler_finds(fit, drawn):
+def test_thresholds_of_people_are_those_that_a_sampler_finds(fit, posterior_draws):
     """Means and spreads of each person's thresholds, over what 4000 draws tell them."""
     objective, quadrature = Objective(fit.answers, Family.WEIBULL, Prior()), Quadrature(fit.answers, Family.WEIBULL)
-    moments = laplace_moments(fit.parameters, *objective.marginal.centres(fit.parameters))
+    moments = laplace_moments(fit.parameters, *objective.marginal.find_modes(fit.parameters))
     for _ in range(3):
         moments = integrate(quadrature, fit.parameters, moments, FINE).moments
     by_shared = np.einsum("nka,nab,nkb->nk", moments.regression, moments.covariance, moments.regression)
-    spread, theta = np.sqrt(moments.variance + by_shared), drawn["theta"]
+    spread, theta = np.sqrt(moments.variance + by_shared), posterior_draws["theta"]
     np.testing.assert_allclose((moments.threshold - theta.mean(axis=0)) / spread, 0.0, atol=0.1)
     np.testing.assert_allclose(spread / theta.std(axis=0), 1.0, atol=0.1)
     off = np.abs(fit.latent[:, :K] - theta.mean(axis=0)) / spread
     assert off.max() > 0.15  # the control: the modes, from which Laplace's method starts, are not the means
 
 
-def test_the_population_is_where_a_sampler_puts_the_maximum(fit, drawn):
+def test_the_population_is_where_a_sampler_puts_the_maximum(fit, posterior_draws):
     """The gradient of the marginal likelihood is the sampler's mean of the gradient with everything known: by it the
     estimates are within a tenth of their standard errors of the maximum."""
-    mean, own, n = drawn["raw"].mean(axis=0), np.exp(fit.parameters[K + 1]), PEOPLE
-    square = (drawn["raw"] ** 2).mean(axis=0).sum(axis=0)
+    mean, own, n = posterior_draws["raw"].mean(axis=0), np.exp(fit.parameters[K + 1]), PEOPLE
+    square = (posterior_draws["raw"] ** 2).mean(axis=0).sum(axis=0)
     slope = np.zeros(K + 5)
     slope[:K], slope[K + 2] = mean[:, 1 : K + 1].sum(axis=0) / own, mean[:, K + 1].sum() / np.exp(fit.parameters[K + 3])
     slope[LOG_SDS] = square[0] - n, square[1 : K + 1].sum() - K * n, square[K + 1] - n, square[K + 2] - n
-    slope += Objective(fit.answers, Family.WEIBULL, Prior()).penalty(fit.parameters)[1][: K + 5]
+    slope += Objective(fit.answers, Family.WEIBULL, Prior()).log_prior(fit.parameters)[1][: K + 5]
     curvature = fit.curvature[: K + 5, : K + 5]  # the lapse rate is held
     off = np.linalg.solve(curvature, slope) / np.sqrt(np.diag(np.linalg.inv(curvature)))
     np.testing.assert_allclose(off, 0.0, atol=0.1)

@@ -43,42 +43,42 @@ def grid_integral(answers, person, numbers, family=Family.WEIBULL):
     return total
 
 
-def settled(objective, quadrature, numbers, counts=FINE):
+def settled_integrals(objective, quadrature, numbers, counts=FINE):
     """Integrals with nodes that have found their place."""
-    moments = laplace_moments(numbers, *objective.marginal.centres(numbers))
+    moments = laplace_moments(numbers, *objective.marginal.find_modes(numbers))
     for _ in range(3):
         moments = integrate(quadrature, numbers, moments, counts).moments
     return integrate(quadrature, numbers, moments, counts)
 
 
 @pytest.fixture(scope="module")
-def prepared():
+def prepared_quadrature():
     answers = simulate_study(NEAR_CAP, PUBLISHED, 3, (8,)).answers
     objective = Objective(answers, Family.WEIBULL, Prior())
-    return answers, objective, Quadrature(answers, Family.WEIBULL), objective.begin
+    return answers, objective, Quadrature(answers, Family.WEIBULL), objective.start
 
 
 @pytest.mark.slow
-def test_an_integral_is_the_sum_over_a_grid(prepared):
+def test_an_integral_is_the_sum_over_a_grid(prepared_quadrature):
     """Where Laplace's method is off by up to a tenth."""
-    answers, objective, quadrature, numbers = prepared
+    answers, objective, quadrature, numbers = prepared_quadrature
     plain = [grid_integral(answers, person, numbers) for person in range(3)]
-    np.testing.assert_allclose(settled(objective, quadrature, numbers).value, plain, atol=4e-3)
+    np.testing.assert_allclose(settled_integrals(objective, quadrature, numbers).value, plain, atol=4e-3)
     assert np.abs(objective.marginal.evaluate(numbers)[0] - plain).max() > 0.04
 
 
-def test_with_single_nodes_it_is_the_method_of_laplace(prepared):
-    _, objective, quadrature, numbers = prepared
-    moments = laplace_moments(numbers, *objective.marginal.centres(numbers))
+def test_with_single_nodes_it_is_the_method_of_laplace(prepared_quadrature):
+    _, objective, quadrature, numbers = prepared_quadrature
+    moments = laplace_moments(numbers, *objective.marginal.find_modes(numbers))
     found = integrate(quadrature, numbers, moments, Counts(1, 1, 1, 1))
     np.testing.assert_allclose(found.value, objective.marginal.evaluate(numbers)[0], atol=1e-8)
 
 
 @pytest.mark.parametrize("family", list(Family))
-def test_gradient_and_hessian_are_those_of_the_integral(prepared, family):
-    answers, _, _, numbers = prepared
+def test_gradient_and_hessian_are_those_of_the_integral(prepared_quadrature, family):
+    answers, _, _, numbers = prepared_quadrature
     objective, quadrature = Objective(answers, family, Prior()), Quadrature(answers, family)
-    found, steps = settled(objective, quadrature, numbers, MANY), 1e-3 * np.eye(len(numbers))
+    found, steps = settled_integrals(objective, quadrature, numbers, MANY), 1e-3 * np.eye(len(numbers))
     sides = [[integrate(quadrature, numbers + sign * step, found.moments, MANY) for sign in (1, -1)] for step in steps]
     by_value = np.stack([(up.value - down.value) / 2e-3 for up, down in sides], axis=1)
     by_scores = np.stack([(up.scores - down.scores).sum(axis=0) / 2e-3 for up, down in sides])
@@ -86,15 +86,15 @@ def test_gradient_and_hessian_are_those_of_the_integral(prepared, family):
     np.testing.assert_allclose(found.hessian, by_scores, atol=0.02)
 
 
-def test_a_person_without_answers_at_a_frequency_has_an_integral(prepared):
+def test_a_person_without_answers_at_a_frequency_has_an_integral(prepared_quadrature):
     from dataclasses import replace
 
-    answers, _, _, numbers = prepared
+    answers, _, _, numbers = prepared_quadrature
     kept = answers.run != 1
     parts = {name: getattr(answers, name)[kept] for name in ("run", "level_db", "side", "right", "wrong")}
     fewer = replace(answers, **parts)
     objective = Objective(fewer, Family.WEIBULL, Prior())
-    found = settled(objective, Quadrature(fewer, Family.WEIBULL), numbers)
+    found = settled_integrals(objective, Quadrature(fewer, Family.WEIBULL), numbers)
     assert found.value[0] == pytest.approx(grid_integral(fewer, 0, numbers), abs=4e-3)
 
 
@@ -107,7 +107,7 @@ def test_medians_are_higher_than_by_the_method_of_laplace():
         objective = Objective(study.answers, Family.WEIBULL, Prior())
         fit = fit_hierarchy(study.answers)
         assert fit.converged
-        shift.append(fit.means_db - maximise(objective, objective.begin).x[:3])
+        shift.append(fit.means_db - maximise(objective, objective.start).x[:3])
         errors.append(fit.means_db - study.true_db.mean(axis=0))
     assert 0.05 < np.mean(shift) < 0.4
     assert abs(np.mean(errors)) < 0.3

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.psychophysics.hierarchy.answers import tally
+from analysis.psychophysics.hierarchy.answers import count_cells
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, newton_or_none, run_likelihoods
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
@@ -14,21 +14,21 @@ CAP_DB = 20 * np.log10(3.0)
 SAME = {"person_sd_db": 0.0, "frequency_sd_db": 0.0, "slope_log_sd": 0.0, "criterion_sd": 0.0}
 
 
-def runs(true_n, people=300):
+def simulate_runs(true_n, people=300):
     study = simulate_study(Crowd((35.0,), (true_n,), **SAME), PUBLISHED, people, (8,))
     return run_likelihoods(study.answers, [Nuisance(2.0, 0.0, (0.02,))] * people, CAP_DB)
 
 
 @pytest.mark.parametrize("true_n", [0.3, 1.0])
 def test_intervals_hold_the_truth_as_often_as_they_say(true_n):
-    true_db, found = 20 * np.log10(true_n), runs(true_n)
+    true_db, found = 20 * np.log10(true_n), simulate_runs(true_n)
     held = [(r.lower_db or -99) <= true_db <= (r.upper_db or 99) for r in found]
     assert 0.92 <= np.mean(held) <= 0.98  # 95 %, two and a half standard errors of 300 runs
     assert np.mean([r.db for r in found]) == pytest.approx(true_db, abs=0.4)
 
 
 def test_above_the_cap_there_is_a_bound():
-    true_db, found = 20 * np.log10(5.0), runs(5.0)
+    true_db, found = 20 * np.log10(5.0), simulate_runs(5.0)
     above = [r for r in found if r.db is None]
     assert len(above) > 0.6 * len(found)
     assert all(r.upper_db is None for r in above)
@@ -37,16 +37,16 @@ def test_above_the_cap_there_is_a_bound():
 
 
 def test_a_guesser_has_no_upper_end_and_newtons_are_of_decibels():
-    found = runs(1e4, people=20)
+    found = simulate_runs(1e4, people=20)
     assert sum(r.upper_db is None for r in found) >= 19
     assert newton_or_none(20.0) == pytest.approx(10.0)
     assert newton_or_none(None) is None
 
 
-def one_run(levels_n, right, family=Family.WEIBULL, slope=2.0):
+def likelihood_of_run(levels_n, right, family=Family.WEIBULL, slope=2.0):
     levels_db, n = 20 * np.log10(np.asarray(levels_n)), len(levels_n)
     side = np.where(np.arange(n) % 2, 1.0, -1.0)
-    answers = tally(("a",), (35.0,), np.zeros(n, dtype=np.intp), levels_db, side, np.asarray(right))
+    answers = count_cells(("a",), (35.0,), np.zeros(n, dtype=np.intp), levels_db, side, np.asarray(right))
     (run,) = run_likelihoods(answers, [Nuisance(slope, 0.1, (0.02,))], CAP_DB, family)
     return run
 
@@ -54,9 +54,9 @@ def one_run(levels_n, right, family=Family.WEIBULL, slope=2.0):
 @pytest.mark.parametrize(("family", "slope"), [(Family.WEIBULL, 2.0), (Family.LOGISTIC, 1.0), (Family.GAUSS, 1.9)])
 def test_right_answers_alone_give_an_upper_bound_and_no_size(family, slope):
     levels = np.repeat([1.0, 0.8, 0.5, 0.4], 3)
-    run = one_run(levels, np.ones(12, dtype=bool), family, slope)
+    run = likelihood_of_run(levels, np.ones(12, dtype=bool), family, slope)
     assert run.below and run.db is None and run.lower_db is None
-    more = one_run(np.tile(levels, 2), np.ones(24, dtype=bool), family, slope)
+    more = likelihood_of_run(np.tile(levels, 2), np.ones(24, dtype=bool), family, slope)
     assert -25.0 < more.upper_db < run.upper_db < 0.0
     size, interval = run_words(run)
     assert size == "below the levels played" and interval.startswith("below 0.")
@@ -65,21 +65,21 @@ def test_right_answers_alone_give_an_upper_bound_and_no_size(family, slope):
 def test_an_upper_bound_after_right_answers_alone_excludes_what_it_should():
     """At the bound, so many right answers have the probability exp(-1.92) of the highest possible: the end that a
     two-sided interval of 95 % has."""
-    run = one_run(np.full(10, 0.5), np.ones(10, dtype=bool))
+    run = likelihood_of_run(np.full(10, 0.5), np.ones(10, dtype=bool))
     t = np.log(-np.log(2 - 2 * 0.5 ** (1 / 3))) + 2.0 * np.log(0.5 / newton_or_none(run.upper_db))
     share = 0.02 + 0.96 * (1.0 - 0.5 * np.exp(-np.exp(t)))
     assert 10 * np.log(share / 0.98) == pytest.approx(-(1.96**2) / 2, abs=0.1)  # the criterion of 0.1 left out here
 
 
 def test_one_right_answer_bounds_nothing_and_a_wrong_one_ends_the_case():
-    nothing = one_run([1.0], [True])
+    nothing = likelihood_of_run([1.0], [True])
     assert nothing.below and nothing.upper_db is None
     assert run_words(nothing) == ("below the levels played", "–")
-    some = one_run(np.repeat([1.0, 0.5, 0.25], 4), [True] * 8 + [True, False, False, True])
+    some = likelihood_of_run(np.repeat([1.0, 0.5, 0.25], 4), [True] * 8 + [True, False, False, True])
     assert not some.below and some.db is not None
 
 
 def test_wrong_answers_far_below_the_cap_give_no_size_either():
-    run = one_run(np.full(12, 0.02), np.zeros(12, dtype=bool))
+    run = likelihood_of_run(np.full(12, 0.02), np.zeros(12, dtype=bool))
     assert not run.below and run.db is None and run.lower_db is not None
     assert run_words(run)[0] == "above the cap"

@@ -8,12 +8,12 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from analysis.figures.study_pictures import study_pictures
-from analysis.psychophysics.hierarchy.answers import tally
+from analysis.psychophysics.hierarchy.answers import count_cells
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity, share_right
-from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, _likelihood
+from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, _likelihood_on_grid
 from analysis.psychophysics.hierarchy.single_persons import fit_single_persons
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
-from analysis.psychophysics.study_analysis import analyse_study, anova_document
+from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
 from analysis.reports.study_report import render_study_report
 from tests.analysis.conftest import PUBLISHED
 
@@ -41,9 +41,11 @@ def test_who_feels_no_direction_has_no_size_and_a_bound():
 
 def test_what_is_not_known_is_averaged_over_as_an_integral_does_it():
     """Oracle: the same average by scipy's quadrature, of a run at one level."""
-    answers = tally(("a",), (5.0,), np.zeros(6, dtype=np.intp), np.zeros(6), np.tile([1.0, -1.0], 3), np.arange(6) > 1)
+    answers = count_cells(
+        ("a",), (5.0,), np.zeros(6, dtype=np.intp), np.zeros(6), np.tile([1.0, -1.0], 3), np.arange(6) > 1
+    )
     person = Nuisance(2.0, 0.0, (0.02,), slope_log_sd=0.4, criterion_sd=0.0)
-    grid, height = _likelihood(answers, 0, person, 9.5, Family.WEIBULL)
+    grid, height = _likelihood_on_grid(answers, 0, person, 9.5, Family.WEIBULL)
     at = int(np.argmin(np.abs(grid + 4.0)))
 
     def likelihood(u: float) -> float:
@@ -59,7 +61,7 @@ def test_one_participant_has_thresholds_by_likelihood_in_report_document_and_fig
     analysis = analyse_study(simulate_study(subjects=1), protocol)
     page = render_study_report(analysis, study_pictures(analysis), {}, "2026-01-02T03:04:05Z")
     assert "Thresholds by likelihood" in page and "Single thresholds by maximum likelihood" in page
-    assert len(anova_document(analysis)["single_persons"]["runs"]) == 5
+    assert len(make_anova_document(analysis)["single_persons"]["runs"]) == 5
     assert "psychometric-1-s01" in [picture.name for picture in study_pictures(analysis)]
 
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from analysis.psychophysics.power.compare_rules import compare_rules, list_compared_rules, play
+from analysis.psychophysics.power.compare_rules import compare_rules, list_compared_rules, simulate_person
 from analysis.psychophysics.power.simulated_study import Crowd
 from analysis.psychophysics.thresholds import thresholds
 from protocols.definition.staircase_rule import BayesianPlacement
 from protocols.document.dumping import dump_protocol
-from protocols.procedure.psi import estimate, posterior
+from protocols.procedure.psi import compute_posterior, estimate_threshold
 from protocols.procedure.staircase import is_complete, is_finished, step, to_db
 from study.cli.main import app
 from study.store.formats.protocol_files import read_study_protocol
@@ -24,22 +24,22 @@ RULE = replace(PUBLISHED, bayesian=BayesianPlacement(trials=40))
 
 def test_a_run_ends_by_trials_or_once_its_threshold_is_known_so_well():
     early = replace(RULE, bayesian=BayesianPlacement(trials=200, spread_db=2.0))
-    _, state, _ = play(Crowd((5.0,), (0.6,)), early, (3,))
+    _, state, _ = simulate_person(Crowd((5.0,), (0.6,)), early, (3,))
     assert 10 < state.trials < 200 and state.spread_db <= 2.0
     with pytest.raises(ValueError, match="finished"):
         step(early, state, True)
-    _, state, _ = play(Crowd((5.0,), (0.6,)), RULE, (3,))
+    _, state, _ = simulate_person(Crowd((5.0,), (0.6,)), RULE, (3,))
     assert state.trials == 40
     limited = replace(RULE, trial_limit=20)
-    _, state, _ = play(Crowd((5.0,), (0.6,)), limited, (3,))
+    _, state, _ = simulate_person(Crowd((5.0,), (0.6,)), limited, (3,))
     assert is_finished(limited, state) and not is_complete(limited, state)
 
 
 def test_who_guesses_is_said_to_be_above_the_cap_and_who_is_sure_is_not():
-    _, guessing, _ = play(Crowd((5.0,), (1e3,), person_sd_db=0.0, frequency_sd_db=0.0), RULE, (4,))
-    assert estimate(posterior(guessing.answered, CAP_DB), CAP_DB).above_cap > 0.5
-    _, sure, _ = play(Crowd((5.0,), (0.3,), person_sd_db=0.0, frequency_sd_db=0.0), RULE, (4,))
-    assert estimate(posterior(sure.answered, CAP_DB), CAP_DB).above_cap < 0.01
+    _, guessing, _ = simulate_person(Crowd((5.0,), (1e3,), person_sd_db=0.0, frequency_sd_db=0.0), RULE, (4,))
+    assert estimate_threshold(compute_posterior(guessing.answered, CAP_DB), CAP_DB).above_cap > 0.5
+    _, sure, _ = simulate_person(Crowd((5.0,), (0.3,), person_sd_db=0.0, frequency_sd_db=0.0), RULE, (4,))
+    assert estimate_threshold(compute_posterior(sure.answered, CAP_DB), CAP_DB).above_cap < 0.01
 
 
 @pytest.mark.slow
@@ -53,7 +53,7 @@ def test_thresholds_are_recovered_with_a_smaller_error_per_trial_than_by_the_sta
 
 
 def test_a_spread_may_be_a_whole_number():
-    assert play(Crowd((5.0,), (0.6,), frequency_sd_db=2), RULE, (3,)) == play(
+    assert simulate_person(Crowd((5.0,), (0.6,), frequency_sd_db=2), RULE, (3,)) == simulate_person(
         Crowd((5.0,), (0.6,), frequency_sd_db=2.0), RULE, (3,)
     )
 

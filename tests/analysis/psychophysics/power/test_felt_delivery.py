@@ -7,9 +7,9 @@ import pytest
 
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family
 from analysis.psychophysics.power.felt_delivery import FeltDelivery, felt_delivery
-from analysis.psychophysics.power.simulated_study import Crowd, _feel_delivery, simulate_study
-from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack, play_run
-from protocols.procedure.staircase import begin, is_finished, step
+from analysis.psychophysics.power.simulated_study import Crowd, _apply_delivery, simulate_study
+from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack_rule, play_run
+from protocols.procedure.staircase import begin_staircase, is_finished, step
 from protocols.trial import Phase
 from study.participants.delivered_feeler import MPS2_PER_N, DeliveredFeeler
 from study.participants.direction_feeler import DirectionFeeler
@@ -27,11 +27,11 @@ ROUGH = FeltDelivery(((RISING, ((-3.0, 1.1, 0.7, 0.6), (3.0, 1.2, 0.7, 0.1))),),
 CIRCLE = FeltDelivery(((RISING, ((0.0, 0.3, 1.2, 0.0),)),))
 
 
-def slow_run(delivery, threshold_n, seed, rule=PUBLISHED, rove_db=0.0):
+def reference_run(delivery, threshold_n, seed, rule=PUBLISHED, rove_db=0.0):
     """The observer of sessions and the rule of sessions, on the random numbers of the compiled run."""
     feeler = DirectionFeeler("slow", ((HZ, threshold_n),), slope=1.7, lapse=0.03, criterion=0.2)
     observer = DeliveredFeeler("slow", feeler, delivery.masking, delivery.adaptation_db, delivery.adaptation_trials)
-    random, state, found = np.random.RandomState(seed), begin(rule), []
+    random, state, found = np.random.RandomState(seed), begin_staircase(rule), []
     while not is_finished(rule, state):
         level_db = state.level_db + (rove_db * (random.random_sample() - 0.5) if rove_db else 0.0)
         direction, trial = (1 if random.random_sample() < 0.5 else 2), len(found)
@@ -50,11 +50,11 @@ def slow_run(delivery, threshold_n, seed, rule=PUBLISHED, rove_db=0.0):
 @pytest.mark.parametrize("threshold_n", [0.3, 0.9, 2.2])
 def test_a_compiled_run_is_that_of_the_observer_of_sessions(delivery, threshold_n):
     t0, pace, threshold_db = AT_THRESHOLD[Family.WEIBULL], 1.7 * NEPER_PER_DB, 20 * np.log10(threshold_n)
-    who = _feel_delivery(Participant(t0, pace, threshold_db, 0.03, 0.2, 0), delivery, 0)
+    who = _apply_delivery(Participant(t0, pace, threshold_db, 0.03, 0.2, 0), delivery, 0)
     for seed in range(8):
         track = Track(*(np.empty(MOST_TRIALS) for _ in range(3)), np.full(PUBLISHED.reversals, np.nan))
-        n, *_ = play_run(pack(PUBLISHED), who, seed, track)
-        slow = slow_run(delivery, threshold_n, seed)
+        n, *_ = play_run(pack_rule(PUBLISHED), who, seed, track)
+        slow = reference_run(delivery, threshold_n, seed)
         assert n == len(slow)
         np.testing.assert_allclose(track.level_db[:n], [level_db for level_db, _, _ in slow], atol=1e-9)
         assert [1 if side > 0 else 2 for side in track.side[:n]] == [direction for _, direction, _ in slow]

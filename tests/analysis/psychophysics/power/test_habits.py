@@ -12,7 +12,7 @@ CROWD = Crowd((5.0, 25.0, 45.0), (0.5, 0.7, 0.9), criterion_sd=0.0)
 PEOPLE = 60
 
 
-def thresholds(crowd, seed=1):
+def threshold_errors(crowd, seed=1):
     study = simulate_study(crowd, PUBLISHED, PEOPLE, (seed,))
     return study.threshold_db - study.true_db
 
@@ -34,9 +34,9 @@ def test_guessers_end_near_the_cap_and_are_as_many_as_said(seed):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_looking_again_without_a_limit_lowers_thresholds_by_2_db_and_three_looks_a_run_hardly(seed):
-    plain = thresholds(CROWD, seed)
-    free = thresholds(replace(CROWD, unsure=0.5, repeats=10_000), seed)
-    limited = thresholds(replace(CROWD, unsure=0.5, repeats=3), seed)
+    plain = threshold_errors(CROWD, seed)
+    free = threshold_errors(replace(CROWD, unsure=0.5, repeats=10_000), seed)
+    limited = threshold_errors(replace(CROWD, unsure=0.5, repeats=3), seed)
     error = np.sqrt(2) * plain.std() / np.sqrt(plain.size)
     assert free.mean() - plain.mean() == pytest.approx(-2.1, abs=0.3 + 3 * error)
     assert abs(limited.mean() - plain.mean()) < 0.6
@@ -44,12 +44,12 @@ def test_looking_again_without_a_limit_lowers_thresholds_by_2_db_and_three_looks
 
 def test_a_drifting_criterion_makes_answers_lean_and_thresholds_rise():
     drifting = replace(CROWD, criterion_drift_sd=1.0)
-    assert thresholds(drifting).mean() > thresholds(CROWD).mean() + 0.5
-    leaning = [_lean(simulate_study(crowd, PUBLISHED, PEOPLE, (4,)).answers) for crowd in (CROWD, drifting)]
+    assert threshold_errors(drifting).mean() > threshold_errors(CROWD).mean() + 0.5
+    leaning = [_answer_imbalance(simulate_study(crowd, PUBLISHED, PEOPLE, (4,)).answers) for crowd in (CROWD, drifting)]
     assert leaning[1] > 2.0 * leaning[0]
 
 
-def _lean(answers):
+def _answer_imbalance(answers):
     """Mean over people of how far their share of answers 1 is from a half."""
     first = np.where(answers.side > 0, answers.right, answers.wrong)
     given = np.bincount(answers.person, first)

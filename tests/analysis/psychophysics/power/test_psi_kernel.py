@@ -11,8 +11,8 @@ from analysis.psychophysics.power.psi_kernel import pack_psi, play_psi
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track
 from protocols.definition.staircase_rule import BayesianPlacement
-from protocols.procedure.psi import estimate, posterior
-from protocols.procedure.staircase import begin, is_finished, step, to_db
+from protocols.procedure.psi import compute_posterior, estimate_threshold
+from protocols.procedure.staircase import begin_staircase, is_finished, step, to_db
 from tests.analysis.conftest import PUBLISHED
 
 PSI = replace(PUBLISHED, bayesian=BayesianPlacement(60))
@@ -31,13 +31,13 @@ def test_levels_and_estimates_are_those_of_step(rule, threshold_n):
         track = Track(*(np.empty(MOST_TRIALS) for _ in range(3)), np.full(rule.reversals, np.nan))
         who = Participant(AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, to_db(threshold_n), 0.02, 0.1, 0)
         trials, _, mean_db, above = play_psi(pack_psi(rule), who, seed, track)
-        state = begin(rule)
+        state = begin_staircase(rule)
         for index in range(trials):
             assert not is_finished(rule, state)
             assert track.level_db[index] == pytest.approx(state.level_db, abs=1e-9)
             state = step(rule, state, bool(track.right[index]))
         assert is_finished(rule, state)
-        expected = estimate(posterior(state.answered, cap_db), cap_db)
+        expected = estimate_threshold(compute_posterior(state.answered, cap_db), cap_db)
         assert (mean_db, above) == pytest.approx((expected.mean_db, expected.above_cap), abs=1e-9)
         assert min(mean_db, cap_db) == pytest.approx(estimate_db(rule, state), abs=1e-9)
 

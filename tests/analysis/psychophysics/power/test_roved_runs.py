@@ -8,20 +8,20 @@ import pytest
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family
 from analysis.psychophysics.power.compare_rules import ComparedPerson, answer_trials, compare_rules, list_compared_rules
 from analysis.psychophysics.power.felt_delivery import felt_delivery
-from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, _feel_delivery, simulate_study
-from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack, play_run
-from protocols.procedure.staircase import begin, is_finished, step, to_db
+from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, _apply_delivery, simulate_study
+from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack_rule, play_run
+from protocols.procedure.staircase import begin_staircase, is_finished, step, to_db
 from tests.analysis.conftest import PUBLISHED
-from tests.analysis.psychophysics.power.test_felt_delivery import FLAWLESS, HZ, ROUGH, slow_run
+from tests.analysis.psychophysics.power.test_felt_delivery import FLAWLESS, HZ, ROUGH, reference_run
 
 ROVE_DB = 6.0
 RULE = replace(PUBLISHED, cap_n=2.12)
 SEEDS = range(12)
 
 
-def compiled(who, rule, rove_db, seed):
+def play_compiled(who, rule, rove_db, seed):
     track = Track(*(np.empty(MOST_TRIALS) for _ in range(3)), np.full(rule.reversals, np.nan))
-    n, *_ = play_run(pack(rule, rove_db), who, seed, track)
+    n, *_ = play_run(pack_rule(rule, rove_db), who, seed, track)
     return n, track
 
 
@@ -32,7 +32,7 @@ def test_a_compiled_run_is_the_plain_one_trial_by_trial(family, rove_db):
     person = ComparedPerson(to_db(0.7), 1.7, 0.2)
     who = Participant(AT_THRESHOLD[family], 1.7 * NEPER_PER_DB, to_db(0.7), 0.03, 0.2, FAMILIES.index(family))
     for seed in SEEDS:
-        n, track = compiled(who, RULE, rove_db, seed)
+        n, track = play_compiled(who, RULE, rove_db, seed)
         order = (1, 2, 0) if rove_db else (0, 1)  # the compiled run draws the amplitude first, and only where it roves
         draws = np.random.RandomState(seed).random_sample((MOST_TRIALS, len(order)))[:, order]
         plain, played_n = answer_trials(crowd, RULE, person, np.column_stack([draws, draws[:, 0]])[:, :3])
@@ -45,10 +45,10 @@ def test_a_compiled_run_is_the_plain_one_trial_by_trial(family, rove_db):
 @pytest.mark.parametrize("threshold_n", [0.3, 0.9, 2.2])
 def test_a_roved_run_is_that_of_the_observer_of_sessions(delivery, threshold_n):
     t0, pace = AT_THRESHOLD[Family.WEIBULL], 1.7 * NEPER_PER_DB
-    who = _feel_delivery(Participant(t0, pace, to_db(threshold_n), 0.03, 0.2, 0), delivery, 0)
+    who = _apply_delivery(Participant(t0, pace, to_db(threshold_n), 0.03, 0.2, 0), delivery, 0)
     for seed in SEEDS:
-        n, track = compiled(who, RULE, ROVE_DB, seed)
-        slow = slow_run(delivery, threshold_n, seed, RULE, ROVE_DB)
+        n, track = play_compiled(who, RULE, ROVE_DB, seed)
+        slow = reference_run(delivery, threshold_n, seed, RULE, ROVE_DB)
         assert n == len(slow)
         np.testing.assert_allclose(track.level_db[:n], [level_db for level_db, _, _ in slow], atol=1e-9)
         assert [1 if side > 0 else 2 for side in track.side[:n]] == [direction for _, direction, _ in slow]
@@ -58,8 +58,8 @@ def test_a_roved_run_is_that_of_the_observer_of_sessions(delivery, threshold_n):
 def test_the_staircase_moves_its_own_level_and_amplitudes_are_even_around_it():
     who, off_db, sides = Participant(AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, -3.0, 0.02, 0.0, 0), [], []
     for seed in SEEDS:
-        n, track = compiled(who, RULE, ROVE_DB, seed)
-        state = begin(RULE)
+        n, track = play_compiled(who, RULE, ROVE_DB, seed)
+        state = begin_staircase(RULE)
         for index in range(n):
             off_db.append(track.level_db[index] - state.level_db)
             sides.append(track.side[index])

@@ -8,9 +8,16 @@ from scipy.stats import norm
 
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity
 from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, simulate_study
-from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, evidence, pack, play_run
+from analysis.psychophysics.power.staircase_kernel import (
+    MOST_TRIALS,
+    Participant,
+    Track,
+    compute_evidence,
+    pack_rule,
+    play_run,
+)
 from protocols.definition.staircase_rule import StaircaseRule, StepChange, StepPhase
-from protocols.procedure.staircase import begin, is_finished, step
+from protocols.procedure.staircase import begin_staircase, is_finished, step
 from tests.analysis.conftest import PUBLISHED
 
 THREE = (StepPhase(8.0, 1), StepPhase(4.0, 2), StepPhase(2.0, 5))
@@ -30,8 +37,8 @@ def test_levels_and_reversals_are_those_of_step(rule, threshold_n):
         level, side, right = np.empty(MOST_TRIALS), np.empty(MOST_TRIALS), np.empty(MOST_TRIALS)
         turns = np.full(rule.reversals, np.nan)
         who = Participant(AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, 20 * np.log10(threshold_n), 0.02, 0.1, 0)
-        trials, reversals, *_ = play_run(pack(rule), who, seed, Track(level, side, right, turns))
-        state = begin(rule)
+        trials, reversals, *_ = play_run(pack_rule(rule), who, seed, Track(level, side, right, turns))
+        state = begin_staircase(rule)
         for index in range(trials):
             assert not is_finished(rule, state)
             assert level[index] == pytest.approx(state.level_db, abs=1e-9)
@@ -43,7 +50,7 @@ def test_levels_and_reversals_are_those_of_step(rule, threshold_n):
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_compiled_evidence_is_that_of_the_analysis(family):
     t = np.linspace(-8.0, 3.0, 45)
-    compiled = [evidence(x, FAMILIES.index(family)) for x in t]
+    compiled = [compute_evidence(x, FAMILIES.index(family)) for x in t]
     np.testing.assert_allclose(compiled, sensitivity(t, family)[0], atol=1e-7)
 
 
@@ -51,7 +58,7 @@ def test_the_compiled_evidence_is_that_of_the_analysis(family):
 def test_far_above_threshold_errors_become_as_rare_as_the_family_says(family):
     """Beyond t = 3.2 too, where only a Weibull participant is sure: a logistic one still errs in 2 %."""
     t = np.linspace(0.0, 10.0, 51)
-    errors = norm.sf([evidence(x, FAMILIES.index(family)) for x in t])
+    errors = norm.sf([compute_evidence(x, FAMILIES.index(family)) for x in t])
     np.testing.assert_allclose(errors, norm.sf(sensitivity(t, family)[0]), rtol=1e-6, atol=1.2e-11)
 
 
@@ -62,7 +69,7 @@ def test_shares_are_those_of_the_model_with_lapses_and_a_criterion():
     counts = np.zeros((2, 2))
     for seed in range(10):
         who = Participant(AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, 0.0, 0.05, 0.4, 0)
-        n, *_ = play_run(pack(rule), who, seed, Track(level, side, right, np.empty(100)))
+        n, *_ = play_run(pack_rule(rule), who, seed, Track(level, side, right, np.empty(100)))
         for index, sign in enumerate((1.0, -1.0)):
             shown = side[:n] == sign
             counts[index] += shown.sum(), right[:n][shown].sum()

@@ -24,7 +24,7 @@ def free_mass(**actuator) -> MechanicalModel:
 
 
 def slewed(rate: float) -> tuple[np.ndarray, np.ndarray]:
-    acts = SLEW.acts
+    acts = SLEW.action
     return acts.change(JUMP, STEP_S, {"rate": rate}), acts.at_end(JUMP, STEP_S, {"rate": rate})
 
 
@@ -54,7 +54,7 @@ def test_a_slew_limited_jump_is_a_ramp():
 
 def test_a_slew_limit_follows_down_as_it_follows_up():
     there_and_back = np.concatenate([JUMP, -JUMP])
-    end = SLEW.acts.at_end(there_and_back, STEP_S, {"rate": 300.0})
+    end = SLEW.action.at_end(there_and_back, STEP_S, {"rate": 300.0})
     np.testing.assert_allclose(end[40:46], [0.7, 0.4, 0.1, -0.2, -0.5, -0.8], atol=1e-12)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.simulation.interpolated_response import read_other_times
+from equalizer.effects.simulation.interpolated_response import resample_response
 
 RATE_HZ = 1000.0
 ALL = (0, 1, 2)
@@ -24,13 +24,13 @@ def test_between_samples_a_band_limited_signal_is_what_it_is(frequency_hz):
         return np.sin(2 * np.pi * frequency_hz * at / RATE_HZ)[:, None]
 
     k = np.arange(3000.0)
-    read = read_other_times(sine(k), 1 + 3e-4, 0.37)
+    read = resample_response(sine(k), 1 + 3e-4, 0.37)
     np.testing.assert_allclose(read[40:-40], sine(k * (1 + 3e-4) + 0.37)[40:-40], atol=2e-4)
 
 
 def test_straight_lines_are_numpys():
     k, values = np.arange(500.0), np.random.default_rng(4).standard_normal((500, 2))
-    read = read_other_times(values, 1 + 2e-3, -3.3, linear_share=1.0)
+    read = resample_response(values, 1 + 2e-3, -3.3, linear_share=1.0)
     expected = np.column_stack([np.interp(k * (1 + 2e-3) - 3.3, k, column) for column in values.T])
     np.testing.assert_allclose(read, expected, atol=1e-12)
 
@@ -38,7 +38,7 @@ def test_straight_lines_are_numpys():
 def test_its_own_times_change_nothing():
     values = np.random.default_rng(4).standard_normal((500, 2))
     for straight in (0.0, 0.5, 1.0):
-        np.testing.assert_allclose(read_other_times(values, 1.0, 0.0, straight), values, atol=1e-12)
+        np.testing.assert_allclose(resample_response(values, 1.0, 0.0, straight), values, atol=1e-12)
 
 
 @pytest.mark.parametrize("ppm", [8.0, -60.0, 900.0])
@@ -55,7 +55,7 @@ def test_a_drifting_clock_takes_the_position_with_it(bench, command):
     model = bench.three_axes()
     drifted = bench.measured(model, bench.placed("clock_drift", {"ppm": 500.0}, *ALL), command, seed=None)
     plain = bench.measured(model, (), command, seed=None)
-    expected = read_other_times(plain.position, 1 + 500e-6, 0.0)
+    expected = resample_response(plain.position, 1 + 500e-6, 0.0)
     np.testing.assert_allclose(drifted.position, expected, atol=1e-12)
 
 

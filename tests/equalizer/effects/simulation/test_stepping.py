@@ -7,7 +7,7 @@ import pytest
 
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import AxisForce, PlacedEffect
-from equalizer.effects.simulation.bodies import Restarts, bodies_of, simulate_bodies
+from equalizer.effects.simulation.bodies import Restarts, build_bodies, simulate_bodies
 from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.instant import (
     A_FREE,
@@ -28,11 +28,11 @@ from equalizer.effects.simulation.modal_form import step_form
 from equalizer.effects.simulation.simulator import (
     simulate_mechanism,
     simulate_response,
+    simulate_states_before,
     simulate_windows,
-    states_before,
 )
 from equalizer.effects.simulation.stepping import BLOCK
-from equalizer.plant.linear_simulation import linear_steps
+from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 
@@ -50,7 +50,7 @@ def placed(*named) -> list[PlacedEffect]:
 
 def plainly(bodies, driven, size, step_s):
     """What `moved` gives."""
-    linear = linear_steps(bodies.structure, step_s, bodies.ports)
+    linear = discretise_model(bodies.structure, step_s, bodies.ports)
     n, steps = size
     r, stride = bodies.ports.shape[1], len(driven.mean) // n
     rows = np.vstack([linear.motion, linear.response, linear.position])
@@ -58,7 +58,7 @@ def plainly(bodies, driven, size, step_s):
     by_u = np.vstack([linear.motion_by_command, linear.response_by_command, nothing[:, : driven.mean.shape[1]]])
     by_f = np.vstack([linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((len(nothing), r))])
     state, force_end, shown = np.zeros(len(linear.advance)), np.zeros(r), np.zeros(driven.mean.shape[1])
-    memories = [np.zeros(act.memory) for act in bodies.acts]
+    memories = [np.zeros(act.memory) for act in bodies.actions]
     looked, added = np.empty((n, len(rows))), np.empty((n, r))
     for k in range(n):
         looked[k], added[k] = rows @ state + by_u @ shown + by_f @ force_end, force_end
@@ -72,12 +72,12 @@ def plainly(bodies, driven, size, step_s):
 
 
 def _one_step(bodies, linear, state, u, memories, at):
-    r, items = bodies.ports.shape[1], len(bodies.acts)
+    r, items = bodies.ports.shape[1], len(bodies.actions)
     force, end, own = np.zeros(r), np.zeros(r), np.zeros((items, 2))
     before = [memory.copy() for memory in memories]
     motion = linear.motion
     for sweep in range(CONVERGED if items > 1 else 1):
-        for item, (act, port, numbers) in enumerate(zip(bodies.acts, bodies.port, bodies.parameters, strict=True)):
+        for item, (act, port, numbers) in enumerate(zip(bodies.actions, bodies.port, bodies.parameters, strict=True)):
             if sweep:
                 force[port] -= own[item, 0]
                 end[port] -= own[item, 1]
@@ -99,14 +99,14 @@ def _one_step(bodies, linear, state, u, memories, at):
 
 
 def assert_same(model, effects, commands, steps, fine=1):
-    bodies = bodies_of(model, effects)
+    bodies = build_bodies(model, effects)
     held = np.repeat(commands, fine, axis=0)
     ramp = held + 0.1 * np.sin(np.arange(len(held)))[:, None] if fine > 1 else held
     driven = ActuatorForce(ramp, ramp if fine == 1 else ramp + 0.01)
     size, step_s = (len(commands), steps), 1 / (RATE_HZ * steps)
     found, pushed = simulate_bodies(bodies, driven, size, step_s)
     wanted, forced = plainly(bodies, driven, size, step_s)
-    within = RUBBING if any(act.memory for act in bodies.acts) else WITHIN
+    within = RUBBING if any(act.memory for act in bodies.actions) else WITHIN
     scale = np.abs(wanted).max(axis=0) + 1e-12
     np.testing.assert_array_less(np.abs(found - wanted).max(axis=0) / scale, within)
     np.testing.assert_allclose(pushed, forced, atol=within * (np.abs(forced).max() + 1e-12), rtol=0)
@@ -205,7 +205,7 @@ def _heavier(of: np.ndarray, memory: np.ndarray, at: np.ndarray) -> float:
 @pytest.mark.parametrize("asked", [True, False])
 def test_a_law_knows_the_acceleration_if_its_effect_asks_for_it(bench, asked):
     acts = AxisForce(_heavier, lambda model, axis, values: np.array([0.05]), acceleration=asked)
-    effects = [PlacedEffect(replace(EFFECTS["coulomb_friction"], acts=acts), (axis,), {}) for axis in (0, 1)]
+    effects = [PlacedEffect(replace(EFFECTS["coulomb_friction"], action=acts), (axis,), {}) for axis in (0, 1)]
     commands = bench.commands(3)[:SAMPLES] + 0.1
     if asked:
         assert_same(bench.three_axes(), effects, commands, 4)
@@ -218,7 +218,7 @@ def test_a_law_knows_the_acceleration_if_its_effect_asks_for_it(bench, asked):
     [(springs(CRITICAL), True), (springs(0.1), True), (free_masses(1), True), (free_masses(3), False)],
 )
 def test_pairs_are_used_where_they_are_well_apart_and_say_the_same(model, pairs):
-    advance = linear_steps(model, 1 / RATE_HZ).advance
+    advance = discretise_model(model, 1 / RATE_HZ).advance
     form = step_form(advance)
     half = len(advance) // 2
     assert (form.advance.shape == (4, half)) is pairs
@@ -236,7 +236,7 @@ def test_pieces_begun_in_the_states_of_the_whole_go_on_as_the_whole_does(bench, 
     commands, effects, model = bench.commands(3)[:SAMPLES], placed(*named), bench.three_axes()
     sampled, starts = (RATE_HZ, Hold.ZERO_ORDER), np.array([90, 250])
     whole = simulate_response(model, commands, RATE_HZ, effects)
-    states = states_before(model, commands, sampled, effects, starts)
+    states = simulate_states_before(model, commands, sampled, effects, starts)
     kept = np.r_[90:150, 250:400]
     joined = Restarts(np.array([0, 60]), states)
     pieces = simulate_windows(model, commands[kept], sampled, effects, None, joined)

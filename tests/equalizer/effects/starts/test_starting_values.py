@@ -12,7 +12,7 @@ def test_a_law_is_found_beside_what_comes_with_it():
     force = nuisances @ np.array([3.0, -2.0, 5.0]) + 0.7 * law
     found = PartialRegression(force, nuisances).fit(law)
     assert found.strengths == pytest.approx([0.7])
-    assert found.explained == pytest.approx(1.0)
+    assert found.explained_share == pytest.approx(1.0)
 
 
 def test_where_nothing_is_known_nothing_is_found():

@@ -131,8 +131,8 @@ def test_the_tolerances_cover_the_truth(two_axes):
 
 def test_what_was_tried_ends_with_the_reason_for_stopping(two_axes):
     fit = two_axes[0]
-    assert fit.tried[0].what == "the driven axes alone"
-    assert [each for each in fit.tried if each.accepted][-1].error < 1.1
+    assert fit.candidates[0].description == "the driven axes alone"
+    assert [each for each in fit.candidates if each.accepted][-1].error < 1.1
     assert "noise" in fit.reason
 
 

@@ -7,7 +7,7 @@ from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_mo
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitSettings
 from equalizer.identification.mechanical.mechanical_structure import insert_joint
 from equalizer.identification.mechanical.rigid_body import remove_friction_damping
-from equalizer.plant.linear_simulation import linear_steps
+from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -21,7 +21,7 @@ def one_piece(mass=0.28, damping=9.0) -> MechanicalModel:
 
 
 def played(model, commands) -> np.ndarray:
-    steps, state, out = linear_steps(model, 1 / RATE_HZ), np.zeros(2 * model.coordinates), []
+    steps, state, out = discretise_model(model, 1 / RATE_HZ), np.zeros(2 * model.coordinates), []
     before = np.zeros(1)
     for u in commands:
         out.append(steps.response @ state + steps.response_by_command @ before)

@@ -20,9 +20,9 @@ def tone(frequency_hz):
 def test_the_stylus_takes_what_lies_above_its_edge_and_within_what_is_known_of_it(frequency_hz, taken):
     wanted = tone(frequency_hz)
     share = share_with_stylus(wanted, RATE_HZ, actuator())
-    assert np.abs(share.motors + share.taken - wanted).max() < 1e-12
-    assert np.linalg.norm(share.taken) / np.linalg.norm(wanted) == pytest.approx(taken, abs=5e-3)
-    assert np.linalg.norm(share.played - share.taken) < 0.01 * np.linalg.norm(wanted)
+    assert np.abs(share.motors + share.actuator_share - wanted).max() < 1e-12
+    assert np.linalg.norm(share.actuator_share) / np.linalg.norm(wanted) == pytest.approx(taken, abs=5e-3)
+    assert np.linalg.norm(share.predicted - share.actuator_share) < 0.01 * np.linalg.norm(wanted)
 
 
 def test_a_stylus_at_its_limit_leaves_the_rest_to_the_motors():
@@ -30,7 +30,7 @@ def test_a_stylus_at_its_limit_leaves_the_rest_to_the_motors():
     share = share_with_stylus(wanted, RATE_HZ, actuator(limit))
     assert np.abs(share.command).max() <= limit * (1 + 1e-12)
     assert np.linalg.norm(share.motors) > 0.1 * np.linalg.norm(wanted)
-    assert np.abs(share.motors + share.taken - wanted).max() < 1e-12
+    assert np.abs(share.motors + share.actuator_share - wanted).max() < 1e-12
 
 
 def test_an_actuator_that_cannot_be_is_refused():

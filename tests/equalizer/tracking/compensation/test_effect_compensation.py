@@ -14,11 +14,11 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Mo
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
-from equalizer.tracking.compensation.effect_roles import IN_MODEL, SENSORS
+from equalizer.tracking.compensation.effect_roles import IN_MODEL, SENSOR_REASON
 from equalizer.tracking.compensation.known_forces import LAWS, deadband_share, equivalent_impedance
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
 from equalizer.tracking.feedforward.band_part import band_part
-from equalizer.tracking.feedforward.planned_motion import planned_motion
+from equalizer.tracking.feedforward.planned_motion import integrate_motion
 from equalizer.tracking.learning.iteration import rms
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
@@ -146,7 +146,7 @@ def test_what_is_linear_is_in_the_model_and_what_is_the_sensors_is_let_be(fricti
     known = physics(effect("viscous_damping", damping=5.0), effect("sensor_gain", gain=1.2))
     done = compensate(forces, wanted, frictionless, known, None)
     np.testing.assert_array_equal(done.forces, forces)
-    assert [reason for _, reason in done.not_used] == [IN_MODEL, SENSORS]
+    assert [reason for _, reason in done.not_used] == [IN_MODEL, SENSOR_REASON]
 
 
 def test_an_effect_on_one_axis_changes_that_force_alone(frictionless, wanted):
@@ -201,7 +201,7 @@ def test_a_dead_band_is_crossed(plants, frictionless, wanted, jump):
 
 
 def test_a_planned_motion_is_the_motion_whose_acceleration_is_wanted(wanted):
-    motion = planned_motion(wanted, RATE_HZ, BAND_HZ)
+    motion = integrate_motion(wanted, RATE_HZ, BAND_HZ)
     inside = slice(AROUND, -AROUND)
     np.testing.assert_allclose(
         np.gradient(motion.position, 1 / RATE_HZ, axis=0)[inside],
@@ -213,13 +213,13 @@ def test_a_planned_motion_is_the_motion_whose_acceleration_is_wanted(wanted):
 
 
 def test_a_lead_takes_the_motion_ahead_of_time(wanted):
-    now, ahead = (planned_motion(wanted, RATE_HZ, BAND_HZ, lead).velocity for lead in (0.0, 0.005))
+    now, ahead = (integrate_motion(wanted, RATE_HZ, BAND_HZ, lead).velocity for lead in (0.0, 0.005))
     np.testing.assert_allclose(ahead[:-5], now[5:], atol=1e-9)
 
 
 def test_a_motion_about_a_resting_place_needs_a_band_above_zero(wanted):
     with pytest.raises(ValueError, match="needs more than 0 Hz"):
-        planned_motion(wanted, RATE_HZ, (0.0, 35.0))
+        integrate_motion(wanted, RATE_HZ, (0.0, 35.0))
 
 
 def test_equivalents_are_those_of_the_literature():

@@ -10,7 +10,13 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
-from equalizer.tracking.compensation.law_compensation import COMMANDS, FOLDED, REMEMBERS, SENSED, SEVERAL
+from equalizer.tracking.compensation.law_compensation import (
+    DEPENDS_ON_COMMAND,
+    HAS_MEMORY,
+    NOT_INVERTIBLE,
+    SENSOR_ERROR,
+    SEVERAL_SIGNALS,
+)
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
 
 RATE_HZ, BAND_HZ, N = 1000.0, (5.0, 35.0), 1000
@@ -144,12 +150,12 @@ def test_a_map_that_falls_among_the_commands_needed_is_refused():
 @pytest.mark.parametrize(
     ("text", "acts_on", "why"),
     [
-        ("0.1*fy*sin(y/0.01)", "force", COMMANDS),
-        ("lag(fy, 0.01)", "command", REMEMBERS),
-        ("fy + 0.1*fx", "command", SEVERAL),
-        ("-1.0*abs(fy)", "command", FOLDED),
-        ("2.0*ay", "response", SENSED),
-        ("0*fy", "command", FOLDED),
+        ("0.1*fy*sin(y/0.01)", "force", DEPENDS_ON_COMMAND),
+        ("lag(fy, 0.01)", "command", HAS_MEMORY),
+        ("fy + 0.1*fx", "command", SEVERAL_SIGNALS),
+        ("-1.0*abs(fy)", "command", NOT_INVERTIBLE),
+        ("2.0*ay", "response", SENSOR_ERROR),
+        ("0*fy", "command", NOT_INVERTIBLE),
     ],
 )
 def test_what_cannot_be_compensated_says_why(text, acts_on, why):

@@ -43,7 +43,7 @@ def test_what_is_wanted_in_the_band_is_what_the_device_does(model, plant, noise)
     played = plant.play(found.forces.samples)
     assert band_error(noise.samples, played, RATE_HZ, BAND_HZ) < 0.01
     assert found.error < 0.01
-    assert found.left_out < 0.03
+    assert found.out_of_band_share < 0.03
 
 
 def test_what_lies_outside_the_band_is_left_out_and_said(model, plant, noise):
@@ -51,7 +51,7 @@ def test_what_lies_outside_the_band_is_left_out_and_said(model, plant, noise):
     t = np.arange(2000) / RATE_HZ
     whistle = replace(noise, samples=noise.samples + 0.5 * np.sin(2 * np.pi * 84.0 * t)[:, None])
     found, without = feedforward(model, whistle), feedforward(model, noise)
-    assert found.left_out > 0.3
+    assert found.out_of_band_share > 0.3
     assert np.abs(found.forces.samples - without.forces.samples).max() < 0.02
     assert band_error(noise.samples, plant.play(found.forces.samples), RATE_HZ, BAND_HZ) < 0.02
 

@@ -10,12 +10,12 @@ from equalizer.tracking.learning.convergence import convergence
 from equalizer.tracking.learning.iteration import (
     Repetition,
     Verdict,
-    begin,
     largest_share,
     next_forces,
     noise_of_repeats,
     noise_of_rest,
     rms,
+    start_iteration,
 )
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
@@ -58,7 +58,7 @@ def error(device, forces, wanted) -> float:
 
 def repeated(device, repetition, repeats, seed):
     """Plays once and at most `find_repeats` times more."""
-    state = begin(repetition)
+    state = start_iteration(repetition)
     for play in range(repeats + 1):
         if state.verdict is not Verdict.CONTINUE:
             break
@@ -175,7 +175,7 @@ def test_at_a_shifted_place_a_smaller_gain_gets_there(rubbing, plants, repetitio
 def test_a_correction_that_is_always_wrong_ends_as_diverging(plants, repetition, wanted):
     plant = plants.omega_like()
     wrong = Repetition(wanted, lambda rows: -2 * repetition.invert(rows), RATE_HZ, BAND_HZ, noise_floor=0.01)
-    state = begin(wrong, first=0.5 * repetition.invert(wanted))
+    state = start_iteration(wrong, first=0.5 * repetition.invert(wanted))
     for play in range(10):
         if state.verdict is not Verdict.CONTINUE:
             break
@@ -197,7 +197,7 @@ def test_corrections_stay_under_the_cap_and_say_so(rubbing, plants, repetition, 
 def test_corrections_stay_below_the_slew_limit_and_say_so(rubbing, plants, repetition, wanted):
     device, first = rubbing.rubbing(plants.modes_of(), 0.3), repetition.invert(wanted)
     slew = 1.1 * steepest(first)
-    state = begin(Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, slew=slew))
+    state = start_iteration(Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, slew=slew))
     found = []
     while state.verdict is Verdict.CONTINUE and len(found) < 5:
         state = next_forces(state, device.measured(state.forces, seed=len(found)))
@@ -210,7 +210,7 @@ def test_corrections_stay_below_the_slew_limit_and_say_so(rubbing, plants, repet
 def test_a_correction_that_no_slew_limit_leaves_room_for_ends_with_the_best_forces(plants, repetition, wanted):
     first = repetition.invert(wanted)
     tight = Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=1e-3, slew=0.5 * steepest(first))
-    state = next_forces(begin(tight, first), 0.8 * wanted)
+    state = next_forces(start_iteration(tight, first), 0.8 * wanted)
     assert state.verdict is Verdict.BEST_KEPT
     np.testing.assert_array_equal(state.forces, first)
 
@@ -221,7 +221,7 @@ def test_at_the_ends_of_the_record_no_impulse_is_built_up(repetition, wanted):
     jumps[:5], jumps[-5:] = 20.0, -20.0
     known = Repetition(wanted, lambda rows: repetition.invert(rows) + jumps, RATE_HZ, BAND_HZ, noise_floor=1e-3)
     first = repetition.invert(wanted)
-    state = begin(known, first)
+    state = start_iteration(known, first)
     for _ in range(4):
         state = next_forces(state, 0.5 * wanted)
     assert state.gains
@@ -250,16 +250,16 @@ def test_the_share_that_fits_ends_at_the_cap():
 
 def test_first_forces_above_the_cap_are_refused(repetition, wanted):
     with pytest.raises(ValueError, match=r"the first forces reach .* N, but the cap is 0.1 N"):
-        begin(Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, cap=0.1))
+        start_iteration(Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, cap=0.1))
 
 
 def test_what_has_nothing_in_the_band_is_refused(repetition, wanted):
     with pytest.raises(ValueError, match="no content in the band of 5 to 35 Hz"):
-        begin(Repetition(0 * wanted, repetition.invert, RATE_HZ, BAND_HZ))
+        start_iteration(Repetition(0 * wanted, repetition.invert, RATE_HZ, BAND_HZ))
 
 
 def test_a_measurement_that_does_not_fit_is_refused(repetition, wanted):
-    state = begin(repetition)
+    state = start_iteration(repetition)
     with pytest.raises(ValueError, match="it must be"):
         next_forces(state, wanted[:-1])
     with pytest.raises(ValueError, match="not finite"):
@@ -286,6 +286,8 @@ def test_rows_that_are_not_judged_do_not_hold_up_a_verdict(plants, repetition, w
     spoilt[rows:] = 0.5 * np.sin(2 * np.pi * 15 * np.arange(AROUND) / RATE_HZ)[:, None]
     states = []
     for judged in (None, (0, rows - 100)):
-        state = begin(Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, judged=judged))
+        state = start_iteration(
+            Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, judged_rows=judged)
+        )
         states.append(next_forces(state, plant.measured(state.forces, 3) + spoilt))
     assert [state.verdict for state in states] == [Verdict.CONTINUE, Verdict.AT_FLOOR]

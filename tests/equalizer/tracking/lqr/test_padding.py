@@ -22,8 +22,8 @@ def test_rows_of_forces_are_one_to_one_with_rows_of_the_trajectory(problem, nois
         padded = track_padded(problem, noise, padding)
         before, after = padding.samples(1000.0)
         assert padded.forces.shape == (500, 3)
-        assert padded.whole.forces.shape == (500 + before + after, 3)
-        assert padded.whole.predicted[padded.rows].shape == (500, 3)
+        assert padded.padded.forces.shape == (500 + before + after, 3)
+        assert padded.padded.predicted[padded.rows].shape == (500, 3)
 
 
 def test_no_padding_at_all_is_plain_tracking(problem, noise):
@@ -32,20 +32,22 @@ def test_no_padding_at_all_is_plain_tracking(problem, noise):
 
 
 def test_room_before_the_start_helps_where_it_is_played(problem, noise):
-    assert track_padded(problem, noise, Padding()).whole_error < 0.3 * track_padded(problem, noise, CAUSAL).whole_error
+    assert (
+        track_padded(problem, noise, Padding()).padded_error < 0.3 * track_padded(problem, noise, CAUSAL).padded_error
+    )
 
 
 def test_and_is_worse_than_none_where_only_the_rows_are_played(problem, noise):
     cut, causal = track_padded(problem, noise, Padding()), track_padded(problem, noise, CAUSAL)
     assert cut.cut_error > 3 * causal.cut_error
-    assert causal.cut_error == pytest.approx(causal.whole_error, rel=1e-9)
+    assert causal.cut_error == pytest.approx(causal.padded_error, rel=1e-9)
 
 
 def test_the_stated_errors_are_those_of_the_device(problem, noise, plants):
     padded = track_padded(problem, noise, Padding())
-    whole = plants.omega_like().play(padded.whole.forces)[padded.rows]
+    whole = plants.omega_like().play(padded.padded.forces)[padded.rows]
     cut = plants.omega_like().play(padded.forces)
-    assert padded.whole_error == pytest.approx(band_error(noise, whole, 1000.0, (5.0, 35.0)), rel=1e-6)
+    assert padded.padded_error == pytest.approx(band_error(noise, whole, 1000.0, (5.0, 35.0)), rel=1e-6)
     assert padded.cut_error == pytest.approx(band_error(noise, cut, 1000.0, (5.0, 35.0)), rel=1e-6)
 
 
@@ -53,7 +55,7 @@ def test_room_after_the_end_lets_the_device_come_to_rest(problem, noise):
     still = np.zeros((300, 3))
 
     def ringing(padding) -> float:
-        forces = track_padded(problem, noise, padding).whole.forces[:800]
+        forces = track_padded(problem, noise, padding).padded.forces[:800]
         forces = np.vstack([forces, still[: 800 - len(forces)]])
         return float(np.linalg.norm(simulate_from_rest(problem, forces)[500:]))
 

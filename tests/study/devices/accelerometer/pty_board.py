@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from study.devices.accelerometer.calibration import Calibration
-from study.devices.accelerometer.parser import CHECKED, LAYOUT, SIZE, SYNC, crc_of
+from study.devices.accelerometer.parser import CHECKED, LAYOUT, SIZE, SYNC, compute_crc
 
 SCALE = 600.0
 IDEAL = Calibration(np.full(3, 32_768.0), SCALE * np.eye(3), np.zeros(3), 0.0)
@@ -27,7 +27,7 @@ def encode_packets(sequence: npt.ArrayLike, time_us: npt.ArrayLike, raw: npt.Arr
     packets["sequence"] = numbers & 0xFFFF
     packets["time_us"] = np.asarray(time_us, dtype=np.int64) & 0xFFFFFFFF
     packets["raw"] = raw
-    packets["crc"] = crc_of(packets.view(np.uint8).reshape(-1, SIZE)[:, CHECKED])
+    packets["crc"] = compute_crc(packets.view(np.uint8).reshape(-1, SIZE)[:, CHECKED])
     return packets.tobytes()
 
 

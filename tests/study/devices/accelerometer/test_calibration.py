@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP, calibrate
+from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP_DIRECTIONS, calibrate
 
 COUNTS_PER_MPS2 = 0.3 / 3.3 * 65536 / GRAVITY_MPS2
 """ADXL335: 300 mV/g at 3 V, read with 16 bits over 3.3 V."""
@@ -19,7 +19,7 @@ def readings(seed: int, noise_counts: float = 40.0, tilt_deg: float = 0.0, count
     random = np.random.default_rng(100 + seed)
     sensitivity, bias = sensor(seed)
     positions = []
-    for up in UP:
+    for up in UP_DIRECTIONS:
         tilted = up + np.radians(tilt_deg) * random.normal(0, 1, 3)
         at_rest = sensitivity @ (GRAVITY_MPS2 * tilted / np.linalg.norm(tilted)) + bias
         positions.append(np.round(at_rest + noise_counts * random.normal(0, 1, (count, 3))))

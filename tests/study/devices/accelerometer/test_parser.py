@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from study.devices.accelerometer.parser import CHECKED, SIZE, SYNC, PacketParser, crc_of
+from study.devices.accelerometer.parser import CHECKED, SIZE, SYNC, PacketParser, compute_crc
 from tests.study.devices.accelerometer.pty_board import encode_packets
 
 FIRMWARE = Path(__file__).parents[4] / "docs" / "firmware"
@@ -23,7 +23,7 @@ def stream(count: int, first: int = 0, seed: int = 1) -> tuple[bytes, np.ndarray
 
 def test_the_check_sum_is_the_published_one():
     """CRC-16/CCITT-FALSE of the digits 1 to 9 is 29B1."""
-    assert crc_of(np.frombuffer(b"123456789", dtype=np.uint8)[None]) == 0x29B1
+    assert compute_crc(np.frombuffer(b"123456789", dtype=np.uint8)[None]) == 0x29B1
 
 
 def test_encoded_packets_are_decoded_unchanged():
@@ -138,7 +138,7 @@ def forged(tail: bytes, sequence: int) -> bytes:
     head = np.frombuffer(encode_packets(sequence, 123_456_789, [[0, 0, 0]])[: SIZE - len(tail)], dtype=np.uint8)
     tries = np.tile(np.concatenate((head, np.frombuffer(tail, dtype=np.uint8))), (2**16, 1))
     tries[:, 4:6] = np.arange(2**16, dtype="<u2").view(np.uint8).reshape(-1, 2)  # of its time stamp: one of them fits
-    right = crc_of(tries[:, CHECKED]) == tries[:, 14:16].copy().view("<u2")[:, 0]
+    right = compute_crc(tries[:, CHECKED]) == tries[:, 14:16].copy().view("<u2")[:, 0]
     return tries[np.flatnonzero(right)[0], : SIZE - len(tail)].tobytes()
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from equalizer.signals.lockin import phasors
 from study.devices.accelerometer.history import ArrivedSamples
-from study.devices.accelerometer.placement import HALF_PERIODS, place, resample
+from study.devices.accelerometer.placement import HALF_PERIODS, fit_and_resample, resample
 
 TICK_HZ = 1000.0
 START_S = 5e4
@@ -55,7 +55,7 @@ TICKS_S = START_S + 10.0 + np.arange(2000) / TICK_HZ
 @pytest.mark.parametrize("rate_hz", [1000.0, 2000.0, 4000.0, 10_000.0])
 def test_a_tone_keeps_its_phase_through_drift_offset_and_late_arrivals(rate_hz, drift_ppm):
     stretch, values = board(rate_hz, drift_ppm, tone(45.0))
-    placed = place(stretch, values, TICKS_S, TICK_HZ)
+    placed = fit_and_resample(stretch, values, TICKS_S, TICK_HZ)
     assert placed.fit is not None and placed.fit.drift_ppm == pytest.approx(drift_ppm, abs=10.0)
     assert np.isfinite(placed.values).all()
     found = found_tone(placed.values, TICKS_S, 45.0)
@@ -76,7 +76,7 @@ def test_the_newest_sample_at_each_tick_would_come_late():
     stretch, values = board(2000.0, 0.0, tone(45.0))
     newest = np.searchsorted(stretch.arrived_s, TICKS_S, "right") - 1
     assert late_of(found_tone(values[newest], TICKS_S, 45.0)) > 1e-3
-    placed = place(stretch, values, TICKS_S, TICK_HZ).values
+    placed = fit_and_resample(stretch, values, TICKS_S, TICK_HZ).values
     assert np.abs(values[newest] - tone(45.0)(TICKS_S)[:, None]).max() > 0.4
     assert np.abs(placed - tone(45.0)(TICKS_S)[:, None]).max() < 0.15
 
@@ -97,13 +97,13 @@ def test_a_few_lost_packets_change_little_and_a_gap_leaves_ticks_without_a_value
     lost = random.random(len(values)) < 0.05
     lost[22_000:22_040] = True  # 20 ms, at 11 s
     kept = ArrivedSamples(stretch.device_s[~lost], stretch.restarts[~lost], values[~lost], *_arrivals(stretch))
-    placed = place(kept, values[~lost], TICKS_S, TICK_HZ).values
+    placed = fit_and_resample(kept, values[~lost], TICKS_S, TICK_HZ).values
     known = np.isfinite(placed[:, 0])
     around = np.abs(TICKS_S - (START_S + 11.01)) < 0.01 + HALF_PERIODS / TICK_HZ
     assert not known[around][1:-1].any() and known[~around].mean() > 0.97
     # 45 Hz, spaces of 1 to 2.5 ms bridged: the amplitude of a trial stays within a percent, and so does its phase.
     found = found_tone(np.where(np.isfinite(placed), placed, np.nan), TICKS_S, 45.0)
-    whole = found_tone(place(stretch, values, TICKS_S, TICK_HZ).values, TICKS_S, 45.0)
+    whole = found_tone(fit_and_resample(stretch, values, TICKS_S, TICK_HZ).values, TICKS_S, 45.0)
     assert abs(found / whole - 1) < 0.01
 
 
@@ -117,18 +117,24 @@ def test_a_board_that_began_anew_is_placed_by_each_of_its_clocks():
     again = ArrivedSamples(
         device_s[keep], restarts[keep], values[keep], device_s[keep], restarts[keep], stretch.arrived_s[keep]
     )
-    placed = place(again, values[keep], TICKS_S, TICK_HZ).values
+    placed = fit_and_resample(again, values[keep], TICKS_S, TICK_HZ).values
     known = np.isfinite(placed[:, 0])
     assert 0.2 / 2 < 1 - known.mean() < 0.3 / 2
     assert late_of(found_tone(placed, TICKS_S, 45.0)) == pytest.approx(LEAST_DELAY_S[2000.0], abs=6e-5)
     # The negative control: as if it were one clock, nothing of the second part is where it belongs.
     one_clock = ArrivedSamples(np.sort(device_s[keep]), 0 * restarts[keep], *_of(again))
-    assert abs(np.angle(found_tone(place(one_clock, values[keep], TICKS_S, TICK_HZ).values, TICKS_S, 45.0)) - 0.7) > 0.1
+    assert (
+        abs(
+            np.angle(found_tone(fit_and_resample(one_clock, values[keep], TICKS_S, TICK_HZ).values, TICKS_S, 45.0))
+            - 0.7
+        )
+        > 0.1
+    )
 
 
 def test_a_clock_that_was_heard_for_less_than_a_second_places_nothing():
     stretch, values = board(2000.0, 0.0, tone(45.0), seconds=0.9)
-    placed = place(stretch, values, START_S + 0.3 + np.arange(100) / TICK_HZ, TICK_HZ)
+    placed = fit_and_resample(stretch, values, START_S + 0.3 + np.arange(100) / TICK_HZ, TICK_HZ)
     assert placed.fit is None and np.isnan(placed.values).all()
     assert np.isnan(resample(np.zeros(0), np.zeros((0, 3)), TICKS_S, TICK_HZ)).all()
 

@@ -19,11 +19,11 @@ def noisy(noise_mps2):
 
 
 def found(monkeypatch, rate_hz=4000.0, drift_ppm=0.0, noise_mps2=(0.04, 0.04, 0.08), spoil=lambda block: block):
-    monkeypatch.setattr(sensor_findings, "LISTENED_S", 1.5)
+    monkeypatch.setattr(sensor_findings, "MEASUREMENT_S", 1.5)
     with contextlib.closing(Board(rate_hz, drift_ppm)) as board:
         board.signal, board.spoil = noisy(noise_mps2), spoil
         with contextlib.closing(Accelerometer(open_serial(board.path, 2_000_000), IDEAL, RAW_RANGE)) as sensor:
-            findings = {finding.name: finding for finding in sensor_findings.sensor_findings(sensor)}
+            findings = {finding.name: finding for finding in sensor_findings.check_sensor(sensor)}
     assert not any(finding.wrong for finding in findings.values())
     return findings, {name for name, finding in findings.items() if finding.warning}
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP
-from study.devices.accelerometer.newest_sample import FRESH_S
+from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP_DIRECTIONS
+from study.devices.accelerometer.newest_sample import MAX_AGE_S
 from study.devices.accelerometer.parser import SIZE
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.serial_reader import open_serial
@@ -49,7 +49,7 @@ def test_a_channel_at_its_limit_is_reported(board, sensor):
 
 def test_a_board_that_falls_silent_reads_nothing(board, sensor):
     board.on = False
-    assert within(FRESH_S + 5.0, lambda: bool(np.isnan(sensor.latest()[0]).all()))
+    assert within(MAX_AGE_S + 5.0, lambda: bool(np.isnan(sensor.latest()[0]).all()))
 
 
 @pytest.mark.parametrize("rate_hz", [1000.0, pytest.param(4000.0, marks=pytest.mark.slow), 10_000.0])
@@ -110,7 +110,7 @@ def test_six_positions_at_the_table_give_the_table_of_the_lab_s_file(board):
 
     def lay_down(position: str, heard: tuple[float, float, float] | None) -> None:
         assert (heard is None) is (not laid)
-        board.acceleration = GRAVITY_MPS2 * UP[len(laid)]
+        board.acceleration = GRAVITY_MPS2 * UP_DIRECTIONS[len(laid)]
         laid.append(position)
 
     table = tomllib.loads(calibrate_on_table(board.path, 115_200, lay_down, rest_s=0.3))["accelerometer"]

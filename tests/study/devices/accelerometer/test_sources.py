@@ -10,7 +10,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from study.devices.accelerometer.calibration import GRAVITY_MPS2, UP, Calibration
+from study.devices.accelerometer.calibration import GRAVITY_MPS2, UP_DIRECTIONS, Calibration
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.six_positions import calibrate_on_table
 from study.devices.accelerometer.sources import DUMMY_V, open_source
@@ -19,7 +19,7 @@ from study.errors import DeviceError
 RATE_HZ = 3999.0
 """What the drivers make of 4000."""
 VOLTS = Calibration(np.array([1.65, 1.6, 1.7]), 0.0306 * np.eye(3), np.zeros(3), 0.0)
-UP_FIRST = GRAVITY_MPS2 * UP[4]
+UP_FIRST = GRAVITY_MPS2 * UP_DIRECTIONS[4]
 
 
 class Scanner:
@@ -118,7 +118,7 @@ def test_scans_that_a_labjack_lost_are_counted_and_left_out(labjack):
 
 
 def test_six_positions_in_volts(ni):
-    turns = iter(UP)
+    turns = iter(UP_DIRECTIONS)
 
     def lay_down(position, heard):
         ni.acceleration = GRAVITY_MPS2 * next(turns)

@@ -134,7 +134,7 @@ def test_a_trial_on_the_driver_is_recorded_on_its_ticks_missed_ones_too(stub, ri
                 device.keep_alive()
                 time.sleep(0.02)
             played = device.release()
-            due_s = device._governor.row_due_s()
+            due_s = device._governor.compute_row_times()
     assert played.recording is not None and played.health.sensor is not None
     health = played.health.sensor
     assert (health.ticks, health.unplaced_ticks, health.lost) == (len(played.recording.response), 0, 0)

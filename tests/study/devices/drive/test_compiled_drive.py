@@ -12,12 +12,12 @@ from numba import njit
 
 from study.devices.clock import VirtualClock
 from study.devices.device import Fault
-from study.devices.drive.compiled_drive import DUE_S, SENSE_SIGNATURE, SPIN_S, STARTED_S, WANTED, WRITE_SIGNATURE
+from study.devices.drive.compiled_drive import DUE_S, SENSE_SIGNATURE, SPIN_S, STARTED_S, THREAD_NEEDED, WRITE_SIGNATURE
 from study.devices.drive.realtime_drive import RealtimeDrive
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.governor import cells
 from study.devices.governor.governor import Governor
-from study.devices.native import CLOCK, SLEEP, SYSTEM_SIZE, SharedLock, address_of, call_int, system_calls
+from study.devices.native import CLOCK, SLEEP, SYSTEM_SIZE, SharedLock, call_int, find_address, system_calls
 from study.devices.rig import READING_SIZE, CompiledIo
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
@@ -145,8 +145,8 @@ class ScriptedRig:
 
     def __init__(self, rigs, clock: ScriptedTime, fails_at: int) -> None:
         self.info = replace(rigs.INFO, simulated=False)
-        self._calls = np.append(system_calls(SharedLock()), address_of(clock.work))
-        self._calls[CLOCK], self._calls[SLEEP] = address_of(clock.now), address_of(clock.wait)
+        self._calls = np.append(system_calls(SharedLock()), find_address(clock.work))
+        self._calls[CLOCK], self._calls[SLEEP] = find_address(clock.now), find_address(clock.wait)
         self._own, self._samples = np.array([float(fails_at), 0.0]), np.zeros((1, 1))
         self.halves = CompiledIo(tremble, work, self._calls, self._own, self._samples, lambda code: OSError(code))
 
@@ -179,8 +179,8 @@ def played(rigs, monkeypatch):
         drive = RealtimeDrive(runner, governor, clock, rigs.RATE_HZ, rigs.LIMITS.watchdog_s)
         assert drive.start(lambda: governor.begin_hold(rigs.sine(2.0, fade_s=0.01)))
         governor.settings[cells.WATCHDOG_TICKS] = governor.state[cells.LONGEST] = np.inf
-        clock.at_end = governor.ask_stop
-        drive._loop_state[WANTED] = 0.0
+        clock.at_end = governor.request_stop
+        drive._loop_state[THREAD_NEEDED] = 0.0
         calls = 0
         while governor.moving:
             calls += 1

@@ -16,8 +16,8 @@ from study.devices.drive.real_time_class import (
     PRIORITY,
     STARVING_ADVICE,
     SWITCH_S,
+    check_real_time_rights,
     real_time_class,
-    real_time_finding,
 )
 from study.devices.safe import SafeDevice
 
@@ -90,7 +90,7 @@ def test_real_time_priority_lasts_as_long_as_the_loop(allow):
 @pytest.mark.parametrize(("scheduled", "locked"), [(False, False), (True, False), (False, True)])
 def test_a_refused_priority_is_a_warning_with_its_remedy(allow, scheduled, locked):
     allow(scheduled, locked)
-    finding = real_time_finding()
+    finding = check_real_time_rights()
     assert (finding.fine, finding.warning, finding.wrong) == (False, True, False)
     assert finding.advice == LINUX_ADVICE and "rtprio" in finding.advice
     assert ("may delay" in finding.value) == (not scheduled)
@@ -99,7 +99,7 @@ def test_a_refused_priority_is_a_warning_with_its_remedy(allow, scheduled, locke
 
 def test_with_all_permissions_there_is_no_warning(allow):
     allow(True, True)
-    assert real_time_finding().fine and real_time_finding().advice == ""
+    assert check_real_time_rights().fine and check_real_time_rights().advice == ""
 
 
 @pytest.mark.parametrize("first_begun_ends_first", [True, False])
@@ -121,7 +121,7 @@ def test_querying_the_priority_does_not_change_a_running_loop(allow, granted_aga
     library, _ = allow(True, True)
     with real_time_class():
         library.allowed = granted_again
-        assert real_time_finding().fine == granted_again
+        assert check_real_time_rights().fine == granted_again
         assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_S)
     assert not library.locked
 
@@ -139,11 +139,11 @@ def test_future_memory_is_locked_only_without_a_memory_limit(allow, monkeypatch,
 def test_unlimited_real_time_runtime_of_the_kernel_is_a_warning(allow, as_linux_comes, scheduled):
     allow(scheduled, True)
     as_linux_comes.write_text("-1\n")
-    finding = real_time_finding()
+    finding = check_real_time_rights()
     assert finding.warning and not finding.wrong
     assert (STARVING_ADVICE in finding.advice) == scheduled  # a loop of the ordinary kind starves nothing
     as_linux_comes.unlink()
-    assert real_time_finding().fine == scheduled
+    assert check_real_time_rights().fine == scheduled
 
 
 def test_an_error_inside_restores_the_priority(allow):
@@ -191,7 +191,7 @@ def test_on_windows_sleeps_are_made_finer_and_the_thread_comes_first(monkeypatch
 def test_another_operating_system_is_reported_as_offering_no_priority(monkeypatch):
     monkeypatch.setattr(module.platform, "system", lambda: "Darwin")
     monkeypatch.delattr(module.ctypes, "windll", raising=False)
-    assert real_time_finding().advice == "This system offers none: close other programs."
+    assert check_real_time_rights().advice == "This system offers none: close other programs."
 
 
 @pytest.mark.parametrize("simulated", [False, True])

@@ -9,7 +9,7 @@ import pytest
 
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
-from study.devices.force_dimension.tick_io import rest_once
+from study.devices.force_dimension.tick_io import repeat_zero_once
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
 from study.session.stimulus.timing_verdict import LATE_SHARE
@@ -163,6 +163,6 @@ def test_a_repeated_zero_that_is_answered_with_an_error_is_followed_by_the_brake
         rig.write(np.zeros(3))
         assert stepped_stub.applied_n.any()
         stepped_stub.fail("dhdSetForce", 7)
-        assert rest_once(rig.halves.calls, rig.halves.cells, 0.0, np.zeros(3)) != 0
+        assert repeat_zero_once(rig.halves.calls, rig.halves.cells, 0.0, np.zeros(3)) != 0
         stepped_stub.advance(0.001)
         assert stepped_stub.safe

@@ -4,7 +4,7 @@ import pytest
 
 from study.devices.accelerometer.calibration import Calibration
 from study.devices.accelerometer.six_positions import calibration_toml
-from study.devices.force_dimension.lab import keep_sensor, read_lab
+from study.devices.force_dimension.lab import read_lab, write_sensor_table
 from study.errors import DeviceError
 from tests.study.devices.accelerometer.pty_board import IDEAL
 
@@ -37,7 +37,7 @@ def file(tmp_path, monkeypatch):
 
 
 def test_a_first_calibration_makes_the_file(file):
-    assert keep_sensor(TABLE) == file
+    assert write_sensor_table(TABLE) == file
     lab = read_lab()
     assert lab.accelerometer is not None and lab.accelerometer.port == "/dev/ttyACM3"
     assert [path.name for path in file.parent.iterdir()] == ["device.toml"]
@@ -46,7 +46,7 @@ def test_a_first_calibration_makes_the_file(file):
 def test_a_new_calibration_takes_the_place_of_the_old_one_alone(file):
     file.parent.mkdir()
     file.write_text(OLD)
-    keep_sensor(TABLE)
+    write_sensor_table(TABLE)
     text, lab = file.read_text(), read_lab()
     assert text.startswith("# the lab's own words\neffector_mass_kg = 0.153     # with the sensor\n")
     assert "of last year" not in text and text.count("[accelerometer]") == 1
@@ -61,10 +61,10 @@ def test_nothing_changes_where_the_file_cannot_be_used_or_the_table_is_none(file
     file.parent.mkdir()
     file.write_text("effector_mass_kg = ")
     with pytest.raises(DeviceError, match="cannot be used"):
-        keep_sensor(TABLE)
+        write_sensor_table(TABLE)
     file.write_text(OLD)
     with pytest.raises(DeviceError, match="was not kept"):
-        keep_sensor(TABLE.replace("bias", "bais"))
+        write_sensor_table(TABLE.replace("bias", "bais"))
     assert file.read_text() == OLD
 
 

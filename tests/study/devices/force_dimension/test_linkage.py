@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.linkage.grid import arm_azimuths, beside, difference_error
+from equalizer.linkage.grid import arm_azimuths, difference_error, difference_positions
 from study.devices.clock import VirtualClock
-from study.devices.opening import linkage_of, open_device
-from study.devices.simulated.own_linkage import fit_linkage
+from study.devices.opening import open_device, open_linkage
+from study.devices.simulated.simulated_linkage import fit_linkage
 from study.errors import DeviceError, ExitCode, StudyError, WrongUseError
 from study.store.formats.calibration_file import read_calibration
 from study.workflows.recording.calibrate_linkage import CalibrationPlan, calibrate_linkage
@@ -55,10 +55,10 @@ def test_the_readings_are_of_the_linkage_behind_the_library(calibrated, tmp_path
 
 def test_the_jacobian_is_the_derivative_of_positions_by_joint_angles(stub):
     """Oracle: central differences of the library's own positions, by its encoder counts."""
-    with linkage_of("omega3") as linkage:
+    with open_linkage("omega3") as linkage:
         for place in np.array([[0.0, 0, 0], [0.03, -0.02, 0.04], [-0.04, 0.05, 0.0]]):
-            angles = np.array([linkage.angles_at(each) for each in beside(place)])
-            assert difference_error(linkage.at(place).jacobian, beside(place), angles) < 0.01
+            angles = np.array([linkage.angles_at(each) for each in difference_positions(place)])
+            assert difference_error(linkage.at(place).jacobian, difference_positions(place), angles) < 0.01
 
 
 def test_lengths_and_masses_are_recovered(calibrated):

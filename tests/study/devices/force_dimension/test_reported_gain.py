@@ -8,14 +8,14 @@ import pytest
 from numba import njit
 
 from study.devices.force_dimension import loop_cells
-from study.devices.force_dimension.loop_cells import CELLS_SIZE, GIVES_ANOTHER, MEMORY, REPORTED, check_status
+from study.devices.force_dimension.loop_cells import CELLS_SIZE, FORCE_MISMATCH, MEMORY, REPORTED, check_status
 from study.devices.force_dimension.tick_io import LOOKS_AT, LOOKS_OF
 
 AMPLITUDES_N = (0.2, 0.25, 0.3, 0.5, 1.0, 1.9, 3.0)
 FREQUENCIES_HZ = (5, 7, 12.5, 20, 25, 30, 35, 40, 45, 50, 80, 1000 / 14, 1000 / 21, 1000 / 22, 1000 / 42)
 """Some with whole periods between the status checks."""
 
-note_sent, add_to_sums, gain_is_off = loop_cells.note_sent, loop_cells._add_to_sums, loop_cells._gain_is_off
+note_sent, add_to_sums, gain_is_off = loop_cells.record_sent_force, loop_cells._add_to_sums, loop_cells._is_gain_wrong
 
 
 @njit
@@ -80,7 +80,7 @@ def status_checks(stepped_stub, axis: int, amplitude_n: float) -> int:
 
 
 @pytest.mark.parametrize("axis", range(3))
-@pytest.mark.parametrize(("gain", "code"), [(0.7, GIVES_ANOTHER), (1.0, 0), (1.3, GIVES_ANOTHER)])
+@pytest.mark.parametrize(("gain", "code"), [(0.7, FORCE_MISMATCH), (1.0, 0), (1.3, FORCE_MISMATCH)])
 def test_a_device_that_is_driven_along_an_axis_alone_is_judged_by_its_report(stepped_stub, axis, gain, code):
     stepped_stub.set("told_lift", 0.5)
     stepped_stub.set("silent_gain", gain)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from study.devices.drive.stepped_runner import CLOSE_PATIENCE_S
+from study.devices.drive.stepped_runner import CLOSE_TIMEOUT_S
 from study.devices.force_dimension.rig import JOIN_S
 from study.devices.native import acquire, now_s, release, sleep_until
 
@@ -113,9 +113,9 @@ def test_closing_brakes_at_once_and_ends_the_thread_of_the_zeros(stub):
         closing = threading.Thread(target=rig.close)
         closing.start()
         braked_within_s(stub)
-        assert rig._resting.is_alive()  # what hangs holds up neither zero nor brakes
+        assert rig._zero_thread.is_alive()  # what hangs holds up neither zero nor brakes
         closing.join()
-        assert not rig._resting.is_alive()
+        assert not rig._zero_thread.is_alive()
         assert stub.safe and (stub.get("stops"), stub.get("closes")) == (1, 1)
 
 
@@ -125,8 +125,8 @@ def test_closing_waits_for_a_zero_that_hangs_no_longer_than_half_of_its_time(stu
         hang_a_zero(stub, rig, 3.0)
         began_s = time.monotonic()
         assert rig.close()
-        assert JOIN_S <= time.monotonic() - began_s < CLOSE_PATIENCE_S
-        assert rig._resting.is_alive() and stub.safe
+        assert JOIN_S <= time.monotonic() - began_s < CLOSE_TIMEOUT_S
+        assert rig._zero_thread.is_alive() and stub.safe
 
 
 @pytest.mark.parametrize("late_s", [0.3, 0.8], ids=["waited for", "given up"])
@@ -151,7 +151,7 @@ def test_a_call_that_wakes_the_device_too_late_leaves_it_braked_once_it_is_close
         stub.fail("dhdClose")
         rig.close()
         assert stub.safe
-        rig._resting.join()
+        rig._zero_thread.join()
         assert stub.safe
         stub.fail("dhdClose", times=0)
     assert (stub.get("opened"), stub.safe) == (0, True)

@@ -46,22 +46,22 @@ def test_ten_million_ticks_of_false_readings_never_exceed_the_force_limits(lying
 
 MUTATIONS = {
     "the fade turns the force round": (
-        govern, "force[i] = max(left, 0.0) * state[LET_GO_FROM + i]",
-        "force[i] = -max(left, 0.0) * state[LET_GO_FROM + i]", "fade: its sign",
+        govern, "force[i] = max(remaining, 0.0) * state[LET_GO_FROM + i]",
+        "force[i] = -max(remaining, 0.0) * state[LET_GO_FROM + i]", "fade: its sign",
     ),
     "the fade rises": (
-        govern, "left = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0)",
-        "left = 1.0 + (state[TICK] - state[LET_GO_AT] + 1.0)", "fade: no way down",
+        govern, "remaining = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0)",
+        "remaining = 1.0 + (state[TICK] - state[LET_GO_AT] + 1.0)", "fade: no way down",
     ),
     "the fade takes twice as long": (
         govern, "/ settings[LET_GO_TICKS]", "/ (2.0 * settings[LET_GO_TICKS])", "fade: longer",
     ),
     "the release turns the force round": (
-        govern, "left = 1.0 - _fade_share(", "left = _fade_share(", "",
+        govern, "remaining = 1.0 - _fade_share(", "remaining = _fade_share(", "",
     ),
     "the stimulus' fade turns round": (
-        govern, "    return left * state[STIMULUS_GAIN], left * state[SPRING_GAIN]",
-        "    return -left * state[STIMULUS_GAIN], left * state[SPRING_GAIN]", "fade: its sign",
+        govern, "    return remaining * state[STIMULUS_GAIN], remaining * state[SPRING_GAIN]",
+        "    return -remaining * state[STIMULUS_GAIN], remaining * state[SPRING_GAIN]", "fade: its sign",
     ),
     "the stimulus fades in twice too high": (
         govern, "return state[STIMULUS_GAIN], state[SPRING_GAIN]",
@@ -78,7 +78,7 @@ MUTATIONS = {
         govern, "confine(force, settings[STIMULUS_CAP])", "False", "",
     ),
     "twice the slew": (
-        govern, "settings[SLEW_STEP] * WITHIN", "(2.0 * settings[SLEW_STEP])", "slew",
+        govern, "settings[SLEW_STEP] * LIMIT_FACTOR", "(2.0 * settings[SLEW_STEP])", "slew",
     ),
     "no watchdog": (
         govern, "tick - state[LAST_SIGN] > settings[WATCHDOG_TICKS]", "False", "late: a force after the watchdog",
@@ -93,7 +93,7 @@ MUTATIONS = {
         feedback, "stiffness * (reading[0]", "2.0 * stiffness * (reading[0]", "",
     ),
     "the spring pushes": (
-        feedback, "force[0] -= share * (kept * x)", "force[0] += share * (kept * x)", "spring: pushes",
+        feedback, "force[0] -= share * (total_factor * x)", "force[0] += share * (total_factor * x)", "spring: pushes",
     ),
     "three times the feedback's cap": (
         feedback, "cap, stiffness, damping = settings[FEEDBACK_CAP]",
@@ -274,7 +274,7 @@ def test_the_kept_code_of_the_tick_is_outdated_when_any_file_of_the_safety_layer
     folder = Path(govern.__file__).parent
     rig = folder.parent / "rig.py"
     expected = compiling.fingerprint(folder, rig)
-    for entry in (govern.tick, govern.miss):
+    for entry in (govern.tick, govern.record_missed_ticks):
         assert expected in [cell.cell_contents for cell in entry.py_func.__closure__]
     for name in ("cells", "compiling", "confine", "feedback", "govern", "plausibility", "rig"):
         for source in folder.glob("*.py"):

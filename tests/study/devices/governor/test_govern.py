@@ -26,7 +26,7 @@ def test_without_spring_the_force_is_the_faded_stimulus_and_nothing_else(rigs):
 def test_a_release_fades_as_the_stimulus_says_and_ends_at_zero(rigs):
     bench = Bench(rigs, without_spring(rigs))
     bench.hold(rigs.sine(2.0, fade_s=0.1), 400)
-    bench.governor.ask_release()
+    bench.governor.request_release()
     forces = bench.go_on(200)
     expected = (
         np.tile(rigs.sine(2.0).loop.samples, (3, 1))[400:501]
@@ -40,7 +40,7 @@ def test_a_release_fades_as_the_stimulus_says_and_ends_at_zero(rigs):
 def test_a_release_during_the_fade_in_starts_from_where_that_was(rigs):
     bench = Bench(rigs, without_spring(rigs))
     bench.hold(rigs.sine(3.0, fade_s=0.5), 250)
-    bench.governor.ask_release()
+    bench.governor.request_release()
     forces = bench.go_on(600)
     assert rigs.violations(forces, rigs.LIMITS) == []
     assert np.linalg.norm(forces, axis=1).max() <= 1.5 + 1e-9
@@ -147,7 +147,7 @@ def test_a_cap_that_is_not_positive_means_no_force(bench, rigs, cap):
 
 def test_missed_ticks_are_rows_without_readings_in_which_the_force_was_held(bench, rigs):
     bench.hold(rigs.sine(2.0, fade_s=0.0), 20)
-    bench.governor.miss(3)
+    bench.governor.record_missed_ticks(3)
     bench.go_on(10)
     rows = bench.governor.rows()
     assert len(rows) == 33
@@ -161,7 +161,7 @@ def test_ticks_missed_at_the_end_of_commands_do_not_shift_what_was_recorded(benc
     commands = rigs.force(np.linspace(0.0, 1.0, 301)[:, None] * [1.0, 0.0, 0.0])
     bench.governor.begin_play(commands)
     bench.go_on(790)
-    bench.governor.miss(30)  # 500 to settle, 301 to play
+    bench.governor.record_missed_ticks(30)  # 500 to settle, 301 to play
     bench.go_on(100)
     assert np.allclose(bench.gained()[:290], commands.samples[:290])
     assert len(bench.governor.rows()) == 301

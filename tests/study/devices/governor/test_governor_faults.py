@@ -137,7 +137,7 @@ def test_the_longest_hold_ends_a_stimulus_without_an_answer(rigs):
 
 def test_the_emergency_stop_is_zero_at_the_very_next_tick_and_for_good(bench, rigs):
     bench.hold(rigs.sine(3.0, 5), 450)
-    bench.governor.ask_stop()
+    bench.governor.request_stop()
     forces = bench.go_on(10)
     assert np.linalg.norm(forces[449]) > 0.5
     assert len(forces) == 451
@@ -148,7 +148,7 @@ def test_the_emergency_stop_is_zero_at_the_very_next_tick_and_for_good(bench, ri
 
 def test_a_safety_release_needs_no_sensor_and_goes_straight_to_zero(bench, rigs):
     bench.hold(rigs.sine(3.0), 450)
-    bench.governor.ask_let_go()
+    bench.governor.request_let_go()
     bench.lean(math.nan, 0.0, 0.0)
     forces = bench.go_on(100)
     last = forces[449]
@@ -160,7 +160,7 @@ def test_a_force_delayed_by_the_slew_limit_is_zero_at_the_end_of_the_fade(rigs):
     bench = Bench(rigs, replace(rigs.SETTINGS, limits=replace(rigs.LIMITS, slew_n_per_s=5.0)))
     bench.lean(0.0, 0.3, 0.0)
     bench.hold(rigs.sine(0.0, fade_s=0.05), 1000)
-    bench.governor.ask_release()
+    bench.governor.request_release()
     forces = bench.go_on(200)
     assert len(forces) <= 1000 + 50 + 1 + 50
     assert not forces[-1].any()

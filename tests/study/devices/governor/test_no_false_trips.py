@@ -32,7 +32,7 @@ def hold(rigs, rng, seconds: float, frequency_hz: float, level_n: float) -> tupl
     for _ in range(round(seconds)):
         governor.sign_of_life()
         runner.run(1000)
-    governor.ask_release()
+    governor.request_release()
     runner.run(1000)
     return governor.fault, governor.ticks
 

@@ -58,16 +58,16 @@ def disturb(rng, rigs, rig, governor) -> None:
     elif dice < 0.34:
         rig.state[rigs.LEAN + rng.integers(3)] = rng.choice([np.nan, np.inf, 1e300, -1e7])
     elif dice < 0.40:
-        governor.ask_release()
+        governor.request_release()
     elif dice < 0.43:
-        governor.miss(int(rng.integers(1, 50)))
+        governor.record_missed_ticks(int(rng.integers(1, 50)))
 
 
 def ask_for_zero(rng, rigs, rig, runner, release: int) -> bool:
     """Let go or stop, and whether the force was off in time."""
     writes = int(rng.choice([release, 1]))
     governor = runner._governor
-    (governor.ask_stop if writes == 1 else governor.ask_let_go)()
+    (governor.request_stop if writes == 1 else governor.request_let_go)()
     asked_for = min(writes, TICKS_PER_DEVICE - int(rig.state[rigs.WRITES]))
     runner.run(asked_for)
     return asked_for < writes or not rigs.written(rig)[-1].any()

@@ -120,7 +120,7 @@ def test_callers_detect_a_loop_that_died_silently(rigs, kind):
 def test_a_second_start_is_refused_where_the_ticks_run(rigs, rig, device):
     device.hold(rigs.push())
     alive(device, 0.1)
-    device._held = None  # as another thread sees it, which looked a moment earlier
+    device._held_stimulus = None  # as another thread sees it, which looked a moment earlier
     with pytest.raises(DeviceError, match="still playing"):
         device.hold(rigs.push(-2.9))
     with pytest.raises(DeviceError, match="still playing"):

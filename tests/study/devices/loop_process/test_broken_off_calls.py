@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import pytest
 
-from study.devices.device import Fault, Played
+from study.devices.device import Fault, PlaybackResult
 from study.devices.loop_process import line, remote_device, start
 from study.errors import DeviceError
 from tests.study.devices.loop_process.awaited import LATEST_S, becomes, runs
@@ -71,7 +71,7 @@ def test_a_stop_that_is_not_answered_kills_the_process_without_a_grace(
     monkeypatch.setattr(line, "GRACE_S", 3600.0)
     device = served.remote(behind, rigs.SETTINGS)
     device.hold(rigs.push())
-    with device._losing:  # as a call that waits for the end of a process that hung up
+    with device._loss_lock:  # as a call that waits for the end of a process that hung up
         stopping = threading.Thread(target=device.stop, daemon=True)
         stopping.start()
         becomes(lambda: device._process.killed)
@@ -110,7 +110,7 @@ os.kill(device._process.pid, signal.SIGSTOP)
 def interrupted(*arguments):
     raise KeyboardInterrupt
 
-device._process.close.begin = interrupted
+device._process.close.queue_call = interrupted
 device.close()
 """
 
@@ -146,7 +146,7 @@ def test_an_interruption_while_the_process_starts_leaves_none(rigs, monkeypatch)
 def test_an_interruption_before_the_device_opens_ends_the_process(behind, served, rigs, monkeypatch):
     process = served.ServedHere(behind)
     monkeypatch.setattr(remote_device, "LoopProcess", lambda: process)
-    monkeypatch.setattr(process.work, "begin", interrupted)
+    monkeypatch.setattr(process.work, "queue_call", interrupted)
     with pytest.raises(KeyboardInterrupt):
         remote_device.open_remotely("omega3", rigs.SETTINGS, 1)
     assert process.patience_s == [remote_device.CLOSE_S]
@@ -156,7 +156,7 @@ def test_an_interruption_before_the_device_opens_ends_the_process(behind, served
 @pytest.mark.parametrize("said_by", ["fault", "health", "release"])
 def test_a_force_that_was_left_on_is_not_forgotten_with_the_process(behind, served, rigs, monkeypatch, said_by):
     left = replace(behind.health(), fault=Fault.FORCE_LEFT)
-    answers = {"fault": Fault.FORCE_LEFT, "health": left, "release": Played(recording=None, health=left)}
+    answers = {"fault": Fault.FORCE_LEFT, "health": left, "release": PlaybackResult(recording=None, health=left)}
     monkeypatch.setattr(behind, said_by, lambda: answers[said_by])
     with contextlib.closing(served.remote(behind, rigs.SETTINGS)) as device:
         getattr(device, said_by)()

@@ -24,7 +24,7 @@ def pipe():
 
 def test_an_answer_that_comes_together_with_an_interruption_is_kept(pipe, monkeypatch):
     line, theirs = pipe
-    call = line.begin("ask")
+    call = line.queue_call("ask")
     theirs.send((VALUE, 7))
     take = call._next_progress
 
@@ -40,14 +40,14 @@ def test_an_answer_that_comes_together_with_an_interruption_is_kept(pipe, monkey
 
 
 def test_only_what_carries_much_is_waited_for_longer(pipe, monkeypatch):
-    call = pipe[0].begin("play")
+    call = pipe[0].queue_call("play")
     shares = iter([0.0, 0.5, 1.0])
     waited_s: list[float] = []
 
     def take(patience_s: float, grace_s: float | None) -> float | None:
         waited_s.append(patience_s)
         if (share := next(shares, None)) is None:
-            call.hear((VALUE, 7))
+            call.receive((VALUE, 7))
         return share
 
     monkeypatch.setattr(call, "_next_progress", take)
@@ -98,7 +98,7 @@ def test_what_cannot_be_sent_raises_where_it_was_asked_and_loses_nothing(device,
 
 def test_why_an_answer_cannot_be_read_is_said(pipe):
     line, theirs = pipe
-    call = line.begin("ask")
+    call = line.queue_call("ask")
     theirs.send_bytes(b"no pickle")
     with pytest.raises(LoopGoneError, match=r"its answer cannot be read \(UnpicklingError: .+\)"):
         call.answer(20.0)
@@ -106,13 +106,13 @@ def test_why_an_answer_cannot_be_read_is_said(pipe):
 
 def test_a_call_after_the_end_of_its_line_is_refused_at_once(pipe, monkeypatch):
     line, theirs = pipe
-    waiting = line.begin("ask")
+    waiting = line.queue_call("ask")
     line.end()
-    queued = line.begin("ask")
+    queued = line.queue_call("ask")
     theirs.send((VALUE, 7))
     assert waiting.answer(20.0) == 7
     assert line._ended.wait(20.0)
-    for call in (queued, line.begin("ask")):
+    for call in (queued, line.queue_call("ask")):
         with pytest.raises(LoopGoneError, match="it was given up"):
             call.answer(20.0)
 

@@ -123,7 +123,7 @@ def check_it_is_lost(device, rigs, said: str) -> None:
     """And nothing is asked of it any more, so nothing is waited for."""
     asked: list[str] = []
     for each in device._process.lines:
-        each.begin = lambda name, *arguments: asked.append(name)
+        each.queue_call = lambda name, *arguments: asked.append(name)
     assert device.fault() is device.health().fault is Fault.LOST
     device.keep_alive()
     assert device.look().position_m is None
@@ -156,7 +156,7 @@ def test_after_the_end_of_its_process_a_device_is_lost_to_every_call(device, rig
     device.hold(rigs.push())
     device._process.die()
     getattr(device, first)()
-    assert device._lost.startswith("it ended")
+    assert device._loss_reason.startswith("it ended")
     assert not rig.last_n.any()  # the server let go as its pipes closed
     if first not in ("stop", "release"):
         check_it_is_lost(device, rigs, "it ended, with code 0")

@@ -128,7 +128,7 @@ def test_an_error_in_the_loop_itself_turns_the_force_off(rigs, clock):
         time.sleep(0.01)
     assert device.fault() is Fault.LOST
     with pytest.raises(DeviceError, match="clock failed"):
-        device._must_be_there()
+        device._require_connected()
     device.close()
 
 

@@ -17,7 +17,7 @@ from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
 from study.devices.governor import cells, govern
 from study.devices.governor.telemetry_row import write_row
-from study.devices.opening import open_device, telemetry_of
+from study.devices.opening import open_device, open_telemetry
 from study.devices.safe import SafeDevice
 from study.devices.telemetry import Ring, TelemetryReader
 from study.errors import StudyError
@@ -151,7 +151,7 @@ def test_a_device_writes_each_tick_of_a_stimulus(rigs):
     clock, ring = VirtualClock(), Ring()
     with contextlib.closing(SafeDevice(rigs.ScriptedRig(), rigs.SETTINGS, clock, ring)) as device:
         reader_path = device.telemetry
-        reader = telemetry_of(reader_path)
+        reader = open_telemetry(reader_path)
         started_s = clock.now_s()
         device.hold(rigs.sine(2.0))
         for _ in range(20):
@@ -169,14 +169,14 @@ def test_a_device_writes_each_tick_of_a_stimulus(rigs):
     applied = np.concatenate([held.applied_n, over.applied_n]).tolist()
     recorded = played.recording.command.samples.tolist()
     assert any(applied[start : start + len(recorded)] == recorded for start in range(len(applied)))
-    assert over.phase[-1] == cells.STILL and not np.any(over.applied_n[-1])
+    assert over.phase[-1] == cells.IDLE and not np.any(over.applied_n[-1])
     assert not Path(reader_path).is_file()
 
 
 def test_a_fault_and_the_fade_after_it_are_in_the_ring(rigs):
     clock, rig, ring = VirtualClock(), rigs.ScriptedRig(), Ring()
     with contextlib.closing(SafeDevice(rig, rigs.SETTINGS, clock, ring)) as device:
-        reader = telemetry_of(device.telemetry)
+        reader = open_telemetry(device.telemetry)
         device.hold(rigs.sine(2.0))
         for _ in range(100):
             clock.sleep(0.1)  # no sign of life
@@ -187,7 +187,7 @@ def test_a_fault_and_the_fade_after_it_are_in_the_ring(rigs):
     faded = read.phase == cells.LETTING_GO
     assert np.count_nonzero(faded) and not np.any(read.commanded_n[faded])
     assert np.all(np.isnan(read.velocity_m_per_s[faded]))
-    assert read.phase[-1] == cells.STILL and not np.any(read.applied_n[-1])
+    assert read.phase[-1] == cells.IDLE and not np.any(read.applied_n[-1])
 
 
 def test_the_simulated_device_has_a_ring_in_real_time_and_none_in_virtual_time(rigs):
@@ -218,7 +218,7 @@ def test_what_is_no_ring_is_reported(tmp_path, content):
     path.write_bytes(content)
     for each in (path, tmp_path / "none.ring"):
         with pytest.raises(StudyError, match="cannot be followed"):
-            telemetry_of(str(each))
+            open_telemetry(str(each))
 
 
 @pytest.mark.timeout(20)
@@ -226,16 +226,16 @@ def test_what_is_no_ring_is_reported(tmp_path, content):
 def test_a_pipe_in_the_place_of_a_ring_holds_up_nothing(tmp_path):
     os.mkfifo(tmp_path / "a.ring")
     with pytest.raises(StudyError, match="cannot be followed"):
-        telemetry_of(str(tmp_path / "a.ring"))
+        open_telemetry(str(tmp_path / "a.ring"))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
 def test_the_ring_of_a_killed_program_is_removed_by_the_next_one(tmp_path, monkeypatch):
-    monkeypatch.setattr(telemetry, "_folder", lambda: str(tmp_path))
+    monkeypatch.setattr(telemetry, "_ring_folder", lambda: str(tmp_path))
     monkeypatch.setattr(telemetry, "ABANDONED_AFTER_S", -1.0)
     alive = Ring(rows=2)
     program = (
-        "import os, sys; from study.devices import telemetry; telemetry._folder = lambda: sys.argv[1];"
+        "import os, sys; from study.devices import telemetry; telemetry._ring_folder = lambda: sys.argv[1];"
         "telemetry.Ring(rows=2); os.kill(os.getpid(), 9)"
     )
     subprocess.run([sys.executable, "-c", program, str(tmp_path)], check=False, timeout=60)

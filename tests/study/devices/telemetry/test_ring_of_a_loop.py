@@ -12,7 +12,7 @@ import pytest
 
 from study.devices.clock import RealClock
 from study.devices.device import Fault
-from study.devices.opening import open_device, telemetry_of
+from study.devices.opening import open_device, open_telemetry
 from study.errors import DeviceError
 
 pytestmark = pytest.mark.real_time
@@ -34,7 +34,7 @@ def test_the_program_reads_the_loop_while_it_plays(stub, rigs):
 def read_beside(rigs) -> Fault:
     with contextlib.closing(open_device("omega3", rigs.SETTINGS, RealClock(), seed=1)) as device:
         path = Path(device.telemetry)
-        reader = telemetry_of(device.telemetry)
+        reader = open_telemetry(device.telemetry)
         device.hold(rigs.sine(1.0))
         began_s, reads = time.monotonic(), []
         while time.monotonic() < began_s + 0.5:
@@ -59,7 +59,7 @@ def test_a_loop_that_is_killed_leaves_no_ring_behind(stub, rigs):
     device = open_device("omega3", rigs.SETTINGS, RealClock(), seed=1)
     path = Path(device.telemetry)
     try:
-        reader = telemetry_of(device.telemetry)
+        reader = open_telemetry(device.telemetry)
         device.hold(rigs.sine(1.0))
         time.sleep(0.2)
         os.kill(device._process.pid, signal.SIGKILL)

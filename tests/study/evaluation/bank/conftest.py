@@ -12,14 +12,14 @@ def drawn_once() -> Iterator[None]:
     """For all names: `test_seal_cases.py`. That a draw repeats from its seed: `challenge/test_draw_case.py`."""
     from study.evaluation.bank import seal_cases
 
-    draws = seal_cases.case_of
+    draws = seal_cases.generate_case
     kept = cache(lambda each: draws(each, "kept"))
 
-    def case_of(each, name):
+    def generate_case(each, name):
         case = kept(each)
         recording, model = replace(case.recording, device=name), replace(case.model, name=name)
         return replace(case, recording=recording, model=model)
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(seal_cases, "case_of", case_of)
+        patched.setattr(seal_cases, "generate_case", generate_case)
         yield

@@ -46,20 +46,20 @@ def test_a_killed_sealing_goes_on_with_every_case_labelled(bank, when):
     assert len(kept) == (when == "after")
     seal_cases(bank, PLAN, 1, lambda done: None)
     (place,) = bank.open.iterdir()
-    assert place.name == read_label(bank.label(0))["name"]
+    assert place.name == read_label(bank.label_file(0))["name"]
     assert (place / RECORDING).exists()
-    assert not bank.begun.exists()
+    assert not bank.unfinished.exists()
     assert {path: path.read_bytes() for path in kept} == kept
 
 
 def test_a_label_of_two_cases_finishes_both(bank):
     """Of follow-ups, whose label names the case of each kind."""
     shown, hidden, begun = (begin_case(bank) for _ in range(3))
-    bank.label(0).write_text(f'{{"proposed": {{"name": "{shown.name}"}}, "drawn": {{"name": "{hidden.name}"}}}}')
+    bank.label_file(0).write_text(f'{{"proposed": {{"name": "{shown.name}"}}, "drawn": {{"name": "{hidden.name}"}}}}')
     show_case(bank, shown)
     with finish_begun_cases(bank):
         new = begin_case(bank)
         show_case(bank, new)
     assert {place.name for place in bank.open.iterdir()} == {shown.name, hidden.name, new.name}
     assert not begun.exists()
-    assert not bank.begun.exists()
+    assert not bank.unfinished.exists()

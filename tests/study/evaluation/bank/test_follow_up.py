@@ -8,23 +8,23 @@ import json
 import pytest
 
 from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
-from analysis.evaluation.blind_test.follow_up import FollowUp, follow_up_figures
+from analysis.evaluation.blind_test.follow_up import FollowUp, compute_follow_up_figures
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from study.errors import StudyError
-from study.evaluation.bank.follow_up import DRAWN, NEXT, PROPOSED, follow_up
+from study.evaluation.bank.follow_up import FOLLOW_UP_FOLDER, PROPOSED_KEY, RANDOM_KEY, follow_up
 from study.evaluation.bank.proof_folder import (
     ANSWER,
-    DIED,
-    FURTHER,
+    FURTHER_RECORDING,
     MODEL,
     RECORDING,
     SETTINGS,
+    WORKER_DIED,
     ProofFolder,
     open_proof_folder,
 )
 from study.evaluation.bank.prove import outcome_of
 from study.evaluation.bank.seal_cases import BankPlan, seal_one, settings_text
-from study.evaluation.challenge.draw_bank import draw
+from study.evaluation.challenge.draw_bank import draw_case_plan
 from study.store.disk.provenance import sha256_of
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
@@ -59,8 +59,8 @@ def answer(place, effect="sensor_gain", rival="force_gain", best=""):
 
 def started(path, best):
     folder = open_proof_folder(path, SEED, True)
-    seal_one(folder, draw(SEED, NUMBER, True))
-    label = json.loads(folder.label(NUMBER).read_text())
+    seal_one(folder, draw_case_plan(SEED, NUMBER, True))
+    label = json.loads(folder.label_file(NUMBER).read_text())
     place = folder.open / label["name"]
     without = [effect.name for effect in EFFECT_NAMES if effect.name not in CONSIDERED]
     (place / SETTINGS).write_text(settings_text(without))
@@ -92,9 +92,11 @@ def test_the_right_name_is_left_by_the_recording_that_was_proposed(followed):
 @pytest.mark.slow
 def test_both_cases_are_told_nothing_of_which_is_which(followed):
     folder, *_ = followed
-    again = ProofFolder(folder.path / NEXT)
-    label = json.loads(again.label(NUMBER).read_text())
-    assert {path.name for path in again.open.iterdir()} == {label[which]["name"] for which in (PROPOSED, DRAWN)}
+    again = ProofFolder(folder.path / FOLLOW_UP_FOLDER)
+    label = json.loads(again.label_file(NUMBER).read_text())
+    assert {path.name for path in again.open.iterdir()} == {
+        label[which]["name"] for which in (PROPOSED_KEY, RANDOM_KEY)
+    }
     for place in again.open.iterdir():
         assert {path.name for path in place.iterdir()} == {ANSWER, MODEL, "settings.json"}  # recordings are forgotten
 
@@ -102,9 +104,11 @@ def test_both_cases_are_told_nothing_of_which_is_which(followed):
 @pytest.mark.slow
 def test_the_same_call_continues_without_doing_anything_twice(followed):
     folder, outcome, _, found, _ = followed
-    before = {path: path.stat().st_mtime_ns for path in (folder.path / NEXT).rglob("*") if path.is_file()}
+    before = {path: path.stat().st_mtime_ns for path in (folder.path / FOLLOW_UP_FOLDER).rglob("*") if path.is_file()}
     assert follow_up(folder, PLAN, (outcome,), (2, False), lambda done, of: None) == found
-    assert {path: path.stat().st_mtime_ns for path in (folder.path / NEXT).rglob("*") if path.is_file()} == before
+    assert {
+        path: path.stat().st_mtime_ns for path in (folder.path / FOLLOW_UP_FOLDER).rglob("*") if path.is_file()
+    } == before
 
 
 def test_where_nothing_is_proposed_the_start_stays_open_and_the_random_one_is_played(tmp_path, monkeypatch):
@@ -114,7 +118,7 @@ def test_where_nothing_is_proposed_the_start_stays_open_and_the_random_one_is_pl
     with pytest.raises(StudyError, match="answer.json"):  # without an answer
         follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
     (name,) = asked
-    assert (folder.path / NEXT / "open" / name / FURTHER.format(2)).exists()
+    assert (folder.path / FOLLOW_UP_FOLDER / "open" / name / FURTHER_RECORDING.format(2)).exists()
 
 
 def test_a_case_whose_process_died_keeps_all_its_recordings(tmp_path, monkeypatch):
@@ -122,28 +126,28 @@ def test_a_case_whose_process_died_keeps_all_its_recordings(tmp_path, monkeypatc
 
     def die(again, names, _, on_answered):
         for name in names:
-            (again.open / name / ANSWER).write_text(json.dumps({"name": name, "failed": "it died", DIED: True}))
+            (again.open / name / ANSWER).write_text(json.dumps({"name": name, "failed": "it died", WORKER_DIED: True}))
             on_answered(name)
 
     folder, outcome, _ = started(tmp_path / "bank", False)
     monkeypatch.setattr("study.evaluation.bank.ask_engine.ask_engine", die)
     follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
-    (place,) = (folder.path / NEXT / "open").iterdir()
-    assert {path.name for path in place.glob("*.h5")} == {RECORDING, FURTHER.format(2)}
+    (place,) = (folder.path / FOLLOW_UP_FOLDER / "open").iterdir()
+    assert {path.name for path in place.glob("*.h5")} == {RECORDING, FURTHER_RECORDING.format(2)}
 
 
 def test_a_start_with_one_name_is_not_taken_up_again(tmp_path):
     folder, _, _ = started(tmp_path / "bank", True)
-    place = folder.open / json.loads(folder.label(NUMBER).read_text())["name"]
+    place = folder.open / json.loads(folder.label_file(NUMBER).read_text())["name"]
     said = json.loads((place / ANSWER).read_text())
     said["diagnosis"]["effects"][0]["rivals"] = []
-    alone = outcome_of(json.loads(folder.label(NUMBER).read_text()), said)
+    alone = outcome_of(json.loads(folder.label_file(NUMBER).read_text()), said)
     assert follow_up(folder, PLAN, (alone,), (1, False), lambda done, of: None) == ()
 
 
 def test_a_device_that_cannot_be_drawn_again_is_reported(tmp_path):
     folder, outcome, _ = started(tmp_path / "bank", True)
-    path = folder.label(NUMBER)
+    path = folder.label_file(NUMBER)
     path.write_text(json.dumps(json.loads(path.read_text()) | {"recording_sha256": "0" * 64}))
     with pytest.raises(StudyError, match="cannot be drawn again"):
         follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
@@ -157,7 +161,7 @@ def test_shares_count_all_starts_and_those_for_which_something_is_proposed():
         FollowUp(3, "logger_offset", both, "a sweep", ("sensor_lag",), "another", ("logger_offset",)),
         FollowUp(4, "extra_mode", ("extra_mode", "body_on_actuator"), "", (), "another", ("extra_mode",)),
     ]
-    assert [(follow_up_figure.hits, follow_up_figure.of) for follow_up_figure in follow_up_figures(found)] == [
+    assert [(follow_up_figure.hits, follow_up_figure.of) for follow_up_figure in compute_follow_up_figures(found)] == [
         (1, 4),
         (2, 4),
         (1, 3),

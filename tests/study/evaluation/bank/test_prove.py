@@ -16,8 +16,8 @@ from study.evaluation.bank.proof_summary import blind_test_lines, summary
 from study.evaluation.bank.prove import outcome_of, prove
 from study.evaluation.bank.seal_cases import BankPlan, drawable_cases
 from study.evaluation.bank.sealed_bank import BankOptions, reveal_bank
-from study.evaluation.bank.write_proof import commit, write_proof, write_table
-from study.evaluation.challenge.draw_bank import draw
+from study.evaluation.bank.write_proof import read_current_commit, write_proof, write_table
+from study.evaluation.challenge.draw_bank import draw_case_plan
 from study.store.disk.file_errors import UnusableFileError
 
 ROOT = Path(__file__).parents[4]
@@ -54,7 +54,7 @@ def test_seals_are_read_by_sha256sum_and_come_before_any_answer(proof):
     checked = subprocess.run(["sha256sum", "--check", "--status", "labels.sha256"], cwd=folder.path, check=False)
     assert checked.returncode == 0
     answers = [path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")]
-    assert folder.seals.stat().st_mtime_ns <= min(answers)
+    assert folder.seals_file.stat().st_mtime_ns <= min(answers)
 
 
 def test_what_the_diagnosis_is_given_tells_neither_number_nor_seed(proof):
@@ -118,7 +118,7 @@ def test_a_proof_leaves_a_document_a_row_per_case_and_a_small_table(proof, tmp_p
     document = json.loads((done.folder.path / "proof.json").read_text())
     write_proof(replace(done, engines=("another",)))
     assert json.loads((done.folder.path / "proof.json").read_text())["commit"] == "unknown: the code has changed since"
-    assert document["commit"] == commit()
+    assert document["commit"] == read_current_commit()
     assert next(blind_test_lines(done)).endswith(f"misses in {len(done.outcomes)} cases")
     assert summary(done)["cases"] == len(done.outcomes)
 
@@ -136,14 +136,14 @@ def test_a_label_that_was_changed_afterwards_breaks_its_seal(copied):
     path.write_text(path.read_text().replace('"kind"', '"kind" '))
     with pytest.raises(StudyError, match="A seal is broken"):
         reveal_bank(folder, 100, outcome_of)
-    sealed = folder.seals.read_text()
+    sealed = folder.seals_file.read_text()
     with pytest.raises(StudyError, match="A seal is broken"):
         prove(folder.path, PLAN, BankOptions(), lambda *_: None)
-    assert folder.seals.read_text() == sealed
+    assert folder.seals_file.read_text() == sealed
 
 
 def test_seals_that_are_none_break_the_proof(copied):
-    copied.seals.write_text("garbage\n")
+    copied.seals_file.write_text("garbage\n")
     with pytest.raises(StudyError, match="A seal is broken"):
         prove(copied.path, PLAN, BankOptions(), lambda *_: None)
 
@@ -202,7 +202,7 @@ def test_ctrl_c_keeps_what_is_sealed(tmp_path):
 
 
 def test_the_short_bank_is_of_this_kind():
-    assert {draw(SEED, number, True).rig.period for number in range(3)} == {1000}
+    assert {draw_case_plan(SEED, number, True).settings.period for number in range(3)} == {1000}
 
 
 def test_an_answer_that_is_nested_without_end_is_named(tmp_path):

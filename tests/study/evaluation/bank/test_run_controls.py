@@ -3,7 +3,7 @@
 import pytest
 
 from study.evaluation.bank.ask_engine import is_answered
-from study.evaluation.bank.proof_folder import ANSWER, DIED
+from study.evaluation.bank.proof_folder import ANSWER, WORKER_DIED
 from study.evaluation.bank.run_controls import run_controls
 from study.evaluation.challenge.controls import CONTROLS
 
@@ -20,7 +20,7 @@ def test_noise_alone_and_a_clean_device_name_nothing_and_are_asked_once(tmp_path
 
 
 def test_a_case_whose_process_died_is_asked_again(tmp_path):
-    (tmp_path / ANSWER).write_text('{"failed": "killed", "' + DIED + '": true}')
+    (tmp_path / ANSWER).write_text('{"failed": "killed", "' + WORKER_DIED + '": true}')
     assert not is_answered(tmp_path)
     (tmp_path / ANSWER).write_text('{"failed": "an error of ours"}')
     assert is_answered(tmp_path)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from study.evaluation.bank.seal_cases import truths
+from study.evaluation.bank.seal_cases import concealed_effects_json
 from study.evaluation.challenge.draw_case import Truth, draw_case
 
 
@@ -14,10 +14,10 @@ def case():
 
 
 def test_nothing_missing_is_an_empty_list(case):
-    assert truths(replace(case, truth=())) == []
+    assert concealed_effects_json(replace(case, truth=())) == []
 
 
 def test_what_the_vocabulary_has_no_name_for_stands_apart(case):
     truth = Truth("end_stop", "mechanism", "x", {"position": 0.01}, {"sides": 1.0})
-    (entry,) = truths(replace(case, truth=(truth,)))
+    (entry,) = concealed_effects_json(replace(case, truth=(truth,)))
     assert entry["unseen"] == {"sides": 1.0}

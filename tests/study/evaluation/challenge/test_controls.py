@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from study.evaluation.challenge.controls import CONTROLS, WRONG
-from study.evaluation.challenge.rig import Rig
+from study.evaluation.challenge.case_settings import CaseSettings
+from study.evaluation.challenge.controls import CONTROLS, WRONG_EFFECT
 
-SHORT = Rig((0,), 1000, 3)
+SHORT = CaseSettings((0,), 1000, 3)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_another_device_has_another_model(asked):
 
 def test_a_catalogue_of_one_leaves_one(asked):
     (one,) = asked["a catalogue of one wrong hypothesis"]
-    assert WRONG not in one.without and len(one.without) > 30
+    assert WRONG_EFFECT not in one.excluded_effects and len(one.excluded_effects) > 30
 
 
 def test_other_names_change_nothing_but_names(asked):

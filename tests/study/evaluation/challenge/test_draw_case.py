@@ -7,7 +7,7 @@ import pytest
 
 from equalizer.signals.recording_checks import check_recording
 from study.evaluation.challenge.bench import draw_bench
-from study.evaluation.challenge.device import Device, motion
+from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.draw_case import draw_case
 from study.evaluation.challenge.drive_plan import DrivePlan, draw_plan
 from study.evaluation.challenge.nominal import WIDE, draw_calibration, retune, shift_diagonals
@@ -54,7 +54,7 @@ def test_nothing_missing_is_an_empty_truth():
     [
         ({"effects": ["stiction"]}, "there is no way to conceal 'stiction'"),
         ({"effects": ["cogging"], "strength": 1.5}, "strength is 1.5; it must lie between 0 and 1"),
-        ({"effects": ["hand_impedance"], "concealed": "retuned"}, "from a calibrated model only"),
+        ({"effects": ["hand_impedance"], "origin": "retuned"}, "from a calibrated model only"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(change, said):
@@ -78,7 +78,7 @@ def test_retuning_finds_the_bench_when_nothing_hides():
     random = np.random.default_rng(4)
     bench, plan = draw_bench(random), first_seconds(draw_plan(random))
     start = shift_diagonals(bench, np.repeat((0.02, 0.5, 15.0), 3))
-    each = [motion(Device(bench), plan.command[s.start : s.stop])[0] for s in plan.segments]
+    each = [simulate_motion(Device(bench), plan.command[s.start : s.stop])[0] for s in plan.segments]
     response = np.vstack([one_pole(part, 1.0 - np.exp(-np.pi)) for part in each])
     found, tolerance = retune(start, response, plan)
     assert tolerance == WIDE

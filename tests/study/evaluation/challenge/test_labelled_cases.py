@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study.evaluation.challenge.bench import Bench, Oscillators
-from study.evaluation.challenge.device import Device, motion
+from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.drive_plan import DrivePlan
 from study.evaluation.challenge.effects.actuator import EFFECTS as ACTUATOR
 from study.evaluation.challenge.nominal import retune
@@ -39,7 +39,7 @@ def opened(shared):
 
 def misfit(device, recording):
     """In units of the noise, worst channel, where nothing is clipped."""
-    acceleration, _ = motion(device, recording.command.samples)
+    acceleration, _ = simulate_motion(device, recording.command.samples)
     seen = one_pole(acceleration, 1.0 - np.exp(-np.pi)) @ device.sensor.orientation.T
     apart = (recording.response.samples - seen) / NOISE_MPS2
     read = np.abs(recording.response.samples) < 29.0

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from study.evaluation.challenge.concealed_effect import with_cells, with_forces
-from study.evaluation.challenge.device import Device, motion
+from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.drive_plan import RATE_HZ
 from study.evaluation.challenge.friction_kernel import NEGATIVE, POSITIVE, STIFFNESS
 from study.evaluation.challenge.handle_force_kernel import DRAG
@@ -33,7 +33,7 @@ def exactly(bench, command):
 
 
 def test_the_linear_bench_moves_as_the_matrix_exponential_says(bench, command):
-    acceleration, position = motion(Device(bench), command)
+    acceleration, position = simulate_motion(Device(bench), command)
     true_acceleration, true_position = exactly(bench, command)
     assert (acceleration - true_acceleration).std() < 0.01 * true_acceleration.std()
     assert (position - true_position).std() < 1e-3 * true_position.std()
@@ -42,23 +42,23 @@ def test_the_linear_bench_moves_as_the_matrix_exponential_says(bench, command):
 def test_a_sample_is_read_before_its_own_command_acts(bench):
     command = np.zeros((5, 3))
     command[2:, 0] = 1.0
-    acceleration, _ = motion(Device(bench), command)
+    acceleration, _ = simulate_motion(Device(bench), command)
     assert not acceleration[:3].any()
     assert acceleration[3, 0] == pytest.approx(np.linalg.inv(bench.matrices()[0])[0, 0], rel=0.2)
 
 
 def test_friction_above_the_drive_holds_the_handle(bench, command):
     held = with_cells(np.zeros((3, 7)), 0, {POSITIVE: 50.0, NEGATIVE: 50.0, STIFFNESS: 3e6})
-    _, position = motion(Device(bench, friction=held), command)
+    _, position = simulate_motion(Device(bench, friction=held), command)
     assert np.abs(position[:, 0]).max() < 2e-5 < np.abs(position[:, 1]).max()
 
 
 def test_drag_takes_energy_away_and_an_even_spring_does_not_blow_up(bench, command):
-    _, free = motion(Device(bench), command)
-    _, dragged = motion(with_forces(Device(bench), 0, {DRAG: 50.0}), command)
+    _, free = simulate_motion(Device(bench), command)
+    _, dragged = simulate_motion(with_forces(Device(bench), 0, {DRAG: 50.0}), command)
     assert dragged[:, 0].std() < free[:, 0].std()
 
 
 def test_a_device_that_runs_away_is_refused(bench, command):
     with pytest.raises(ValueError, match="ran away"):
-        motion(replace(Device(bench), coupling=1e7), command)
+        simulate_motion(replace(Device(bench), coupling=1e7), command)

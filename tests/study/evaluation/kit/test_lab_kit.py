@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.evaluation.blind_test.lab_kit import CHANGES, NOTHING
+from analysis.evaluation.blind_test.lab_kit import CHANGES, CONTROL_CHANGE
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from study.errors import StudyError
 from study.evaluation.kit.lab_kit import draw_labels, read_labels, seal_labels
@@ -23,7 +23,7 @@ def test_nothing_is_changed_twice_as_often_and_the_order_is_drawn(tmp_path: Path
     labels = draw_labels(tmp_path / "one.csv", 2, seed=1)
     other = draw_labels(tmp_path / "other.csv", 2, seed=2)
     assert [label.recording for label in labels] == [f"rec_{n:02d}" for n in range(1, 15)]
-    assert [label.change for label in labels].count(NOTHING) == 4
+    assert [label.change for label in labels].count(CONTROL_CHANGE) == 4
     assert [label.change for label in labels] != [each.change for each in other]
     assert len({label.salt for label in labels}) == 14
     assert read_labels(tmp_path / "one.csv") == labels

@@ -16,7 +16,7 @@ from equalizer.signals.signal import Signal
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import open_proof_folder
 from study.evaluation.real.inject_real import PROCESSOR_S, Carrier, seal_injections
-from study.evaluation.real.injected_halves import drawn_halves, held_out_change, without_lead
+from study.evaluation.real.injected_halves import blank_lead_responses, draw_halves, held_out_change
 from study.store.disk.provenance import sha256_of
 from study.store.formats.recording_file import read_recording
 
@@ -55,30 +55,30 @@ def carrier(recording, model) -> Carrier:
 @pytest.fixture(scope="module")
 def split(recording) -> tuple[Recording, Recording]:
     """The later half is the one to be spoiled."""
-    return drawn_halves(recording, np.random.default_rng(LATER))
+    return draw_halves(recording, np.random.default_rng(LATER))
 
 
 def test_what_was_commanded_before_the_later_half_goes_before_it(recording, split):
     sound, rest = split
     lead = rest.segments[0].start
     assert 0 < lead < len(rest) <= SAMPLES
-    given = without_lead(rest)
+    given = blank_lead_responses(rest)
     begun = np.flatnonzero((recording.command.samples == rest.command.samples[0]).all(axis=1))[0]
     assert np.array_equal(given.command.samples, recording.command.samples[begun : begun + len(rest)])
     assert np.isnan(given.response.samples[:lead]).all()
     assert np.array_equal(given.response.samples[lead:], rest.response.samples[lead:])
-    own = without_lead(sound).response.samples
+    own = blank_lead_responses(sound).response.samples
     assert not np.isin(own[np.isfinite(own)], given.response.samples).any()
 
 
 def test_both_halves_are_played_from_rest_equally_well(split, model):
-    errors = [prediction_error(without_lead(half), model, "all").without_gain for half in split]
+    errors = [prediction_error(blank_lead_responses(half), model, "all").without_gain for half in split]
     assert errors == pytest.approx([0.002, 0.002], rel=0.2)
 
 
 def test_splits_differ_and_the_same_draw_gives_the_same():
     def of(seed: int) -> tuple[int, int]:
-        first, second = drawn_halves(in_parts(), np.random.default_rng(seed))
+        first, second = draw_halves(in_parts(), np.random.default_rng(seed))
         return len(first), len(second)
 
     assert of(1) == of(1)
@@ -98,7 +98,7 @@ def in_parts() -> Recording:
 
 def test_parts_by_chance_are_whole_and_in_one_half_only():
     for seed in range(20):
-        halves = drawn_halves(in_parts(), np.random.default_rng(seed))
+        halves = draw_halves(in_parts(), np.random.default_rng(seed))
         if all(len(half.meta.get("parts", ())) > 1 and half.segments[0].start == 0 for half in halves):
             samples = np.concatenate([half.command.samples for half in halves])
             assert np.array_equal(np.sort(samples, axis=0), np.sort(in_parts().command.samples, axis=0))
@@ -108,7 +108,7 @@ def test_parts_by_chance_are_whole_and_in_one_half_only():
 
 @pytest.mark.slow
 def test_what_a_fault_changes_is_what_a_base_of_the_clean_half_misses(split):
-    sound, rest = (without_lead(half) for half in split)
+    sound, rest = (blank_lead_responses(half) for half in split)
     assert held_out_change(sound, rest, rest) == 1.0
     doubled = replace(rest, command=replace(rest.command, samples=2 * rest.command.samples))
     slightly = replace(rest, command=replace(rest.command, samples=1.0001 * rest.command.samples))
@@ -119,7 +119,7 @@ def test_what_a_fault_changes_is_what_a_base_of_the_clean_half_misses(split):
 def test_the_labels_say_what_was_put_in_and_the_clean_half_stays(carrier, tmp_path: Path):
     folder = open_proof_folder(tmp_path / "bank", 4, False)
     names = seal_injections(folder, (carrier,), 8, 4)
-    labels = [json.loads(folder.label(number).read_text()) for number in range(8)]
+    labels = [json.loads(folder.label_file(number).read_text()) for number in range(8)]
     assert [each["name"] for each in labels] == list(names)
     assert {bool(each["effects"]) for each in labels} == {True, False}
     readings, commands = carrier.recording.response.samples, carrier.recording.command.samples
@@ -138,7 +138,7 @@ def test_the_labels_say_what_was_put_in_and_the_clean_half_stays(carrier, tmp_pa
 def test_labels_bind_recording_model_and_clean_half_and_the_search_has_its_time(carrier, tmp_path: Path):
     folder = open_proof_folder(tmp_path / "bank", 4, False)
     (name,) = seal_injections(folder, (carrier,), 1, 4)
-    label, place = json.loads(folder.label(0).read_text()), folder.open / name
+    label, place = json.loads(folder.label_file(0).read_text()), folder.open / name
     assert label["model_sha256"] == sha256_of(place / "model.toml")
     assert label["others_sha256"] == {"clean/recording.h5": sha256_of(place / "clean" / "recording.h5")}
     assert json.loads((place / "settings.json").read_text()) == {"without": [], "processor_s": PROCESSOR_S}
@@ -147,6 +147,6 @@ def test_labels_bind_recording_model_and_clean_half_and_the_search_has_its_time(
 def test_a_label_that_was_changed_breaks_its_seal(carrier, tmp_path: Path):
     folder = open_proof_folder(tmp_path / "bank", 4, False)
     seal_injections(folder, (carrier,), 1, 4)
-    folder.label(0).write_text(folder.label(0).read_text().replace('"strength"', '"strength" '))
+    folder.label_file(0).write_text(folder.label_file(0).read_text().replace('"strength"', '"strength" '))
     with pytest.raises(StudyError, match="A seal is broken"):
         seal_injections(folder, (carrier,), 1, 4)

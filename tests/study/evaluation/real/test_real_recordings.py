@@ -48,7 +48,7 @@ def test_one_recording_is_answered_and_the_others_are_reported(folder: Path, tmp
     assert axis.numbers[0].name == "mass" and axis.numbers[0].holds_nominal
     assert axis.objections == ("It is simulated.",)
     assert torn.verdict == "refused" and "run.npz" in torn.answer
-    assert [trouble.where for trouble in done.results.troubles] == ["without_map"]
+    assert [trouble.location for trouble in done.results.troubles] == ["without_map"]
     page = done.page.read_text()
     assert "It is simulated." in page and "without_map" in page
     assert done.table.read_text().splitlines()[1].startswith(f"axis,run,{axis.verdict},sensor_offset")
@@ -70,7 +70,7 @@ def test_recordings_that_are_links_are_sent_to_workers_too(folder: Path, tmp_pat
     (linked / "gone.npz").symlink_to(folder / "no_such_file")
     write_files(there / "axis", read_files(linked))
     (sent,) = read_real_folder(there).recordings
-    assert (sent.name, [path.name for path in sent.found.files]) == ("run", ["run.npz"])
+    assert (sent.name, [path.name for path in sent.found_map.files]) == ("run", ["run.npz"])
     assert sent.model() is not None
 
 
@@ -197,18 +197,18 @@ def test_every_folder_of_public_recordings_is_understood(shared: Path) -> None:
     found = read_real_folder(shared / "recordings")
     by_name = {recording.name: recording for recording in found.recordings}
     # Folders that no shipped map describes are named as such, and stop none of the others.
-    without_map = {trouble.where for trouble in found.troubles}
-    assert all("no map is for its files" in trouble.why for trouble in found.troubles)
+    without_map = {trouble.location for trouble in found.troubles}
+    assert all("no map is for its files" in trouble.reason for trouble in found.troubles)
     assert not without_map & {"emps", "f16_gvt", "haptic_paddle", "rack_drive", "silverbox", "vibration_actuator"}
     assert set(by_name) >= {
         "emps", "f16_gvt", "haptic_paddle_sensors", "haptic_paddle_torque", "rack_drive", "silverbox",
         "vibration_actuator_noise_condition1_noise", "vibration_actuator_noise_condition2_noise",
     }  # fmt: skip
     on_a_body = by_name["vibration_actuator_noise_condition2_noise"]
-    assert on_a_body.before is not None and on_a_body.before.files[0].name == "condition1_noise.npz"
+    assert on_a_body.reference is not None and on_a_body.reference.files[0].name == "condition1_noise.npz"
     assert [test.files[0].stem for test in on_a_body.tests] == ["condition2_clip"]
     assert [test.name for test in by_name["silverbox"].tests] == ["silverbox_growing_noise", "silverbox_schroeder"]
-    assert all(recording.found.source.map.diagnosis.objections for recording in found.recordings)
+    assert all(recording.found_map.source.map.diagnosis.objections for recording in found.recordings)
     assert by_name["haptic_paddle_torque"].model().rotational
 
 

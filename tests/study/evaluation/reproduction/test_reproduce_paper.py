@@ -180,8 +180,8 @@ def test_interrupted_it_says_that_the_same_command_continues(plan, tmp_path):
 def test_progress_never_steps_back():
     told: list[float] = []
     steps = Steps({"a": 1.0, "b": 3.0}, told.append)
-    steps.of("a")(1.0)
-    steps.of("b")(0.5)
-    steps.of("b")(0.2)
-    steps.of("b")(2.0)
+    steps.progress_of("a")(1.0)
+    steps.progress_of("b")(0.5)
+    steps.progress_of("b")(0.2)
+    steps.progress_of("b")(2.0)
     assert told == [0.25, 0.625, 0.625, 1.0]

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study.importing.expressions.budget import Budget
-from study.importing.expressions.expression import evaluate, names_in
+from study.importing.expressions.expression import evaluate, find_names
 from study.importing.expressions.functions import FUNCTIONS
 from study.importing.expressions.namespace import Namespace
 from study.importing.map_format.map_errors import ImportProblemError
@@ -109,7 +109,7 @@ def test_huge_powers_take_no_time():
 
 
 def test_the_names_that_an_expression_needs_are_known():
-    assert names_in("gain * (u - mean(array('Force [N]'))) + pi * clock_s") == {"gain", "u", "Force [N]"}
+    assert find_names("gain * (u - mean(array('Force [N]'))) + pi * clock_s") == {"gain", "u", "Force [N]"}
 
 
 def test_every_function_says_how_it_is_used():

@@ -3,13 +3,13 @@ import pytest
 
 from study.importing.map_format.import_map import SegmentMap
 from study.importing.map_format.map_errors import ImportProblemError
-from study.importing.map_format.map_segments import segments_of
+from study.importing.map_format.map_segments import place_segments
 
 COMMAND = np.linspace(-3, 2, 1000)[:, None]
 
 
 def found(*entries, part=("a.npz", "")):
-    return [(s.start, s.stop, s.role, round(s.amplitude, 3)) for s in segments_of(entries, part, COMMAND, 100.0)]
+    return [(s.start, s.stop, s.role, round(s.amplitude, 3)) for s in place_segments(entries, part, COMMAND, 100.0)]
 
 
 def test_a_segment_is_the_whole_part_with_its_measured_peak():

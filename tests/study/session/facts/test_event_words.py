@@ -6,7 +6,7 @@ from datetime import timedelta, timezone
 import pytest
 
 from protocols.trial import Phase
-from study.session.facts.event_words import in_words, log_in_words
+from study.session.facts.event_words import describe_event, describe_log
 from study.session.facts.events import (
     AnswerGiven,
     DemoFinished,
@@ -97,7 +97,7 @@ SENTENCES = [
 
 @pytest.mark.parametrize(("event", "sentence"), SENTENCES, ids=lambda value: getattr(value, "event", ""))
 def test_each_fact_is_a_plain_sentence(event, sentence):
-    assert in_words(event) == sentence
+    assert describe_event(event) == sentence
 
 
 def test_no_kind_of_fact_is_without_words():
@@ -117,18 +117,18 @@ def test_no_kind_of_fact_is_without_words():
     ],
 )
 def test_forms_are_told_by_their_outcome(form, passed, answers, expected):
-    assert expected in in_words(FormFilled(UTC, form, "1", "E7", passed, answers))
+    assert expected in describe_event(FormFilled(UTC, form, "1", "E7", passed, answers))
 
 
 @pytest.mark.parametrize("form", ["exclusion", "debrief"])
 def test_nothing_about_health_is_in_the_words(form):
-    said = in_words(FormFilled(UTC, form, "1", "", False, {"question_1": "white fingers"}))
+    said = describe_event(FormFilled(UTC, form, "1", "", False, {"question_1": "white fingers"}))
     assert "white fingers" not in said
     assert "question_1" not in said
 
 
 def test_the_direction_is_reported_once_the_answer_counts():
-    (_, presented, answer, _) = log_in_words((PRESENTED, ANSWER, MEASURED))
+    (_, presented, answer, _) = describe_log((PRESENTED, ANSWER, MEASURED))
     assert presented == "09:30:12  Run 2, trial 5 (test): direction 2, 1.000 N at 35 Hz."
     assert answer == "09:30:12  Answer 2 after 1.23 s: right."
 
@@ -139,7 +139,7 @@ VOID = TrialSpoiled(UTC, 1, 4, 0, "no answer")
 @pytest.mark.parametrize("end", [(), (VOID,), (ANSWER,), (ANSWER, VOID)])
 def test_the_direction_of_a_trial_that_does_not_count_is_told_nowhere(end):
     """It may come again, or was told to be void: the same stimulus is played again."""
-    words = " ".join(log_in_words((PRESENTED, *end)))
+    words = " ".join(describe_log((PRESENTED, *end)))
     assert "direction" not in words
     assert "right" not in words
     assert "wrong" not in words
@@ -148,19 +148,19 @@ def test_the_direction_of_a_trial_that_does_not_count_is_told_nowhere(end):
 
 def test_another_attempt_of_the_same_trial_keeps_its_own_direction_hidden():
     again = TrialPresented(UTC, 1, 4, 1, Phase.TEST, 35.0, 0.0, 1.0, 1, 135.0, 1)
-    words = log_in_words((PRESENTED, ANSWER, MEASURED, again))
+    words = describe_log((PRESENTED, ANSWER, MEASURED, again))
     assert "direction 2" in words[1]
     assert words[4] == "09:30:12  Run 2, trial 5 (test, attempt 2): 1.000 N at 35 Hz."
 
 
 def test_a_detection_trial_has_an_interval():
     shown = TrialPresented(UTC, 1, 4, 0, Phase.DETECTION, 35.0, 0.0, 1.0, 2, 45.0, 1)
-    assert "interval 2" in log_in_words((shown, ANSWER, MEASURED))[1]
+    assert "interval 2" in describe_log((shown, ANSWER, MEASURED))[1]
 
 
 def test_each_day_has_a_line_of_its_own():
     later = SessionClosed("2026-05-05T10:00:00+00:00", "completed")
-    dates = [line for line in log_in_words((OPENED, MEASURED, later)) if "times are UTC" in line]
+    dates = [line for line in describe_log((OPENED, MEASURED, later)) if "times are UTC" in line]
     assert dates == ["2026-05-04 (times are UTC +00:00)", "2026-05-05 (times are UTC +00:00)"]
 
 
@@ -170,7 +170,7 @@ def test_times_are_those_of_the_place_and_a_change_of_its_clock_has_a_line_of_it
         return time.astimezone(timezone(timedelta(hours=2 if time.hour < 1 else 1)))
 
     told = [RestTaken(f"2026-10-25T{utc}:00.000+00:00", 0, 0, 60.0) for utc in ("00:30", "01:30")]
-    lines = log_in_words(told, zone)
+    lines = describe_log(told, zone)
     assert [line[:8] for line in lines] == ["2026-10-", "02:30:00", "2026-10-", "02:30:00"]
     assert [lines[0][11:], lines[2][11:]] == ["(times are UTC +02:00)", "(times are UTC +01:00)"]
 
@@ -179,8 +179,8 @@ def test_a_time_that_cannot_be_converted_stays_as_it_is():
     def none(time):
         raise OverflowError
 
-    assert log_in_words([DemoFinished(UTC)], none) == (f"{UTC}  The demonstration is over.",)
+    assert describe_log([DemoFinished(UTC)], none) == (f"{UTC}  The demonstration is over.",)
 
 
 def test_control_characters_of_a_note_do_not_reach_the_terminal():
-    assert "\x1b" not in in_words(NoteTaken(UTC, "participant", "a\x1b[2Jb"))
+    assert "\x1b" not in describe_event(NoteTaken(UTC, "participant", "a\x1b[2Jb"))

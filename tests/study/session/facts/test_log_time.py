@@ -9,9 +9,9 @@ import pytest
 from protocols.definition.exposure import SittingLimits
 from study.session.facts.events import DemoPlayed, NoteTaken, SessionInterrupted, SessionResumed
 from study.session.facts.log_time import ClockStep, Moment, clock_step, elapsed_s
-from study.session.state.fold import apply
-from study.session.state.machine import limit_reached
-from study.session.state.sitting_state import NIGHT_H, dose_now, pass_time
+from study.session.state.fold import apply_event
+from study.session.state.machine import find_reached_limit
+from study.session.state.sitting_state import NIGHT_H, compute_daily_dose, pass_time
 from study.session.state.state import begin_session
 
 H = 3600.0
@@ -43,7 +43,7 @@ class Computer:
         return self
 
     def log(self, event) -> "Computer":
-        self.state = apply(self.state, event)
+        self.state = apply_event(self.state, event)
         return self
 
     def vibrate(self) -> "Computer":
@@ -62,14 +62,14 @@ class Computer:
 
     @property
     def vibrated_s(self) -> float:
-        return dose_now(pass_time(self.state.sitting, Moment(self.utc, self.stamp))).vibrated_s
+        return compute_daily_dose(pass_time(self.state.sitting, Moment(self.utc, self.stamp))).vibrated_s
 
     @property
     def steps_h(self) -> list[float]:
         return [round(step.by_s / H, 3) for step in self.state.sitting.clock_steps]
 
     def limit(self) -> str:
-        return limit_reached(self.state, self.utc, self.stamp)
+        return find_reached_limit(self.state, self.utc, self.stamp)
 
 
 @pytest.fixture

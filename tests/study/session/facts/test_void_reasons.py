@@ -8,10 +8,10 @@ from study.devices.device import Fault, Health
 from study.session.facts.void_reasons import (
     SCREEN_LATE,
     SCREEN_SILENT,
-    busy_sentence,
-    computer_too_busy,
-    why_screen_silent,
-    why_too_many,
+    describe_busy_voids,
+    explain_many_voids,
+    explain_silent_screen,
+    is_computer_busy,
 )
 from study.tui.trial_words import void_words
 from study.workflows.trial.judge_trial import judge
@@ -30,19 +30,19 @@ MISSED = "12.0 % of the 1 kHz ticks were missed"
     ],
 )
 def test_a_silent_screen_is_put_down_to_the_computer_only_where_something_shows_it(engine_late_s, load, why):
-    assert why_screen_silent(engine_late_s, load) == why
+    assert explain_silent_screen(engine_late_s, load) == why
 
 
 def test_what_a_busy_computer_does_to_a_trial_is_counted_as_that(small_protocol):
     late = judge(Health(Fault.NONE, 1000, 120, 0, 0, 0, 0, 1.0), small_protocol.measurement, True)
-    assert late.spoiled == MISSED
-    for reason in (SCREEN_LATE, Fault.STALLED.value, late.spoiled):
-        assert computer_too_busy(reason)
+    assert late.void_reason == MISSED
+    for reason in (SCREEN_LATE, Fault.STALLED.value, late.void_reason):
+        assert is_computer_busy(reason)
         words = void_words(reason)
         assert words.startswith("The computer was too busy for a moment")
         assert words.endswith("This was not your fault, and the trial is repeated.")
     for reason in (SCREEN_SILENT, Fault.LOST.value, "the participant asked for it again", ""):
-        assert not computer_too_busy(reason)
+        assert not is_computer_busy(reason)
 
 
 @pytest.mark.parametrize(
@@ -61,21 +61,21 @@ def test_above_a_limit_of_the_protocol_late_ticks_make_a_trial_void(small_protoc
     health = Health(Fault.NONE, 1000, missed, 0, 0, 0, 0, 1.0, late_ticks=late, latest_s=latest_s)
     limited = replace(small_protocol.measurement, late_ticks_limit=0.02, longest_late_ms=10.0)
     found = judge(health, limited, True)
-    assert found.spoiled == spoiled
-    assert computer_too_busy(found.spoiled) is bool(spoiled)
+    assert found.void_reason == spoiled
+    assert is_computer_busy(found.void_reason) is bool(spoiled)
 
 
 def test_late_ticks_are_judged_as_they_were_at_the_answer(small_protocol):
     at_answer = Health(Fault.NONE, 1000, 0, 0, 0, 0, 0, 1.0, late_ticks=1, latest_s=0.002)
     released = replace(at_answer, ticks=1100, late_ticks=50, latest_s=0.05)
     limited = replace(small_protocol.measurement, late_ticks_limit=0.02, longest_late_ms=10.0)
-    assert judge(released, limited, True, at_answer).spoiled == ""
-    assert judge(released, limited, True).spoiled != ""
+    assert judge(released, limited, True, at_answer).void_reason == ""
+    assert judge(released, limited, True).void_reason != ""
 
 
 def test_a_protocol_that_limits_no_late_ticks_counts_such_trials(small_protocol):
     late = Health(Fault.NONE, 1000, 0, 0, 0, 0, 0, 1.0, late_ticks=900, latest_s=0.09)
-    assert judge(late, small_protocol.measurement, True).spoiled == ""
+    assert judge(late, small_protocol.measurement, True).void_reason == ""
 
 
 def test_a_silent_screen_is_not_the_participants_fault_either():
@@ -87,15 +87,17 @@ def test_a_silent_screen_is_not_the_participants_fault_either():
 
 def test_three_void_trials_end_a_sitting_for_the_reason_that_they_had():
     busy = "the computer is too busy: 3 trials in a row were void because of it, not because of the participant"
-    assert why_too_many((SCREEN_LATE, SCREEN_LATE, MISSED)) == f"{busy} (the last because {MISSED})"
-    assert why_too_many((SCREEN_LATE, MISSED, Fault.STALLED.value)).startswith(busy)
-    mixed = why_too_many((SCREEN_LATE, SCREEN_LATE, SCREEN_SILENT))
+    assert explain_many_voids((SCREEN_LATE, SCREEN_LATE, MISSED)) == f"{busy} (the last because {MISSED})"
+    assert explain_many_voids((SCREEN_LATE, MISSED, Fault.STALLED.value)).startswith(busy)
+    mixed = explain_many_voids((SCREEN_LATE, SCREEN_LATE, SCREEN_SILENT))
     assert mixed.endswith("the last because the screen gave no sign of life: the computer may be too busy")
-    away = why_too_many((SCREEN_LATE, MISSED, "no answer within the time limit"))
+    away = explain_many_voids((SCREEN_LATE, MISSED, "no answer within the time limit"))
     assert away == "3 trials in a row were void, the last because no answer within the time limit"
 
 
 def test_the_experimenter_reads_how_many():
-    assert busy_sentence(1).startswith("The computer was too busy: 1 trial was void because of it in this sitting")
-    assert "3 trials were void" in busy_sentence(3)
-    assert busy_sentence(3).endswith("hapteq doctor measures how late it is.")
+    assert describe_busy_voids(1).startswith(
+        "The computer was too busy: 1 trial was void because of it in this sitting"
+    )
+    assert "3 trials were void" in describe_busy_voids(3)
+    assert describe_busy_voids(3).endswith("hapteq doctor measures how late it is.")

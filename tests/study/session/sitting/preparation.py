@@ -4,7 +4,7 @@ from study.session.facts.events import (
     DeviceChecked,
     FormFilled,
 )
-from study.session.state.fold import apply
+from study.session.state.fold import apply_event
 
 UTC = "2026-01-01T00:00:00.000+00:00"
 
@@ -15,5 +15,5 @@ def filled(form: str, passed: bool = True, **answers: str) -> FormFilled:
 
 def prepared(state):
     for event in (filled("consent"), filled("exclusion"), filled("setup"), DeviceChecked(UTC, True, ())):
-        state = apply(state, event)
+        state = apply_event(state, event)
     return state

@@ -11,19 +11,19 @@ from study.session.facts.events import (
     SessionResumed,
 )
 from study.session.state.draw_check import LogContradiction
-from study.session.state.fold import apply
+from study.session.state.fold import apply_event
 from study.session.state.machine import (
     CheckDevice,
     Demonstrate,
+    EndSitting,
     FillIn,
     Finish,
-    Leave,
-    Rest,
+    TakeRest,
     next_action,
     next_preparation,
 )
 from study.session.views.form_views import FormKind, FormReply, find_missing_fields
-from study.session.views.forms import form_of, judge_form
+from study.session.views.forms import judge_form, make_form
 from tests.study.session.sitting.preparation import UTC, filled, prepared
 
 
@@ -32,7 +32,7 @@ def test_a_person_is_asked_for_consent_first_and_for_the_device_last(begun, full
     for event in (filled("consent"), filled("exclusion"), filled("setup"), DeviceChecked(UTC, True, ())):
         due = next_preparation(state)
         kinds.append(due.form.kind if isinstance(due, FillIn) else type(due))
-        state = apply(state, event)
+        state = apply_event(state, event)
     assert kinds == [FormKind.CONSENT, FormKind.EXCLUSION, FormKind.SETUP, CheckDevice]
     assert next_preparation(state) is None
 
@@ -47,81 +47,81 @@ def test_a_simulated_participant_signs_nothing(begun, full):
 def test_without_consent_or_with_an_exclusion_no_stimulus_comes(begun, full, form, reason):
     state = begun(full)
     if form == "exclusion":
-        state = apply(state, filled("consent"))
-    state = apply(state, filled(form, passed=False))
-    assert isinstance(next_preparation(state), Leave)
+        state = apply_event(state, filled("consent"))
+    state = apply_event(state, filled(form, passed=False))
+    assert isinstance(next_preparation(state), EndSitting)
     assert reason in next_preparation(state).reason
 
 
 def test_a_resumed_session_asks_again_how_one_sits_and_nothing_else(begun, full, facts):
     state = prepared(begun(full))
-    resumed = apply(state, SessionResumed(UTC, state.opened.device, {}))
+    resumed = apply_event(state, SessionResumed(UTC, state.opened.device, {}))
     assert next_preparation(resumed).form.kind is FormKind.SETUP
 
 
 def test_a_refusal_by_a_slip_of_the_finger_can_be_mended_in_another_sitting(begun, full):
-    state = apply(begun(full), filled("consent", passed=False))
-    again = apply(state, SessionResumed(UTC, state.opened.device, {}))
+    state = apply_event(begun(full), filled("consent", passed=False))
+    again = apply_event(state, SessionResumed(UTC, state.opened.device, {}))
     assert next_preparation(again).form.kind is FormKind.CONSENT
 
 
 def test_the_demonstration_comes_once_before_the_first_trial(begun, full):
     state = prepared(begun(full))
     assert isinstance(next_action(state), Demonstrate)
-    state = apply(state, DemoPlayed(UTC, 25.0, 1.0, 1, 135.0, 2.0))
+    state = apply_event(state, DemoPlayed(UTC, 25.0, 1.0, 1, 135.0, 2.0))
     assert isinstance(next_action(state), Demonstrate)
-    state = apply(state, DemoFinished(UTC))
+    state = apply_event(state, DemoFinished(UTC))
     assert next_action(state).phase is Phase.TRAINING
 
 
 def test_nothing_is_filled_in_or_demonstrated_while_a_trial_is_open(begun, small_protocol, facts):
     state = begun(small_protocol)
-    state = apply(state, facts.presented(next_action(state)))
+    state = apply_event(state, facts.presented(next_action(state)))
     with pytest.raises(LogContradiction, match="while a trial is open"):
-        apply(state, DemoFinished(UTC))
+        apply_event(state, DemoFinished(UTC))
 
 
 def test_the_debrief_comes_after_the_last_run(begun, full, facts):
-    state = apply(prepared(begun(full)), DemoFinished(UTC))
+    state = apply_event(prepared(begun(full)), DemoFinished(UTC))
     answers = iter([True, True, True, False] * 200)
     while not state.finished:
         action = next_action(state)
         state = (
-            apply(state, RestTaken(UTC, state.run, state.trial, 2.0))
-            if isinstance(action, Rest)
+            apply_event(state, RestTaken(UTC, state.run, state.trial, 2.0))
+            if isinstance(action, TakeRest)
             else facts.one_trial(state, next(answers))
         )
     assert next_action(state).form.kind is FormKind.DEBRIEF
-    assert isinstance(next_action(apply(state, filled("debrief"))), Finish)
+    assert isinstance(next_action(apply_event(state, filled("debrief"))), Finish)
 
 
 def test_consent_is_given_by_every_statement_and_kept(full):
-    form = form_of(full, FormKind.CONSENT)
+    form = make_form(full, FormKind.CONSENT)
     assert (form.version, form.ethics_id) == ("3", "EK 7/26")
-    assert judge_form(full, form_of(full, FormKind.CONSENT), FormReply({"statement_1": "yes"})).passed
-    assert not judge_form(full, form_of(full, FormKind.CONSENT), FormReply({"statement_1": "no"})).passed
+    assert judge_form(full, make_form(full, FormKind.CONSENT), FormReply({"statement_1": "yes"})).passed
+    assert not judge_form(full, make_form(full, FormKind.CONSENT), FormReply({"statement_1": "no"})).passed
 
 
 def test_answers_about_health_are_not_kept(full):
-    outcome = judge_form(full, form_of(full, FormKind.EXCLUSION), FormReply({"question_1": "yes"}))
+    outcome = judge_form(full, make_form(full, FormKind.EXCLUSION), FormReply({"question_1": "yes"}))
     assert not outcome.passed
     assert outcome.kept == {}
 
 
 def test_a_set_up_that_is_not_the_protocols_is_reported(full):
     answers = {"hearing": "nothing", "hand_hidden": "no", "arm_supported": "yes", "grip": "pen grip", "hand": "right"}
-    outcome = judge_form(full, form_of(full, FormKind.SETUP), FormReply(answers))
+    outcome = judge_form(full, make_form(full, FormKind.SETUP), FormReply(answers))
     assert outcome.passed
     assert outcome.kept == answers
     assert outcome.reminder == "The set-up is not the protocol's: the device can be heard, the hand can be seen."
 
 
 def test_a_form_knows_what_is_missing(full):
-    form = form_of(full, FormKind.DEBRIEF)
+    form = make_form(full, FormKind.DEBRIEF)
     assert [field.key for field in find_missing_fields(form, FormReply({}))] == []
     assert [field.key for field in find_missing_fields(form, FormReply({"felt": "maybe"}))] == ["felt"]
     assert find_missing_fields(form, FormReply({"felt": "no", "strategy": ""})) == ()
 
 
 def test_a_protocol_that_asks_nothing_has_no_forms(small_protocol):
-    assert [form_of(small_protocol, kind) for kind in FormKind] == [None] * len(FormKind)
+    assert [make_form(small_protocol, kind) for kind in FormKind] == [None] * len(FormKind)

@@ -15,15 +15,15 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.facts.log_time import Moment
-from study.session.state.fold import apply
+from study.session.state.fold import apply_event
 from study.session.state.machine import (
+    EndSitting,
     Finish,
-    Leave,
-    Rest,
-    limit_reached,
+    TakeRest,
+    find_reached_limit,
     next_action,
 )
-from study.session.state.progress import progress
+from study.session.state.progress import estimate_progress
 from study.session.state.vibration_dose import a8_mps2
 from tests.study.session.sitting.preparation import UTC, prepared
 
@@ -31,16 +31,16 @@ LATER = "2026-01-01T02:00:00.000+00:00"
 
 
 def test_practice_stays_at_its_level_until_it_is_passed(begun, full, facts):
-    state = apply(prepared(begun(full)), DemoFinished(UTC))
+    state = apply_event(prepared(begun(full)), DemoFinished(UTC))
     while next_action(state) and not state.runs[state.run].practice:
         action = next_action(state)
         state = (
-            apply(state, RestTaken(UTC, state.run, state.trial, 2.0))
-            if isinstance(action, Rest)
+            apply_event(state, RestTaken(UTC, state.run, state.trial, 2.0))
+            if isinstance(action, TakeRest)
             else facts.one_trial(state, correct=True)
         )
-    if isinstance(next_action(state), Rest):
-        state = apply(state, RestTaken(UTC, state.run, state.trial, 2.0))
+    if isinstance(next_action(state), TakeRest):
+        state = apply_event(state, RestTaken(UTC, state.run, state.trial, 2.0))
     practice = state.run
     levels = []
     for correct in (False, True, True):
@@ -58,7 +58,7 @@ def through_to_test(state, facts):
     while state.runs[state.run].phase is not Phase.TEST:
         state = facts.one_trial(state, correct=True)
         if state.rest_due_s:
-            state = apply(state, RestTaken(UTC, state.run, state.trial, 2.0))
+            state = apply_event(state, RestTaken(UTC, state.run, state.trial, 2.0))
     return state
 
 
@@ -104,14 +104,14 @@ def test_in_a_detection_run_the_interval_is_the_answer(begun, small_protocol, fa
 def test_the_dose_counts_every_vibration_at_the_hand(begun, small_protocol, facts):
     state = begun(small_protocol)
     action = next_action(state)
-    state = apply(apply(state, facts.presented(action)), facts.answered(action, correct=True))
+    state = apply_event(apply_event(state, facts.presented(action)), facts.answered(action, correct=True))
     measured = replace(facts.measured(action), delivered_mps2=3.0, off_axis_mps2=4.0, vibrated_s=10.0)
-    state = apply(state, measured)
+    state = apply_event(state, measured)
     first = state.sitting.dose
     assert first.vibrated_s == 10.0
     action = next_action(state)
-    state = apply(state, facts.presented(action))
-    state = apply(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "a pause", vibrated_s=10.0))
+    state = apply_event(state, facts.presented(action))
+    state = apply_event(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "a pause", vibrated_s=10.0))
     assert state.sitting.dose.vibrated_s == 20.0
     assert state.sitting.dose.squared_s > first.squared_s  # at the ratio that was measured before
     assert a8_mps2(state.sitting.dose) < 1.0
@@ -120,30 +120,30 @@ def test_the_dose_counts_every_vibration_at_the_hand(begun, small_protocol, fact
 def test_a_stimulus_without_a_measurement_is_marked_in_the_dose(begun, small_protocol, facts):
     state = begun(small_protocol)
     action = next_action(state)
-    state = apply(state, facts.presented(action))
-    state = apply(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "a fault", vibrated_s=3.0))
+    state = apply_event(state, facts.presented(action))
+    state = apply_event(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "a fault", vibrated_s=3.0))
     assert state.sitting.dose.unmeasured_s == 3.0
 
 
 def test_the_dose_starts_again_after_a_night_and_not_at_midnight(begun, small_protocol, facts):
     late = "2026-01-01T23:50:00.000+00:00"
-    state = apply(begun(small_protocol), DemoPlayed(late, 25.0, 1.0, 1, 135.0, 2.0))
-    past_midnight = apply(state, DemoPlayed("2026-01-02T00:10:00.000+00:00", 25.0, 1.0, 1, 135.0, 2.0))
+    state = apply_event(begun(small_protocol), DemoPlayed(late, 25.0, 1.0, 1, 135.0, 2.0))
+    past_midnight = apply_event(state, DemoPlayed("2026-01-02T00:10:00.000+00:00", 25.0, 1.0, 1, 135.0, 2.0))
     assert past_midnight.sitting.dose.vibrated_s == 4.0
-    set_back = apply(state, DemoPlayed(UTC, 25.0, 1.0, 1, 135.0, 2.0))
+    set_back = apply_event(state, DemoPlayed(UTC, 25.0, 1.0, 1, 135.0, 2.0))
     assert set_back.sitting.dose.vibrated_s == 4.0
-    tomorrow = apply(state, DemoPlayed("2026-01-02T11:00:00.000+00:00", 25.0, 1.0, 1, 135.0, 2.0))
+    tomorrow = apply_event(state, DemoPlayed("2026-01-02T11:00:00.000+00:00", 25.0, 1.0, 1, 135.0, 2.0))
     assert tomorrow.sitting.dose.vibrated_s == 2.0
 
 
 def test_a_sitting_that_is_too_long_ends_between_two_trials(begun, small_protocol, facts):
     protocol = replace(small_protocol, limits=SittingLimits(longest_min=119.0))
     state = facts.one_trial(begun(protocol), correct=True)
-    assert limit_reached(state, UTC) == ""
+    assert find_reached_limit(state, UTC) == ""
     due = next_action(state, LATER)
-    assert isinstance(due, Leave)
+    assert isinstance(due, EndSitting)
     assert "119 minutes" in due.reason and "another day" in due.reason
-    resumed = apply(state, SessionResumed(LATER, state.opened.device, {}))
+    resumed = apply_event(state, SessionResumed(LATER, state.opened.device, {}))
     assert next_action(resumed, LATER).phase is Phase.TRAINING
 
 
@@ -153,27 +153,27 @@ def test_a_hand_that_had_its_dose_rests_for_the_day(begun, small_protocol):
     shaken = replace(state.sitting, dose=replace(state.sitting.dose, squared_s=100.0), still_s=0.0, last=Moment(UTC))
     tired = replace(state, sitting=shaken)
     assert "vibration dose for today" in next_action(tired, LATER).reason
-    assert not isinstance(next_action(tired, LATER.replace("01-01", "01-02")), Leave)
+    assert not isinstance(next_action(tired, LATER.replace("01-01", "01-02")), EndSitting)
     simulated = replace(tired, opened=replace(tired.opened, observer="ideal"))
-    assert not isinstance(next_action(simulated, LATER), Leave)
+    assert not isinstance(next_action(simulated, LATER), EndSitting)
 
 
 def test_a_pause_changes_nothing(begun, small_protocol):
     state = begun(small_protocol)
-    assert apply(state, PauseTaken(UTC, "experimenter", 12.0)) == state
+    assert apply_event(state, PauseTaken(UTC, "experimenter", 12.0)) == state
 
 
 def test_progress_grows_with_trials_and_says_nothing_of_levels(begun, small_protocol, facts):
     right, wrong = begun(small_protocol), begun(small_protocol)
-    shares = [progress(right).share_done]
+    shares = [estimate_progress(right).share_done]
     for _ in range(4):
         right, wrong = facts.one_trial(right, correct=True), facts.one_trial(wrong, correct=False)
-        assert progress(right) == progress(wrong)
-        shares.append(progress(right).share_done)
+        assert estimate_progress(right) == estimate_progress(wrong)
+        shares.append(estimate_progress(right).share_done)
     assert shares[0] == 0.0
     assert shares == sorted(shares)
-    assert progress(right).minutes_left is None
-    right = apply(right, RestTaken(UTC, 1, 0, 2.0))
+    assert estimate_progress(right).minutes_left is None
+    right = apply_event(right, RestTaken(UTC, 1, 0, 2.0))
     for _ in range(4):
         right = facts.one_trial(right, correct=True)
-    assert 0 < progress(right).minutes_left < 30
+    assert 0 < estimate_progress(right).minutes_left < 30

@@ -4,8 +4,8 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 
 from study.session.facts.log_time import Moment
-from study.session.state.daily_dose import dose_elsewhere, with_dose_elsewhere
-from study.session.state.sitting_state import SittingState, dose_now, pass_time, start_motion
+from study.session.state.daily_dose import find_dose_elsewhere, set_dose_elsewhere
+from study.session.state.sitting_state import SittingState, compute_daily_dose, pass_time, start_motion
 from study.session.state.vibration_dose import Dose
 
 MORNING = datetime.fromisoformat("2026-01-01T08:00:00.000+00:00")
@@ -24,7 +24,7 @@ def session(began_h: float, ended_h: float, vibrated_s: float) -> SittingState:
 
 def test_sessions_of_the_same_day_add_up_and_those_before_a_night_do_not():
     sessions = {"P01_001": session(-14, -13, 7.0), "P01_002": session(0, 1, 20.0), "P01_003": session(3, 4, 30.0)}
-    found = dose_elsewhere(sessions, "P01_004", at(5))
+    found = find_dose_elsewhere(sessions, "P01_004", at(5))
     assert found is not None
     assert found.sessions == ("P01_002", "P01_003")
     assert (found.squared_s, found.vibrated_s, found.still_s) == (500.0, 50.0, 3600.0)
@@ -32,25 +32,25 @@ def test_sessions_of_the_same_day_add_up_and_those_before_a_night_do_not():
 
 def test_own_movements_join_two_others_into_one_day_and_are_not_counted_twice():
     sessions = {"P01_001": session(-8, -7, 7.0), "P01_002": session(1, 2, 20.0)}
-    found = dose_elsewhere(sessions, "P01_002", at(4))
+    found = find_dose_elsewhere(sessions, "P01_002", at(4))
     assert found is not None
     assert (found.sessions, found.vibrated_s) == (("P01_001",), 7.0)
-    assert dose_elsewhere({"P01_002": sessions["P01_002"]}, "P01_002", at(4)) is None
+    assert find_dose_elsewhere({"P01_002": sessions["P01_002"]}, "P01_002", at(4)) is None
 
 
 def test_after_a_night_nothing_counts_and_a_clock_set_back_is_no_night():
     sessions = {"P01_001": session(0, 1, 20.0)}
-    assert dose_elsewhere(sessions, "P01_002", at(11.0)) is None
-    back = dose_elsewhere(sessions, "P01_002", at(-30.0))
+    assert find_dose_elsewhere(sessions, "P01_002", at(11.0)) is None
+    back = find_dose_elsewhere(sessions, "P01_002", at(-30.0))
     assert back is not None and (back.vibrated_s, back.still_s) == (20.0, 0.0)
-    assert dose_elsewhere({"P01_001": SittingState()}, "P01_002", at(0)) is None
+    assert find_dose_elsewhere({"P01_001": SittingState()}, "P01_002", at(0)) is None
 
 
 def test_what_was_found_counts_until_the_hand_has_rested_for_a_night():
-    found = dose_elsewhere({"P01_001": session(0, 1, 20.0)}, "P01_002", at(2))
-    fresh = with_dose_elsewhere(SittingState(last=Moment(at(2))), found)
-    assert dose_now(fresh).vibrated_s == 20.0
+    found = find_dose_elsewhere({"P01_001": session(0, 1, 20.0)}, "P01_002", at(2))
+    fresh = set_dose_elsewhere(SittingState(last=Moment(at(2))), found)
+    assert compute_daily_dose(fresh).vibrated_s == 20.0
     shaken = replace(start_motion(fresh), dose=Dose(5.0, 5.0, 0.0))
-    assert dose_now(shaken).vibrated_s == 25.0
-    assert dose_now(pass_time(shaken, Moment(at(12.5)))).vibrated_s == 0.0
-    assert with_dose_elsewhere(shaken, None).elsewhere.vibrated_s == 0.0
+    assert compute_daily_dose(shaken).vibrated_s == 25.0
+    assert compute_daily_dose(pass_time(shaken, Moment(at(12.5)))).vibrated_s == 0.0
+    assert set_dose_elsewhere(shaken, None).other_sessions_dose.vibrated_s == 0.0

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from protocols.procedure.staircase import begin, level_n, step
+from protocols.procedure.staircase import begin_staircase, level_n, step
 from protocols.trial import Phase, TrialStatus
 from study.session.facts.events import (
     DeviceFacts,
@@ -18,8 +18,8 @@ from study.session.facts.events import (
     parse_event,
 )
 from study.session.state.draw_check import LogContradiction
-from study.session.state.fold import apply
-from study.session.state.machine import Finish, Rest, next_action
+from study.session.state.fold import apply_event
+from study.session.state.machine import Finish, TakeRest, next_action
 from study.session.state.state import begin_session
 from tests.session_facts import UTC, answered, measured, one_trial, opened, presented
 
@@ -34,7 +34,7 @@ def test_training_comes_first_and_ends_at_its_trial_limit(fresh):
     for _ in range(4):
         assert next_action(state).phase is Phase.TRAINING
         state = one_trial(state, correct=True)
-    assert next_action(state) == Rest(2.0)
+    assert next_action(state) == TakeRest(2.0)
 
 
 def test_a_session_of_right_and_wrong_answers_comes_to_its_end(fresh):
@@ -44,13 +44,13 @@ def test_a_session_of_right_and_wrong_answers_comes_to_its_end(fresh):
         state = one_trial(state, next(answers))
     assert {t.phase for t in state.trials} == {Phase.TRAINING, Phase.TEST}
     assert {t.frequency_hz for t in state.trials if t.phase is Phase.TEST} == {25.0, 35.0}
-    assert apply(state, SessionClosed(UTC, "completed")).closed
+    assert apply_event(state, SessionClosed(UTC, "completed")).closed
 
 
 def test_a_spoiled_trial_is_drawn_again_at_the_same_level_and_moves_nothing(fresh):
     action = next_action(fresh)
-    state = apply(fresh, presented(action))
-    state = apply(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "a fault"))
+    state = apply_event(fresh, presented(action))
+    state = apply_event(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "a fault"))
     again = next_action(state)
     assert (again.trial, again.attempt, again.level_n) == (action.trial, action.attempt + 1, action.level_n)
     assert state.trials[0].status is TrialStatus.SPOILED
@@ -59,17 +59,17 @@ def test_a_spoiled_trial_is_drawn_again_at_the_same_level_and_moves_nothing(fres
 
 def test_an_answer_moves_the_staircase_only_when_the_trial_is_closed(fresh):
     action = next_action(fresh)
-    state = apply(apply(fresh, presented(action)), answered(action, correct=False))
+    state = apply_event(apply_event(fresh, presented(action)), answered(action, correct=False))
     assert state.staircase == fresh.staircase
     assert state.answers == 1
-    closed = apply(state, measured(action))
+    closed = apply_event(state, measured(action))
     assert closed.staircase.level_db == pytest.approx(4.0)
 
 
 def test_a_trial_answered_and_then_spoiled_by_the_device_counts_for_nothing(fresh):
     action = next_action(fresh)
-    state = apply(apply(fresh, presented(action)), answered(action, correct=False))
-    state = apply(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "the device let go"))
+    state = apply_event(apply_event(fresh, presented(action)), answered(action, correct=False))
+    state = apply_event(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "the device let go"))
     assert state.answers == 0
     assert state.staircase == fresh.staircase
     assert state.trials[0].answer is not None
@@ -78,7 +78,7 @@ def test_a_trial_answered_and_then_spoiled_by_the_device_counts_for_nothing(fres
 def test_a_level_that_the_rules_do_not_give_is_a_contradiction(fresh):
     wrong = replace(presented(next_action(fresh)), level_n=1.1)
     with pytest.raises(LogContradiction, match=r"level_n 1\.1 where 1\.0 is due: .*different rules"):
-        apply(fresh, wrong)
+        apply_event(fresh, wrong)
 
 
 @pytest.mark.parametrize("field", ["direction", "angle_deg", "polarity", "level_db", "frequency_hz", "phase"])
@@ -93,46 +93,46 @@ def test_no_part_of_a_draw_can_be_changed_in_the_log(fresh, field):
         "phase": Phase.TEST,
     }
     with pytest.raises(LogContradiction, match=f"presented with {field} "):
-        apply(fresh, replace(right, **{field: other[field]}))
+        apply_event(fresh, replace(right, **{field: other[field]}))
 
 
 def test_the_last_bit_of_a_level_may_differ_between_machines(fresh):
     right = presented(next_action(fresh))
-    assert apply(fresh, replace(right, level_n=right.level_n * (1 + 1e-15))).presented is not None
+    assert apply_event(fresh, replace(right, level_n=right.level_n * (1 + 1e-15))).presented is not None
 
 
 def test_a_session_cannot_be_closed_before_its_last_run(fresh):
     with pytest.raises(LogContradiction, match="before its last run was finished"):
-        apply(fresh, SessionClosed(UTC, "completed"))
+        apply_event(fresh, SessionClosed(UTC, "completed"))
 
 
 def test_a_rest_that_was_not_due_is_a_contradiction(fresh):
     with pytest.raises(LogContradiction, match="none was due"):
-        apply(fresh, RestTaken(UTC, 0, 0, rested_s=5.0))
+        apply_event(fresh, RestTaken(UTC, 0, 0, rested_s=5.0))
 
 
 @pytest.mark.parametrize("change", [{"run": 1}, {"trial": 1}, {"attempt": 1}])
 def test_a_trial_out_of_turn_is_a_contradiction(fresh, change):
     with pytest.raises(LogContradiction, match="was due"):
-        apply(fresh, replace(presented(next_action(fresh)), **change))
+        apply_event(fresh, replace(presented(next_action(fresh)), **change))
 
 
 def test_an_answer_without_a_trial_is_a_contradiction(fresh):
     with pytest.raises(LogContradiction, match="which is not open"):
-        apply(fresh, answered(next_action(fresh), correct=True))
+        apply_event(fresh, answered(next_action(fresh), correct=True))
 
 
 def test_a_second_answer_to_a_trial_is_a_contradiction(fresh):
     action = next_action(fresh)
-    state = apply(apply(fresh, presented(action)), answered(action, correct=True))
+    state = apply_event(apply_event(fresh, presented(action)), answered(action, correct=True))
     with pytest.raises(LogContradiction, match="answered twice"):
-        apply(state, answered(action, correct=False))
+        apply_event(state, answered(action, correct=False))
 
 
 def test_a_measurement_before_the_answer_is_a_contradiction(fresh):
     action = next_action(fresh)
     with pytest.raises(LogContradiction, match="measured before it was answered"):
-        apply(apply(fresh, presented(action)), measured(action))
+        apply_event(apply_event(fresh, presented(action)), measured(action))
 
 
 def finished_session(fresh):
@@ -140,29 +140,29 @@ def finished_session(fresh):
     answers = iter([True, True, True, False] * 100)
     while not isinstance(next_action(state), Finish):
         state = one_trial(state, next(answers))
-    return apply(state, SessionClosed(UTC, "completed"))
+    return apply_event(state, SessionClosed(UTC, "completed"))
 
 
 def test_an_interruption_at_the_very_end_does_not_spoil_a_finished_session(fresh):
     """As a Ctrl-C right after the last line left it."""
     closed = finished_session(fresh)
-    assert apply(closed, SessionInterrupted(UTC, "interrupted at the keyboard")).closed
+    assert apply_event(closed, SessionInterrupted(UTC, "interrupted at the keyboard")).closed
 
 
 def test_nothing_else_follows_the_closing(fresh):
     closed = finished_session(fresh)
     with pytest.raises(LogContradiction, match="after the session was closed"):
-        apply(closed, SessionClosed(UTC, "completed"))
+        apply_event(closed, SessionClosed(UTC, "completed"))
 
 
 def test_a_session_is_opened_once(fresh):
     with pytest.raises(LogContradiction, match="opened twice"):
-        apply(fresh, fresh.opened)
+        apply_event(fresh, fresh.opened)
 
 
 def test_an_open_trial_must_be_closed_before_the_next_action(fresh):
     with pytest.raises(ValueError, match="a trial is open"):
-        next_action(apply(fresh, presented(next_action(fresh))))
+        next_action(apply_event(fresh, presented(next_action(fresh))))
 
 
 def test_swapped_labels_change_the_number_and_not_the_device(small_protocol, small_text):
@@ -182,7 +182,7 @@ def test_who_felt_what(small_protocol, small_text):
     }
     for expected, line in cases.items():
         state = begin_session(line, small_protocol)
-        assert apply(state, presented(next_action(state))).trials[0].felt is expected
+        assert apply_event(state, presented(next_action(state))).trials[0].felt is expected
 
 
 def test_every_event_survives_its_line(fresh):
@@ -210,11 +210,11 @@ def test_folding_gives_the_levels_of_the_staircase_alone(answers):
     state = begin_session(opened(protocol, text), protocol)
     while state.run == 0:
         state = one_trial(state, correct=True)
-    expected = begin(protocol.staircase)
+    expected = begin_staircase(protocol.staircase)
     for correct in answers:
         if state.run != 1:
             break
-        before = next_action(state) if not isinstance(next_action(state), Rest) else None
+        before = next_action(state) if not isinstance(next_action(state), TakeRest) else None
         if before is not None:
             assert before.level_n == level_n(protocol.staircase, expected)
         state = one_trial(state, correct)

@@ -6,7 +6,7 @@ from study.session.state.vibration_dose import (
     NO_DOSE,
     Dose,
     a8_mps2,
-    add,
+    add_sinusoid,
     hand_arm_weight,
 )
 
@@ -36,20 +36,20 @@ def test_without_a_frequency_there_is_no_weight(frequency_hz: float) -> None:
 
 
 def test_eight_hours_give_the_weighted_rms_itself() -> None:
-    dose = add(NO_DOSE, 12.5, 4.0, 8 * 3600.0)
+    dose = add_sinusoid(NO_DOSE, 12.5, 4.0, 8 * 3600.0)
     assert a8_mps2(dose) == pytest.approx(hand_arm_weight(12.5) * 4.0 / math.sqrt(2))
 
 
 def test_a_quarter_of_the_time_halves_the_exposure() -> None:
-    whole, quarter = (add(NO_DOSE, 35.0, 10.0, seconds) for seconds in (1200.0, 300.0))
+    whole, quarter = (add_sinusoid(NO_DOSE, 35.0, 10.0, seconds) for seconds in (1200.0, 300.0))
     assert a8_mps2(quarter) == pytest.approx(a8_mps2(whole) / 2)
 
 
 def test_time_without_a_measured_amplitude_is_distinguished() -> None:
-    dose = add(add(NO_DOSE, 25.0, None, 7.0), 25.0, 0.0, 3.0)
+    dose = add_sinusoid(add_sinusoid(NO_DOSE, 25.0, None, 7.0), 25.0, 0.0, 3.0)
     assert dose == Dose(squared_s=0.0, vibrated_s=10.0, unmeasured_s=7.0)
 
 
 def test_a_negative_time_is_refused() -> None:
     with pytest.raises(ValueError, match="0 s or longer"):
-        add(NO_DOSE, 25.0, 1.0, -1.0)
+        add_sinusoid(NO_DOSE, 25.0, 1.0, -1.0)

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from protocols.definition.apparatus import SafetySettings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import MultisineSegment, SineSegment, SweepSegment
-from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, limits_of_recording
-from study.session.stimulus.recording_pieces import pieces
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, make_recording_limits
+from study.session.stimulus.recording_pieces import make_pieces
 
 RATE_HZ = 1000.0
 SAFETY = SafetySettings(stimulus_cap_n=2.0, total_cap_n=3.0)
@@ -20,7 +20,9 @@ def protocol(*segments, **changes) -> RecordingProtocol:
 
 
 def test_each_frequency_is_a_piece_whose_counted_part_is_steady_whole_loops():
-    plan = pieces(protocol(SineSegment("sine", (5.0, 15.0), 1.0, "direction_1", duration_s=1.1, settle_s=0.4)), RATE_HZ)
+    plan = make_pieces(
+        protocol(SineSegment("sine", (5.0, 15.0), 1.0, "direction_1", duration_s=1.1, settle_s=0.4)), RATE_HZ
+    )
     assert [piece.frequency_hz for piece in plan] == [5.0, 15.0]
     for piece in plan:
         counted = piece.segment.stop - piece.segment.start
@@ -31,7 +33,7 @@ def test_each_frequency_is_a_piece_whose_counted_part_is_steady_whole_loops():
 
 
 def test_every_piece_begins_and_ends_with_a_rest():
-    plan = pieces(protocol(SweepSegment("sweep", 1.0, 400.0, 1.0, "y", duration_s=2.0, periods=3)), RATE_HZ)
+    plan = make_pieces(protocol(SweepSegment("sweep", 1.0, 400.0, 1.0, "y", duration_s=2.0, periods=3)), RATE_HZ)
     samples = plan[0].commands.samples
     assert np.all(samples[:500] == 0)
     assert np.all(samples[-500:] == 0)
@@ -41,21 +43,21 @@ def test_every_piece_begins_and_ends_with_a_rest():
 
 
 def test_the_last_sweep_periods_are_alike():
-    plan = pieces(protocol(SweepSegment("sweep", 1.0, 400.0, 1.0, "y", duration_s=2.0, periods=3)), RATE_HZ)
+    plan = make_pieces(protocol(SweepSegment("sweep", 1.0, 400.0, 1.0, "y", duration_s=2.0, periods=3)), RATE_HZ)
     wave = plan[0].commands.samples[500:-500, 1]
     assert wave[2000:4000] == pytest.approx(wave[4000:6000])
 
 
 def test_repeats_play_the_list_again():
     segment = SineSegment("sine", (25.0,), 1.0, "x", duration_s=0.2)
-    assert len(pieces(protocol(segment, segment, repeats=3), RATE_HZ)) == 6
+    assert len(make_pieces(protocol(segment, segment, repeats=3), RATE_HZ)) == 6
 
 
 def test_sweeps_have_a_slew_limit_of_their_own():
     sweep = SweepSegment("sweep", 1.0, 400.0, 1.0, "y", duration_s=2.0)
-    plan = pieces(protocol(sweep), RATE_HZ)
+    plan = make_pieces(protocol(sweep), RATE_HZ)
     steepest = np.abs(np.diff(plan[0].commands.samples, axis=0)).max() * RATE_HZ
-    assert steepest < limits_of_recording(protocol(sweep)).slew_n_per_s
+    assert steepest < make_recording_limits(protocol(sweep)).slew_n_per_s
 
 
 def multisine(**changes) -> MultisineSegment:
@@ -64,7 +66,7 @@ def multisine(**changes) -> MultisineSegment:
 
 
 def test_every_period_of_a_multisine_is_the_same_to_the_last_bit():
-    (piece,) = pieces(protocol(multisine()), RATE_HZ)
+    (piece,) = make_pieces(protocol(multisine()), RATE_HZ)
     counted = piece.commands.samples[piece.segment.start : piece.segment.stop].reshape(3, 2000, 3)
     assert np.array_equal(counted[0], counted[1])
     assert np.array_equal(counted[0], counted[2])
@@ -72,7 +74,7 @@ def test_every_period_of_a_multisine_is_the_same_to_the_last_bit():
 
 
 def test_the_fade_of_a_sweep_ends_within_its_first_period():
-    (piece,) = pieces(protocol(SweepSegment("sweep", 1.0, 400.0, 1.0, "y", duration_s=2.0, periods=3)), RATE_HZ)
+    (piece,) = make_pieces(protocol(SweepSegment("sweep", 1.0, 400.0, 1.0, "y", duration_s=2.0, periods=3)), RATE_HZ)
     counted = piece.commands.samples[piece.segment.start : piece.segment.stop, 1].reshape(3, 2000)
     assert np.array_equal(counted[1], counted[2])
     assert np.array_equal(counted[0, 100:], counted[1, 100:])
@@ -80,7 +82,7 @@ def test_the_fade_of_a_sweep_ends_within_its_first_period():
 
 
 def test_a_multisine_fades_in_and_out_outside_its_periods():
-    (piece,) = pieces(protocol(multisine(), fade_s=0.2), RATE_HZ)
+    (piece,) = make_pieces(protocol(multisine(), fade_s=0.2), RATE_HZ)
     samples, start, stop = piece.commands.samples, piece.segment.start, piece.segment.stop
     assert (start, len(samples) - stop) == (700, 700)
     assert np.all(samples[:501] == 0)
@@ -90,7 +92,7 @@ def test_a_multisine_fades_in_and_out_outside_its_periods():
 
 
 def test_each_realisation_is_a_piece_that_says_its_role_and_band():
-    plan = pieces(protocol(multisine(realisations=2, along="direction_2"), repeats=2), RATE_HZ)
+    plan = make_pieces(protocol(multisine(realisations=2, along="direction_2"), repeats=2), RATE_HZ)
     assert [piece.realisation for piece in plan] == [1, 2, 1, 2]
     assert {(piece.segment.role, piece.segment.kind, piece.band_hz) for piece in plan} == {
         ("test", "multisine", (5.0, 35.0))
@@ -101,7 +103,7 @@ def test_each_realisation_is_a_piece_that_says_its_role_and_band():
 
 
 def test_roles_are_carried_from_sines_and_sweeps_too():
-    plan = pieces(
+    plan = make_pieces(
         protocol(
             SineSegment("sine", (25.0,), 1.0, "x", duration_s=0.2, role="fit"),
             SweepSegment("sweep", 1.0, 400.0, 1.0, "y", duration_s=2.0, role="test"),
@@ -112,8 +114,8 @@ def test_roles_are_carried_from_sines_and_sweeps_too():
 
 
 def test_a_piece_at_another_amplitude_is_the_same_excitation():
-    (piece,) = pieces(protocol(multisine()), RATE_HZ)
-    lower = piece.at(0.75)
+    (piece,) = make_pieces(protocol(multisine()), RATE_HZ)
+    lower = piece.scale_to(0.75)
     assert lower.segment.amplitude == 0.75
     assert np.array_equal(lower.commands.samples, piece.commands.samples * 0.5)
 
@@ -127,6 +129,6 @@ def test_no_multisine_is_steeper_than_the_limits_made_for_it(from_hz, width, see
     to_hz = min(500.0, from_hz * (1 + width) + 0.6)
     segment = MultisineSegment("multisine", from_hz, to_hz, 2.0, "all", 2.0, seed=seed, odd_only=False)
     source = protocol(segment, fade_s=fade_s)
-    (piece,) = pieces(source, RATE_HZ)
+    (piece,) = make_pieces(source, RATE_HZ)
     steepest = np.linalg.norm(np.diff(piece.commands.samples, axis=0), axis=1).max() * RATE_HZ
-    assert steepest < limits_of_recording(source).slew_n_per_s - SPRING_SLEW_N_PER_S
+    assert steepest < make_recording_limits(source).slew_n_per_s - SPRING_SLEW_N_PER_S

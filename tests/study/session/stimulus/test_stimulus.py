@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.equalizer import Identity
 from protocols.definition.apparatus import TestDirections
-from study.session.stimulus.limits import limits_of_study
-from study.session.stimulus.stimulus import direction_vector, held_stimulus, loop_length
+from study.session.stimulus.limits import make_study_limits
+from study.session.stimulus.stimulus import direction_vector, loop_length, make_held_stimulus
 
 RATE_HZ = 1000.0
 
@@ -43,7 +43,7 @@ def test_a_loop_holds_whole_periods(frequency_hz):
 def test_the_loop_is_a_sinusoid_along_the_direction_with_the_polarity_in_its_sign(small_protocol):
     vector = direction_vector(small_protocol.directions, 2)
     plus, minus = (
-        held_stimulus(small_protocol.stimulus, vector, 25.0, level, Identity(), RATE_HZ).loop.samples
+        make_held_stimulus(small_protocol.stimulus, vector, 25.0, level, Identity(), RATE_HZ).loop.samples
         for level in (2.0, -2.0)
     )
     assert plus == pytest.approx(-minus)
@@ -64,7 +64,7 @@ def test_a_stimulus_in_acceleration_goes_through_the_equalizer(small_protocol):
             return None
 
     vector = direction_vector(small_protocol.directions, 1)
-    held = held_stimulus(small_protocol.stimulus, vector, 25.0, 4.0, HalfKilogram(), RATE_HZ)
+    held = make_held_stimulus(small_protocol.stimulus, vector, 25.0, 4.0, HalfKilogram(), RATE_HZ)
     assert np.abs(held.loop.samples @ vector).max() == pytest.approx(2.0)
 
 
@@ -76,7 +76,7 @@ def test_without_an_equalizer_only_a_force_can_be_played():
 
 def test_the_slew_limit_is_just_above_the_steepest_stimulus(small_protocol):
     """The fastest frequency at the cap while it fades: the limit lets it pass, and a quarter more not."""
-    limits = limits_of_study(small_protocol)
+    limits = make_study_limits(small_protocol)
     t = np.arange(0, 0.1, 1 / RATE_HZ)
     envelope = 0.5 - 0.5 * np.cos(np.pi * t / 0.1)
     steepest = max(

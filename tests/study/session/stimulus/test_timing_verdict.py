@@ -5,20 +5,20 @@ import random
 import numpy as np
 import pytest
 
-from study.session.stimulus.timing_verdict import judge_late, judge_lateness, judge_load, judge_missed, lateness_of
+from study.session.stimulus.timing_verdict import judge_late, judge_lateness, judge_load, judge_missed, measure_lateness
 
 
 def finding(late_ms, simulated: bool, rate_hz: float = 1000.0):
-    return judge_lateness(lateness_of(np.asarray(late_ms) / 1000.0, rate_hz), simulated)
+    return judge_lateness(measure_lateness(np.asarray(late_ms) / 1000.0, rate_hz), simulated)
 
 
 def test_the_figures_are_those_of_the_measurement():
-    lateness = lateness_of(np.arange(101) / 1000.0 / 100.0, 1000.0)
+    lateness = measure_lateness(np.arange(101) / 1000.0 / 100.0, 1000.0)
     assert (lateness.median_ms, lateness.p99_ms, lateness.longest_ms) == pytest.approx((0.5, 0.99, 1.0))
     assert lateness.missing_a_tick == 0.0
     assert not lateness.too_late
     with pytest.raises(ValueError, match="no wake-up"):
-        lateness_of(np.array([]), 1000.0)
+        measure_lateness(np.array([]), 1000.0)
 
 
 def test_99_of_100_wake_ups_must_come_within_a_tick():

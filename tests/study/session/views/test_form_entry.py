@@ -2,14 +2,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study.session.views.form_entry import (
-    MOST_CHARACTERS,
+    LONGEST_TEXT,
     FormEntry,
-    blank_entry,
     click_choice,
     click_continue,
+    make_blank_entry,
+    make_reply,
     paste,
     press,
-    reply_of,
 )
 from study.session.views.form_views import Form, FormField, FormKind, find_missing_fields
 
@@ -21,7 +21,7 @@ SETUP = Form(FormKind.SETUP, "T", "", (FormField("hearing", "What?", LONG), Form
 
 
 def typed(form: Form, *keys: str, stacked: bool = False, entry: FormEntry | None = None) -> FormEntry:
-    entry = blank_entry(form) if entry is None else entry
+    entry = make_blank_entry(form) if entry is None else entry
     for key in keys:
         entry = press(entry, key, key if len(key) == 1 else None, stacked) or entry
     return entry
@@ -29,50 +29,50 @@ def typed(form: Form, *keys: str, stacked: bool = False, entry: FormEntry | None
 
 def test_each_answer_belongs_to_the_question_at_which_its_key_came():
     entry = typed(EXCLUSION, "1", "enter", "2", "enter", "1", "enter", "enter")
-    assert entry.sent
-    assert reply_of(entry).answers == {"q0": "yes", "q1": "no", "q2": "yes"}
+    assert entry.is_sent
+    assert make_reply(entry).answers == {"q0": "yes", "q1": "no", "q2": "yes"}
 
 
 def test_enter_alone_answers_nothing_and_sends_nothing():
-    assert typed(EXCLUSION, *["enter"] * 9) == blank_entry(EXCLUSION)
+    assert typed(EXCLUSION, *["enter"] * 9) == make_blank_entry(EXCLUSION)
 
 
 def test_it_is_not_sent_while_an_answer_is_missing():
     entry = typed(EXCLUSION, "1", "down", "down", "2", "down", "enter")
-    assert (entry.sent, entry.at, entry.open) == (False, 1, (1,))
+    assert (entry.is_sent, entry.cursor, entry.open) == (False, 1, (1,))
     assert typed(EXCLUSION, "n", entry=entry).open == ()
 
 
 def test_a_changed_choice_is_looked_at_once_more_before_an_exclusion_is_sent():
     entry = typed(EXCLUSION, "1", "2", "enter", "2", "enter", "2", "enter", "enter")
-    assert (entry.sent, entry.at, entry.check) == (False, 0, (0,))
+    assert (entry.is_sent, entry.cursor, entry.check) == (False, 0, (0,))
     again = typed(EXCLUSION, "down", "down", "down", "enter", entry=entry)
-    assert again.sent and reply_of(again).answers == {"q0": "no", "q1": "no", "q2": "no"}
-    assert typed(SETUP, "1", "2", "enter", "1", "enter", "enter").sent
+    assert again.is_sent and make_reply(again).answers == {"q0": "no", "q1": "no", "q2": "no"}
+    assert typed(SETUP, "1", "2", "enter", "1", "enter", "enter").is_sent
 
 
 def test_up_and_down_go_through_choices_below_each_other_first():
     entry = typed(SETUP, "down", "down", stacked=True)
-    assert (entry.at, entry.given[0].marked) == (0, 1)
-    assert typed(SETUP, "down", "down", stacked=True, entry=entry).at == 1
-    assert typed(SETUP, "up", stacked=True, entry=entry).given[0].marked == 0
-    assert typed(SETUP, "down", "down").at == 2
+    assert (entry.cursor, entry.field_entries[0].marked) == (0, 1)
+    assert typed(SETUP, "down", "down", stacked=True, entry=entry).cursor == 1
+    assert typed(SETUP, "up", stacked=True, entry=entry).field_entries[0].marked == 0
+    assert typed(SETUP, "down", "down").cursor == 2
 
 
 def test_free_text_is_edited_at_its_caret():
     entry = typed(TEXT, *"pan", "left", "e", "left", "left", "home", "delete", "end", "s", "backspace", "t")
-    assert entry.given[0].answer == "aent"
-    assert len(typed(TEXT, *["x"] * (MOST_CHARACTERS + 5)).given[0].answer) == MOST_CHARACTERS
+    assert entry.field_entries[0].answer == "aent"
+    assert len(typed(TEXT, *["x"] * (LONGEST_TEXT + 5)).field_entries[0].answer) == LONGEST_TEXT
 
 
 def test_a_paste_is_text_and_never_keys():
-    assert paste(blank_entry(EXCLUSION), "1\n1\n1\n\n") == blank_entry(EXCLUSION)
-    assert paste(blank_entry(TEXT), "two\nlines\x07").given[0].answer == "two lines"
+    assert paste(make_blank_entry(EXCLUSION), "1\n1\n1\n\n") == make_blank_entry(EXCLUSION)
+    assert paste(make_blank_entry(TEXT), "two\nlines\x07").field_entries[0].answer == "two lines"
 
 
 def test_the_mouse_chooses_where_it_clicks_and_the_cursor_follows():
-    entry = click_choice(blank_entry(EXCLUSION), 2, 1)
-    assert entry.at == 2 and entry.given[2].answer == "no"
+    entry = click_choice(make_blank_entry(EXCLUSION), 2, 1)
+    assert entry.cursor == 2 and entry.field_entries[2].answer == "no"
     assert click_continue(entry).open == (0, 1)
 
 
@@ -82,11 +82,11 @@ KEYS = st.lists(st.sampled_from(["1", "2", "y", "n", "enter", "tab", "shift+tab"
 @given(KEYS, st.booleans())
 @settings(max_examples=200)
 def test_no_key_touches_an_answer_other_than_that_under_the_cursor(keys, stacked):
-    entry = blank_entry(EXCLUSION)
+    entry = make_blank_entry(EXCLUSION)
     for key in keys:
         after = typed(EXCLUSION, key, stacked=stacked, entry=entry)
-        changed = [i for i in range(3) if after.given[i] != entry.given[i]]
-        assert changed in ([], [entry.at])
-        assert not after.sent or find_missing_fields(EXCLUSION, reply_of(after)) == ()
-        assert not entry.sent or after == entry
+        changed = [i for i in range(3) if after.field_entries[i] != entry.field_entries[i]]
+        assert changed in ([], [entry.cursor])
+        assert not after.is_sent or find_missing_fields(EXCLUSION, make_reply(after)) == ()
+        assert not entry.is_sent or after == entry
         entry = after

@@ -1,6 +1,6 @@
 import pytest
 
-from study.session.views.participant_codes import code_problem, is_code, next_code
+from study.session.views.participant_codes import code_problem, is_code, suggest_code
 
 
 @pytest.mark.parametrize("code", ["P01", "1", "a1", "A" * 15 + "1"])
@@ -32,9 +32,9 @@ def test_nothing_typed_asks_for_a_code(text):
     ],
 )
 def test_the_next_code_follows_the_manner_of_the_latest(taken, proposed):
-    assert next_code(taken) == proposed
+    assert suggest_code(taken) == proposed
 
 
 def test_the_next_code_was_never_taken():
     taken = ("P02", "P10", "P09")
-    assert next_code(taken) not in taken
+    assert suggest_code(taken) not in taken

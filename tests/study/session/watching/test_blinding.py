@@ -10,7 +10,7 @@ from study.session.facts.events import (
     TrialMeasured,
     TrialSpoiled,
 )
-from study.session.watching.make_watch_view import LiveInfo, watch_view
+from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from tests.watched_story import Story, at, place
 
 
@@ -42,7 +42,7 @@ def test_no_field_tells_the_open_trial_wherever_in_the_session_it_is(story, answ
     row = replace(state.trials[-1], direction_shown=other.direction, angle_deg=other.angle_deg)
     swapped = replace(story.watched, state=replace(state, presented=other, trials=(*state.trials[:-1], row)))
     now = at(story.seconds + 4)
-    assert watch_view(swapped, LiveInfo(), now) == story.view()
+    assert make_watch_view(swapped, LiveInfo(), now) == story.view()
 
 
 def test_the_direction_appears_once_the_answer_counts(story):

@@ -11,9 +11,9 @@ from study.session.facts.events import (
     SessionResumed,
 )
 from study.session.facts.void_reasons import HARDLY_ARRIVED, SCREEN_LATE
-from study.session.state.due_trial import Present
+from study.session.state.due_trial import PresentTrial
 from study.session.state.machine import next_action
-from study.session.watching.make_watch_view import LiveInfo, watch_view
+from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from tests.watched_story import DEVICE, at, kinds
 
 
@@ -84,7 +84,7 @@ def test_two_lapses_of_the_last_five_catch_trials_are_an_alarm(with_parts):
     while lapses < 2:
         assert kinds(story.view()) == []
         catch = next_action(story.watched.state)
-        is_catch = isinstance(catch, Present) and catch.phase is Phase.CATCH
+        is_catch = isinstance(catch, PresentTrial) and catch.phase is Phase.CATCH
         story.answer(not is_catch)
         lapses += is_catch
     assert kinds(story.view()) == ["lapses"]
@@ -158,7 +158,7 @@ def test_a_killed_program_is_an_alarm(story):
 
 
 def test_a_log_that_cannot_be_followed_is_an_alarm(story):
-    view = watch_view(story.watched, LiveInfo(problem="it contradicts the rules."), at(1))
+    view = make_watch_view(story.watched, LiveInfo(problem="it contradicts the rules."), at(1))
     assert [a.sentence for a in view.alarms] == ["The log cannot be followed: it contradicts the rules."]
 
 
@@ -167,7 +167,7 @@ def test_elapsed_time_and_dose_follow_the_monotonic_clock_of_the_session_not_a_c
     story.watched = replace(story.watched, state=replace(story.watched.state, sitting=_stamped_sitting(story, 100.0)))
     before = story.view(live=story.live(monotonic_s=104.0))
     set_forward = replace(story.live(monotonic_s=104.0), utc=at(story.seconds + 36000.0))
-    after = watch_view(story.watched, LiveInfo(set_forward, None), at(story.seconds + 36000.0))
+    after = make_watch_view(story.watched, LiveInfo(set_forward, None), at(story.seconds + 36000.0))
     assert after.exposure == before.exposure
     assert after.exposure.dose_a8_mps2 > 0
 
@@ -181,7 +181,7 @@ def test_a_clock_set_back_below_the_sittings_begin_silences_no_alarm(story):
     """The live state and what was noted are of this sitting, at any time that they state."""
     story.open_trial()
     back = story.live(monotonic_s=50.0, fault="the device stopped answering")
-    view = watch_view(story.watched, LiveInfo(replace(back, utc=at(-3600.0)), None), at(-3599.0))
+    view = make_watch_view(story.watched, LiveInfo(replace(back, utc=at(-3600.0)), None), at(-3599.0))
     assert [alarm.kind for alarm in view.alarms] == ["device"]
     noted = story.tell(NoteTaken(at(-3597.0), "participant", "numb", adverse=True)).view()
     assert "adverse" in [alarm.kind for alarm in noted.alarms]
@@ -207,8 +207,8 @@ def test_how_long_a_trial_waits_follows_no_clock_that_was_set(story):
     waits = story.live(monotonic_s=104.0)
     for hours in (-5.0, 0.0, 5.0):
         now = at(story.seconds + 3600.0 * hours)
-        view = watch_view(story.watched, LiveInfo(replace(waits, utc=now), None), now)
+        view = make_watch_view(story.watched, LiveInfo(replace(waits, utc=now), None), now)
         assert (view.open_trial.presented_s, view.activity_s) == (4.0, 4.0)
         assert "unanswered" not in [alarm.kind for alarm in view.alarms]
-    late = watch_view(story.watched, LiveInfo(replace(waits, monotonic_s=161.0), None), at(story.seconds))
+    late = make_watch_view(story.watched, LiveInfo(replace(waits, monotonic_s=161.0), None), at(story.seconds))
     assert "unanswered" in [alarm.kind for alarm in late.alarms]

@@ -9,7 +9,7 @@ from study.session.facts.events import (
     SessionInterrupted,
     SessionResumed,
 )
-from study.session.watching.followed_session import NO_STEADY_PART
+from study.session.watching.followed_session import UNMEASURED_FLAG
 from tests.watched_story import DEVICE, at
 
 
@@ -47,7 +47,7 @@ def test_delivered_and_off_axis_acceleration_and_flags_are_shown(story):
 
 
 def test_a_flag_that_older_logs_have_on_nearly_every_trial_is_not_shown(story):
-    seen = story.answer(True, status="flagged", flags=("late", NO_STEADY_PART)).view().last[0]
+    seen = story.answer(True, status="flagged", flags=("late", UNMEASURED_FLAG)).view().last[0]
     assert seen.remark == "late"
 
 

@@ -12,7 +12,7 @@ from study.cli.main import app
 from study.session.watching.live import Live
 from study.session.watching.requests import NoteAsked
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.privacy import close_to_others, data_folder_warning, make_folder, open_to_others
+from study.store.disk.privacy import close_to_others, data_folder_warning, is_open_to_others, make_folder
 from study.store.sessions.archive import new_session_folder
 from study.store.sessions.live_file import write_live
 from study.store.sessions.request_inbox import RequestInbox
@@ -77,8 +77,8 @@ def test_a_session_closes_a_data_folder_that_others_can_read(opened, tmp_path):
     outside.chmod(0o644)
     (opened / "P04_001" / "recordings" / "linked.h5").symlink_to(outside)
     run("resume", "P04_001", "--data", opened)
-    assert not open_to_others(opened)
-    assert not open_to_others(opened / "P01_001")
+    assert not is_open_to_others(opened)
+    assert not is_open_to_others(opened / "P01_001")
     assert exposed(opened / "P04_001") == ["P04_001/recordings/linked.h5"]  # a link has no rights of its own
     assert stat.S_IMODE(outside.stat().st_mode) == 0o644
 
@@ -115,7 +115,7 @@ def test_a_folder_that_is_not_closed_is_reported(opened, why, monkeypatch, tmp_p
         data_folder_warning(opened),
     )
     folder = new_session_folder(opened, "P09")
-    assert open_to_others(opened)
+    assert is_open_to_others(opened)
     assert exposed(folder.path) == []
 
 
@@ -143,8 +143,8 @@ def test_closing_follows_no_link(opened, tmp_path):
     other = Path(shutil.copytree(opened, tmp_path / "other"))
     shutil.rmtree(opened / "P01_001")
     (opened / "P01_001").symlink_to(other)
-    close_to_others(opened / "P01_001", inside=True)
-    close_to_others(opened, inside=True)
+    close_to_others(opened / "P01_001", recursive=True)
+    close_to_others(opened, recursive=True)
     assert stat.S_IMODE(other.stat().st_mode) == 0o755
     assert exposed(opened) == ["data/P01_001"]
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.hdf5_file import SEAL_BYTES, with_seal
+from study.store.disk.hdf5_file import SEAL_BYTES, add_seal
 from study.store.formats.calibration_file import LAYOUT, read_calibration, write_calibration
 from study.workflows.files.validate import validate_file
 from tests.equalizer.linkage.truth import calibration, readings
@@ -51,7 +51,7 @@ def test_a_changed_byte_is_noticed_by_the_array_s_own_check_sum_too(path):
         offset = SEAL_BYTES + file["inertia_kg"].id.get_chunk_info(0).byte_offset
     content = bytearray(path.read_bytes())
     content[offset + 100] ^= 1
-    path.write_bytes(with_seal(bytes(content)))
+    path.write_bytes(add_seal(bytes(content)))
     with pytest.raises(UnusableFileError, match="can be read"):
         read_calibration(path)
 
@@ -109,7 +109,7 @@ def test_wrong_arrays_are_refused(path, name, value, said):
     with h5py.File(path, "r+") as file:
         del file[name]
         file[name] = value
-    path.write_bytes(with_seal(path.read_bytes()))
+    path.write_bytes(add_seal(path.read_bytes()))
     with pytest.raises(UnusableFileError, match=said):
         read_calibration(path)
 
@@ -117,6 +117,6 @@ def test_wrong_arrays_are_refused(path, name, value, said):
 def test_missing_attributes_are_all_named(path):
     with h5py.File(path, "r+") as file:
         del file.attrs["device"], file.attrs["line_deg"]
-    path.write_bytes(with_seal(path.read_bytes()))
+    path.write_bytes(add_seal(path.read_bytes()))
     with pytest.raises(UnusableFileError, match="'device' is missing.*'line_deg' is missing"):
         read_calibration(path)

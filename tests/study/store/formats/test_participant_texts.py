@@ -7,7 +7,7 @@ import pytest
 from protocols.document.hashing import protocol_hash
 from protocols.wording.english import ENGLISH, LANGUAGES
 from study.store.disk.file_errors import CannotReadError, UnusableFileError
-from study.store.formats.participant_texts import language_template, read_language
+from study.store.formats.participant_texts import make_language_template, read_language
 from study.store.formats.protocol_files import (
     LockedProtocolChangedError,
     ProtocolRefusedError,
@@ -44,7 +44,7 @@ def french(tmp_path):
 @pytest.mark.parametrize("code", LANGUAGES)
 def test_a_template_is_a_table_that_can_be_read_again(tmp_path, code):
     path = tmp_path / "copy.toml"
-    path.write_text(language_template(code), encoding="utf-8")
+    path.write_text(make_language_template(code), encoding="utf-8")
     assert read_language(str(path))[1] == read_language(code)[1]
 
 

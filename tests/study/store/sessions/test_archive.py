@@ -1,14 +1,14 @@
 import pytest
 
 from study.errors import StudyError, WrongUseError
-from study.store.sessions.archive import check_subject, find_session, new_session_folder, session_folders
+from study.store.sessions.archive import check_subject, find_session, list_session_folders, new_session_folder
 from study.store.sessions.session_lock import PLACES_NAME, hold_places_lock, hold_session_lock
 
 
 def test_every_session_gets_a_folder_of_its_own(tmp_path):
     names = [new_session_folder(tmp_path / "data", code).name for code in ("P01", "P01", "P02", "P01")]
     assert names == ["P01_001", "P01_002", "P02_001", "P01_003"]
-    assert [f.name for f in session_folders(tmp_path / "data")] == sorted(names)
+    assert [f.name for f in list_session_folders(tmp_path / "data")] == sorted(names)
 
 
 def test_a_number_is_not_used_again_after_a_folder_was_moved_away(tmp_path):

@@ -4,7 +4,7 @@ import pytest
 
 from study.errors import StudyError
 from study.session.facts.events import NoteTaken
-from study.store.sessions.event_log import EventLog, mend, read_log
+from study.store.sessions.event_log import EventLog, read_log, remove_incomplete_line
 
 
 def note(text: str) -> NoteTaken:
@@ -43,7 +43,7 @@ def test_a_torn_last_line_is_distinguished_and_mended(written, cut):
     contents = read_log(written)
     assert [event.text for event in contents.events] == ["first"]
     assert contents.torn
-    mend(written, contents)
+    remove_incomplete_line(written, contents)
     assert whole.startswith(written.read_bytes())
     log = EventLog.reopen(written)
     log.append(note("third"))
@@ -59,7 +59,7 @@ def test_a_torn_line_that_cannot_be_removed_is_a_clear_error(written, monkeypatc
 
     monkeypatch.setattr(os, "ftruncate", fail)
     with pytest.raises(StudyError) as error:
-        mend(written, read_log(written))
+        remove_incomplete_line(written, read_log(written))
     assert error.value.happened == (
         "The incomplete last line of events.jsonl in P01_001 cannot be removed: Input/output error."
     )

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from study.store.sessions.archive import new_session_folder
-from study.store.sessions.withdrawal_files import SessionParticipant, read_begun, write_tombstone
+from study.store.sessions.withdrawal_files import SessionParticipant, read_participant, write_tombstone
 
 BEGUN = SessionParticipant("paper", False, 3)
 
@@ -18,7 +18,7 @@ def folder(tmp_path):
 
 
 def test_a_tombstone_keeps_protocol_and_number(folder):
-    assert read_begun(folder) == BEGUN
+    assert read_participant(folder) == BEGUN
 
 
 @pytest.mark.parametrize(
@@ -28,4 +28,4 @@ def test_facts_of_a_wrong_type_are_no_facts(folder, facts):
     content = json.loads(folder.tombstone.read_text())
     content["begun"] |= facts
     folder.tombstone.write_text(json.dumps(content))
-    assert read_begun(folder) is None
+    assert read_participant(folder) is None

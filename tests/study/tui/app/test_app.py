@@ -15,9 +15,9 @@ from study.store.sessions.log_writer import is_log_locked
 from study.tui.app.app import HapteqApp
 from study.tui.app.app_start import AppStart
 from study.tui.engine.from_engine import Failed, Finished
-from study.tui.engine.to_engine import Begin, SessionOrder
+from study.tui.engine.to_engine import BeginSession, SessionOrder
 from study.tui.home_messages import BeginWanted
-from study.tui.screens.confirm_view import SHOWN_HERE
+from study.tui.screens.confirm_view import VIEW_SHOWN_NOTE
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
@@ -102,7 +102,7 @@ def run(start: AppStart, story: Callable[[Person], Awaitable[None]]) -> HapteqAp
 
 @pytest.fixture
 def sitting(order) -> Callable[[Callable[[Person], Awaitable[None]]], HapteqApp]:
-    return lambda story: run(AppStart(order.data, "simulated", first=Begin(order)), story)
+    return lambda story: run(AppStart(order.data, "simulated", first=BeginSession(order)), story)
 
 
 @pytest.fixture
@@ -227,7 +227,7 @@ def test_a_pause_a_note_and_the_watchers_view_in_one_terminal(sitting, log):
             await person.press("enter")
         await person.until("TrialScreen")
         assert '"text":"cough"' in log.read_text()
-        assert SHOWN_HERE in log.read_text()
+        assert VIEW_SHOWN_NOTE in log.read_text()
         await person.press("ctrl+c", "ctrl+c")
 
     sitting(story)
@@ -253,7 +253,7 @@ def test_a_participant_does_not_open_the_experimenters_view_by_accident(sitting,
         await person.press("ctrl+c", "ctrl+c")
 
     sitting(story)
-    assert SHOWN_HERE not in log.read_text()
+    assert VIEW_SHOWN_NOTE not in log.read_text()
 
 
 def test_help_themes_and_commands_are_there_on_every_screen(tmp_path):
@@ -282,6 +282,6 @@ def test_what_the_command_line_asked_for_and_cannot_be_is_reported_by_the_comman
             await asyncio.sleep(0.05)
 
     order = SessionOrder("no_such_protocol", "simulated", "P01", str(tmp_path))
-    app = run(AppStart(str(tmp_path), "simulated", first=Begin(order)), story)
+    app = run(AppStart(str(tmp_path), "simulated", first=BeginSession(order)), story)
     assert isinstance(app.outcome, Failed)
     assert app.outcome.error.exit_code == 2

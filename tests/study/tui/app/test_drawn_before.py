@@ -6,7 +6,7 @@ from textual.app import App
 from textual.widgets._footer import FooterKey
 
 from study.session.views.views import PlayingNotice
-from study.tui.app.sitting_screens import forget_drawn_before
+from study.tui.app.sitting_screens import clear_render_caches
 from study.tui.screens.playing import PlayingScreen
 from study.tui.screens.trial import TrialScreen
 
@@ -24,7 +24,7 @@ def test_of_screens_that_are_gone_nothing_drawn_is_kept():
                 app.pop_screen()
                 await pilot.pause()
                 await pilot.pause()
-                forget_drawn_before(app)
+                clear_render_caches(app)
                 gc.collect()
                 kept.append(sum(isinstance(get_object, StylesCache | FooterKey) for get_object in gc.get_objects()))
 

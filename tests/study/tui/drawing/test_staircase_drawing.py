@@ -5,7 +5,15 @@ from dataclasses import replace
 import pytest
 
 from study.session.views.archive_views import Staircase
-from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG, staircase_lines, summary
+from study.tui.drawing.staircase_drawing import (
+    LABEL_COLUMNS,
+    PEAK_MARK,
+    RIGHT_MARK,
+    VALLEY_MARK,
+    WRONG_MARK,
+    staircase_lines,
+    summary,
+)
 
 SMALL = Staircase("Run", (1.0, 1.0, 0.5, 1.0), (True, True, False, True), (False, True, True, False), 0.75, 3.0)
 
@@ -17,14 +25,14 @@ def marks(lines):
 def test_every_trial_has_its_mark_and_a_higher_level_stands_higher():
     lines = staircase_lines(SMALL, 60, 12)
     by_column = dict(sorted((column, (row, c)) for (column, row), c in marks(lines).items()))
-    assert [c for _, c in by_column.values()] == [RIGHT, PEAK, VALLEY, RIGHT]
+    assert [c for _, c in by_column.values()] == [RIGHT_MARK, PEAK_MARK, VALLEY_MARK, RIGHT_MARK]
     rows = [row for row, _ in by_column.values()]
     assert rows[0] == rows[1] == rows[3] < rows[2]
 
 
 def test_a_wrong_answer_that_turns_nothing_is_a_cross():
     lines = staircase_lines(replace(SMALL, reversals=(False,) * 4), 60, 12)
-    assert sorted(marks(lines).values()) == sorted([RIGHT, RIGHT, WRONG, RIGHT])
+    assert sorted(marks(lines).values()) == sorted([RIGHT_MARK, RIGHT_MARK, WRONG_MARK, RIGHT_MARK])
 
 
 def test_cap_threshold_and_lowest_level_have_their_numbers():

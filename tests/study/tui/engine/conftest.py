@@ -13,7 +13,7 @@ from study.session.views.form_views import FormReply
 from study.session.views.views import AfterPause, Answered, DemoDone
 from study.tui.engine.client import EngineClient
 from study.tui.engine.from_engine import Ask, Call, Failed, Finished, FromEngine
-from study.tui.engine.to_engine import Begin, Heartbeat, Reply, SessionOrder, ToEngine
+from study.tui.engine.to_engine import BeginSession, Heartbeat, Reply, SessionOrder, ToEngine
 
 SHORT = {"after_run_s = 2.0": "after_run_s = 0.1", "trial_limit = 4": "trial_limit = 1"}
 
@@ -23,15 +23,15 @@ def ordinary_reply(ask: Ask) -> Any:
         case Call.ASK:
             return Answered(1 + ask.number % 2, time.monotonic())
         case Call.FILL_IN:
-            return FormReply({field.key: (*field.choices, "fine")[0] for field in ask.shown.fields})
+            return FormReply({field.key: (*field.choices, "fine")[0] for field in ask.content.fields})
         case Call.DEVICE_CHECKED:
             return True
         case Call.CHOOSE_DEMO:
             return DemoDone()
         case Call.PAUSE:
-            return AfterPause.GO_ON
+            return AfterPause.CONTINUE_SITTING
         case Call.REST:
-            return ask.shown.seconds
+            return ask.content.seconds
     return None
 
 
@@ -101,7 +101,7 @@ def order(tmp_path, small_text) -> SessionOrder:
 
 @pytest.fixture
 def begun(screen, order) -> ScriptedScreen:
-    screen.send(Begin(order))
+    screen.send(BeginSession(order))
     return screen
 
 

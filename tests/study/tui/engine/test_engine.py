@@ -14,10 +14,10 @@ from study.session.facts.void_reasons import SCREEN_LATE, SCREEN_SILENT
 from study.session.views.views import Answered
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.log_writer import is_log_locked
-from study.tui.engine.from_engine import Ask, Call, Close, Failed, Finished, Home, Session, Withdrawn
+from study.tui.engine.from_engine import Ask, Call, CloseRequest, Failed, Finished, Home, Session, Withdrawn
 from study.tui.engine.to_engine import (
     AskOtherSession,
-    Begin,
+    BeginSession,
     LetGo,
     Relay,
     Reply,
@@ -89,23 +89,23 @@ def test_letting_go_ends_the_sitting_and_it_can_be_resumed(begun, order, session
     assert is_log_locked(session / "events.jsonl") is False
     begun.send(Reply(trial.number, Answered(1, time.monotonic())))
     begun.send(Resume("P01_001", "simulated", order.data))
-    assert begun.wait_for(asks(Call.WELCOME)).shown.resumed_after == 2
+    assert begun.wait_for(asks(Call.WELCOME)).content.resumed_after == 2
 
 
 def test_letting_go_before_the_engine_has_begun_begins_nothing(screen, order, session):
-    screen.send(Begin(order))
+    screen.send(BeginSession(order))
     screen.send(LetGo())
     failure = screen.next()
     assert isinstance(failure, Failed)
     assert (failure.error.title, failure.path) == ("Interrupted", "")
     assert not session.exists()
-    screen.send(Begin(order))
+    screen.send(BeginSession(order))
     screen.wait_for(asks(Call.WELCOME))
 
 
 def test_a_reply_of_an_earlier_sitting_answers_nothing_in_the_next(screen, order):
     screen.send(Reply(1, True))
-    screen.send(Begin(order))
+    screen.send(BeginSession(order))
     assert screen.wait_for(is_a(Ask)).number == 1
     with pytest.raises(queue.Empty):
         screen.next(1.0)
@@ -124,16 +124,16 @@ def test_without_a_heartbeat_the_trial_is_void_and_waits_for_a_screen(begun, ses
     trial = third_trial(begun)
     begun.suspend()
     began_s = time.monotonic()
-    assert begun.next() == Close(trial.number)
+    assert begun.next() == CloseRequest(trial.number)
     assert 0.3 < time.monotonic() - began_s < 1.2
     waiting = begun.next()
     assert isinstance(waiting, Ask)
     assert waiting.call is Call.AWAIT_RETURN
-    assert waiting.shown in (SCREEN_SILENT, SCREEN_LATE)  # by how busy this computer is
+    assert waiting.content in (SCREEN_SILENT, SCREEN_LATE)  # by how busy this computer is
     assert "the screen gave no sign of life" in log_of(session).splitlines()[-1]
     begun.come_back()
     begun.reply(waiting)
-    assert begun.next().shown.repeated
+    assert begun.next().content.repeated
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_requests_from_the_screen_reach_the_session(begun, session, request_, ca
 
 
 def test_what_cannot_be_begun_is_reported_and_the_engine_continues(screen, order):
-    screen.send(Begin(SessionOrder("no_such_protocol", "simulated", "P01", order.data)))
+    screen.send(BeginSession(SessionOrder("no_such_protocol", "simulated", "P01", order.data)))
     failure = screen.next()
     assert isinstance(failure, Failed)
     assert "no_such_protocol" in failure.error.happened
@@ -195,9 +195,9 @@ spec = importlib.util.spec_from_file_location("scripted", {conftest!r})
 scripted = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(scripted)
 from study.tui.engine.from_engine import Ask, Call
-from study.tui.engine.to_engine import Begin, SessionOrder
+from study.tui.engine.to_engine import BeginSession, SessionOrder
 screen = scripted.ScriptedScreen()
-screen.send(Begin(SessionOrder({protocol!r}, "simulated", "P01", {data!r}, seed=4)))
+screen.send(BeginSession(SessionOrder({protocol!r}, "simulated", "P01", {data!r}, seed=4)))
 for _ in range(3):
     trial = screen.wait_for(lambda m: isinstance(m, Ask) and m.call is Call.ASK)
     if _ < 2:
@@ -221,4 +221,4 @@ def test_a_killed_screen_takes_the_engine_with_it_and_loses_nothing(screen, orde
     assert gone_within(engine, 4.5)  # about one on a machine that is not busy; its last resort comes at five
     assert "session_interrupted" in log_of(session).splitlines()[-1]
     screen.send(Resume("P01_001", "simulated", order.data))
-    assert screen.wait_for(asks(Call.WELCOME)).shown.resumed_after == 2
+    assert screen.wait_for(asks(Call.WELCOME)).content.resumed_after == 2

@@ -22,8 +22,8 @@ from study.session.views.views import (
     RestNotice,
     Unanswered,
 )
-from study.tui.engine.from_engine import Ask, Call, Close, LookUpdate
-from study.tui.engine.remote_display import SILENT_AFTER_S, RemoteDisplay, silent
+from study.tui.engine.from_engine import Ask, Call, CloseRequest, LookUpdate
+from study.tui.engine.remote_display import SILENT_AFTER_S, RemoteDisplay, make_silent_screen_reply
 from study.tui.engine.screen_link import ScreenLink
 from study.tui.engine.to_engine import Heartbeat, Reply
 from study.tui.trial_replies import TIME_OVER
@@ -32,7 +32,7 @@ pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
 QUESTION = Question(Phase.TEST, 1, 5, 3, repeated=False, time_limit_s=0.0, picture=PICTURE)
-MENU = DemoMenu(PICTURE, vibrations=1, vibration=1, felt=(), handle_moves=True)
+MENU = DemoMenu(PICTURE, vibrations=1, vibration=1, played_pairs=(), handle_moves=True)
 
 
 class OtherEnd:
@@ -40,7 +40,7 @@ class OtherEnd:
 
     def __init__(self) -> None:
         self.pipe, theirs = Pipe()
-        self.link = ScreenLink(theirs, interrupt=lambda: None, gone=lambda: None)
+        self.link = ScreenLink(theirs, interrupt=lambda: None, on_screen_ended=lambda: None)
         self.link.start()
         self.display = RemoteDisplay(self.link, RealClock())
         self._alive = True
@@ -120,13 +120,13 @@ def test_a_silent_screen_ends_every_force_at_the_hand(screen, wait):
     reply = wait(screen.display)
     assert SILENT_AFTER_S - 0.15 < time.monotonic() - began_s < SILENT_AFTER_S + 0.3
     # Which of the two depends on how busy this computer is.
-    assert reply in (silent(0.0, 0.1), silent(0.0, 4.0))
+    assert reply in (make_silent_screen_reply(0.0, 0.1), make_silent_screen_reply(0.0, 4.0))
 
 
 def test_a_silent_screen_of_a_busy_computer_is_distinguished(screen):
     screen.fall_silent()
     busy = RemoteDisplay(screen.link, RealClock(), load=lambda: 4.0)
-    assert busy.ask(QUESTION, alive) == silent(0.0, 4.0)
+    assert busy.ask(QUESTION, alive) == make_silent_screen_reply(0.0, 4.0)
 
 
 def test_a_silent_screen_may_take_its_time_while_nothing_plays(screen):
@@ -149,14 +149,14 @@ def test_what_plays_is_closed_when_its_time_is_over(screen):
     assert screen.display.show_playing(PlayingNotice("Interval 1", 1, 0.3, None), alive) is None
     assert time.monotonic() - began_s == pytest.approx(0.3, abs=0.06)
     assert isinstance(screen.hear(), Ask)
-    assert screen.hear() == Close(1)
+    assert screen.hear() == CloseRequest(1)
 
 
 def test_the_time_limit_is_the_engines(screen):
     reply = screen.display.ask(replace(QUESTION, time_limit_s=0.2), alive)
     assert reply == TIME_OVER
     screen.hear()
-    assert screen.hear() == Close(1)
+    assert screen.hear() == CloseRequest(1)
 
 
 def test_a_rest_lasts_even_if_the_screen_comes_back_too_early(screen):
@@ -172,9 +172,9 @@ def test_a_handle_that_is_held_still_for_a_moment_is_no_news(screen):
 
 def test_an_unmeasured_handle_position_is_shown_after_a_while(screen):
     view = HandleView(False, "The device does not say where its handle is.", (0.0, 0.0), 5.0)
-    screen.soon(Reply(1, Unanswered("asked for a pause", leave=False, pause=True)), delay_s=1.4)
+    screen.soon(Reply(1, Unanswered("asked for a pause", ends_sitting=False, pause=True)), delay_s=1.4)
     assert screen.display.await_handle(lambda: view, alive).pause
-    assert screen.hear().shown == view
+    assert screen.hear().content == view
 
 
 def test_the_screen_sees_the_handle_come_back(screen):
@@ -183,7 +183,7 @@ def test_the_screen_sees_the_handle_come_back(screen):
     coming = iter(views)
     assert screen.display.await_handle(lambda: next(coming), alive) is None
     heard = [screen.hear() for _ in range(5)]
-    assert heard == [Ask(1, Call.AWAIT_HANDLE, views[0]), *(LookUpdate(1, view) for view in views[1:]), Close(1)]
+    assert heard == [Ask(1, Call.AWAIT_HANDLE, views[0]), *(LookUpdate(1, view) for view in views[1:]), CloseRequest(1)]
 
 
 def test_a_wait_gives_signs_of_life_twenty_times_a_second(screen):

@@ -41,7 +41,7 @@ class Bare(App[None]):
         self._keys = KeysInOrder(self, super().on_event)
 
     async def on_event(self, event: Event) -> None:
-        await self._keys.take(event)
+        await self._keys.handle_event(event)
 
     def on_mount(self) -> None:
         self.push_screen(self.first)

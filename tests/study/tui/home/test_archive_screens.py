@@ -27,7 +27,7 @@ def test_a_session_that_a_person_takes_now_is_shown_after_its_name_was_typed(on_
 
     async def story(sight):
         archive = ArchiveScreens(sight.app, lambda _: None, AppStart("data", "simulated"))
-        await archive.hear(Session(view))
+        await archive.handle_message(Session(view))
         await sight.pilot.pause()
         assert isinstance(sight.app.screen, ConfirmView) is asks_first
         if asks_first:

@@ -3,7 +3,7 @@
 import pytest
 from textual.widgets import Input
 
-from study.tui.engine.from_engine import Calibrated, LayDown, SensorKept
+from study.tui.engine.from_engine import Calibrated, CalibrationStored, LayDown
 from study.tui.screens.home import HomeScreen
 from study.tui.screens.sensor import SensorScreen
 from tests.study.tui.home.conftest import messages_of
@@ -15,8 +15,8 @@ def story_of(*steps):
 
     async def story(sight):
         for step in steps:
-            if isinstance(step, LayDown | Calibrated | SensorKept):
-                sight.app.screen.hear(step)
+            if isinstance(step, LayDown | Calibrated | CalibrationStored):
+                sight.app.screen.handle_message(step)
                 await sight.pilot.pause()
             else:
                 await sight.press(*step)
@@ -38,7 +38,7 @@ def test_a_person_is_led_through_six_positions(on_screen):
         ("enter", "enter"),
         Calibrated('[accelerometer]\nport = "COM3"', "/lab/device.toml"),
         ("enter", "enter"),
-        SensorKept("/lab/device.toml"),
+        CalibrationStored("/lab/device.toml"),
     )
     app = on_screen(SensorScreen(), story, (90, 30))
     assert "The port is opened" in seen[1]
@@ -78,7 +78,7 @@ def test_after_an_error_it_begins_again(on_screen):
         await sight.press(*PORT, "f5")
         screen = sight.app.screen
         assert screen.query_one("#port", Input).disabled
-        screen.begin_again()
+        screen.reset_after_error()
         await sight.pilot.pause()
         assert "F5 begins again." in sight.words and not screen.query_one("#port", Input).disabled
         await sight.press("f5")

@@ -3,7 +3,7 @@
 import pytest
 from textual.color import Color
 
-from study.tui.themes import NEXT, THEMES
+from study.tui.themes import NEXT_THEME, THEMES
 
 
 @pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
@@ -19,7 +19,7 @@ def test_the_key_that_changes_themes_goes_through_all_of_them():
     name, seen = "hapteq-dark", set()
     for _ in THEMES:
         seen.add(name)
-        name = NEXT[name]
+        name = NEXT_THEME[name]
     assert seen == names
     assert name == "hapteq-dark"
 

@@ -15,7 +15,7 @@ from study.session.views.views import (
 from study.tui.line_mode.line_input import LineInput
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
-MENU = DemoMenu(PICTURE, vibrations=3, vibration=2, felt=((2, 1),), handle_moves=True)
+MENU = DemoMenu(PICTURE, vibrations=3, vibration=2, played_pairs=((2, 1),), handle_moves=True)
 PLAYING = PlayingNotice("Direction 1", number=1, seconds=2.0, picture=PICTURE)
 
 
@@ -65,7 +65,7 @@ def test_the_demonstration_plays_what_is_chosen(typed, lines, choice):
 def test_the_menu_says_what_was_felt_and_shows_the_picture_once(typed):
     typed.type("n", "1", "1")
     choose(typed)
-    choose(typed, replace(MENU, felt=((2, 1), (2, 2)), handle_moves=False))
+    choose(typed, replace(MENU, played_pairs=((2, 1), (2, 2)), handle_moves=False))
     assert "Demonstration, vibration 2 of 3. Felt so far: 1." in typed.said
     assert "Demonstration, vibration 3 of 3. Nothing of it was felt yet." in typed.said
     assert "Felt so far: 1 and 2. The device is a simulation: nothing moves." in typed.said
@@ -116,19 +116,21 @@ def test_a_gap_between_two_intervals_is_silent(unhurried):
 @pytest.mark.parametrize(
     ("text", "reply", "after_s"),
     [
-        ("q", Unanswered("the participant left", leave=True), 1.0),
-        ("p", Unanswered("asked for a pause", leave=False, asked=True, pause=True), 1.0),
+        ("q", Unanswered("the participant left", ends_sitting=True), 1.0),
+        ("p", Unanswered("asked for a pause", ends_sitting=False, repeat_requested=True, pause=True), 1.0),
         ("1", None, 2.0),
     ],
 )
 def test_only_leaving_and_pausing_are_heard_while_something_plays(unhurried, text, reply, after_s):
-    unhurried.display._talk._lines = Person(unhurried.clock, text, at_s=1.0)
+    unhurried.display._conversation._lines = Person(unhurried.clock, text, at_s=1.0)
     assert unhurried.display.show_playing(PLAYING, lambda: True) == reply
     assert unhurried.clock.now_s() == pytest.approx(after_s, abs=0.11)
 
 
 def test_a_fault_ends_what_plays_at_once(unhurried):
-    assert unhurried.display.show_playing(PLAYING, lambda: False) == Unanswered("the stimulus ended early", leave=False)
+    assert unhurried.display.show_playing(PLAYING, lambda: False) == Unanswered(
+        "the stimulus ended early", ends_sitting=False
+    )
     assert unhurried.clock.now_s() <= 0.1
 
 
@@ -163,9 +165,9 @@ def test_a_handle_that_is_there_needs_no_words(unhurried):
 def test_waiting_for_the_handle_ends_by_a_fault_by_leaving_or_with_the_input(unhurried):
     away = Handle(unhurried.clock, 1e6).look
     fault = unhurried.display.await_handle(away, lambda: False)
-    assert fault == Unanswered("the stimulus ended early", leave=False)
+    assert fault == Unanswered("the stimulus ended early", ends_sitting=False)
     unhurried.end()
-    assert unhurried.display.await_handle(away, lambda: True) == Unanswered("the input ended", leave=True)
-    unhurried.display._talk._lines = Person(unhurried.clock, "p", at_s=3.0)
+    assert unhurried.display.await_handle(away, lambda: True) == Unanswered("the input ended", ends_sitting=True)
+    unhurried.display._conversation._lines = Person(unhurried.clock, "p", at_s=3.0)
     paused = unhurried.display.await_handle(away, lambda: True)
-    assert paused == Unanswered("asked for a pause", leave=False, asked=True, pause=True)
+    assert paused == Unanswered("asked for a pause", ends_sitting=False, repeat_requested=True, pause=True)

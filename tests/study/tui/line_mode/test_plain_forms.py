@@ -11,7 +11,7 @@ from study.devices.clock import RealClock
 from study.session.views.form_views import Form, FormField, FormKind, find_missing_fields
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.tui.line_mode.line_input import LineInput
-from study.tui.line_mode.plain import PlainDisplay
+from study.tui.line_mode.plain_display import PlainDisplay
 
 CONSENT = FormField("hands", "Are both hands well?", ("yes", "no"))
 SCALE = FormField("sure", "How sure were you?", ("0", "1", "2"))

@@ -51,13 +51,13 @@ def test_after_a_rest_one_can_leave(unhurried, line):
 @pytest.mark.parametrize(
     ("lines", "decision"),
     [
-        (("",), AfterPause.GO_ON),
-        (("q",), AfterPause.LEAVE),
+        (("",), AfterPause.CONTINUE_SITTING),
+        (("q",), AfterPause.END_SITTING),
         (("w", "withdraw"), AfterPause.WITHDRAW),
         (("w", "Withdraw"), AfterPause.WITHDRAW),
-        (("w", "", ""), AfterPause.GO_ON),
-        (("w", "yes", "q"), AfterPause.LEAVE),
-        (("x", "?", ""), AfterPause.GO_ON),
+        (("w", "", ""), AfterPause.CONTINUE_SITTING),
+        (("w", "yes", "q"), AfterPause.END_SITTING),
+        (("x", "?", ""), AfterPause.CONTINUE_SITTING),
     ],
 )
 def test_a_pause_ends_by_decision_and_withdrawing_needs_the_whole_word(typed, lines, decision):
@@ -82,7 +82,7 @@ def test_notes_and_adverse_events_reach_the_session(typed_in):
     notes = []
     typed = typed_in(notes=notes)
     typed.type("n", "the phone rang", "e", "the thumb is numb", "n", "", "")
-    assert typed.display.pause(PAUSE, lambda: True) is AfterPause.GO_ON
+    assert typed.display.pause(PAUSE, lambda: True) is AfterPause.CONTINUE_SITTING
     assert notes == [
         NoteAsked("participant", "the phone rang", adverse=False),
         NoteAsked("participant", "the thumb is numb", adverse=True),

@@ -11,7 +11,7 @@ from protocols.wording.english import ENGLISH
 from protocols.wording.words import Words
 from study.devices.clock import VirtualClock
 from study.session.views.form_views import FormKind, FormReply
-from study.session.views.forms import confirmation_of, form_of
+from study.session.views.forms import make_confirmation, make_form
 from study.session.views.views import (
     AfterPause,
     DemoDone,
@@ -34,7 +34,7 @@ from study.store.formats.participant_texts import load_in_language
 from study.store.formats.protocol_files import read_protocol
 from study.tui.line_mode.conversation import LINE_WIDTH
 from study.tui.line_mode.line_input import LineInput
-from study.tui.line_mode.plain import PlainDisplay
+from study.tui.line_mode.plain_display import PlainDisplay
 from tests.study.tui.screens.test_spoken_screens import english_in
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
@@ -140,16 +140,16 @@ def test_the_rest_of_it_too(told):
 
 def test_forms_are_answered_in_the_language_by_word_letter_or_number(told, spoken):
     display, table = told.display, told.table
-    consent = form_of(spoken, FormKind.CONSENT)
+    consent = make_form(spoken, FormKind.CONSENT)
     yes, no = table["yes"], table["no"]
     told.type("xyz", no, "b", yes, yes[0], "1", yes, table["line_form_confirm_letter"])
     reply = display.fill_in(consent)
     assert set(reply.answers.values()) == {yes}
     left, right = table["quoted"].split("{text}")
-    check = confirmation_of(consent, FormReply({**reply.answers, "statement_1": no}), Words(table))
+    check = make_confirmation(consent, FormReply({**reply.answers, "statement_1": no}), Words(table))
     assert f"{left}{table['protocol_told']}{right}" in check.introduction
     assert left != ENGLISH["quoted"][0]
-    questions = form_of(spoken, FormKind.QUESTIONNAIRE)
+    questions = make_form(spoken, FormKind.QUESTIONNAIRE)
     told.type("abc", "7", "34,5", "")
     assert display.fill_in(questions).answers == {"age": "34,5", "handedness": ""}
     told.check("consent_intro", "line_form_n", "line_form_changed", "line_form_none_numbered", "form_number",

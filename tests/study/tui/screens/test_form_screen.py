@@ -4,7 +4,7 @@ import random
 import pytest
 from textual import events
 
-from study.session.views.form_entry import blank_entry, press, reply_of
+from study.session.views.form_entry import make_blank_entry, make_reply, press
 from study.session.views.form_views import Form, FormField, FormKind, FormReply
 from study.tui.screens.form import FormScreen
 
@@ -143,9 +143,9 @@ def test_a_key_without_a_meaning_where_it_was_typed_means_nothing_later(on_stage
 
     async def story(stage):
         stage.burst("down", "down", "down", "1", "up", "n")
-        await stage.until(lambda: stage.app.screen.entry.given[2].answer)
+        await stage.until(lambda: stage.app.screen.entry.field_entries[2].answer)
         await stage.pilot.pause(0.2)
-        assert [given.answer for given in stage.app.screen.entry.given] == ["", "", "no"]
+        assert [given.answer for given in stage.app.screen.entry.field_entries] == ["", "", "no"]
 
     on_stage(FormScreen(EXCLUSION), story)
 
@@ -171,31 +171,33 @@ def follow_bursts(on_stage, form, seed, bursts):
     async def story(stage):
         rows = list(screen.query("FormQuestion"))
         stacked = [row.stacked for row in rows] + [False]
-        wanted = blank_entry(form)
+        wanted = make_blank_entry(form)
         for _ in range(bursts):
             keys = draw.choices(WALK + (TEXT_KEYS if form is MIXED else []), k=draw.randint(2, 15))
-            if wanted.at == len(form.fields):
+            if wanted.cursor == len(form.fields):
                 keys[0] = "up"  # so that it goes on for long
             for key in keys:
                 character = key if len(key) == 1 else " " if key == "space" else None
-                wanted = press(wanted, key, character, stacked[wanted.at]) or wanted
-                if wanted.sent:
+                wanted = press(wanted, key, character, stacked[wanted.cursor]) or wanted
+                if wanted.is_sent:
                     break
             stage.burst(*keys)
             for _ in range(draw.choice([0, 0, 1, 3, 30])):
                 await asyncio.sleep(0)
-            if wanted.sent:
+            if wanted.is_sent:
                 break
-        if wanted.sent:
+        if wanted.is_sent:
             await stage.until(lambda: any(isinstance(heard, FormReply) for heard in stage.heard))
             reply = next(heard for heard in stage.heard if isinstance(heard, FormReply))
-            assert reply == reply_of(wanted), f"seed {seed}"
+            assert reply == make_reply(wanted), f"seed {seed}"
             return
         await stage.pilot.pause()
         assert screen.entry == wanted, f"seed {seed}"
         shown = [row.query_one("ChoiceRow").answer for row in rows if row.field.choices]
-        assert shown == [given.answer for given, row in zip(wanted.given, rows, strict=True) if row.field.choices]
-        assert [row.has_class("-at") for row in rows] == [i == wanted.at for i in range(len(rows))]
+        assert shown == [
+            given.answer for given, row in zip(wanted.field_entries, rows, strict=True) if row.field.choices
+        ]
+        assert [row.has_class("-at") for row in rows] == [i == wanted.cursor for i in range(len(rows))]
 
     on_stage(screen, story)
 
@@ -212,7 +214,7 @@ def test_a_click_in_a_burst_of_keys_keeps_its_place(on_stage):
             stage.app._driver.send_message(kind(None, x, y, 0, 0, 1, False, False, False, x, y))
         stage.burst("up", "1")
         await stage.pilot.pause()
-        assert reply_of(screen.entry).answers == {"s1": "yes", "s2": "yes", "s3": "no"}
+        assert make_reply(screen.entry).answers == {"s1": "yes", "s2": "yes", "s3": "no"}
 
     on_stage(screen, story)
 
@@ -223,11 +225,11 @@ def test_pasted_text_chooses_nothing_and_sends_nothing(on_stage):
     async def story(stage):
         stage.app.post_message(events.Paste("1\n2\n\n"))
         await stage.pilot.pause()
-        assert screen.entry == blank_entry(MIXED)
+        assert screen.entry == make_blank_entry(MIXED)
         await stage.press("1", "enter", "1", "enter")
         stage.app.post_message(events.Paste("by\nfeel"))
         await stage.pilot.pause()
-        assert "by feel" in stage.words and screen.entry.at == 2
+        assert "by feel" in stage.words and screen.entry.cursor == 2
 
     assert on_stage(screen, story) == []
 
@@ -249,4 +251,4 @@ def test_a_question_mark_is_written_in_free_text_and_is_help_elsewhere(on_stage)
         await stage.press("question_mark", "1", "enter", "1", "enter", "question_mark")
 
     assert on_stage(screen, story) == ["help"]
-    assert screen.entry.given[2].answer == "?"
+    assert screen.entry.field_entries[2].answer == "?"

@@ -57,7 +57,7 @@ def read(on_stage):
 @pytest.mark.parametrize(
     "screen",
     [
-        lambda: InstructionsScreen(Welcome("T", PICTURE, 5, 1, "d", felt=True, resumed_after=0)),
+        lambda: InstructionsScreen(Welcome("T", PICTURE, 5, 1, "d", device_moves=True, resumed_after=0)),
         lambda: PracticeOverScreen(PracticeResult(True, 8, 10)),
         lambda: AwaitReturnScreen("reason"),
         lambda: GoodbyeScreen(Goodbye(True, 5)),
@@ -70,7 +70,7 @@ def test_enter_and_no_other_key_leaves_a_page(read, screen):
 
 
 def test_instructions_say_what_happens_and_that_nothing_can_go_wrong(read):
-    words = read(InstructionsScreen(Welcome("T", PICTURE, 5, 1, "d", felt=True, resumed_after=0)))[1]
+    words = read(InstructionsScreen(Welcome("T", PICTURE, 5, 1, "d", device_moves=True, resumed_after=0)))[1]
     for part in (
         "press 1 or 2",
         "if you cannot tell, guess. A guess can do no harm.",
@@ -82,7 +82,7 @@ def test_instructions_say_what_happens_and_that_nothing_can_go_wrong(read):
 
 
 def test_instructions_tell_practice_resumption_and_other_keys(read):
-    welcome = Welcome("T", PICTURE, 5, 0, "the simulation", felt=False, resumed_after=12)
+    welcome = Welcome("T", PICTURE, 5, 0, "the simulation", device_moves=False, resumed_after=12)
     words = read(InstructionsScreen(welcome, parse_keys("f,j")))[1]
     assert "Welcome back: 12 answers are on the disk." in words
     assert "Practice: the device is a simulation (the simulation)" in words

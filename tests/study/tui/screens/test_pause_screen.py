@@ -23,12 +23,12 @@ def paused(on_stage):
 
 
 def test_enter_continues(paused):
-    assert paused("enter")[0] == [AfterPause.GO_ON]
+    assert paused("enter")[0] == [AfterPause.CONTINUE_SITTING]
 
 
 def test_leaving_is_the_second_choice_and_the_first_after_a_request_to_leave(paused):
-    assert paused("down", "enter")[0] == [AfterPause.LEAVE]
-    assert paused("enter", leaving=True)[0] == [AfterPause.LEAVE]
+    assert paused("down", "enter")[0] == [AfterPause.END_SITTING]
+    assert paused("enter", leaving=True)[0] == [AfterPause.END_SITTING]
 
 
 def test_reason_and_answers_are_reported(paused):
@@ -87,7 +87,7 @@ def test_a_note_without_an_author_asks_who_writes_it(on_stage):
         await stage.press(*"abc", "ctrl+s")
         assert "Please choose who writes this." in stage.words
 
-    assert on_stage(NoteScreen(who="program"), story) == []
+    assert on_stage(NoteScreen(writer="program"), story) == []
 
 
 def test_lines_of_a_note_become_one(on_stage):

@@ -12,11 +12,11 @@ import pytest
 
 from protocols.document.loading import protocol_from_values
 from protocols.wording.english import ENGLISH
-from protocols.wording.in_language import in_language
+from protocols.wording.in_language import translate_protocol
 from protocols.wording.words import Words
 from study.session.facts.void_reasons import SCREEN_LATE, SCREEN_SILENT
 from study.session.views.form_views import FormKind
-from study.session.views.forms import form_of
+from study.session.views.forms import make_form
 from study.session.views.views import (
     DemoMenu,
     DeviceFinding,
@@ -203,7 +203,7 @@ def test_a_form_is_in_the_language_from_top_to_bottom(on_stage, kind, code):
         {"key": "tired", "question": "How tired are you?", "scale": [1, 5], "ends": ["not at all", "very"]},
     ]
     values = {**tomllib.loads(read_protocol("direction_threshold").text), "before": before}
-    form = form_of(protocol_from_values(in_language(values, table, code), "mine"), kind)
+    form = make_form(protocol_from_values(translate_protocol(values, table, code), "mine"), kind)
 
     async def story(stage):
         for _ in range(len(form.fields) * 6 + 1):

@@ -9,7 +9,7 @@ from study.session.watching.watch_view import (
     OpenTrial,
 )
 from study.tui.watch.watch_app import WatchApp
-from study.tui.watch.watch_screen import NO_NEWS_AFTER_S, RING_EVERY_S
+from study.tui.watch.watch_screen import BELL_INTERVAL_S, STALE_AFTER_S
 from tests.study.tui.watch_screen.watched import ALARM, LIVE, Source, view
 
 
@@ -18,16 +18,16 @@ def test_an_alarm_rings_until_it_is_seen_and_stays_on_the_screen(seated):
         assert seat.bells == []
         await seat.show(view(alarms=(ALARM,)))
         for look in range(9):
-            await seat.pass_time(0.3 * RING_EVERY_S)
+            await seat.pass_time(0.3 * BELL_INTERVAL_S)
             await seat.show(view(alarms=(ALARM,), activity_s=float(look)))  # news keep coming
         assert len(seat.bells) == 3
         assert "ALARM: press a when you have seen it" in seat.text
         assert "▲ The acceleration sensor is clipped: it reads too little. since 10:17:00 +00:00" in seat.text
         await seat.press("a")
         assert "1 alarm seen." in seat.lines[1]
-        await seat.pass_time(0.3 * RING_EVERY_S)
+        await seat.pass_time(0.3 * BELL_INTERVAL_S)
         await seat.show(view(alarms=(ALARM,)))
-        await seat.pass_time(0.8 * RING_EVERY_S - 1.0)
+        await seat.pass_time(0.8 * BELL_INTERVAL_S - 1.0)
         assert len(seat.bells) == 3
         assert "seen: The acceleration sensor is clipped" in seat.text
         await seat.show(view())
@@ -40,7 +40,7 @@ def test_an_alarm_rings_until_it_is_seen_and_stays_on_the_screen(seated):
 
 def test_a_view_that_stands_still_is_an_alarm(seated):
     async def story(seat):
-        await seat.pass_time(NO_NEWS_AFTER_S - 0.1)
+        await seat.pass_time(STALE_AFTER_S - 0.1)
         assert seat.bells == []
         await seat.pass_time(0.2)
         assert "This view has not been updated for seconds" in seat.text

@@ -7,7 +7,7 @@ from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.session.watching.watch_view import (
     Alarm,
 )
-from study.tui.watch.watch_screen import UNHEARD_AFTER_S
+from study.tui.watch.watch_screen import STOP_TIMEOUT_S
 from tests.study.tui.watch_screen.watched import UTC, view
 
 STOP, PAUSE = StopAsked("experimenter"), PauseAsked("experimenter")
@@ -38,7 +38,7 @@ def test_a_small_s_stops_nothing(seated):
 def test_a_stop_that_is_not_heard_is_an_alarm(seated):
     async def story(seat):
         await seat.press("S")
-        await seat.pass_time(UNHEARD_AFTER_S - 0.1)
+        await seat.pass_time(STOP_TIMEOUT_S - 0.1)
         assert seat.bells == []
         await seat.pass_time(0.2)
         assert "The session has not answered the stop." in seat.text
@@ -53,7 +53,7 @@ def test_a_stop_that_is_not_heard_in_a_pause_is_an_alarm_too(seated):
     async def story(seat):
         await seat.show(view(standing="paused", activity="pausing", open_trial=None))
         await seat.press("S")
-        await seat.pass_time(UNHEARD_AFTER_S + 0.1)
+        await seat.pass_time(STOP_TIMEOUT_S + 0.1)
         assert "The session has not answered the stop." in seat.text
 
     assert len(seated(story).bells) == 1

@@ -15,7 +15,7 @@ from study.store.disk.provenance import sha256_of
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks.daily_check import MotionCallbacks, check_on
-from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on
+from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on_device
 
 AS_NEW = {"friction": 0.15, "damping": 1.0, "mode_hz": 60.0, "noise": 0.05}
 QUIET = MotionCallbacks(lambda notice: None, lambda done: None)
@@ -66,7 +66,7 @@ def recorded(device_like, kept):
         once = kept / f"{'-'.join(map(str, (seed, *changed, *changed.values())))}.h5"
         if not once.exists():
             with device_like(seed, changed) as (device, plan):
-                record_on(device, plan, lambda done: None, lambda notice: None)
+                record_on_device(device, plan, lambda done: None, lambda notice: None)
             plan.out.rename(once)
         shutil.copyfile(once, out)
         return read_recording(out)

@@ -8,7 +8,7 @@ import pytest
 
 from study.session.views.views import DeviceFinding
 from study.workflows.checks import bare_loop
-from study.workflows.checks.bare_loop import BareLoop, BareRun, judge_beside, run_bare_loop_beside
+from study.workflows.checks.bare_loop import BareLoop, BareRun, compare_with_bare_loop, run_bare_loop_beside
 
 
 @pytest.mark.real_time
@@ -27,7 +27,7 @@ def test_its_source_compiles_without_a_warning(vendor, tmp_path):
 
 
 def beside(late: int, bare_late: int, ticks: int = 60_000) -> DeviceFinding:
-    return judge_beside(late, ticks, BareRun(BareLoop(60_000, bare_late, 0.0042, True)))
+    return compare_with_bare_loop(late, ticks, BareRun(BareLoop(60_000, bare_late, 0.0042, True)))
 
 
 @pytest.mark.parametrize(("late", "bare_late"), [(0, 0), (3, 0), (150, 100), (170, 100), (1500, 1000), (10, 500)])
@@ -59,7 +59,7 @@ def test_without_a_compiler_it_is_said_that_nothing_was_compared(monkeypatch):
     monkeypatch.setattr(bare_loop, "_compiler", lambda: None)
     with run_bare_loop_beside(1.0, 1000.0, True) as run:
         pass
-    found = judge_beside(5, 1000, run)
+    found = compare_with_bare_loop(5, 1000, run)
     assert found.fine and "not compared: no C compiler" in found.value
 
 
@@ -68,7 +68,7 @@ def test_a_compiler_that_fails_or_makes_nothing_is_told(monkeypatch, tool):
     monkeypatch.setattr(bare_loop, "_compiler", lambda: [shutil.which(tool)])
     with run_bare_loop_beside(1.0, 1000.0, True) as run:
         pass
-    assert run.result is None and "not compared" in judge_beside(5, 1000, run).value
+    assert run.result is None and "not compared" in compare_with_bare_loop(5, 1000, run).value
 
 
 def test_a_measurement_that_breaks_off_leaves_no_loop_behind():

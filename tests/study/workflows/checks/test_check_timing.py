@@ -219,6 +219,6 @@ def test_an_interruption_while_a_real_loop_is_timed_lets_go_at_once(rigs, settin
 
 def test_before_a_sitting_on_a_real_device_it_is_said_whether_its_loop_may_go_first(monkeypatch):
     refused = DeviceFinding("Priority", "other programs may delay the loop", fine=False, advice="ask", warning=True)
-    monkeypatch.setattr("study.workflows.checks.check_timing.loop_priority", lambda: refused)
+    monkeypatch.setattr("study.workflows.checks.check_timing.check_loop_priority", lambda: refused)
     assert refused in check_computer(VirtualClock(), 1000.0, False, 0.1)
     assert refused not in check_computer(VirtualClock(), 1000.0, True, 0.1)

@@ -96,10 +96,10 @@ def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, s
         assert said in found.value and checked.file.name in found.value
         assert found.fine == (seed == 2) and found.warning == (seed != 2)
         if found.fine:
-            assert last_check(INFO, needed=True) == found
+            assert last_check(INFO, required=True) == found
         else:
             with pytest.raises(DeviceError, match="requires a passed daily check.*noise changed.*--daily"):
-                last_check(INFO, needed=True)
+                last_check(INFO, required=True)
     other = replace(INFO, details="serial 7, firmware 2.41, SDK 3.17.5.0")
     assert last_check(other).value == "none yet"
     path = device_folder() / "daily_checks" / "3.json"

@@ -112,7 +112,7 @@ def test_a_baseline_that_tells_too_little_is_refused(device_like, monkeypatch):
     with device_like(1, {}) as (device, plan):
         assert daily_check._record_baseline_on(device, plan, QUIET)[0] == "baselines/1.h5"
         good = read_recording(plan.out)
-        monkeypatch.setattr(daily_check, "record_on", lambda *_: None)
+        monkeypatch.setattr(daily_check, "record_on_device", lambda *_: None)
         for spoil, said in (
             (lowered, "at its limit in 1 of 6"),
             (clipped, "at its limit in 1 of 6"),
@@ -164,7 +164,7 @@ def test_a_pass_ends_with_another_acceptance_and_with_a_check_that_broke_off(
         announce("It moves.")
         raise DeviceError("The device let go", "A cable.", "Look.")
 
-    monkeypatch.setattr(daily_check, "record_on", broken)
+    monkeypatch.setattr(daily_check, "record_on_device", broken)
     with device_like(2, {}) as (device, plan), pytest.raises(DeviceError, match="let go"):
         check_on(device, replace(plan, out=checks / "2.h5"), QUIET)
     assert "it broke off" in last_check(INFO).value and not last_check(INFO).fine

@@ -18,7 +18,7 @@ from study.errors import DeviceError
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks.daily_check import compare_recordings
-from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on
+from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on_device
 
 NEW = Omega3Parameters()
 CENTRE_M = (0.0, 0.0, 0.0)
@@ -41,7 +41,7 @@ def recorded(tmp_path_factory):
         out = folder / f"{len(list(folder.iterdir()))}.h5"
         plan = RecordingPlan(read_recording_protocol("daily_check").protocol, "simulated", CENTRE_M, seed, out)
         with contextlib.closing(SafeDevice(rig, make_recording_settings(plan), VirtualClock())) as device:
-            assert record_on(device, plan, lambda done: None).warnings == ()
+            assert record_on_device(device, plan, lambda done: None).warnings == ()
         return read_recording(plan.out)
 
     return record

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study.cli.main import main
-from study.devices.simulated.own_linkage import make_simulated_linkage
+from study.devices.simulated.simulated_linkage import make_simulated_linkage
 from study.errors import ExitCode, StudyError
 from study.store.formats.calibration_file import write_calibration
 from study.store.formats.mechanical_model_file import read_mechanical_model

@@ -10,7 +10,7 @@ from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.law_entry import effects_of
+from equalizer.effects.law_entry import effects_per_axis
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.law import law_of
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, Tolerance
@@ -78,11 +78,11 @@ def test_a_file_that_is_no_effect_is_refused(tmp_path, text, said):
 def test_at_other_axes_all_letters_turn_along(model_file, tmp_path):
     entry = write_entry(model_file, tmp_path / "drag.py")
     turned = replace(entry, law=law_of("-2.0*vx*y + 0.1*fz + 0*t", "force", "x"))
-    assert [each.law.text for each in effects_of(turned, Channels())] == [
+    assert [each.law.text for each in effects_per_axis(turned, Channels())] == [
         "-2.0*vx*y + 0.1*fz + 0*t", "-2.0*vy*z + 0.1*fx + 0*t", "-2.0*vz*x + 0.1*fy + 0*t"
     ]  # fmt: skip
     only = replace(entry, law=law_of("-2.0*vy**3", "force", "y"))
-    assert [each.law.text for each in effects_of(only, Channels(("u",), ("a",)))] == ["-2.0*vx**3"]
+    assert [each.law.text for each in effects_per_axis(only, Channels(("u",), ("a",)))] == ["-2.0*vx**3"]
 
 
 def recording(*laws) -> Recording:

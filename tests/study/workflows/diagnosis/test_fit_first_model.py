@@ -8,7 +8,7 @@ import pytest
 
 from analysis.diagnosis.errors.prediction_error import prediction_error
 from analysis.diagnosis.first_model.choose_structure import choose_structure
-from analysis.diagnosis.first_model.fit_without_model import _answers
+from analysis.diagnosis.first_model.fit_without_model import _responds_to_commands
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
@@ -73,7 +73,7 @@ def fitted(folder: Path, recording: Recording, structure: str = "auto") -> First
 
 def inside(done: FirstModel, name: str, truth: float) -> bool:
     (number,) = [each for each in done.choice.fit.parameters if each.name == name]
-    return number.half is not None and abs(number.value - truth) <= number.half
+    return number.half_width is not None and abs(number.value - truth) <= number.half_width
 
 
 @pytest.mark.parametrize("seed", range(1, 6))
@@ -86,7 +86,10 @@ def test_mass_damping_and_stiffness_come_back_within_their_intervals(tmp_path, s
 
 def test_the_intervals_are_no_wider_than_a_tenth_where_there_is_hardly_noise(tmp_path):
     done = fitted(tmp_path, recorded(device(0.4, 6.0, 900.0)), "mass-spring")
-    assert all(number.half is not None and number.half < 0.1 * number.value for number in done.choice.fit.parameters)
+    assert all(
+        number.half_width is not None and number.half_width < 0.1 * number.value
+        for number in done.choice.fit.parameters
+    )
 
 
 def test_coupled_axes_give_symmetric_matrices(tmp_path):
@@ -176,7 +179,7 @@ def test_the_file_is_accepted_for_a_diagnosis(tmp_path):
 
 @pytest.mark.parametrize(("mass", "answers"), [(0.5, True), (1e31, False)])
 def test_a_model_of_masses_without_bound_does_not_answer(mass, answers):
-    assert _answers(device(mass, 2.0, 300.0), recorded(device(0.5, 2.0, 300.0))) == answers
+    assert _responds_to_commands(device(mass, 2.0, 300.0), recorded(device(0.5, 2.0, 300.0))) == answers
 
 
 def test_segments_to_test_are_held_out(tmp_path):

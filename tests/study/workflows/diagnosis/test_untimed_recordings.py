@@ -10,7 +10,7 @@ from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES, UNTIMED
 from analysis.diagnosis.result.candidate_wording import Device
-from analysis.diagnosis.result.wording import place_of
+from analysis.diagnosis.result.wording import describe_place
 from analysis.diagnosis.search.guard import Guard
 from equalizer.plant.effect_vocabulary import matrix_unit
 from equalizer.signals.recording import Recording
@@ -69,8 +69,8 @@ def test_no_unit_holds_a_second(first):
 
 def test_no_place_is_reported_in_hertz(first):
     row = Mismatch("x", "fx", (0.0, 0.5), None, None, 0.02, 0.0)
-    assert "Hz" not in place_of(row, Device(True, first.model.system))
-    assert "Hz" in place_of(row)
+    assert "Hz" not in describe_place(row, Device(True, first.model.system))
+    assert "Hz" in describe_place(row)
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from study.store.formats.trajectory_file import read_trajectory, write_trajector
 from study.workflows.equalizer import play_contact as play_contact_module
 from study.workflows.equalizer import repeat_playback as repeat_playback_module
 from study.workflows.equalizer.equalize_trajectory import EqualizePlan
-from study.workflows.equalizer.play_contact import ContactPlan, contact_lines, play_contact
+from study.workflows.equalizer.play_contact import ContactPlan, format_contact, play_contact
 from study.workflows.equalizer.repeat_trajectory import RepeatOrder, repeat_trajectory
 
 NORMAL = (1.0, 2.0, -2.0)
@@ -55,17 +55,17 @@ def refusal(folder, tmp_path, **more) -> StudyError:
 
 def test_the_model_gives_the_transient_that_one_gain_misses(done):
     found, told = done
-    assert found.equalized.error < 0.5 * found.plain.error
+    assert found.equalized.error < 0.5 * found.single_gain.error
     assert found.start.error(found.normal) <= found.start.worst_error
     across = found.equalized.measured - np.outer(found.equalized.measured @ found.normal, found.normal)
-    plain = found.plain.measured - np.outer(found.plain.measured @ found.normal, found.normal)
+    plain = found.single_gain.measured - np.outer(found.single_gain.measured @ found.normal, found.normal)
     assert np.linalg.norm(across) < np.linalg.norm(plain)
     assert told[-1] == 1.0 and told == sorted(told)
 
 
 def test_no_force_acts_before_the_contact(done, folder):
     found, _ = done
-    assert len(found.equalized.forces) == len(found.wanted) > len(tap().signal)
+    assert len(found.equalized.forces) == len(found.reference) > len(tap().signal)
     written = read_trajectory(folder / "out" / "forces.csv")
     assert written.start_s == 0.0
     np.testing.assert_array_equal(written.signal.samples, found.equalized.forces)
@@ -84,7 +84,7 @@ def test_what_was_played_is_written_with_a_picture(done, folder):
     document = json.loads((folder / "out" / "contact.json").read_text("utf-8"))
     assert document["measured_error"] == pytest.approx(found.equalized.error)
     assert document["normal"] == pytest.approx([1 / 3, 2 / 3, -2 / 3])
-    assert f"As measured: error {100 * found.equalized.error:.1f} %" in contact_lines(found)[1]
+    assert f"As measured: error {100 * found.equalized.error:.1f} %" in format_contact(found)[1]
 
 
 def test_forces_above_the_cap_are_refused_with_the_scale_that_fits(folder, tmp_path):

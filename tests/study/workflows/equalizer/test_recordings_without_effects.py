@@ -18,7 +18,7 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import read_recording, write_recording
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
-from study.workflows.equalizer.recordings_without_effects import excitation_band_hz
+from study.workflows.equalizer.recordings_without_effects import find_excitation_band
 
 pytestmark = pytest.mark.usefixtures("sketched")
 
@@ -126,7 +126,7 @@ def test_an_effect_on_an_axis_that_is_not_there_is_refused(folder, tmp_path):
 
 def test_what_was_excited_is_read_off_the_excitation(folder):
     recording = read_recording(folder / "0.h5")
-    assert excitation_band_hz(recording) == pytest.approx((4.6, 36.8), abs=0.4)
+    assert find_excitation_band(recording) == pytest.approx((4.6, 36.8), abs=0.4)
     silent = Signal(np.full((100, 3), 0.2), RATE_HZ, "force", "N", ("fx", "fy", "fz"))
     with pytest.raises(ValueError, match="contains no excitation"):
-        excitation_band_hz(replace(recording, command=silent, excitation=None))
+        find_excitation_band(replace(recording, command=silent, excitation=None))

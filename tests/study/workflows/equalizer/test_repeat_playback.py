@@ -26,7 +26,7 @@ from study.store.formats.recording_file import read_recording
 from study.store.formats.repeats_file import read_repeats, repeats_path
 from study.store.formats.trajectory_file import read_trajectory
 from study.workflows.equalizer.repeat_playback import repeat_playback
-from study.workflows.equalizer.repeat_results import RepeatPlan, earlier_forces
+from study.workflows.equalizer.repeat_results import RepeatPlan, read_earlier_forces
 from study.workflows.files.validate import validate_file
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
@@ -83,11 +83,11 @@ def test_ten_repeats_bring_the_error_near_the_noise(plan, seed):
     found = repeat_playback(replace(plan, seed=seed), unheard)
     assert len(found.errors) <= 11
     assert found.errors[0] > 0.1
-    assert found.errors[found.kept] < 0.015
-    assert found.errors[found.kept] < 1.6 * found.noise_floor
+    assert found.errors[found.best_play] < 0.015
+    assert found.errors[found.best_play] < 1.6 * found.noise_floor
     # In truth what is left is what the accelerometer gets wrong: it is turned by a degree or so, and lags.
-    assert true_error(found.played[0], plan.wanted) > 0.1
-    assert true_error(found.played[found.kept], plan.wanted) < 0.055
+    assert true_error(found.plays[0], plan.reference) > 0.1
+    assert true_error(found.plays[found.best_play], plan.reference) < 0.055
 
 
 def slow_burst() -> Trajectory:
@@ -98,7 +98,7 @@ def slow_burst() -> Trajectory:
 
 
 def test_the_spring_is_left_what_it_will_do(plan):
-    slow = replace(plan, wanted=slow_burst(), repeats=1)
+    slow = replace(plan, reference=slow_burst(), repeats=1)
     with_it = repeat_playback(slow, unheard).errors[0]
     without = repeat_playback(replace(slow, spring=VirtualSpring()), unheard).errors[0]
     assert with_it < 0.8 * without
@@ -110,11 +110,11 @@ def test_what_was_found_is_kept_and_gone_on_from(plan, tmp_path):
     document = read_repeats(tmp_path / "forces.repeats.json")
     assert document.errors == pytest.approx(found.errors)
     assert document.verdict == found.verdict.name.lower() == "best_kept"
-    assert (document.kept, document.interrupted) == (found.kept, False)
+    assert (document.kept, document.interrupted) == (found.best_play, False)
     np.testing.assert_array_equal(read_trajectory(out).signal.samples, found.forces.signal.samples)
-    earlier = earlier_forces(out, plan.wanted, plan.model_sha256)
+    earlier = read_earlier_forces(out, plan.reference, plan.model_sha256)
     again = repeat_playback(replace(plan, repeats=1, first=earlier, seed=9), unheard)
-    assert again.errors[0] < 1.3 * found.errors[found.kept]
+    assert again.errors[0] < 1.3 * found.errors[found.best_play]
 
 
 @pytest.mark.parametrize("other", ["another trajectory", "another model", "a table of forces that was changed since"])
@@ -124,10 +124,10 @@ def test_forces_of_something_else_are_not_gone_on_from(plan, tmp_path, other):
     if other.startswith("a table"):
         header, first, _, *rest = out.read_text().splitlines()
         out.write_text("\n".join([header, first, "0.001,0.5,0.0,0.0", *rest]))
-    wanted = trajectory(1.7) if other == "another trajectory" else plan.wanted
+    wanted = trajectory(1.7) if other == "another trajectory" else plan.reference
     model = "1" * 64 if other == "another model" else plan.model_sha256
     with pytest.raises(StudyError, match="cannot continue from the earlier forces") as refused:
-        earlier_forces(out, wanted, model)
+        read_earlier_forces(out, wanted, model)
     assert refused.value.happened == f"forces.repeats.json belongs to {other}."
 
 
@@ -151,7 +151,7 @@ def test_interrupted_the_best_so_far_is_kept_and_said(plan, tmp_path):
     document = read_repeats(repeats_path(out))
     assert document.interrupted is True
     assert len(document.errors) == 3
-    assert earlier_forces(out, plan.wanted, plan.model_sha256).shape == (2000, 3)
+    assert read_earlier_forces(out, plan.reference, plan.model_sha256).shape == (2000, 3)
 
 
 def test_interrupted_in_the_first_play_nothing_is_written(plan, tmp_path):
@@ -165,8 +165,8 @@ def test_interrupted_in_the_first_play_nothing_is_written(plan, tmp_path):
 
 
 def test_a_play_that_was_limited_is_not_learnt_from(plan):
-    slow = replace(plan, wanted=slow_burst(), repeats=1)
-    first = repeat_playback(slow, unheard).played[0].recording
+    slow = replace(plan, reference=slow_burst(), repeats=1)
+    first = repeat_playback(slow, unheard).plays[0].recording
     total, decided = (float(np.linalg.norm(s.samples, axis=1).max()) for s in (first.command, first.excitation))
     cap_n = 1.001 * decided
     assert total > cap_n
@@ -177,28 +177,28 @@ def test_a_play_that_was_limited_is_not_learnt_from(plan):
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 3))])
 def test_corrections_never_reach_the_slew_limit(plan, seed):
-    first = repeat_playback(replace(plan, repeats=1), unheard).played[0].recording.excitation.samples
+    first = repeat_playback(replace(plan, repeats=1), unheard).plays[0].recording.excitation.samples
     steepest = 1000 * float(np.linalg.norm(np.diff(first, axis=0), axis=1).max())
     tight = replace(SETTINGS, limits=replace(SETTINGS.limits, slew_n_per_s=1.02 * steepest + SPRING_SLEW_N_PER_S))
     found = repeat_playback(replace(plan, settings=tight, seed=seed), unheard)
     assert "its change within" in found.remark
-    assert found.errors[found.kept] < 0.8 * found.errors[0]
+    assert found.errors[found.best_play] < 0.8 * found.errors[0]
 
 
 def test_forces_above_the_cap_are_refused_before_anything_moves(plan):
     with pytest.raises(StudyError, match="The first forces reach .* N, but the cap is 3 N") as refused:
-        repeat_playback(replace(plan, wanted=trajectory(8.0)), unheard)
+        repeat_playback(replace(plan, reference=trajectory(8.0)), unheard)
     assert refused.value.saved == "Nothing moved."
 
 
 def test_what_does_not_fit_is_refused_before_anything_moves(plan, tmp_path):
     (tmp_path / "taken.csv").write_text("")
-    slow = Trajectory(Signal(plan.wanted.signal.samples, 500.0, "acceleration", "m/s^2", ("ax", "ay", "az")))
+    slow = Trajectory(Signal(plan.reference.signal.samples, 500.0, "acceleration", "m/s^2", ("ax", "ay", "az")))
     for wrong, why in (
         (replace(plan, repeats=0), "0 repeats were requested"),
         (replace(plan, out=tmp_path / "taken.csv"), "exists already"),
         (replace(plan, out=tmp_path / "no" / "f.csv"), "There is no folder"),
-        (replace(plan, wanted=slow), "The trajectory is at 500 Hz, the device runs at 1000 Hz"),
+        (replace(plan, reference=slow), "The trajectory is at 500 Hz, the device runs at 1000 Hz"),
         (replace(plan, first=np.zeros((5, 3))), r"Forces of shape \(5, 3\) do not match 2000 rows"),
     ):
         with pytest.raises(StudyError, match=why):
@@ -224,6 +224,6 @@ def test_a_document_that_is_wrong_says_where(plan, tmp_path):
 
 
 def test_quiet_wishes_still_end_with_a_verdict(plan):
-    found = repeat_playback(replace(plan, wanted=trajectory(0.5), repeats=3), unheard)
+    found = repeat_playback(replace(plan, reference=trajectory(0.5), repeats=3), unheard)
     assert found.verdict is Verdict.BEST_KEPT
-    assert found.errors[found.kept] < found.errors[0]
+    assert found.errors[found.best_play] < found.errors[0]

@@ -86,19 +86,19 @@ def test_convergence_is_tested_before_anything_is_played(done):
 
 
 def test_forces_and_how_they_were_found_are_written(done):
-    out = done.solved.plan.out
+    out = done.equalized.plan.out
     assert len(read_trajectory(out).signal) == 2000
     assert read_repeats(repeats_path(out)).errors == pytest.approx(done.repeated.errors)
     assert repeat_summary(done)["repeats"] == str(repeats_path(out))
 
 
 def test_a_later_run_continues_from_them(done, plan):
-    again = repeat_trajectory(plan, replace(ORDER, repeats=1, earlier=done.solved.plan.out), unheard)
+    again = repeat_trajectory(plan, replace(ORDER, repeats=1, earlier=done.equalized.plan.out), unheard)
     assert again.repeated.errors[0] < 0.4 * done.repeated.errors[0]
 
 
 def test_but_not_for_another_model_or_table(done, plan, tmp_path):
-    order = replace(ORDER, earlier=done.solved.plan.out)
+    order = replace(ORDER, earlier=done.equalized.plan.out)
     assert "belongs to another model" in refusal(changed(plan, tmp_path, delay_samples=7.0), order).happened
     write_trajectory(tmp_path / "other.csv", table(level=1.0))
     other = replace(plan, trajectory=tmp_path / "other.csv")

@@ -11,7 +11,7 @@ from protocols.trial import Trial
 from study.store.disk.csv_rows import rows_to_csv
 from study.store.disk.json_document import write_json
 from study.store.formats.identified_model_file import write_identified_model
-from study.store.formats.participant_texts import language_template
+from study.store.formats.participant_texts import make_language_template
 from study.store.formats.protocol_files import list_shipped_protocols
 from study.store.formats.recording_file import write_recording
 from study.store.formats.thresholds_file import write_thresholds
@@ -88,7 +88,7 @@ def test_the_shipped_protocols_are_sound(name):
 @pytest.mark.parametrize("language", ["de", "es", "mine.toml"])
 def test_a_protocol_in_a_language_is_sound_as_its_file_is_read(tmp_path, small_text, language):
     """Its texts are filled in from the table, as where a session begins."""
-    written(tmp_path / "mine.toml", language_template("de"))
+    written(tmp_path / "mine.toml", make_language_template("de"))
     asked = f'{small_text}\n[text]\nlanguage = "{language}"\n'
     assert sound(written(tmp_path / "study.toml", asked)).startswith("study protocol 'small': ")
     lost = validate_file(written(tmp_path / "lost.toml", asked.replace(language, "nowhere.toml")))

@@ -110,9 +110,9 @@ def test_crashes_in_a_process_are_noted_here():
         time.sleep(0.02)
         raise ValueError("no such number")
 
-    assert list(guard.over(map_forked, "its fit")(broken, CATALOGUE[:6])) == []
-    assert [crash.what for crash in guard.crashes] == [effect.name for effect in CATALOGUE[:6]]
-    assert all(crash.said == "ValueError: no such number" for crash in guard.crashes)
+    assert list(guard.wrap(map_forked, "its fit")(broken, CATALOGUE[:6])) == []
+    assert [crash.subject for crash in guard.crashes] == [effect.name for effect in CATALOGUE[:6]]
+    assert all(crash.message == "ValueError: no such number" for crash in guard.crashes)
 
 
 def asked(most: int, map_: object) -> int:

@@ -12,12 +12,12 @@ from analysis.psychophysics.group_contrasts import contrasts
 from analysis.psychophysics.power.power_curve import judge_study
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
-from study.cli.power import sample_sizes
+from study.cli.power import parse_sample_sizes
 from study.errors import StudyError, WrongUseError
 from study.workflows.planning.simulate_power import (
     FINISHED_NAME,
     PowerPlan,
-    judge_piece,
+    judge_chunk,
     power_lines,
     simulate_power,
 )
@@ -103,7 +103,7 @@ def test_a_broken_run_continues_and_any_number_of_workers_gives_the_same_numbers
     (broken / FINISHED_NAME).write_text("\n".join([*lines[:2], lines[2][:40]]), "utf-8")
     assert run(plan, "broken") == whole
     assert run(plan, "two", workers=2) == whole
-    assert judge_piece(plan, (3, 10)) == judge_piece(plan, (3, 10))
+    assert judge_chunk(plan, (3, 10)) == judge_chunk(plan, (3, 10))
 
 
 def test_a_run_that_was_killed_anywhere_goes_on_with_the_same_numbers(run, tmp_path):
@@ -140,9 +140,9 @@ def test_a_trial_limit_is_refused(run):
 
 
 def test_sample_sizes_are_read():
-    assert sample_sizes("5:40:5") == (5, 10, 15, 20, 25, 30, 35, 40)
-    assert sample_sizes("12") == (12,)
-    assert sample_sizes("3:5") == (3, 4, 5)
+    assert parse_sample_sizes("5:40:5") == (5, 10, 15, 20, 25, 30, 35, 40)
+    assert parse_sample_sizes("12") == (12,)
+    assert parse_sample_sizes("3:5") == (3, 4, 5)
     for wrong in ("", "a", "1", "9:5", "5:9:0", "5:9:1:1", "1001"):
         with pytest.raises(WrongUseError):
-            sample_sizes(wrong)
+            parse_sample_sizes(wrong)

@@ -7,7 +7,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.errors import StudyError
 from study.store.formats.recording_file import write_recording
-from study.workflows.recording.look_at_recordings import look_at
+from study.workflows.recording.look_at_recordings import inspect_recordings
 
 QUANTITIES = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2"), ("voltage", "V"), ("unknown", "1"))
 
@@ -37,7 +37,7 @@ def test_any_recording_is_looked_at_or_refused(seed, tmp_path):
     path = tmp_path / "fuzz.h5"
     write_recording(path, drawn(seed))
     try:
-        (found,) = look_at([path])
+        (found,) = inspect_recordings([path])
     except StudyError as refusal:
         assert refusal.happened
     else:

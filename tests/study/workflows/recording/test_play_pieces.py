@@ -16,8 +16,8 @@ from study.devices.safe import SafeDevice
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.store.formats.recording_file import read_recording
 from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
-from study.workflows.recording.play_pieces import MOST_TRIES
-from study.workflows.recording.record_device import RecordingPlan, record_device, record_on
+from study.workflows.recording.play_pieces import MOST_TAKES
+from study.workflows.recording.record_device import RecordingPlan, record_device, record_on_device
 
 SWEEP = SweepSegment("sweep", 5.0, 30.0, 1.0, "x", duration_s=0.5)
 MULTISINE = MultisineSegment("multisine", 5.0, 30.0, 1.0, "all", 1.0, realisations=3, role="test")
@@ -57,7 +57,7 @@ def amplitudes(recording) -> list[float]:
 
 
 def test_a_piece_that_clips_is_played_again_with_less_and_the_others_are_not(tmp_path, device_that_clips_at):
-    done = record_on(device_that_clips_at(5.0), plan(tmp_path / "r.h5"), lambda _: None)
+    done = record_on_device(device_that_clips_at(5.0), plan(tmp_path / "r.h5"), lambda _: None)
     recording = read_recording(tmp_path / "r.h5")
     assert amplitudes(recording) == pytest.approx([0.7, 1.0])
     assert np.abs(recording.response.samples[:, 0]).max() < 5.0
@@ -72,7 +72,7 @@ def test_a_piece_that_clips_is_played_again_with_less_and_the_others_are_not(tmp
 
 
 def test_only_the_clean_take_is_kept(tmp_path, device_that_clips_at):
-    record_on(device_that_clips_at(2.5), plan(tmp_path / "r.h5"), lambda _: None)
+    record_on_device(device_that_clips_at(2.5), plan(tmp_path / "r.h5"), lambda _: None)
     recording = read_recording(tmp_path / "r.h5")
     assert recording.meta["segments"][0]["tries"] == 4
     assert len(recording) == sum(round(1.4 * 1000) for _ in PROTOCOL.segments)
@@ -80,7 +80,7 @@ def test_only_the_clean_take_is_kept(tmp_path, device_that_clips_at):
 
 def test_what_had_to_be_lowered_is_so_at_once_when_it_comes_round_again(tmp_path, device_that_clips_at):
     again = replace(PROTOCOL, repeats=2)
-    done = record_on(device_that_clips_at(5.0), plan(tmp_path / "r.h5", again), lambda _: None)
+    done = record_on_device(device_that_clips_at(5.0), plan(tmp_path / "r.h5", again), lambda _: None)
     recording = read_recording(tmp_path / "r.h5")
     assert amplitudes(recording) == pytest.approx([0.7, 1.0, 0.7, 1.0])
     assert [about["tries"] for about in recording.meta["segments"]] == [2, 1, 1, 1]
@@ -89,7 +89,7 @@ def test_what_had_to_be_lowered_is_so_at_once_when_it_comes_round_again(tmp_path
 
 def test_nothing_goes_below_the_least_amplitude_and_what_still_clips_is_reported(tmp_path, device_that_clips_at):
     bounded = replace(PROTOCOL, segments=(SWEEP,), least_amplitude_n=0.6)
-    done = record_on(device_that_clips_at(0.1), plan(tmp_path / "r.h5", bounded), lambda _: None)
+    done = record_on_device(device_that_clips_at(0.1), plan(tmp_path / "r.h5", bounded), lambda _: None)
     (about,) = read_recording(tmp_path / "r.h5").meta["segments"]
     assert (about["played_amplitude_n"], about["tries"]) == (pytest.approx(0.6), 3)
     assert about["sensor_clipped"] > 0
@@ -99,14 +99,14 @@ def test_nothing_goes_below_the_least_amplitude_and_what_still_clips_is_reported
 
 def test_a_broken_sensor_does_not_keep_the_device_moving_for_ever(tmp_path, device_that_clips_at):
     patient = replace(PROTOCOL, segments=(SWEEP,), least_amplitude_n=1e-6)
-    record_on(device_that_clips_at(-1.0), plan(tmp_path / "r.h5", patient), lambda _: None)
+    record_on_device(device_that_clips_at(-1.0), plan(tmp_path / "r.h5", patient), lambda _: None)
     (about,) = read_recording(tmp_path / "r.h5").meta["segments"]
-    assert about["tries"] == MOST_TRIES
+    assert about["tries"] == MOST_TAKES
 
 
 def test_a_protocol_may_keep_the_amplitude_when_samples_clip(tmp_path, device_that_clips_at):
     stubborn = replace(PROTOCOL, lower_on_clip=False)
-    done = record_on(device_that_clips_at(5.0), plan(tmp_path / "r.h5", stubborn), lambda _: None)
+    done = record_on_device(device_that_clips_at(5.0), plan(tmp_path / "r.h5", stubborn), lambda _: None)
     recording = read_recording(tmp_path / "r.h5")
     assert amplitudes(recording) == [1.0, 1.0]
     assert recording.meta["segments"][0]["sensor_clipped"] > 0
@@ -115,7 +115,7 @@ def test_a_protocol_may_keep_the_amplitude_when_samples_clip(tmp_path, device_th
 
 def test_the_cap_of_the_total_force_lowers_too(tmp_path, device_that_clips_at):
     device = device_that_clips_at(1e3, total_cap_n=1.0, stimulus_cap_n=1.0)
-    done = record_on(device, plan(tmp_path / "r.h5", replace(PROTOCOL, segments=(SWEEP,))), lambda _: None)
+    done = record_on_device(device, plan(tmp_path / "r.h5", replace(PROTOCOL, segments=(SWEEP,))), lambda _: None)
     (about,) = read_recording(tmp_path / "r.h5").meta["segments"]
     assert about["played_amplitude_n"] < 1.0
     assert about["total_clipped"] == 0
@@ -124,7 +124,7 @@ def test_the_cap_of_the_total_force_lowers_too(tmp_path, device_that_clips_at):
 
 def test_progress_steps_back_where_a_piece_is_played_again_and_ends_at_the_whole(tmp_path, device_that_clips_at):
     seconds: list[float] = []
-    record_on(device_that_clips_at(5.0), plan(tmp_path / "r.h5"), seconds.append)
+    record_on_device(device_that_clips_at(5.0), plan(tmp_path / "r.h5"), seconds.append)
     assert seconds != sorted(seconds)
     assert seconds[-1] == pytest.approx(plan(tmp_path / "x.h5").total_s)
 
@@ -139,7 +139,7 @@ def test_interrupted_in_a_second_try_the_pieces_before_are_kept(tmp_path, device
 
     y_first = replace(PROTOCOL, segments=(replace(SWEEP, along="y"), SWEEP))
     with pytest.raises(UserInterruptError) as left:
-        record_on(device_that_clips_at(5.0), plan(tmp_path / "r.h5", y_first), press)
+        record_on_device(device_that_clips_at(5.0), plan(tmp_path / "r.h5", y_first), press)
     assert left.value.happened.startswith("1 of 2 pieces")
     recording = read_recording(tmp_path / "r.h5")
     assert amplitudes(recording) == [1.0]
@@ -149,7 +149,7 @@ def test_interrupted_in_a_second_try_the_pieces_before_are_kept(tmp_path, device
 def test_a_device_that_lets_go_says_along_which_axis(tmp_path, device_that_clips_at):
     device = device_that_clips_at(1e3)
     with pytest.raises(DeviceError, match="While recording along all axes: the emergency stop was pressed"):
-        record_on(
+        record_on_device(
             device,
             plan(tmp_path / "r.h5", replace(PROTOCOL, segments=(MULTISINE,))),
             lambda s: device.stop() if s else 0,
@@ -165,7 +165,7 @@ def test_before_a_real_device_moves_it_is_said_who_may_hold_the_handle(tmp_path,
         assert progress == []
 
     progress: list[float] = []
-    record_on(device_that_clips_at(1e3, simulated=False), plan(tmp_path / "r.h5"), progress.append, still)
+    record_on_device(device_that_clips_at(1e3, simulated=False), plan(tmp_path / "r.h5"), progress.append, still)
     assert len(said) == 1
     assert said[0].startswith("No person may hold the handle: 'mass'")
     assert progress != []
@@ -177,7 +177,7 @@ def test_a_real_device_does_not_move_after_the_answer_no(tmp_path, device_that_c
 
     device = device_that_clips_at(1e3, simulated=False)
     with pytest.raises(UserInterruptError, match="0 of 2 pieces were recorded"):
-        record_on(device, plan(tmp_path / "r.h5"), lambda _: None, no)
+        record_on_device(device, plan(tmp_path / "r.h5"), lambda _: None, no)
     assert device.look().position_m == (0.0, 0.0, 0.0)
     assert list(tmp_path.iterdir()) == []
 
@@ -201,7 +201,7 @@ def test_from_python_a_real_device_does_not_move_unannounced(tmp_path, device_th
 
 def test_a_simulated_device_needs_no_warning(tmp_path, device_that_clips_at):
     said: list[str] = []
-    record_on(device_that_clips_at(1e3), plan(tmp_path / "r.h5"), lambda _: None, said.append)
+    record_on_device(device_that_clips_at(1e3), plan(tmp_path / "r.h5"), lambda _: None, said.append)
     assert said == []
 
 

@@ -9,7 +9,7 @@ from protocols.trial import TrialStatus, VoidCause
 from study.devices.device import Fault, Health
 from study.errors import DeviceError
 from study.session.facts.sensor_facts import SensorFacts
-from study.session.facts.void_reasons import HARDLY_ARRIVED, computer_too_busy
+from study.session.facts.void_reasons import HARDLY_ARRIVED, is_computer_busy
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import read_log
 from study.tui.trial_words import void_words
@@ -89,16 +89,16 @@ def test_what_is_missing_above_the_limit_cannot_be_trusted(small_protocol, senso
     found = judged(sensor, small_protocol)
     assert sensor is None or sensor.missing == pytest.approx(missing)
     too_much = missing is not None and missing > 0.05
-    assert (found.spoiled, found.measured) == ("", not too_much)
+    assert (found.void_reason, found.measured) == ("", not too_much)
     assert any("no trustworthy acceleration" in flag for flag in found.flags) is too_much
     needed = judged(sensor, small_protocol, accelerometer_needed=True)
-    assert bool(needed.spoiled) is too_much
+    assert bool(needed.void_reason) is too_much
     assert needed.cause is (VoidCause.NO_ACCELERATION if too_much else VoidCause.FAULT)
 
 
 def test_a_participant_reads_that_the_sensor_was_not_heard(small_protocol):
-    reason = judged(BAD, small_protocol, accelerometer_needed=True).spoiled
-    assert reason == "10.0 % of the acceleration is missing" and not computer_too_busy(reason)
+    reason = judged(BAD, small_protocol, accelerometer_needed=True).void_reason
+    assert reason == "10.0 % of the acceleration is missing" and not is_computer_busy(reason)
     assert void_words(reason).startswith("The sensor at the handle gave too few readings")
 
 

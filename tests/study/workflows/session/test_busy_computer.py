@@ -26,7 +26,7 @@ class LateScreen:
     def ask(self, question, sign_of_life):
         self._asked += 1
         if self._asked - 1 in self._late_at:
-            return Unanswered(SCREEN_LATE, leave=False)
+            return Unanswered(SCREEN_LATE, ends_sitting=False)
         return self._display.ask(question, sign_of_life)
 
     def await_return(self, reason: str) -> None:
@@ -55,7 +55,7 @@ def of(end, kind):
 
 def test_trials_that_a_busy_computer_spoiled_are_repeated_counted_and_told_at_the_end(late_at):
     end, screen = late_at(2, 5)
-    assert end.left == ""
+    assert end.end_reason == ""
     assert screen.voids == [SCREEN_LATE] * 2
     assert [event.reason for event in of(end, TrialSpoiled)] == [SCREEN_LATE] * 2
     (told,) = screen.told
@@ -67,7 +67,7 @@ def test_trials_that_a_busy_computer_spoiled_are_repeated_counted_and_told_at_th
 
 def test_three_in_a_row_end_the_sitting_in_words_that_fit(late_at):
     end, screen = late_at(1, 2, 3)
-    assert end.left == (
+    assert end.end_reason == (
         "the computer is too busy: 3 trials in a row were void because of it, not because of the participant "
         f"(the last because {SCREEN_LATE})"
     )

@@ -7,7 +7,7 @@ import pytest
 from study.devices.clock import VirtualClock
 from study.participants.observers import find_observer
 from study.session.facts.events import NoteTaken, SessionResumed
-from study.session.state.sitting_state import dose_now
+from study.session.state.sitting_state import compute_daily_dose
 from study.session.views.views import Unanswered
 from study.store.sessions.event_log import read_log
 from study.workflows.files.validate import validate_file
@@ -42,7 +42,7 @@ class Answers:
             self._clock.set_by_s = self._by_s
         self._asked += 1
         if self._asked - 1 == self._leave_at:
-            return Unanswered("the participant left", leave=True)
+            return Unanswered("the participant left", ends_sitting=True)
         return self._display.ask(question, sign_of_life)
 
     def trouble(self, sentence: str) -> None:
@@ -71,7 +71,7 @@ def test_a_clock_that_is_set_in_a_sitting_changes_nothing_and_is_said_everywhere
     seat = at(NOON, set_at=3, by_s=3600.0 * hours)
     end = conduct_new(sitter.plan(), "simulated", seat)
     undisturbed = sitter.whole("P02")
-    assert end.left == ""
+    assert end.end_reason == ""
     assert end.state.sitting.dose == undisturbed.state.sitting.dose
     assert end.state.sitting.sat_s == pytest.approx(undisturbed.state.sitting.sat_s, abs=0.1)
     (told,) = seat.display.told
@@ -104,9 +104,9 @@ def test_every_entry_of_a_sitting_carries_the_monotonic_clock(sitter):
 
 def test_a_simulated_session_that_continues_does_so_after_its_own_last_entry(sitter):
     """Its time runs ahead of the computer's, which is no clock that was set back."""
-    clock = VirtualClock.not_before("2099-01-01T00:00:00.000+00:00")
+    clock = VirtualClock.resume_at("2099-01-01T00:00:00.000+00:00")
     assert clock.utc() == "2099-01-01T00:00:00.000+00:00"
-    assert VirtualClock.not_before("2001-01-01T00:00:00.000+00:00").utc() > "2026"
+    assert VirtualClock.resume_at("2001-01-01T00:00:00.000+00:00").utc() > "2026"
 
 
 def test_a_second_session_on_the_same_day_continues_with_the_dose_of_the_first(sitter):
@@ -115,7 +115,7 @@ def test_a_second_session_on_the_same_day_continues_with_the_dose_of_the_first(s
     opened = read_log(second.folder.log).events[0]
     assert opened.dose_elsewhere.sessions == (first.folder.name,)
     assert opened.dose_elsewhere.vibrated_s == first.state.sitting.dose.vibrated_s > 0
-    assert dose_now(second.state.sitting).vibrated_s > first.state.sitting.dose.vibrated_s
+    assert compute_daily_dose(second.state.sitting).vibrated_s > first.state.sitting.dose.vibrated_s
     other = conduct_new(sitter.plan("P02", observer=None), "simulated", sitter.participant(2, leave))
     assert read_log(other.folder.log).events[0].dose_elsewhere is None
     again = sitter.resumed(second.folder)
@@ -134,4 +134,4 @@ def test_a_session_that_cannot_be_read_is_named_where_its_dose_is_missing(sitter
 
 
 def leave() -> Unanswered:
-    return Unanswered("the participant left", leave=True)
+    return Unanswered("the participant left", ends_sitting=True)

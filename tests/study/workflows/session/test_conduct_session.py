@@ -25,7 +25,7 @@ def decisions(state):
 
 def test_a_session_runs_to_its_end_and_its_log_folds_to_the_same_state(sitter):
     done = sitter.whole()
-    assert done.left == ""
+    assert done.end_reason == ""
     assert done.state.closed
     assert fold_session(done.folder).state == done.state
     assert {t.phase for t in done.state.trials} == {Phase.TRAINING, Phase.TEST}
@@ -82,7 +82,7 @@ def test_a_louder_level_is_a_stronger_acceleration(sitter):
 def test_leaving_and_coming_back_changes_no_decision(sitter):
     whole = decisions(sitter.whole("P02").state)
     left = sitter.interrupted(after=9)
-    assert left.left == "the participant left"
+    assert left.end_reason == "the participant left"
     assert not left.state.closed
     done = sitter.resumed(left.folder)
     assert done.state.closed
@@ -108,7 +108,7 @@ def test_a_trial_that_was_open_at_the_end_is_void_and_drawn_again(sitter):
 
 def test_a_repeat_that_was_asked_for_is_drawn_again_in_the_same_sitting(sitter):
     done = conduct_new(
-        sitter.plan(), "simulated", sitter.participant(4, lambda: Unanswered("asked to repeat", leave=False))
+        sitter.plan(), "simulated", sitter.participant(4, lambda: Unanswered("asked to repeat", ends_sitting=False))
     )
     assert done.state.closed
     assert sum(t.status is TrialStatus.SPOILED for t in done.state.trials) == 1

@@ -16,12 +16,12 @@ from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.json_document import write_json
 from study.store.disk.provenance import sha256_of
 from study.store.sessions.archive import SessionFolder
-from study.store.sessions.event_log import LOG_NAME, mend, read_log
+from study.store.sessions.event_log import LOG_NAME, read_log, remove_incomplete_line
 from study.store.sessions.log_seal import SEAL_NAME
 from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session
-from study.workflows.results.session_results import due_results, write_tables
+from study.workflows.results.session_results import list_due_results, write_tables
 from study.workflows.results.write_results import write_results
 from study.workflows.session.end_sitting import finish_closed
 from study.workflows.session.participant_number import read_begun_participant
@@ -121,7 +121,7 @@ def test_a_log_that_continues_under_this_version_covers_what_came_before(session
     older = (session / "events.jsonl").read_bytes()
     chain, line = session_logs.write_chained(read_log(session / "events.jsonl").chain, NOTE)
     (session / "events.jsonl").write_bytes(older + line)
-    assert fold_session(SessionFolder(session)).contents.chain.since == chain.lines
+    assert fold_session(SessionFolder(session)).log_contents.chain.since == chain.lines
     (session / "events.jsonl").write_bytes(older.replace(b'"displacement_mm":0.', b'"displacement_mm":1.', 1) + line)
     with pytest.raises(StudyError, match="or one of the lines before it was changed"):
         fold_session(SessionFolder(session))
@@ -138,10 +138,10 @@ def test_what_a_kill_left_out_is_finished_and_said(session, name):
         (session / name).unlink()
         if torn is not None and name != SEAL_NAME:
             (session / name).write_bytes(torn)
-        assert due_results(folder, fold_session(folder)) == (name,)
+        assert list_due_results(folder, fold_session(folder)) == (name,)
         (said,) = collect_sessions(session).finished
         assert name in said
-        assert due_results(folder, fold_session(folder)) == ()
+        assert list_due_results(folder, fold_session(folder)) == ()
     if name != "session.json":
         assert (session / name).read_bytes() == before
 
@@ -262,5 +262,5 @@ def test_a_bad_time_leaves_one_session_out_of_an_analysis_and_not_all(session, s
 def test_a_torn_note_after_the_end_is_mended_and_the_seal_still_holds(session):
     log = session / "events.jsonl"
     log.write_bytes(log.read_bytes() + b'{"utc":"2026')
-    mend(log, read_log(log))
+    remove_incomplete_line(log, read_log(log))
     assert len(unseen_by(session)) == 5

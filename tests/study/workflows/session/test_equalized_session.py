@@ -12,8 +12,8 @@ from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
-from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, highest_level_n, limits_of_study
-from study.session.stimulus.stimulus import held_stimulus
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, highest_level_n, make_study_limits
+from study.session.stimulus.stimulus import make_held_stimulus
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.trials_file import TRIALS_NAME, read_trials
 from study.store.sessions.trial_recordings import find_trial_recording, recording_name
@@ -94,16 +94,16 @@ def test_a_steep_stimulus_roved_to_its_highest_keeps_the_slew_limit(small_text, 
 
     def jagged(*arguments):
         """Every other sample halved: as high as before, and far steeper."""
-        stimulus = held_stimulus(*arguments)
+        stimulus = make_held_stimulus(*arguments)
         forces = stimulus.played_once_then_loop.copy()
         forces[1::2] /= 2
         played.append(float(np.linalg.norm(np.diff(forces, axis=0), axis=1).max()) * 1000.0)
         return SimpleNamespace(played_once_then_loop=forces, loop=stimulus.loop)
 
-    monkeypatch.setattr(equalize_stimuli, "held_stimulus", jagged)
+    monkeypatch.setattr(equalize_stimuli, "make_held_stimulus", jagged)
     (scale, *_) = level_scales(protocol, ModelEqualizer(rigid()), 1000.0)
     steepest = max(played[:2]) * highest_level_n(protocol) / scale.n_per_mps2 + SPRING_SLEW_N_PER_S
-    assert steepest == pytest.approx(limits_of_study(protocol).slew_n_per_s)
+    assert steepest == pytest.approx(make_study_limits(protocol).slew_n_per_s)
 
 
 def test_what_is_within_reach_is_shown(conducted):

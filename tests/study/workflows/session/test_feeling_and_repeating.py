@@ -8,7 +8,7 @@ from protocols.trial import Phase, VoidCause
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
 from study.participants.delivered_feeler import DeliveredFeeler
-from study.store.sessions.archive import session_folders
+from study.store.sessions.archive import list_session_folders
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
@@ -26,7 +26,7 @@ def test_what_is_felt_is_what_the_session_measures(sitter, monkeypatch):
     reply = DeliveredFeeler.reply
     monkeypatch.setattr(DeliveredFeeler, "reply", lambda self, each, seed: felt.append(each) or reply(self, each, seed))
     done = conducted(sitter, "delivered")
-    assert done.left == ""
+    assert done.end_reason == ""
     known = {(t.run, t.trial): t for t in done.state.trials if t.delivered_mps2 and t.phase is Phase.TEST}
     pairs = [(each.delivered, known[each.run, each.trial]) for each in felt if each.delivered and each.run > 0]
     assert len(pairs) == len(known) > 20
@@ -69,7 +69,7 @@ def test_a_rehearsal_is_of_the_chosen_people_and_goes_on_with_no_others(sitter):
         return Rehearsal(sitter.protocol, sitter.text, 1, 5, sitter.data, observer=observer)
 
     rehearse_study(rehearsal("repeating"), workers=1, on_finished=lambda _: None)
-    (session,) = session_folders(sitter.data)
+    (session,) = list_session_folders(sitter.data)
     assert fold_session(session).state.opened.observer == "repeating_1_seed_5"
     with pytest.raises(StudyError, match=r"begun with the observer repeating_1_seed_5"):
         rehearse_study(rehearsal("person"), workers=1, on_finished=lambda _: None)

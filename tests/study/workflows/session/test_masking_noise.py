@@ -85,7 +85,7 @@ def test_it_plays_from_before_the_first_trial_to_the_end(sitter, sound):
 
 
 def test_it_is_silent_in_a_pause_and_comes_back(sitter, sound):
-    pause = lambda: Unanswered("a pause", leave=False, asked=True, pause=True)  # noqa: E731
+    pause = lambda: Unanswered("a pause", ends_sitting=False, repeat_requested=True, pause=True)  # noqa: E731
     told = log_of(sitter.interrupted(after=2, instead=pause).folder)
     at = told.index("pause")
     assert told[at - 1 : at + 2] == ["off", "pause", "on"]
@@ -96,7 +96,7 @@ def test_a_session_that_is_left_and_resumed_begins_it_anew(sitter, sound):
     conducted = sitter.interrupted(after=2)
     assert log_of(conducted.folder)[-2:] == ["off", "left"] and not sound.playing
     again = sitter.resumed(conducted.folder)
-    assert log_of(again.folder).count("on") == 2 and again.left == ""
+    assert log_of(again.folder).count("on") == 2 and again.end_reason == ""
 
 
 def test_noise_that_falls_silent_ends_the_sitting_before_the_next_trial_and_nothing_is_lost(sitter, sound):
@@ -108,7 +108,7 @@ def test_noise_that_falls_silent_ends_the_sitting_before_the_next_trial_and_noth
     session = SessionFolder(folder)
     assert log_of(session)[-1] == "off Headphones plays no more."
     sound.fails_at = NEVER
-    assert sitter.resumed(session).left == ""
+    assert sitter.resumed(session).end_reason == ""
 
 
 def test_the_trial_in_which_the_noise_falls_silent_is_void_and_comes_again(sitter, sound):
@@ -121,7 +121,7 @@ def test_the_trial_in_which_the_noise_falls_silent_is_void_and_comes_again(sitte
     (void,) = (event for event in read_log(session.log).events if isinstance(event, TrialSpoiled))
     assert "masking noise stopped" in void.reason
     sound.fails_at = NEVER
-    assert sitter.resumed(session).left == ""
+    assert sitter.resumed(session).end_reason == ""
     shown = [event for event in read_log(session.log).events if isinstance(event, TrialPresented)]
     assert [(event.run, event.trial, event.attempt) for event in shown[3:5]] == [
         (void.run, void.trial, 0), (void.run, void.trial, 1),
@@ -139,7 +139,7 @@ def test_the_level_is_below_that_of_the_file(monkeypatch):
         given.append(samples)
         return Closable()
 
-    monkeypatch.setattr(masking, "masking_sound", open_sound)
+    monkeypatch.setattr(masking, "make_masking_sound", open_sound)
     monkeypatch.setattr(masking, "LOOP_S", 1)
     for level_db in (0.0, -20.0):
         with masking.open_masking_sound(replace(SETTINGS, level_db=level_db), RealClock(), None) as sound:
@@ -150,7 +150,7 @@ def test_the_level_is_below_that_of_the_file(monkeypatch):
 
 
 def test_nothing_is_opened_where_the_protocol_wants_none_or_no_person_is_there(monkeypatch):
-    monkeypatch.setattr(masking, "masking_sound", lambda *arguments: 1 / 0)
+    monkeypatch.setattr(masking, "make_masking_sound", lambda *arguments: 1 / 0)
     none = ((MaskingSettings(), RealClock(), None), (SETTINGS, VirtualClock(), None), (SETTINGS, RealClock(), "ideal"))
     for settings, clock, observer in none:
         with masking.open_masking_sound(settings, clock, observer) as sound:
@@ -161,7 +161,7 @@ def test_without_an_output_no_session_of_a_person_begins(sitter, monkeypatch):
     def refuse(*arguments: object):
         raise DeviceError("The masking noise cannot be played", "There is no output.", "Connect one.")
 
-    monkeypatch.setattr(masking, "masking_sound", refuse)
+    monkeypatch.setattr(masking, "make_masking_sound", refuse)
     monkeypatch.setattr(masking, "LOOP_S", 1)
     asks_for_noise(sitter)
     seated = replace(sitter.participant(), clock=RealClock())

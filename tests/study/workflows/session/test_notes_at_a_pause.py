@@ -12,7 +12,7 @@ from study.workflows.session.conduct_session import Participant, conduct_new
 from study.workflows.session.simulated_display import SimulatedDisplay
 from study.workflows.trial.requests_port import QueuedRequests
 
-PAUSE = Unanswered("asked for a pause", leave=False, asked=True, pause=True)
+PAUSE = Unanswered("asked for a pause", ends_sitting=False, repeat_requested=True, pause=True)
 
 
 class PausesOnce:
@@ -46,5 +46,5 @@ def test_notes_and_adverse_events_are_in_the_log_however_the_pause_ends(sitter, 
     assert notes == [("the phone rang", False), ("the thumb is numb", True)]
     kinds = [type(event) for event in events]
     assert kinds.index(NoteTaken) < kinds.index(PauseTaken)
-    assert (SessionInterrupted in kinds) is (decision is not AfterPause.GO_ON)
+    assert (SessionInterrupted in kinds) is (decision is not AfterPause.CONTINUE_SITTING)
     assert conducted.withdrawn is (decision is AfterPause.WITHDRAW)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study.devices.onset_line import Pulse
-from study.session.facts.event_words import log_in_words
+from study.session.facts.event_words import describe_log
 from study.session.facts.events import OnsetPulsed, TrialPresented
 from study.store.sessions.event_log import read_log
 from study.workflows.results.fold_session import fold_session
@@ -42,7 +42,7 @@ def test_each_trial_has_its_pulse_and_a_lost_one_costs_no_trial(sitter, pulses):
     assert [(event.run, event.trial, event.attempt) for event in pulsed] == places
     assert [event.pulsed_s for event in pulsed] == [pulse.at_s for pulse in pulses]
     assert [event.trouble for event in pulsed] == [pulse.trouble for pulse in pulses]
-    assert conducted.left == "" and fold_session(conducted.folder).state == conducted.state
+    assert conducted.end_reason == "" and fold_session(conducted.folder).state == conducted.state
 
 
 def test_the_session_is_the_same_without_a_line(sitter, pulses, tmp_path, monkeypatch):
@@ -74,6 +74,6 @@ def test_a_trial_that_was_left_has_its_pulse_too(sitter, pulses):
 
 def test_a_lost_pulse_is_described_in_words(sitter, pulses):
     events = events_of(sitter.interrupted(after=3).folder)
-    told = "\n".join(log_in_words(events))
+    told = "\n".join(describe_log(events))
     assert f"Onset pulse, {LINE}: was sent." in told
     assert f"Onset pulse, {LINE}: was lost: it is gone." in told

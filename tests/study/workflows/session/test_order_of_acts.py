@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
-from study.devices.device import Fault, Health, Played
+from study.devices.device import Fault, Health, PlaybackResult
 from study.errors import StudyError, UserInterruptError
 from study.session.views.views import Unanswered
 from study.store.formats.recording_file import read_recording
@@ -34,7 +34,7 @@ class FollowedSession:
                 watched.calls.append("hold")
                 device.hold(stimulus)
 
-            def release(self) -> Played:
+            def release(self) -> PlaybackResult:
                 watched.calls.append("release")
                 played = device.release()
                 health: Health = replace(
@@ -103,12 +103,12 @@ def test_the_device_stops_before_anything_else_when_the_disk_is_full(sitter, wat
 def test_an_empty_chair_is_not_shaken_for_ever(sitter, watched):
     """Every trial is void by the device: after three in a row the sitting ends, and can be resumed."""
     watched.fault = Fault.HELD_TOO_LONG
-    silent = sitter.participant(0, lambda: Unanswered("the stimulus ended early", leave=False))
+    silent = sitter.participant(0, lambda: Unanswered("the stimulus ended early", ends_sitting=False))
     silent.display._left = 0
-    silent.display._instead = lambda: Unanswered("the stimulus ended early", leave=False)
-    silent.display.ask = lambda *_: Unanswered("the stimulus ended early", leave=False)
+    silent.display._instead = lambda: Unanswered("the stimulus ended early", ends_sitting=False)
+    silent.display.ask = lambda *_: Unanswered("the stimulus ended early", ends_sitting=False)
     done = conduct_new(sitter.plan(), "simulated", silent)
-    assert done.left.startswith("3 trials in a row were void, the last because the stimulus was held longer")
+    assert done.end_reason.startswith("3 trials in a row were void, the last because the stimulus was held longer")
     assert watched.calls.count("hold") == 3
     watched.fault = Fault.NONE
     assert sitter.resumed(done.folder).state.closed
@@ -117,7 +117,7 @@ def test_an_empty_chair_is_not_shaken_for_ever(sitter, watched):
 def test_a_trial_with_too_many_missed_ticks_is_void(sitter, watched):
     watched.missed = 10_000
     done = sitter.whole()
-    assert "ticks were missed" in done.left
+    assert "ticks were missed" in done.end_reason
     assert {(row.missed_ticks, row.late_ticks, row.latest_s) for row in done.state.trials} == {(10_000, 7, 0.0042)}
 
 
@@ -142,7 +142,7 @@ def test_a_stall_after_the_answer_is_flagged_and_the_answer_counts(sitter, watch
 def test_a_device_lost_while_letting_go_ends_the_sitting_and_the_answer_counts(sitter, watched, fault):
     watched.fault = fault
     done = sitter.whole()
-    assert (done.left, done.fault) == (fault.value, fault)
+    assert (done.end_reason, done.fault) == (fault.value, fault)
     assert done.state.answers == 1
     assert watched.calls.count("hold") == 1
 

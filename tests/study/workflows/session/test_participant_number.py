@@ -22,7 +22,7 @@ def number(sitter):
         plan = replace(sitter_plan, protocol=protocol, protocol_text=text)
         from study.session.views.views import Unanswered
 
-        leave = sitter.participant(0, lambda: Unanswered("left", leave=True))
+        leave = sitter.participant(0, lambda: Unanswered("left", ends_sitting=True))
         return conduct_new(plan, "simulated", leave).state.opened.participant_number
 
     return begin

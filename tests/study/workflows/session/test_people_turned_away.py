@@ -9,18 +9,18 @@ import pytest
 
 from protocols.definition.preparation import ConsentSettings
 from protocols.document.dumping import dump_protocol
-from protocols.procedure.schedule import williams_rows
+from protocols.procedure.schedule import make_williams_rows
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
 from study.participants.observers import find_observer
 from study.session.facts.events import FormFilled, PlaceTaken, SessionClosed, SessionInterrupted, SessionOpened
-from study.session.views.archive_views import TURNED_AWAY
+from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.views.form_views import FormKind, FormReply
 from study.session.views.views import Unanswered
-from study.session.watching.followed_session import begin_watching, follow
-from study.session.watching.make_watch_view import LiveInfo, watch_view
+from study.session.watching.followed_session import apply_followed_event, begin_watching
+from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from study.store.sessions.event_log import read_log
-from study.store.sessions.log_seal import seal_paths
+from study.store.sessions.log_seal import find_seals
 from study.tui.session_status import describe
 from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions
@@ -29,11 +29,11 @@ from study.workflows.session.end_sitting import end_sitting
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.plan_sitting import find_unfinished_sessions
 from study.workflows.session.simulated_display import SimulatedDisplay
-from study.workflows.views.list_sessions import session_lines
+from study.workflows.views.view_home import session_lines
 from study.workflows.views.view_session import session_view
 
 UTC = "2026-11-22T12:00:00+00:00"
-LEAVE = Unanswered("the participant left", leave=True)
+LEAVE = Unanswered("the participant left", ends_sitting=True)
 OUTCOMES = [(FormKind.CONSENT, "refused"), (FormKind.EXCLUSION, "excluded")]
 
 
@@ -130,7 +130,7 @@ def test_a_slip_of_the_finger_is_no_refusal_and_is_kept_nowhere(visit, form):
 def test_a_refusal_is_asked_again_once_and_then_holds(visit, form, outcome):
     end, visitor = visit(**{form.value: "twice"})
     assert sum(seen.kind is form for seen in visitor.forms) == 3
-    assert end.state.sitting.turned_away == outcome
+    assert end.state.sitting.ineligibility == outcome
 
 
 @pytest.mark.parametrize(("form", "outcome"), OUTCOMES)
@@ -155,7 +155,7 @@ def test_every_list_and_page_tells_the_outcome_and_nothing_suggests_to_resume(vi
     assert find_unfinished_sessions(data, "P01", "small") == ()
     texts = (str(ended.value), str(resumed.value), describe(line), *view.events, str(view.facts))
     assert not any("resume" in text.casefold() or "unfinished" in text for text in texts)
-    assert any(TURNED_AWAY[outcome] in text for text in texts)
+    assert any(INELIGIBILITY_REASONS[outcome] in text for text in texts)
     assert "without a place" in str(view.facts)
 
 
@@ -165,10 +165,10 @@ def test_a_watcher_sees_the_outcome_without_an_alarm(visit, form, outcome):
     opened, *rest = read_log(end.folder.log).events
     watched = begin_watching(opened, end.state.protocol)
     for event in rest:
-        watched = follow(watched, event)
-    view = watch_view(watched, LiveInfo(writer=False), UTC)
+        watched = apply_followed_event(watched, event)
+    view = make_watch_view(watched, LiveInfo(writer=False), UTC)
     assert (view.standing, view.alarms) == (outcome, ())
-    assert TURNED_AWAY[outcome] in view.reason
+    assert INELIGIBILITY_REASONS[outcome] in view.reason
 
 
 def test_an_analysis_leaves_them_out_by_name(visit, tmp_path, sitter):
@@ -192,7 +192,7 @@ def test_nothing_but_the_outcome_is_in_the_folder(visit):
 
 def test_a_program_that_died_before_the_last_line_is_finished_by_resume(visit):
     end, _ = visit(consent="firm")
-    for seal in seal_paths(end.folder.path).values():  # written after the last line
+    for seal in find_seals(end.folder.path).values():  # written after the last line
         seal.unlink(missing_ok=True)
     lines = end.folder.log.read_bytes().splitlines(keepends=True)
     end.folder.log.write_bytes(b"".join(lines[:-1]))
@@ -226,12 +226,12 @@ def check_the_rows(visit, asking, seed: int, passes: int):
     frequencies = replace(asking.stimulus, frequencies_hz=(15.0, 25.0))
     protocol = replace(asking, schedule=order, stimulus=frequencies)
     luck, taken, visitors = random.Random(seed), [], 0
-    rows = len(williams_rows(2))
+    rows = len(make_williams_rows(2))
     while len(taken) < passes * rows:
         visitors += 1
         way = luck.choice([{"consent": "firm"}, {"exclusion": "firm"}, {}, {"consent": "slip"}, {"exclusion": "twice"}])
         end, _ = visit(f"P{visitors:02d}", protocol, **way)
-        if not end.state.sitting.turned_away:
+        if not end.state.sitting.ineligibility:
             taken.append(end.state.opened.participant_number)
         elif luck.random() < 0.5:  # comes again another day, and takes part
             taken.append(visit(f"P{visitors:02d}", protocol)[0].state.opened.participant_number)

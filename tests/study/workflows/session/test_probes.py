@@ -18,9 +18,9 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.state.draw_check import LogContradiction
-from study.session.state.fold import apply
-from study.session.state.probe_state import ProbeState, after_break
-from study.session.stimulus.probe_stimulus import probe_stimulus, reference_commands
+from study.session.state.fold import apply_event
+from study.session.state.probe_state import ProbeState, apply_break
+from study.session.stimulus.probe_stimulus import make_probe_stimulus, make_reference_commands
 from study.session.views.views import PlayingNotice
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import EventLog, read_log
@@ -53,7 +53,7 @@ def trials_of(done):
 
 def test_no_probe_is_stronger_than_its_own_cap_and_all_come_between_trials(probed):
     done = probed.whole()
-    assert done.left == ""
+    assert done.end_reason == ""
     events = events_of(done.folder)
     played = {e.number: e for e in events if isinstance(e, ProbePlayed)}
     measured = [e for e in events if isinstance(e, ProbeMeasured)]
@@ -100,7 +100,7 @@ def test_a_handle_that_is_still_held_gets_no_reference_and_the_session_goes_on(p
     monkeypatch.setattr(SafeDevice, "simulate_hand", lambda self, on_handle: None)
     done = probed.whole()
     events = events_of(done.folder)
-    assert done.left == ""
+    assert done.end_reason == ""
     assert not [e for e in events if isinstance(e, ProbePlayed) and e.kind == "reference"]
     assert any("seems to be held" in e.trouble for e in events if isinstance(e, ProbeMeasured))
 
@@ -119,7 +119,7 @@ def test_a_sensor_that_is_wrong_never_frees_a_held_handle_and_ends_no_session(pr
     monkeypatch.setattr(play_probe, "release_device", wrong)
     done = probed.whole()
     events = events_of(done.folder)
-    assert done.left == ""
+    assert done.end_reason == ""
     assert not [e for e in events if isinstance(e, ProbePlayed) and e.kind == "reference"]
     assert all(e.apparent_mass_kg is None and e.trouble for e in events if isinstance(e, ProbeMeasured))
 
@@ -133,13 +133,15 @@ def test_the_free_handle_is_compared_at_the_level_of_the_probe_in_the_hand(probe
 
 @pytest.mark.parametrize(("paused_s", "since_s", "mass_kg"), [(200.0, None, None), (30.0, 0.0, 0.4)])
 def test_after_a_pause_no_probe_compares_with_the_grip_before_it(paused_s, since_s, mass_kg):
-    before = ProbeState(played=3, with_hand=2, since_s=50.0, referenced=True, hand_mass_kg=0.4, hand_level_n=0.2)
-    after = after_break(before, PauseTaken("2026-01-01T00:00:00.000+00:00", "participant", paused_s), PROBES)
+    before = ProbeState(
+        probe_count=3, hand_probe_count=2, since_s=50.0, referenced=True, hand_mass_kg=0.4, hand_level_n=0.2
+    )
+    after = apply_break(before, PauseTaken("2026-01-01T00:00:00.000+00:00", "participant", paused_s), PROBES)
     assert (after.since_s, after.hand_mass_kg, after.referenced) == (since_s, mass_kg, paused_s < 120)
 
 
 def test_a_stop_while_the_hand_lets_go_plays_nothing(probed, monkeypatch):
-    begin, begun = SessionSupervisor.begin, []
+    begin, begun = SessionSupervisor.start_activity, []
 
     def stop_at_the_form(self, activity):
         begun.append(activity)
@@ -148,9 +150,9 @@ def test_a_stop_while_the_hand_lets_go_plays_nothing(probed, monkeypatch):
             self._device.stop()
             self.stop_asked = "experimenter"
 
-    monkeypatch.setattr(SessionSupervisor, "begin", stop_at_the_form)
+    monkeypatch.setattr(SessionSupervisor, "start_activity", stop_at_the_form)
     done = probed.whole()
-    assert done.left == "the experimenter stopped the session"
+    assert done.end_reason == "the experimenter stopped the session"
     assert [e.kind for e in events_of(done.folder) if isinstance(e, ProbePlayed)] == ["hand"]
 
 
@@ -170,7 +172,7 @@ def test_a_program_that_ends_within_a_probe_repeats_and_loses_none(probed, monke
     from study.store.sessions.archive import SessionFolder
 
     done = probed.resumed(SessionFolder(folder))
-    assert done.left == ""
+    assert done.end_reason == ""
     events = events_of(done.folder)
     numbers = [e.number for e in events if isinstance(e, ProbePlayed)]
     assert numbers == list(range(len(numbers)))
@@ -181,29 +183,29 @@ def test_a_program_that_ends_within_a_probe_repeats_and_loses_none(probed, monke
 
 def test_a_probe_within_a_trial_or_above_its_cap_is_refused_by_the_log(probed):
     state = replace(probed.whole().state, closed=False)
-    number = state.sitting.probing.played
+    number = state.sitting.probing.probe_count
     probe = ProbePlayed("2026-01-01T00:00:00.000+00:00", number, "hand", 0.8)
     with pytest.raises(LogContradiction, match="allows 1 N"):
-        apply(state, replace(probe, level_n=1.01))
+        apply_event(state, replace(probe, level_n=1.01))
     with pytest.raises(LogContradiction, match="is the next"):
-        apply(state, replace(probe, number=number + 1))
+        apply_event(state, replace(probe, number=number + 1))
     within = replace(state, presented=TrialPresented.__new__(TrialPresented))
     with pytest.raises(LogContradiction, match="while a trial is open"):
-        apply(within, probe)
+        apply_event(within, probe)
 
 
 def test_a_stimulus_above_the_cap_is_not_even_made():
     with pytest.raises(ValueError, match="not within its cap"):
-        probe_stimulus(PROBES, 1.01, 1000.0)
+        make_probe_stimulus(PROBES, 1.01, 1000.0)
 
 
 def test_the_forces_are_odd_lines_one_axis_each_and_the_same_in_probe_and_reference():
-    loop = probe_stimulus(PROBES, 0.8, 1000.0).loop.samples
+    loop = make_probe_stimulus(PROBES, 0.8, 1000.0).loop.samples
     lines = np.abs(np.fft.rfft(loop, axis=0)) > 1e-6
     assert not lines[::2].any()
     assert lines.sum(axis=1).max() == 1
     assert lines.sum(axis=0).min() >= 9
-    commands, segments = reference_commands(PROBES, 1000.0)
+    commands, segments = make_reference_commands(PROBES, 1000.0)
     for segment in segments:
         played = commands.samples[segment.start : segment.start + 1000]
         assert np.allclose(played, segment.amplitude / 0.8 * loop)
@@ -217,7 +219,7 @@ def test_the_forces_are_odd_lines_one_axis_each_and_the_same_in_probe_and_refere
 
 
 def test_a_reference_that_is_cut_short_by_a_pause_lets_go_and_the_session_goes_on_held(probed, monkeypatch):
-    glance, hands = SessionSupervisor.glance, []
+    glance, hands = SessionSupervisor.sign_of_life, []
 
     def asks_for_a_pause(self):
         if self._activity == "reference":
@@ -225,10 +227,10 @@ def test_a_reference_that_is_cut_short_by_a_pause_lets_go_and_the_session_goes_o
         return glance(self)
 
     simulate = SafeDevice.simulate_hand
-    monkeypatch.setattr(SessionSupervisor, "glance", asks_for_a_pause)
+    monkeypatch.setattr(SessionSupervisor, "sign_of_life", asks_for_a_pause)
     monkeypatch.setattr(SafeDevice, "simulate_hand", lambda self, on: hands.append(on) or simulate(self, on))
     done = probed.whole()
-    assert done.left == ""
+    assert done.end_reason == ""
     assert hands == [False, True]
     events = events_of(done.folder)
     (cut,) = (e for e in events if isinstance(e, ProbeMeasured) and e.trouble)
@@ -237,7 +239,7 @@ def test_a_reference_that_is_cut_short_by_a_pause_lets_go_and_the_session_goes_o
 
 
 def test_a_stop_within_a_reference_ends_the_sitting_without_force(probed, monkeypatch):
-    glance = SessionSupervisor.glance
+    glance = SessionSupervisor.sign_of_life
 
     def asks_for_a_stop(self):
         if self._activity == "reference":
@@ -245,7 +247,7 @@ def test_a_stop_within_a_reference_ends_the_sitting_without_force(probed, monkey
             self.stop_asked = "experimenter"
         return glance(self)
 
-    monkeypatch.setattr(SessionSupervisor, "glance", asks_for_a_stop)
+    monkeypatch.setattr(SessionSupervisor, "sign_of_life", asks_for_a_stop)
     done = probed.whole()
-    assert "the experimenter stopped the session" in done.left
+    assert "the experimenter stopped the session" in done.end_reason
     assert done.state.answers == 0

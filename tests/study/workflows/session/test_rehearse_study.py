@@ -10,11 +10,11 @@ from equalizer.plant.identified_model import IdentifiedModel
 from protocols.document.loading import load_protocol
 from study.errors import StudyError, UserInterruptError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
-from study.store.sessions.archive import session_folders
+from study.store.sessions.archive import list_session_folders
 from study.store.sessions.event_log import read_log
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session
-from study.workflows.session.rehearse_study import Rehearsal, rehearse_study, subject_seed
+from study.workflows.session.rehearse_study import Rehearsal, derive_subject_seed, rehearse_study
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def test_a_rehearsal_that_was_cut_off_continues_and_ends_the_same(rehearsal, sit
     done = []
     rehearse_study(rehearsal, workers=2, on_finished=done.append)
     assert done == [1, 2, 3]
-    folders = session_folders(sitter.data)
+    folders = list_session_folders(sitter.data)
     assert [f.name for f in folders] == ["S001_001", "S002_001", "S003_001"]
     whole = [decisions(f) for f in folders]
     assert len({str(d) for d in whole}) == 3
@@ -67,7 +67,7 @@ def test_an_interruption_promises_only_what_workers_elsewhere_have_finished(rehe
 
 
 def test_neighbouring_rehearsals_share_no_participant():
-    seeds = {subject_seed(seed, number) for seed in range(20) for number in range(20)}
+    seeds = {derive_subject_seed(seed, number) for seed in range(20) for number in range(20)}
     assert len(seeds) == 400
 
 

@@ -77,7 +77,7 @@ def test_the_staircase_follows_the_answers_alone_and_is_checked_against_them(rov
 
 
 def test_a_repeated_trial_comes_with_the_same_level(roved):
-    done = roved.interrupted(7, lambda: Unanswered("asked", leave=False, asked=True))
+    done = roved.interrupted(7, lambda: Unanswered("asked", ends_sitting=False, repeat_requested=True))
     (void,) = (t for t in done.state.trials if t.void_cause is not None)
     again = next(t for t in done.state.trials if (t.run, t.trial, t.attempt) == (void.run, void.trial, 1))
     assert (again.level_n, again.nominal_n) == (void.level_n, void.nominal_n)

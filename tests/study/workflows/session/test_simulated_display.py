@@ -7,7 +7,7 @@ import pytest
 from protocols.trial import Phase
 from study.devices.clock import VirtualClock
 from study.participants.observers import find_observer
-from study.session.state.due_trial import Present
+from study.session.state.due_trial import PresentTrial
 from study.session.views.form_views import Form, FormField, FormKind
 from study.session.views.views import Answered, DirectionPicture, HandleView, Question, RestNotice, Task, Unanswered
 from study.workflows.session.simulated_display import SimulatedDisplay
@@ -26,7 +26,7 @@ class Seated:
         right = 0
         for trial in range(trials):
             label = 1 + trial // 2 % 2
-            stimulus = Present(0, trial, 0, phase, frequency_hz, 0.0, level_n, label, 1, 45.0, 1)
+            stimulus = PresentTrial(0, trial, 0, phase, frequency_hz, 0.0, level_n, label, 1, 45.0, 1)
             self.display.feel(stimulus, trial)
             question = Question(phase, 1, 1, trial + 1, False, 0.0, PICTURE, task)
             reply = self.display.ask(question, lambda: True)
@@ -56,7 +56,7 @@ def test_catch_trials_at_full_level_are_right():
 def test_a_handle_that_stays_away_ends_the_sitting_after_a_minute(seated):
     away = HandleView(False, "Bring the handle back", (30.0, 0.0), 5.0)
     reply = seated.display.await_handle(lambda: away, lambda: True)
-    assert reply == Unanswered("the handle did not come back", leave=True)
+    assert reply == Unanswered("the handle did not come back", ends_sitting=True)
     assert seated.clock.now_s() == pytest.approx(60.0, abs=0.3)
 
 

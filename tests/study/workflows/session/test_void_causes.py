@@ -12,8 +12,8 @@ from study.session.views.views import Unanswered
 from study.store.formats.trials_file import TRIALS_NAME, read_trials
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import read_log
-from study.store.sessions.log_seal import seal_paths
-from study.tui.engine.remote_display import silent
+from study.store.sessions.log_seal import find_seals
+from study.tui.engine.remote_display import make_silent_screen_reply
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER
 from study.workflows.files.validate import validate_file
 from study.workflows.results.session_results import write_tables
@@ -24,11 +24,11 @@ CAUSES = [
     (REPEAT, VoidCause.ASKED),
     (PAUSE, VoidCause.PAUSED),
     (LEAVING, VoidCause.PAUSED),
-    (Unanswered("the participant left", leave=True), VoidCause.LEFT),
+    (Unanswered("the participant left", ends_sitting=True), VoidCause.LEFT),
     (TIME_OVER, VoidCause.LATE),
-    (silent(0.0, load_per_processor=0.1), VoidCause.SCREEN_LATE),
-    (silent(0.0, load_per_processor=4.0), VoidCause.SCREEN_LATE),
-    (Unanswered("the stimulus ended early", leave=False), VoidCause.FAULT),
+    (make_silent_screen_reply(0.0, load_per_processor=0.1), VoidCause.SCREEN_LATE),
+    (make_silent_screen_reply(0.0, load_per_processor=4.0), VoidCause.SCREEN_LATE),
+    (Unanswered("the stimulus ended early", ends_sitting=False), VoidCause.FAULT),
 ]
 
 
@@ -39,7 +39,7 @@ def stimulus(trial):
 @pytest.mark.parametrize(("reply", "cause"), CAUSES, ids=lambda value: getattr(value, "name", ""))
 def test_each_cause_is_logged_in_the_table_and_followed_by_the_same_stimulus(sitter, reply, cause):
     end = conduct_new(sitter.plan(), "simulated", sitter.participant(6, lambda: reply))
-    if end.left:
+    if end.end_reason:
         end = sitter.resumed(end.folder)
     write_tables(end.folder)
     trials = read_trials(end.folder.path / TRIALS_NAME)
@@ -109,7 +109,7 @@ def test_ctrl_c_counts_as_leaving_and_a_dead_program_does_not(sitter):
     assert [t.void_cause for t in done.state.trials if t.void_cause] == [VoidCause.LEFT]
 
     whole = sitter.whole("P03")
-    for seal in seal_paths(whole.folder.path).values():  # written after the last line
+    for seal in find_seals(whole.folder.path).values():  # written after the last line
         seal.unlink(missing_ok=True)
     lines = whole.folder.log.read_bytes().splitlines(keepends=True)
     cut = max(i for i, line in enumerate(lines) if b'"trial_presented"' in line)

@@ -12,7 +12,7 @@ from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.workflows.trial.requests_port import ManyRequests, QueuedRequests
 from study.workflows.trial.session_supervisor import SessionSupervisor
 
-CUT = Unanswered("the stimulus ended early", leave=False)
+CUT = Unanswered("the stimulus ended early", ends_sitting=False)
 
 
 @pytest.fixture
@@ -42,57 +42,57 @@ def supervisor(device, clock, requests):
 
 
 def test_a_button_answers_with_its_number_and_its_time(supervisor, pressed, clock):
-    supervisor.begin("trial")
-    assert supervisor.glance()
+    supervisor.start_activity("trial")
+    assert supervisor.sign_of_life()
     clock.sleep(0.7)
     pressed.add(5)
-    assert not supervisor.glance()
+    assert not supervisor.sign_of_life()
     assert supervisor.resolve(CUT) == Answered(2, clock.now_s())
 
 
 def test_a_button_still_down_from_the_last_trial_answers_nothing(supervisor, pressed):
     pressed.add(3)
-    supervisor.begin("trial")
-    assert supervisor.glance() and supervisor.glance()
+    supervisor.start_activity("trial")
+    assert supervisor.sign_of_life() and supervisor.sign_of_life()
     pressed.clear()
-    assert supervisor.glance()
+    assert supervisor.sign_of_life()
     pressed.add(3)
-    assert not supervisor.glance()
+    assert not supervisor.sign_of_life()
     assert supervisor.resolve(CUT).answer == 1
 
 
 def test_both_buttons_at_once_and_other_buttons_answer_nothing(supervisor, pressed):
-    supervisor.begin("trial")
-    supervisor.glance()
+    supervisor.start_activity("trial")
+    supervisor.sign_of_life()
     pressed.update({3, 5})
-    assert supervisor.glance()
+    assert supervisor.sign_of_life()
     pressed.clear()
     pressed.add(7)
-    assert supervisor.glance()
+    assert supervisor.sign_of_life()
 
 
 def test_buttons_mean_nothing_outside_a_trial(supervisor, pressed):
-    supervisor.begin("rest")
-    supervisor.glance()
+    supervisor.start_activity("rest")
+    supervisor.sign_of_life()
     pressed.add(3)
-    assert supervisor.glance()
+    assert supervisor.sign_of_life()
 
 
 def test_a_stop_takes_the_force_away_and_wins_over_an_answer(supervisor, device, requests, rigs):
     device.hold(rigs.sine(1.0))
-    supervisor.begin("trial")
+    supervisor.start_activity("trial")
     requests.send(StopAsked("experimenter"))
-    assert not supervisor.glance()
+    assert not supervisor.sign_of_life()
     assert device.fault() is Fault.STOPPED
     reply = supervisor.resolve(Answered(1, 0.0))
-    assert reply == Unanswered("the experimenter stopped the session", leave=True)
+    assert reply == Unanswered("the experimenter stopped the session", ends_sitting=True)
     device.release()
 
 
 def test_an_answer_that_comes_with_a_pause_counts_and_the_pause_is_kept(supervisor, requests):
-    supervisor.begin("trial")
+    supervisor.start_activity("trial")
     requests.send(PauseAsked("experimenter"))
-    assert not supervisor.glance()
+    assert not supervisor.sign_of_life()
     assert supervisor.resolve(Answered(2, 1.0)) == Answered(2, 1.0)
     assert supervisor.resolve(CUT).pause
     assert supervisor.pause_asked == "experimenter"
@@ -100,20 +100,20 @@ def test_an_answer_that_comes_with_a_pause_counts_and_the_pause_is_kept(supervis
 
 def test_notes_wait_until_they_are_taken(supervisor, requests):
     requests.send(NoteAsked("experimenter", "a door slammed"))
-    supervisor.begin("trial")
-    assert supervisor.glance()
+    supervisor.start_activity("trial")
+    assert supervisor.sign_of_life()
     assert [note.text for note in supervisor.take_notes()] == ["a door slammed"]
     assert supervisor.take_notes() == ()
 
 
 def test_a_fault_ends_a_trial_and_not_the_rest_after_it(supervisor, device, rigs, clock):
     device.hold(rigs.sine(1.0))
-    supervisor.begin("trial")
+    supervisor.start_activity("trial")
     clock.sleep(5.0)  # no sign of life: the watchdog
-    assert not supervisor.glance()
+    assert not supervisor.sign_of_life()
     device.release()
-    supervisor.begin("rest")
-    assert supervisor.glance()
+    supervisor.start_activity("rest")
+    assert supervisor.sign_of_life()
 
 
 def test_several_sources_are_heard_in_turn(requests):
@@ -129,10 +129,10 @@ def test_the_live_state_is_reported_in_real_time_a_few_times_a_second(rigs):
     told, clock = [], RealClock()
     with contextlib.closing(SafeDevice(rigs.compiled_rig(), rigs.SETTINGS, clock)) as device:
         supervisor = SessionSupervisor(device, clock, QueuedRequests(), told.append, place_m=(0.003, 0.004, 0.0))
-        supervisor.begin("trial")
+        supervisor.start_activity("trial")
         until_s = clock.now_s() + 0.7
         while clock.now_s() < until_s:
-            supervisor.glance()
+            supervisor.sign_of_life()
             clock.sleep(0.02)
     assert 2 <= len(told) <= 4
     assert told[0].activity == "trial"
@@ -143,8 +143,8 @@ def test_the_live_state_is_reported_in_real_time_a_few_times_a_second(rigs):
 def test_in_virtual_time_no_live_state_is_reported(device, clock, requests):
     told = []
     supervisor = SessionSupervisor(device, clock, requests, told.append)
-    supervisor.begin("trial")
+    supervisor.start_activity("trial")
     for _ in range(50):
         clock.sleep(0.1)
-        supervisor.glance()
+        supervisor.sign_of_life()
     assert told == []

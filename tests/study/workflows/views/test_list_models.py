@@ -4,7 +4,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from study.store.formats.identified_model_file import write_identified_model
-from study.workflows.views.list_sessions import home_view, model_files
+from study.workflows.views.view_home import home_view, model_files
 
 MODEL = IdentifiedModel(
     np.zeros((1, 1)), np.eye(1), np.eye(1), np.zeros((1, 1)), 1000.0, (5.0, 50.0), "N", "m/s^2", ("fx",), ("ax",)

@@ -33,7 +33,7 @@ def begin(sitter, balanced):
     def conducted(subject, to_the_end=False, observer="scripted"):
         plan = replace(sitter.plan(subject, observer), protocol=balanced[0], protocol_text=balanced[1])
         stay = sitter.participant()
-        leave = sitter.participant(0, lambda: Unanswered("left", leave=True))
+        leave = sitter.participant(0, lambda: Unanswered("left", ends_sitting=True))
         conduct_new(plan, "simulated", stay if to_the_end else leave)
 
     return conducted
@@ -90,7 +90,7 @@ def test_different_texts_of_one_protocol_are_reported(sitter, begin, balanced):
     begin("P01")
     assert only(sitter.data).remarks == ()
     other = replace(sitter.plan("P02"), protocol=balanced[0], protocol_text=balanced[1] + "# later\n")
-    conduct_new(other, "simulated", sitter.participant(0, lambda: Unanswered("left", leave=True)))
+    conduct_new(other, "simulated", sitter.participant(0, lambda: Unanswered("left", ends_sitting=True)))
     assert only(sitter.data).remarks[0].startswith("2 different texts")
 
 

@@ -14,8 +14,8 @@ from study.cli.main import main
 from study.errors import StudyError
 from study.regular_file import open_regular
 from study.workflows.views import stream_session as module
-from study.workflows.views.lsl_outlets import MarkerOutlet, source_id
-from study.workflows.views.stream_session import FRESH_S, SideTasks, measure_offset_s, stream_session
+from study.workflows.views.lsl_outlets import MarkerOutlet, make_source_id
+from study.workflows.views.stream_session import LARGEST_EVENT_AGE_S, SideTasks, measure_offset_s, stream_session
 
 OFFSET_S = 1000.25
 
@@ -95,7 +95,7 @@ def test_nothing_about_the_person_is_reported(tmp_path):
     assert not any(word in said for word in ("P01", "dizzy", "left-handed", "secret"))
 
 
-@pytest.mark.parametrize("monotonic_s", [None, 50.0 - FRESH_S - 1, 60.0, 0.3])
+@pytest.mark.parametrize("monotonic_s", [None, 50.0 - LARGEST_EVENT_AGE_S - 1, 60.0, 0.3])
 def test_a_fact_of_another_clock_is_stamped_when_it_is_sent_and_reports_it(tmp_path, monotonic_s):
     pushed, _ = streamed(tmp_path, [line("trial_presented", monotonic_s=monotonic_s), line("session_closed")])
     marker, at_s = pushed[1]
@@ -104,7 +104,7 @@ def test_a_fact_of_another_clock_is_stamped_when_it_is_sent_and_reports_it(tmp_p
 
 
 def test_the_offset_is_measured_again_and_again(tmp_path):
-    lines = [b""] * round(2.5 * module.OFFSET_EVERY_S / module.EVERY_S)
+    lines = [b""] * round(2.5 * module.OFFSET_INTERVAL_S / module.POLL_INTERVAL_S)
     pushed, _ = streamed(tmp_path, [*lines, line("session_closed", monotonic_s=50.0)])
     assert [marker["event"] for marker, _ in pushed].count("clock") == 3
 
@@ -113,13 +113,13 @@ def test_the_offset_is_noted_at_first_and_when_it_has_changed(tmp_path):
     noted: list[float] = []
     log = tmp_path / "events.jsonl"
     log.write_bytes(b"")
-    lines = [b""] * round(3.5 * module.OFFSET_EVERY_S / module.EVERY_S)
+    lines = [b""] * round(3.5 * module.OFFSET_INTERVAL_S / module.POLL_INTERVAL_S)
     clock = Clock(log, [*lines, line("session_closed", monotonic_s=50.0)])
     outlet = Kept(clock)
-    drift = 0.6 * module.NOTED_S / module.OFFSET_EVERY_S
+    drift = 0.6 * module.REPORTED_CHANGE_S / module.OFFSET_INTERVAL_S
     outlet.clock_s = lambda: clock.now + OFFSET_S + drift * (clock.now - 50.0)
     stream_session(log, outlet, print, clock.now_s, clock.sleep, SideTasks(noted.append, lambda offset_s: 0))
-    assert len(noted) == 2 and noted[1] - noted[0] == pytest.approx(2 * 0.6 * module.NOTED_S, rel=0.1)
+    assert len(noted) == 2 and noted[1] - noted[0] == pytest.approx(2 * 0.6 * module.REPORTED_CHANGE_S, rel=0.1)
 
 
 def test_lost_ticks_are_a_marker(tmp_path):
@@ -236,7 +236,7 @@ def test_markers_arrive_at_another_end_with_their_times(tmp_path):
     following = threading.Thread(target=stream_session, args=(log, outlet, lambda marker: None))
     following.start()
     try:
-        found = pylsl.resolve_byprop("source_id", source_id(log), timeout=20)
+        found = pylsl.resolve_byprop("source_id", make_source_id(log), timeout=20)
         inlet = pylsl.StreamInlet(found[0])
         inlet.open_stream(timeout=20)
         written = []

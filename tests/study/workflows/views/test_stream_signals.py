@@ -15,7 +15,7 @@ from study.devices.safe import SafeDevice
 from study.devices.telemetry import Ring
 from study.session.watching.live import Live
 from study.store.sessions.live_file import write_live
-from study.workflows.views.lsl_outlets import MarkerOutlet, source_id
+from study.workflows.views.lsl_outlets import MarkerOutlet, make_source_id
 from study.workflows.views.stream_signals import LOOK_EVERY, STREAMS, SignalStreams
 
 UTC = "2026-01-01T00:00:00+00:00"
@@ -153,7 +153,7 @@ def send(streams: SignalStreams, lsl_s, over: threading.Event) -> None:
 
 
 def inlet_of(pylsl, log: Path, name: str):
-    found = pylsl.resolve_byprop("source_id", f"{source_id(log)} {name}", timeout=20)
+    found = pylsl.resolve_byprop("source_id", f"{make_source_id(log)} {name}", timeout=20)
     inlet = pylsl.StreamInlet(found[0])
     inlet.open_stream(timeout=20)
     return inlet

@@ -15,4 +15,4 @@ def test_a_first_recording_that_is_held_out_whole_leaves_the_curve_to_the_second
         [held_out, second], diagnosed.device(1), DiagnosisSettings(without=others), map, lambda said, share: None
     )
     assert [effect.effect for effect in found.diagnosis.effects] == ["coulomb_friction"]
-    assert len(found.signatures[0].measured_at) > 10
+    assert len(found.signatures[0].measured_abscissa) > 10

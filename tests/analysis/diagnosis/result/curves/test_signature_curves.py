@@ -3,7 +3,7 @@ import pytest
 
 from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.curves.signature_bins import bin_law_means
@@ -18,7 +18,7 @@ NAMES = Names(("x",), ("ax",), "m/s^2")
 
 
 @pytest.fixture
-def signature(diagnosed):
+def make_signature(diagnosed):
     def of(name, values, axes=1, there=True):
         placed = PlacedEffect(BY_NAME[name], tuple(range(axes)), values)
         recording = diagnosed.recorded(axes, (placed,) if there else ())
@@ -26,7 +26,7 @@ def signature(diagnosed):
         seen = observe(recording, axes)
         noise = np.repeat(diagnosed.NOISE, axes)
         measure, tuning = FreeSimulation((seen,), noise, noise), tuning_of(model, recording.command.channels)
-        without = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+        without = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
         names = Names(tuple("xyz"[:axes]), recording.response.channels, "m/s^2")
         complete = simulate_response(
             model, recording.command.samples, recording.sample_rate_hz, (placed,), recording.hold
@@ -37,8 +37,8 @@ def signature(diagnosed):
 
 
 def law_at_the_dots(curve):
-    order = np.argsort(curve.law_at)
-    return np.interp(curve.measured_at, curve.law_at[order], curve.law[order])
+    order = np.argsort(curve.law_abscissa)
+    return np.interp(curve.measured_abscissa, curve.law_abscissa[order], curve.law[order])
 
 
 @pytest.mark.parametrize(
@@ -56,35 +56,39 @@ def law_at_the_dots(curve):
         ("sensor_offset", {"offset": 0.3}, "time (s)", "error of ax (m/s^2)", 0.1),
     ],
 )
-def test_the_fitted_law_lies_on_what_is_missing(signature, name, values, along, of, apart):
-    one = signature(name, values)
-    assert (one.along, one.of, one.axis) == (along, of, "ax" if along.startswith(("predicted", "time")) else "x")
+def test_the_fitted_law_lies_on_what_is_missing(make_signature, name, values, along, of, apart):
+    one = make_signature(name, values)
+    assert (one.abscissa_label, one.ordinate_label, one.axis) == (
+        along,
+        of,
+        "ax" if along.startswith(("predicted", "time")) else "x",
+    )
     away = np.sqrt(np.mean((one.measured - law_at_the_dots(one)) ** 2))
     assert away < apart * np.sqrt(np.mean(one.measured**2))
 
 
-def test_of_a_lag_the_spectrum_is_shown_and_the_law_follows_it_above_the_noise(signature):
-    one = signature("amplifier_lag", {"time_constant": 2e-3})
-    assert one.along == "frequency (Hz)"
+def test_of_a_lag_the_spectrum_is_shown_and_the_law_follows_it_above_the_noise(make_signature):
+    one = make_signature("amplifier_lag", {"time_constant": 2e-3})
+    assert one.abscissa_label == "frequency (Hz)"
     loud = one.law > 5 * np.median(one.measured[-5:])
     assert loud.sum() >= 10
     assert np.abs(np.log(one.measured[loud] / one.law[loud])).max() < 0.2
 
 
-def test_of_clocks_that_run_apart_the_growth_is_shown(signature):
-    one = signature("clock_drift", {"ppm": 400.0, "interpolated": 0.0})
-    assert one.of == "rms error of ax (m/s^2)"
+def test_of_clocks_that_run_apart_the_growth_is_shown(make_signature):
+    one = make_signature("clock_drift", {"ppm": 400.0, "interpolated": 0.0})
+    assert one.ordinate_label == "rms error of ax (m/s^2)"
     assert one.measured[-1] > 2 * one.measured[0]
 
 
-def test_of_a_turned_sensor_the_channel_that_reads_another_is_shown(signature):
-    one = signature("sensor_misalignment", {"degrees": 8.0, "about_x": 0.0, "about_y": 0.0, "about_z": 8.0}, 3)
-    assert one.along != f"predicted {one.axis} (m/s^2)"
+def test_of_a_turned_sensor_the_channel_that_reads_another_is_shown(make_signature):
+    one = make_signature("sensor_misalignment", {"degrees": 8.0, "about_x": 0.0, "about_y": 0.0, "about_z": 8.0}, 3)
+    assert one.abscissa_label != f"predicted {one.axis} (m/s^2)"
     assert one.axis in ("ax", "ay")
 
 
-def test_where_nothing_is_missing_the_dots_stay_far_from_a_law_that_is_claimed(signature):
-    one = signature("coulomb_friction", {"level": 0.2}, there=False)
+def test_where_nothing_is_missing_the_dots_stay_far_from_a_law_that_is_claimed(make_signature):
+    one = make_signature("coulomb_friction", {"level": 0.2}, there=False)
     assert np.abs(law_at_the_dots(one)).mean() > 0.15
     assert np.abs(one.measured).max() < 0.02
 

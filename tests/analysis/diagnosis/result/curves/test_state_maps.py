@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.judge_laws import judge_laws
-from analysis.diagnosis.balance.motion import motions_of
+from analysis.diagnosis.balance.motion import compute_motions
 from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
-from analysis.diagnosis.result.candidates import balance_errors, with_balances
-from analysis.diagnosis.result.curves.state_maps import NOT_CONFIRMED, state_maps
-from analysis.diagnosis.search.time_budget import always
+from analysis.diagnosis.result.candidates import add_balance_classes, collect_balance_errors
+from analysis.diagnosis.result.curves.state_maps import WITH_CANDIDATES, compute_state_maps
+from analysis.diagnosis.search.time_budget import unlimited_time
 from analysis.figures.diagnosis.state_maps import state_map_pictures
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -21,7 +21,7 @@ ERRORS = Errors(0.5, 0.36, 0.36, 0.02)
 NOTHING = Diagnosis("unexplained", (PLACE,), (), {}, (), Fit(ERRORS, ERRORS), "predicted force", None)
 
 
-def rubbing(level):
+def record_friction(level):
     """A mass with damping and dry friction, moved along three sines; the force is what that takes."""
     seconds = np.arange(8000) / RATE_HZ
     lines = [(0.05, 2 * np.pi * 0.31), (0.02, 2 * np.pi * 0.83), (0.008, 2 * np.pi * 1.7)]
@@ -37,67 +37,67 @@ def rubbing(level):
     )
 
 
-def seen(level, without=frozenset()):
-    recording = rubbing(level)
-    motions = motions_of(observe_parts((recording,), 1))
-    balance = judge_laws(search_structures(motions, 0, False, without, always))
-    return balance, state_maps(NOTHING, (balance,), (), recording), recording
+def find_state_maps(level, without=frozenset()):
+    recording = record_friction(level)
+    motions = compute_motions(observe_parts((recording,), 1))
+    balance = judge_laws(search_structures(motions, 0, False, without, unlimited_time))
+    return balance, compute_state_maps(NOTHING, (balance,), (), recording), recording
 
 
 @pytest.fixture(scope="module")
-def with_friction():
-    return seen(LEVEL)
+def friction_maps():
+    return find_state_maps(LEVEL)
 
 
-def view_of(maps, along):
-    return next(view for view in maps.views if view.along == along)
+def find_view(maps, along):
+    return next(view for view in maps.views if view.abscissa_name == along)
 
 
-def test_friction_shows_as_a_missing_force_that_turns_with_the_velocity(with_friction):
-    (maps,) = with_friction[1]
-    view = view_of(maps, "velocity")
-    slow = np.abs(view.at) < 0.05
-    assert view.mean[slow & (view.at < -0.005)].mean() > 0.3 * LEVEL
-    assert view.mean[slow & (view.at > 0.005)].mean() < -0.3 * LEVEL
-    assert np.sqrt(np.mean(view.left**2)) < 0.2 * np.sqrt(np.mean(view.mean**2))
-    assert (maps.axis, maps.unit, view.unit, maps.completed) == ("force", "N", "m/s", NOT_CONFIRMED)
+def test_friction_shows_as_a_missing_force_that_turns_with_the_velocity(friction_maps):
+    (maps,) = friction_maps[1]
+    view = find_view(maps, "velocity")
+    slow = np.abs(view.bin_abscissa) < 0.05
+    assert view.mean[slow & (view.bin_abscissa < -0.005)].mean() > 0.3 * LEVEL
+    assert view.mean[slow & (view.bin_abscissa > 0.005)].mean() < -0.3 * LEVEL
+    assert np.sqrt(np.mean(view.mean_residual**2)) < 0.2 * np.sqrt(np.mean(view.mean**2))
+    assert (maps.axis, maps.unit, view.unit, maps.completed) == ("force", "N", "m/s", WITH_CANDIDATES)
 
 
 def test_without_friction_nothing_stands_out():
-    (maps,) = seen(0.0)[1]
+    (maps,) = find_state_maps(0.0)[1]
     assert maps.share < 0.05
-    assert np.abs(view_of(maps, "velocity").mean).max() < 0.1 * LEVEL
+    assert np.abs(find_view(maps, "velocity").mean).max() < 0.1 * LEVEL
 
 
-def test_a_loop_follows_the_measured_force_with_the_completed_law(with_friction):
-    (maps,) = with_friction[1]
+def test_a_loop_follows_the_measured_force_with_the_completed_law(friction_maps):
+    (maps,) = friction_maps[1]
     loop = maps.loops[0]
-    far, near = (np.sqrt(np.mean((each - loop.measured) ** 2)) for each in (loop.before, loop.after))
+    far, near = (np.sqrt(np.mean((each - loop.measured) ** 2)) for each in (loop.model_force, loop.completed_force))
     assert near < 0.4 * far
-    assert np.ptp(loop.at) > 0.09
+    assert np.ptp(loop.abscissa) > 0.09
 
 
 def test_what_nothing_completes_has_no_second_course():
     catalogue = frozenset({"coulomb_friction"})
-    balance, _, recording = seen(LEVEL, catalogue)
-    bare = replace(balance, laws=(), others=())
-    (maps,) = state_maps(NOTHING, (bare,), (), recording)
+    balance, _, recording = find_state_maps(LEVEL, catalogue)
+    bare = replace(balance, laws=(), further_laws=())
+    (maps,) = compute_state_maps(NOTHING, (bare,), (), recording)
     assert maps.completed == ""
-    assert all(not len(view.left) for view in maps.views)
-    assert not len(maps.loops[0].after)
+    assert all(not len(view.mean_residual) for view in maps.views)
+    assert not len(maps.loops[0].completed_force)
     assert "Blue" not in state_map_pictures((maps,))[0].caption
 
 
-def test_how_far_names_reach_is_measured_on_held_out_blocks(with_friction):
-    balance, _, recording = with_friction
-    (reached,) = balance_errors(NOTHING, (balance,), recording.command.channels)
-    assert reached.named == pytest.approx(reached.linear)
+def test_how_far_names_reach_is_measured_on_held_out_blocks(friction_maps):
+    balance, _, recording = friction_maps
+    (reached,) = collect_balance_errors(NOTHING, (balance,), recording.command.channels)
+    assert reached.named_error == pytest.approx(reached.linear)
     assert reached.share == pytest.approx(0.0, abs=1e-6)
     assert reached.ceiling < 0.3 * reached.linear
 
 
-def test_states_and_loops_are_drawn_with_plain_units(with_friction):
-    states, loops = state_map_pictures(with_friction[1])
+def test_states_and_loops_are_drawn_with_plain_units(friction_maps):
+    states, loops = state_map_pictures(friction_maps[1])
     labels = [axes.get_xlabel() for axes in states.figure.axes]
     assert labels == ["Position (mm)", "Velocity (mm/s)", "Command (N)", "Time (s)"]
     assert "Against velocity: mean missing force from −" in states.alternative.replace("-", "−")
@@ -105,34 +105,38 @@ def test_states_and_loops_are_drawn_with_plain_units(with_friction):
     assert state_map_pictures(()) == ()
 
 
-def test_what_stands_in_a_class_is_no_candidate_beside_it(with_friction):
-    balance, _, recording = with_friction
+def test_what_stands_in_a_class_is_no_candidate_beside_it(friction_maps):
+    balance, _, recording = friction_maps
     (weighed, *_) = balance.laws
     level = {name: Estimate(value, "N") for name, value in weighed.values.items()}
     effect = NamedEffect(weighed.law.effect, "mechanism", "force", 0.9, 0.9, level)
     named = replace(NOTHING, verdict="partly_explained", effects=(effect,), remainder=(PLACE,))
-    alike = replace(balance, laws=(replace(weighed, alike=("stribeck_friction",)),), others=(weighed, _rival(weighed)))
-    found = with_balances(named, (alike,), recording.command.channels)
+    alike = replace(
+        balance,
+        laws=(replace(weighed, equivalents=("stribeck_friction",)),),
+        further_laws=(weighed, _make_rival(weighed)),
+    )
+    found = add_balance_classes(named, (alike,), recording.command.channels)
     assert found.effects[0].class_ == ()  # it only refines the named law, and is no candidate either
     assert found.candidates == ()
-    apart = replace(balance, laws=(replace(weighed, alike=()),), others=(_rival(weighed),))
+    apart = replace(balance, laws=(replace(weighed, equivalents=()),), further_laws=(_make_rival(weighed),))
     assert [
-        candidate.effect for candidate in with_balances(named, (apart,), recording.command.channels).candidates
+        candidate.effect for candidate in add_balance_classes(named, (apart,), recording.command.channels).candidates
     ] == ["stribeck_friction"]
 
 
-def test_a_law_that_leaves_a_remainder_explains_less_than_all(with_friction):
+def test_a_law_that_leaves_a_remainder_explains_less_than_all(friction_maps):
     """It takes all that all laws together take; these leave half of the linear model's error."""
-    balance, _, recording = with_friction
+    balance, _, recording = friction_maps
     (weighed, *_) = balance.laws
     level = {name: Estimate(value, "N") for name, value in weighed.values.items()}
     effect = NamedEffect(weighed.law.effect, "mechanism", "force", 0.9, 0.9, level)
     named = replace(NOTHING, verdict="partly_explained", effects=(effect,), remainder=(PLACE,))
     half = replace(balance, laws=(replace(weighed, share=1.0),), linear=0.2, error=0.1, ceiling=0.1)
-    assert with_balances(named, (half,), recording.command.channels).effects[0].share == pytest.approx(0.75)
+    assert add_balance_classes(named, (half,), recording.command.channels).effects[0].share == pytest.approx(0.75)
     whole = replace(half, ceiling=0.0)
-    assert with_balances(named, (whole,), recording.command.channels).effects[0].share == pytest.approx(1.0)
+    assert add_balance_classes(named, (whole,), recording.command.channels).effects[0].share == pytest.approx(1.0)
 
 
-def _rival(weighed):
-    return replace(weighed, law=replace(weighed.law, effect="stribeck_friction"), why_not="too little")
+def _make_rival(weighed):
+    return replace(weighed, law=replace(weighed.law, effect="stribeck_friction"), objection="too little")

@@ -6,8 +6,8 @@ import pytest
 
 from study.errors import StudyError
 from study.evaluation.bank.laws.prove_laws import prove_laws, reveal_laws
-from study.evaluation.bank.laws.seal_laws import fresh_file, fresh_motions, seal_laws
-from study.evaluation.bank.laws.write_laws import law_lines, write_laws
+from study.evaluation.bank.laws.seal_laws import fresh_motions_path, read_fresh_motions, seal_laws
+from study.evaluation.bank.laws.write_laws import format_law_lines, write_laws
 from study.evaluation.bank.proof_folder import SETTINGS, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.seal_cases import BankPlan
@@ -34,9 +34,11 @@ def test_the_diagnosis_is_told_to_look_for_laws_and_not_for_which(sealed):
 
 
 def test_fresh_motion_lies_with_the_label(sealed):
-    label = read_label(sealed.label(0))
+    label = read_label(sealed.label_file(0))
     truth = label["truth"]
-    found = fresh_motions(fresh_file(sealed, 0), label["axes"], truth["axes"], truth["acts_on"] == ["response"])
+    found = read_fresh_motions(
+        fresh_motions_path(sealed, 0), label["axes"], truth["axes"], truth["acts_on"] == ["response"]
+    )
     assert len(found) == 2
     assert set(truth["axes"]) == set(found[0].added)
     assert len(found[0].columns["t"]) == len(found[0].added[truth["axes"][0]])
@@ -46,7 +48,7 @@ def test_another_fresh_motion_breaks_the_seal(sealed, tmp_path):
     copy = open_proof_folder(tmp_path / "copy", SEED, True, "laws")
     for name in ("labels.sha256", "sealed/00000.json"):
         (copy.path / name).write_bytes((sealed.path / name).read_bytes())
-    fresh_file(copy, 0).write_bytes(b"other")
+    fresh_motions_path(copy, 0).write_bytes(b"other")
     with pytest.raises(StudyError, match="seal"):
         reveal_laws(copy, 1)
 
@@ -61,6 +63,6 @@ def test_no_law_is_named_that_is_not_there(tmp_path):
     done = prove_laws(tmp_path / "bank", BankPlan(SEED, 20, brief=True), BankOptions(), lambda what, done, of: None)
     write_laws(done)
     assert json.loads((done.folder.path / "proof.json").read_text())["of"] == "laws"
-    assert next(law_lines(done)).endswith("misses in 20 cases")
+    assert next(format_law_lines(done)).endswith("misses in 20 cases")
     assert [each.number for each in done.outcomes if each.diagnosis is None] == []
     assert [each.number for each in done.outcomes if each.false_law or each.wrongly_explained] == []

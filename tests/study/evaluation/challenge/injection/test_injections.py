@@ -9,7 +9,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.evaluation.challenge.injection.axis_motion import axis_motion
 from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
-from study.evaluation.challenge.injection.injections import INJECTIONS, applicable_injections, describe_reading, inject
+from study.evaluation.challenge.injection.injections import INJECTIONS, applicable_injections, inject, measure_response
 
 RATE_HZ = 1000.0
 
@@ -129,7 +129,7 @@ def test_only_faults_that_a_recording_can_carry_are_drawn():
     imposed = replace(swinging(), meta={"imposed": "position"})
     assert {"added_mass", "force_gain"} <= set(applicable_injections(swinging()))
     assert "added_mass" in applicable_injections(imposed) and "force_gain" not in applicable_injections(imposed)
-    assert describe_reading(recording(1)).middle_hz == pytest.approx(7, abs=0.5)
+    assert measure_response(recording(1)).median_hz == pytest.approx(7, abs=0.5)
 
 
 def test_what_cannot_be_injected_is_refused():

@@ -7,7 +7,7 @@ from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.law_kernel import law_force
 from study.evaluation.challenge.laws.build_law import build_law
 from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, Sizes
-from study.evaluation.challenge.laws.draw_law import COUNTS, TURN, draw_law, law_case
+from study.evaluation.challenge.laws.draw_law import COUNTS, TURN, draw_law, generate_law_case
 from study.evaluation.challenge.mechanism_kernel import Motion
 
 SEED = 7
@@ -18,18 +18,18 @@ SIZES = Sizes(0.01, 0.2, 20.0)
 def found():
     """The first device of one axis with a force of its own."""
     number = next(n for n in range(len(TURN)) if _simple(draw_law(SEED, n, brief=True)))
-    return number, law_case(draw_law(SEED, number, brief=True), "first")
+    return number, generate_law_case(draw_law(SEED, number, brief=True), "first")
 
 
 def _simple(drawn):
     kind = next((kind for kind in LAW_KINDS if kind.name == drawn.concealed), None)
-    return kind is not None and kind.code >= 0 and len(drawn.rig.axes) == 1 and not kind.memory
+    return kind is not None and kind.code >= 0 and len(drawn.settings.axes) == 1 and not kind.memory
 
 
 @pytest.mark.slow
 def test_the_same_number_is_the_same_device(found):
     number, case = found
-    again = law_case(draw_law(SEED, number, brief=True), "first")
+    again = generate_law_case(draw_law(SEED, number, brief=True), "first")
     assert again.truth == case.truth
     assert np.array_equal(again.case.recording.response.samples, case.case.recording.response.samples)
 
@@ -46,8 +46,8 @@ def test_every_law_takes_its_turn():
 
 def test_the_law_shows_and_fresh_motion_carries_its_force(found):
     _, case = found
-    assert case.case.adds > 1
-    quiet, loud = (float(np.sqrt(np.mean(each.lawful**2))) for each in case.fresh)
+    assert case.case.detectability > 1
+    quiet, loud = (float(np.sqrt(np.mean(each.lawful**2))) for each in case.fresh_motions)
     assert 0 < quiet < loud
 
 

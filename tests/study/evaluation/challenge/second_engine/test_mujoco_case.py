@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from study.evaluation.challenge.bench import draw_bench
+from study.evaluation.challenge.case_settings import CaseSettings
 from study.evaluation.challenge.concealed_effect import EffectContext
-from study.evaluation.challenge.device import Device, motion
+from study.evaluation.challenge.device import Device
+from study.evaluation.challenge.device import simulate_motion as simulate_bench_motion
 from study.evaluation.challenge.draw_case import EFFECTS
 from study.evaluation.challenge.drive_plan import multisine
-from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.second_engine import second_engine
 from study.evaluation.challenge.sensor import NOISE_MPS2
 
@@ -25,9 +26,9 @@ ALONG_X = {
 
 @pytest.fixture(scope="module")
 def bench():
-    from study.evaluation.challenge.second_engine.mujoco_bench import bare
+    from study.evaluation.challenge.second_engine.mujoco_bench import baseline_bench
 
-    return bare(draw_bench(np.random.default_rng(50_021)))
+    return baseline_bench(draw_bench(np.random.default_rng(50_021)))
 
 
 @pytest.fixture(scope="module")
@@ -43,17 +44,19 @@ def apart(one, other):
 
 @pytest.mark.parametrize("name", ALONG_X)
 def test_both_engines_know_the_same_physics(name, bench, command):
-    from study.evaluation.challenge.second_engine.mujoco_bench import linear, simulate_motion
+    from study.evaluation.challenge.second_engine.mujoco_bench import linear_bench, simulate_motion
     from study.evaluation.challenge.second_engine.mujoco_case import BUILDERS
 
-    free, first = simulate_motion(bench, command), Device(linear(bench))
+    free, first = simulate_motion(bench, command), Device(linear_bench(bench))
     travel, peak = np.abs(free[1]).max(axis=0), np.abs(free[0]).max(axis=0)
-    values = EFFECTS[name].draw(EffectContext(np.random.default_rng(5), 0.8, linear(bench), 0, travel, peak, (0,)))
+    values = EFFECTS[name].draw(
+        EffectContext(np.random.default_rng(5), 0.8, linear_bench(bench), 0, travel, peak, (0,))
+    )
     with_it = BUILDERS[name](bench, 0, values)
     if name == "transport_delay":
         values = {"delay": with_it.delay_s}
     seen = simulate_motion(with_it, command)
-    assert apart(seen, motion(EFFECTS[name].build(first, 0, values), command)) < ALONG_X[name]
+    assert apart(seen, simulate_bench_motion(EFFECTS[name].build(first, 0, values), command)) < ALONG_X[name]
     assert apart(seen, free) > 2 * ALONG_X[name]
 
 
@@ -68,21 +71,21 @@ def test_a_contact_gives_way_as_much_as_its_spring_says(bench):
 
 def test_a_case_holds_what_it_says_and_is_the_same_again():
     drawn = [
-        second_engine.draw_engine_case(50_023, ("sensor_gain",), "calibrated", (0.9,), "a", Rig((1,), 1000, 3))
+        second_engine.draw_engine_case(50_023, ("sensor_gain",), "calibrated", (0.9,), "a", CaseSettings((1,), 1000, 3))
         for _ in range(2)
     ]
     assert drawn[0].truth == drawn[1].truth
     assert drawn[0].truth[0].axis == "y"
     assert np.array_equal(drawn[0].recording.response.samples, drawn[1].recording.response.samples)
-    assert drawn[0].adds > 1.0
+    assert drawn[0].detectability > 1.0
 
 
 def test_what_the_engine_cannot_express_is_refused():
     with pytest.raises(ValueError, match="cannot conceal cogging"):
-        second_engine.draw_engine_case(1, ("cogging",), "calibrated", (0.5,), "a", Rig((0,), 1000, 3))
+        second_engine.draw_engine_case(1, ("cogging",), "calibrated", (0.5,), "a", CaseSettings((0,), 1000, 3))
 
 
 def test_every_effect_of_its_list_can_be_built():
-    from study.evaluation.challenge.second_engine.mujoco_case import BUILDERS, IN_THE_SENSOR
+    from study.evaluation.challenge.second_engine.mujoco_case import BUILDERS, SENSOR_EFFECTS
 
-    assert set(second_engine.EFFECTS) == {*BUILDERS, *IN_THE_SENSOR}
+    assert set(second_engine.EFFECTS) == {*BUILDERS, *SENSOR_EFFECTS}

@@ -35,7 +35,7 @@ def test_other_keys_can_answer_beside_the_digits(asked):
 @pytest.mark.parametrize(("key", "reply"), [("p", PAUSE), ("q", LEAVING), ("r", REPEAT)])
 def test_pause_leave_and_repeat_are_replies_that_leave_no_session(asked, key, reply):
     assert asked(key)[0] == [reply]
-    assert not reply.leave
+    assert not reply.ends_sitting
 
 
 def test_a_used_up_repeat_says_so_and_does_nothing_else(asked):
@@ -197,7 +197,7 @@ def test_an_answer_is_stamped_when_its_key_was_read_not_when_it_was_handled(on_s
         await stage.pilot.pause()
 
     read_s, reply = on_stage(screen, story)
-    assert reply.at_s == read_s
+    assert reply.key_time_s == read_s
 
 
 def test_a_key_that_was_read_before_the_question_answers_nothing(on_stage):

@@ -8,7 +8,7 @@ from study.store.disk.json_document import read_json
 from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.workflows.diagnosis.diagnose_recordings import diagnose_recordings
-from study.workflows.diagnosis.diagnosed_summary import answer_lines, file_lines, summary
+from study.workflows.diagnosis.diagnosed_summary import format_answer, format_paths, make_json
 from tests.study.workflows.diagnosis.recordings.scripted import Scripted, asked_of_engine, plan, quiet
 
 pytestmark = pytest.mark.usefixtures("sketched")
@@ -37,23 +37,26 @@ def test_results_hold_the_hashes_of_their_input_files(done):
 
 def test_the_answer_is_there_before_anything_is_written(in_two_steps, findings):
     answer, there, done = in_two_steps
-    assert answer_lines(answer.findings) == answer_lines(findings)
+    assert format_answer(answer.findings) == format_answer(findings)
     assert there == []
     assert done.out == answer.plan.out
     assert (done.out / "report.html").is_file()
 
 
 def test_the_summary_begins_with_the_verdict_and_then_says_where_the_files_are(done):
-    lines = answer_lines(done.findings)
+    lines = format_answer(done.findings)
     assert lines[0].startswith("Missing in the model: dry friction on the x drive.")
-    assert file_lines(done.out)[1:] == (f"Report: {done.out}/report.html", f"Improved model: {done.out}/improved.toml")
+    assert format_paths(done.out)[1:] == (
+        f"Report: {done.out}/report.html",
+        f"Improved model: {done.out}/improved.toml",
+    )
     assert any(line.startswith("  held out  as given") for line in lines)
-    document = summary(done.findings)
+    document = make_json(done.findings)
     assert (document["format"], document["version"], document["verdict"]) == ("hapteq-diagnosis", 1, "explained")
 
 
 def test_the_engine_gets_recordings_model_names_and_a_parallel_map(files, findings, tmp_path):
-    engine = asked_of_engine(plan(files, tmp_path / "out", without=("backlash",)), findings)
+    engine = asked_of_engine(plan(files, tmp_path / "out", excluded_effects=("backlash",)), findings)
     assert (engine.settings.names, engine.settings.without) == (("rec.h5",), ("backlash",))
     assert engine.mapped == [3, 1, 2]
     assert engine.model.inputs == len(engine.recordings[0].command.channels) == 1
@@ -95,7 +98,7 @@ def test_a_folder_that_is_taken_is_refused_before_any_work(files, findings, tmp_
 
 def test_an_unknown_effect_is_wrong_use_with_a_suggestion(files, findings, tmp_path):
     with pytest.raises(WrongUseError) as refused:
-        diagnose_recordings(plan(files, tmp_path / "out", without=("backlsh",)), quiet, Scripted(findings))
+        diagnose_recordings(plan(files, tmp_path / "out", excluded_effects=("backlsh",)), quiet, Scripted(findings))
     assert refused.value.title == "There is no effect 'backlsh' to exclude"
     assert "did you mean 'backlash'?" in refused.value.happened
     assert "coulomb_friction" in refused.value.do_now

@@ -104,7 +104,7 @@ def test_a_wide_model_alone_plays_its_whole_band(plants, plan, tmp_path):
     write_trajectory(tmp_path / "wide.csv", table(noise(plants, 6.0, 200.0, rms=0.5)))
     done = equalize_trajectory(with_models(plan, "wide", trajectory=tmp_path / "wide.csv"))
     assert done.bands is None
-    assert done.solved.left_out < 0.03
+    assert done.feedforward.out_of_band_share < 0.03
     forces = read_trajectory(done.plan.out).signal.samples
     wanted = read_trajectory(tmp_path / "wide.csv").signal.samples
     assert band_error(wanted, plants.omega_like(0.1).play(forces), RATE_HZ, (5.0, 200.0)) < 0.02

@@ -16,7 +16,7 @@ from study.store.formats.protocol_files import read_protocol
 from study.store.formats.recording_file import read_recording, write_recording
 from study.store.formats.trajectory_file import read_trajectory
 from study.store.sessions.archive import SessionFolder
-from study.store.sessions.event_log import readable_events
+from study.store.sessions.event_log import read_valid_events
 from study.store.sessions.live_file import read_live
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.files.validate import validate_file
@@ -52,7 +52,7 @@ def read_ours(path: Path, beside: Path) -> None:
             shutil.copy(path, path.parent / "requests")
             RequestInbox(path.parent).take()
         case "events.jsonl":
-            readable_events(path)
+            read_valid_events(path)
             session_line(SessionFolder(path.parent))
             fold_session(SessionFolder(path.parent))
         case "model.h5":

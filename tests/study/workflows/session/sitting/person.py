@@ -53,8 +53,8 @@ class Person(SimulatedDisplay):
         self.calls.append(notice.reason)
         self.at_pause()
         if not sign_of_life():
-            return AfterPause.LEAVE
-        return self.decisions.pop(0) if self.decisions else AfterPause.GO_ON
+            return AfterPause.END_SITTING
+        return self.decisions.pop(0) if self.decisions else AfterPause.CONTINUE_SITTING
 
     def trouble(self, sentence):
         self.told.append(sentence)

@@ -43,4 +43,4 @@ def test_a_protocol_may_refuse_a_device_that_was_not_checked_today(plan, small_p
 def test_a_simulated_device_needs_no_daily_check(plan, small_protocol, seat):
     strict = replace(small_protocol, setup=SetupSettings(daily_check_needed=True))
     end = conduct_new(plan(strict), "simulated", seat)
-    assert not end.left and not any("Daily" in line for line in of(end, DeviceChecked)[0].findings)
+    assert not end.end_reason and not any("Daily" in line for line in of(end, DeviceChecked)[0].findings)

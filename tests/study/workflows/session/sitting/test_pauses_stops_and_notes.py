@@ -25,18 +25,18 @@ def test_a_pause_from_the_other_terminal_frees_the_hand_and_the_trial_comes_agai
     assert [event.who for event in of(end, PauseTaken)] == ["experimenter"]
     spoiled = of(end, TrialSpoiled)
     assert [event.reason for event in spoiled] == ["the experimenter asked for a pause"]
-    assert not end.left
+    assert not end.end_reason
 
 
 def test_a_stop_from_the_other_terminal_ends_the_sitting_and_can_be_resumed(plan, full, seat, person, tmp_path, clock):
     inbox = lambda: RequestInbox(tmp_path / "data" / "P01_001")  # noqa: E731
     person.at_question = lambda q: inbox().send(StopAsked("experimenter")) if len(person.questions) == 3 else None
     end = conduct_new(plan(full), "simulated", seat)
-    assert end.left == "the experimenter stopped the session"
+    assert end.end_reason == "the experimenter stopped the session"
     assert len(of(end, AnswerGiven)) == 2
     again = Person(clock)
     resumed = conduct_resumed(end.folder, "simulated", Participant(display=again, hand=again, clock=clock))
-    assert not resumed.left
+    assert not resumed.end_reason
     assert again.calls[:2] == [FormKind.SETUP, "device"]
 
 
@@ -50,7 +50,7 @@ def test_a_stop_during_a_rest_cuts_it_short(plan, small_protocol, seat, person, 
 
     person.rest = rest
     end = conduct_new(plan(long_rest), "simulated", seat)
-    assert end.left == "the experimenter stopped the session"
+    assert end.end_reason == "the experimenter stopped the session"
     assert of(end, RestTaken) == []
 
 
@@ -58,7 +58,7 @@ def test_a_stop_during_a_pause_ends_it(plan, small_protocol, seat, person):
     person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
     person.at_pause = lambda: seat.requests.send(StopAsked("experimenter"))
     end = conduct_new(plan(small_protocol), "simulated", seat)
-    assert end.left == "the experimenter stopped the session"
+    assert end.end_reason == "the experimenter stopped the session"
     assert len(of(end, PauseTaken)) == 1
 
 
@@ -69,7 +69,7 @@ def test_a_note_is_on_the_disk_before_the_pause_is_over(plan, small_protocol, se
         seat.requests.send(NoteAsked("participant", "my thumb is numb", adverse=True))
         sign_of_life()
         seen.append((tmp_path / "data" / "P01_001" / "events.jsonl").read_text())
-        return AfterPause.GO_ON
+        return AfterPause.CONTINUE_SITTING
 
     person.pause = pause
     person.at_question = lambda q: seat.requests.send(PauseAsked("participant")) if len(person.questions) == 2 else None
@@ -94,7 +94,7 @@ def test_a_withdrawal_in_a_pause_ends_the_sitting(plan, small_protocol, seat, pe
     person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
     end = conduct_new(plan(small_protocol), "simulated", seat)
     assert end.withdrawn
-    assert end.left == "the participant withdrew"
+    assert end.end_reason == "the participant withdrew"
 
 
 def test_a_pause_asked_for_during_a_pause_makes_no_second_one(plan, small_protocol, seat, person):
@@ -107,7 +107,7 @@ def test_a_pause_asked_for_during_a_pause_makes_no_second_one(plan, small_protoc
 def test_what_is_noted_during_the_goodbye_is_in_the_log(plan, small_protocol, seat, person):
     person.goodbye = lambda notice: seat.requests.send(NoteAsked("experimenter", "a rash", adverse=True))
     end = conduct_new(plan(small_protocol), "simulated", seat)
-    assert not end.left
+    assert not end.end_reason
     assert [note.text for note in of(end, NoteTaken)] == ["a rash"]
 
 
@@ -117,12 +117,12 @@ def test_ctrl_c_at_the_goodbye_of_a_finished_session_leaves_it_finished(plan, sm
 
     person.goodbye = goodbye
     end = conduct_new(plan(small_protocol), "simulated", seat)
-    assert not end.left
+    assert not end.end_reason
     assert end.state.closed
 
 
 def test_leaving_from_a_pause_can_be_resumed(plan, small_protocol, seat, person):
-    person.decisions = [AfterPause.LEAVE]
+    person.decisions = [AfterPause.END_SITTING]
     person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
     end = conduct_new(plan(small_protocol), "simulated", seat)
-    assert (end.left, end.withdrawn) == ("the participant left", False)
+    assert (end.end_reason, end.withdrawn) == ("the participant left", False)

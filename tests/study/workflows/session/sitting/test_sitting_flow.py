@@ -26,7 +26,7 @@ from tests.study.workflows.session.sitting.person import Person, of
 
 def test_a_whole_sitting_from_consent_to_debrief(plan, full, seat, person):
     end = conduct_new(plan(full), "simulated", seat)
-    assert not end.left
+    assert not end.end_reason
     assert person.calls[:7] == [
         *(FormKind.CONSENT, FormKind.EXCLUSION, FormKind.SETUP),
         *("device", "welcome", "demo", "demo"),
@@ -68,7 +68,7 @@ def test_every_stimulus_tells_how_long_it_shook_and_how_far_the_handle_was(plan,
 def test_without_consent_or_with_an_exclusion_nothing_is_played(plan, full, seat, person, form):
     person.refuse = form
     end = conduct_new(plan(full), "simulated", seat)
-    assert end.left
+    assert end.end_reason
     assert of(end, TrialPresented) == of(end, DemoPlayed) == []
     assert end.fault is Fault.NONE
 
@@ -89,7 +89,7 @@ def test_practice_says_how_it_went(plan, full, seat, person):
     results = [call for call in person.calls if hasattr(call, "passed")]
     assert len(results) == 1
     assert results[0].passed
-    assert (results[0].right, results[0].of) == (2, 2)
+    assert (results[0].correct_count, results[0].answer_count) == (2, 2)
 
 
 def test_the_same_seed_and_answers_give_the_same_trials_for_any_participant(plan, small_protocol, seat, tmp_path):

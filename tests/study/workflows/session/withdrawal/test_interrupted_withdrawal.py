@@ -17,7 +17,7 @@ from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.participant_number import participant_number
-from study.workflows.views.list_sessions import session_lines
+from study.workflows.views.view_home import session_lines
 from study.workflows.views.view_session import session_view
 from tests.study.workflows.session.withdrawal.data_folder import UTC, erase, files
 

@@ -15,15 +15,15 @@ from study.session.views.printable import printable, printable_text
 from study.store.disk.text_file import read_toml_text
 from study.store.formats.identified_model_file import is_identified_model, read_identified_model
 from study.store.formats.protocol_files import ProtocolRefusedError, list_shipped_protocols, read_protocol
-from study.store.sessions.archive import session_folders
+from study.store.sessions.archive import list_session_folders
 from study.workflows.views.session_line import session_line
 
 
 def protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
     """Study protocols to choose from: shipped ones first, then files in the data folder and in its parent folder."""
     places = dict.fromkeys((data.absolute(), data.absolute().parent))
-    found = [str(path) for place in places for path in _toml_files(place) if _says_study(path)]
-    lines = (protocol_line(name, data) for name in (*list_shipped_protocols(), *found))
+    study_files = [str(path) for place in places for path in _toml_files(place) if _says_study(path)]
+    lines = (protocol_line(name, data) for name in (*list_shipped_protocols(), *study_files))
     return tuple(line for line in lines if line is not None)
 
 
@@ -60,8 +60,8 @@ def protocol_line(name: str, data: Path) -> ProtocolLine | None:
 def model_files(data: Path) -> tuple[str, ...]:
     """Files of identified models in the data folder and in its parent folder, the latest first."""
     places = dict.fromkeys((data.absolute(), data.absolute().parent))
-    found = [path for place in places for path in _hdf5_files(place)]
-    return tuple(str(path) for path in sorted(found, key=_mtime_s, reverse=True) if _is_model(path))
+    hdf5_files = [path for place in places for path in _hdf5_files(place)]
+    return tuple(str(path) for path in sorted(hdf5_files, key=_mtime_s, reverse=True) if _is_model(path))
 
 
 def model_words(path: str) -> str:
@@ -108,7 +108,7 @@ def home_view(data: Path) -> HomeView:
 def session_lines(data: Path) -> tuple[SessionLine, ...]:
     """Lines of all sessions, the latest first. Unreadable sessions are listed with a remark."""
     try:
-        folders = session_folders(data)
+        folders = list_session_folders(data)
     except OSError:
         return ()
     lines = printable(tuple(map(session_line, folders)))

@@ -17,7 +17,7 @@ from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
 from study.devices.simulated import layout
 from study.devices.simulated.compiled import pose
-from study.devices.simulated.omega3 import NAME, omega3_info
+from study.devices.simulated.omega3 import NAME, make_omega3_info
 from study.devices.simulated.packing import effective_mass_kg, isotropic_depth_m, pack_parameters
 from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Masses, Omega3Parameters
 
@@ -40,17 +40,17 @@ class SimulatedLinkage:
         """The linkage at a position of the handle (3,), m; None at or beyond the end stop."""
         if not float(np.linalg.norm(position_m)) < self._reach_m:
             return None
-        angles, rates = _pose(self._packed, position_m)
-        carried = self._masses.handle_kg + self._masses.forearm_kg
-        turning = self._packed[layout.ARM_INERTIA] + self._packed[layout.DRIVE_INERTIA]
-        inertia = carried * np.eye(3) + turning * rates.T @ rates
-        held = np.array([0.0, 0.0, GRAVITY_M_S2 * carried])
+        angles, rates = _compute_pose(self._packed, position_m)
+        moving_mass_kg = self._masses.handle_kg + self._masses.forearm_kg
+        arm_inertia = self._packed[layout.ARM_INERTIA] + self._packed[layout.DRIVE_INERTIA]
+        inertia = moving_mass_kg * np.eye(3) + arm_inertia * rates.T @ rates
+        gravity_force_n = np.array([0.0, 0.0, GRAVITY_M_S2 * moving_mass_kg])
         jacobian: FloatArray = np.asarray(np.linalg.inv(rates), dtype=np.float64)
-        return LinkageReading(np.array(position_m), angles, jacobian, inertia, held)
+        return LinkageReading(np.array(position_m), angles, jacobian, inertia, gravity_force_n)
 
     def angles_at(self, position_m: FloatArray) -> FloatArray | None:
         """Joint angles (3,), rad, at a position of the handle (3,), m; None at or beyond the end stop."""
-        return _pose(self._packed, position_m)[0] if float(np.linalg.norm(position_m)) < self._reach_m else None
+        return _compute_pose(self._packed, position_m)[0] if float(np.linalg.norm(position_m)) < self._reach_m else None
 
     def check_frame(self) -> None:
         """Nothing to check: positions and readings of the simulated device have the same axes."""
@@ -71,7 +71,7 @@ def make_simulated_linkage() -> SimulatedLinkage:
     """Linkage of the simulated omega.3 with its default parameters."""
     parameters = Omega3Parameters()
     mass_kg = effective_mass_kg(parameters, pack_parameters(parameters, False, (0.0, 0.0, 0.0)))
-    return SimulatedLinkage(parameters, omega3_info(NAME, mass_kg, "parameter set 1, without a hand"))
+    return SimulatedLinkage(parameters, make_omega3_info(NAME, mass_kg, "parameter set 1, without a hand"))
 
 
 def fit_linkage(calibration: LinkageCalibration) -> FittedLinkage:
@@ -90,17 +90,17 @@ def fit_linkage(calibration: LinkageCalibration) -> FittedLinkage:
     return FittedLinkage(replace(parameters, masses=masses), jacobian_misfit, inertia_misfit)
 
 
-def _pose(packed: FloatArray, position_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _compute_pose(packed: FloatArray, position_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Joint angles (3,), and joint speeds per handle velocity (3, 3), rad/m."""
     angles, rates = np.empty(3), np.empty((3, 3))
     pose(packed, np.array(position_m, dtype=float), angles, rates)
     return angles, rates
 
 
-def _all_rates(parameters: Omega3Parameters, positions: FloatArray) -> FloatArray:
+def _compute_rates(parameters: Omega3Parameters, positions: FloatArray) -> FloatArray:
     """(n, 3, 3), rad/m: joint speeds per handle velocity at the positions (n, 3), m."""
     packed = pack_parameters(parameters, False, (0.0, 0.0, 0.0))
-    return np.stack([_pose(packed, position)[1] for position in positions])
+    return np.stack([_compute_pose(packed, position)[1] for position in positions])
 
 
 def _fit_lengths(positions: FloatArray, rates: FloatArray, azimuths: FloatArray) -> tuple[Linkage, float]:
@@ -108,47 +108,53 @@ def _fit_lengths(positions: FloatArray, rates: FloatArray, azimuths: FloatArray)
     logarithms of four lengths over their start values, which are scaled to the size of the device, and a turn of all
     azimuths."""
     nominal = Linkage()
-    ratio = float(np.abs(_all_rates(Omega3Parameters(), positions)).max() / np.abs(rates).max())
+    ratio = float(np.abs(_compute_rates(Omega3Parameters(), positions)).max() / np.abs(rates).max())
     first = ratio * np.array([nominal.upper_arm_m, nominal.forearm_m, nominal.radius_m, isotropic_depth_m(nominal)])
     largest = float(np.abs(rates).max())
 
-    def linkage_of(numbers: FloatArray) -> Linkage:
-        turned = np.degrees(azimuths + numbers[4])
-        upper, forearm, radius, depth = (float(each) for each in first * np.exp(numbers[:4]))
-        return Linkage(upper, forearm, radius, (float(turned[0]), float(turned[1]), float(turned[2])), depth)
+    def make_linkage(numbers: FloatArray) -> Linkage:
+        azimuths_deg = np.degrees(azimuths + numbers[4])
+        upper, forearm, radius, depth = (float(length) for length in first * np.exp(numbers[:4]))
+        return Linkage(
+            upper, forearm, radius, (float(azimuths_deg[0]), float(azimuths_deg[1]), float(azimuths_deg[2])), depth
+        )
 
     def misfits(numbers: FloatArray) -> FloatArray:
-        found = _all_rates(replace(Omega3Parameters(), linkage=linkage_of(numbers)), positions)
-        return np.ravel(found - rates) / largest
+        fitted_rates = _compute_rates(replace(Omega3Parameters(), linkage=make_linkage(numbers)), positions)
+        return np.ravel(fitted_rates - rates) / largest
 
-    found = least_squares(misfits, np.zeros(5), bounds=(-1.5, 1.5))
-    return linkage_of(found.x), float(np.abs(found.fun).max())
+    solution = least_squares(misfits, np.zeros(5), bounds=(-1.5, 1.5))
+    return make_linkage(solution.x), float(np.abs(solution.fun).max())
 
 
 def _fit_masses(parameters: Omega3Parameters, calibration: LinkageCalibration) -> tuple[Masses, float]:
     """Masses by linear least squares on the calibration's inertia matrices, m I + i J^T J: m moves with the handle, and
     i (kg m²) turns with each arm. Returns the relative misfit too. Raises ValueError for masses that are too small."""
     nominal, arm_m = parameters.masses, parameters.linkage.upper_arm_m
-    rates = _all_rates(parameters, calibration.position_m)
-    turning = np.einsum("nki,nkj->nij", rates, rates)
-    columns = np.stack([np.ravel(np.broadcast_to(np.eye(3), turning.shape)), np.ravel(turning)], axis=1)
-    wanted = np.ravel(calibration.inertia_kg)
-    (carried_kg, inertia_kg_m2), *_ = np.linalg.lstsq(columns, wanted, rcond=None)
-    if carried_kg < LIGHTEST_KG or inertia_kg_m2 <= 0:
+    rates = _compute_rates(parameters, calibration.position_m)
+    rate_products = np.einsum("nki,nkj->nij", rates, rates)
+    design_matrix = np.stack(
+        [np.ravel(np.broadcast_to(np.eye(3), rate_products.shape)), np.ravel(rate_products)], axis=1
+    )
+    inertia_kg = np.ravel(calibration.inertia_kg)
+    (moving_mass_kg, inertia_kg_m2), *_ = np.linalg.lstsq(design_matrix, inertia_kg, rcond=None)
+    if moving_mass_kg < LIGHTEST_KG or inertia_kg_m2 <= 0:
         raise ValueError(
-            f"its handle would weigh {1000 * carried_kg:.0f} g and its arms {inertia_kg_m2:.2g} kg m^2; the simulated "
-            f"one weighs at least {1000 * LIGHTEST_KG:.0f} g"
+            f"its handle would weigh {1000 * moving_mass_kg:.0f} g and its arms {inertia_kg_m2:.2g} kg m^2; the "
+            f"simulated one weighs at least {1000 * LIGHTEST_KG:.0f} g"
         )
-    misfit = float(np.abs(columns @ np.array([carried_kg, inertia_kg_m2]) - wanted).max() / np.abs(wanted).max())
+    misfit = float(
+        np.abs(design_matrix @ np.array([moving_mass_kg, inertia_kg_m2]) - inertia_kg).max() / np.abs(inertia_kg).max()
+    )
     # The inertia does not show how i is divided between arms and motors: the ratio is that of the nominal device.
-    forearms = 2 / 3 * nominal.forearm_kg * arm_m**2
-    share = inertia_kg_m2 / (nominal.upper_arm_kg_m2 + forearms + nominal.drive_kg_m2)
-    arms_kg_m2 = share * (nominal.upper_arm_kg_m2 + forearms) - forearms
+    forearm_kg_m2 = 2 / 3 * nominal.forearm_kg * arm_m**2
+    share = inertia_kg_m2 / (nominal.upper_arm_kg_m2 + forearm_kg_m2 + nominal.drive_kg_m2)
+    arms_kg_m2 = share * (nominal.upper_arm_kg_m2 + forearm_kg_m2) - forearm_kg_m2
     if arms_kg_m2 <= 0:
         raise ValueError(f"its arms would weigh less than forearms of {1000 * nominal.forearm_kg:.0f} g alone")
     masses = replace(
         nominal,
-        handle_kg=float(carried_kg) - nominal.forearm_kg,
+        handle_kg=float(moving_mass_kg) - nominal.forearm_kg,
         upper_arm_kg_m2=float(arms_kg_m2),
         drive_kg_m2=float(share * nominal.drive_kg_m2),
     )

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from equalizer.linkage.calibration import inertia_about
-from equalizer.linkage.grid import beside, difference_error, symmetric_grid
+from equalizer.linkage.grid import difference_error, difference_positions, symmetric_grid
 from study.devices.rig import POSITION
-from study.devices.simulated.own_linkage import SimulatedLinkage, fit_linkage, make_simulated_linkage
 from study.devices.simulated.parameters import Linkage, Masses, Omega3Parameters
+from study.devices.simulated.simulated_linkage import SimulatedLinkage, fit_linkage, make_simulated_linkage
 from tests.equalizer.linkage.truth import calibration
 
 OTHER = replace(
@@ -28,7 +28,7 @@ def told(parameters=OTHER, spoil=lambda reading: reading):
 def test_its_jacobian_is_the_derivative_of_its_own_positions():
     linkage = make_simulated_linkage()
     for place in ([0.0, 0, 0], [0.03, -0.02, 0.04]):
-        places = beside(np.array(place))
+        places = difference_positions(np.array(place))
         angles = np.array([linkage.angles_at(each) for each in places])
         assert difference_error(linkage.at(np.array(place)).jacobian, places, angles) < 1e-3
 

@@ -1,11 +1,12 @@
-"""Size of a simulated case: driven axes, length of the recording, size of the nuisance effects, integration step."""
+"""Settings of a simulated case: driven axes, length of the recording, size of the nuisance effects, integration
+step."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Rig:
-    """Size of a case. Axes that are not driven move passively, and their parameters are known exactly."""
+class CaseSettings:
+    """Settings of a case. Axes that are not driven move passively, and their parameters are known exactly."""
 
     axes: tuple[int, ...] = (0, 1, 2)
     """Driven and measured axes."""
@@ -21,10 +22,10 @@ class Rig:
     loud_n: float = 0.0
     """Level (N) of an additional test segment with all axes at once; 0 = none."""
 
-    def along(self, samples: int) -> int:
+    def scale_duration(self, samples: int) -> int:
         """Scale a duration (samples), stated for a period of 2000 samples, to this period."""
         return samples * self.period // 2000
 
 
-WHOLE = Rig()
+DEFAULT_SETTINGS = CaseSettings()
 """Three axes, four periods of 2000 samples, no unlabelled effects."""

@@ -9,15 +9,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from equalizer.effects.effect import STEPS, AxisForce, PlacedEffect
-from equalizer.effects.simulation.along_motion_kernel import run_laws_along
-from equalizer.effects.simulation.bodies import bodies_of, kernel_forces
+from equalizer.effects.simulation.bodies import build_bodies, kernel_forces
 from equalizer.effects.simulation.command_path import drive_actuators, moves_between_samples, subdivide_commands
-from equalizer.plant.linear_simulation import linear_steps
+from equalizer.effects.simulation.forces_along_motion_kernel import evaluate_laws_along_motion
+from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
-RESTS = 0.01
+REST_SPEED_SHARE = 0.01
 """Share of the rms speed below which an axis with negligible mass counts as possibly at rest."""
 
 Motion = tuple[FloatArray, FloatArray, FloatArray]
@@ -33,20 +33,20 @@ def actuator_force(
     return np.asarray(driven.mean.reshape(len(commands), fine, -1).mean(axis=1))
 
 
-def force_along(
+def effect_forces_along_motion(
     model: MechanicalModel, effects: Sequence[PlacedEffect], motion: Motion, forces: tuple[FloatArray, FloatArray],
     sample_rate_hz: float,
 ) -> FloatArray:  # fmt: skip
     """(n, m): sum of the effects' forces at the driven axes along the motion. forces: (n, m) each, the commands, and
     the unbalanced force: actuator force minus the force that the linear model needs for the motion, mean over each
     step. Friction at rest balances it. Raises ValueError for an axis that is not there or too many laws."""
-    commands, pushing = forces
-    bodies = bodies_of(model, [effect for effect in effects if isinstance(effect.effect.acts, AxisForce)])
-    if not bodies.acts:
-        return np.zeros_like(pushing)
+    commands, unbalanced_force = forces
+    bodies = build_bodies(model, [effect for effect in effects if isinstance(effect.effect.action, AxisForce)])
+    if not bodies.actions:
+        return np.zeros_like(unbalanced_force)
     axes = tuple(range(model.inputs))
-    acting = kernel_forces(bodies, axes)
-    steps = linear_steps(model, 1 / sample_rate_hz)
+    table = kernel_forces(bodies, axes)
+    steps = discretise_model(model, 1 / sample_rate_hz)
     per_newton = np.vstack(
         [
             _own_axis_rows(steps.motion[: 2 * len(axes)] @ steps.by_axis_force),
@@ -54,11 +54,11 @@ def force_along(
         ]
     )
     _hold_light_axes(per_newton, motion[1], commands, 1 / sample_rate_hz)
-    force = np.array(pushing, dtype=np.float64, order="C")
-    position, velocity, acceleration = (np.ascontiguousarray(each) for each in motion)
-    run_laws_along(
-        acting.laws, acting.places, acting.parameters, acting.memory, (position, velocity, acceleration),
-        np.ascontiguousarray(commands, dtype=np.float64) if acting.sees else np.empty((0, 0)),
+    force = np.array(unbalanced_force, dtype=np.float64, order="C")
+    position, velocity, acceleration = (np.ascontiguousarray(signal) for signal in motion)
+    evaluate_laws_along_motion(
+        table.laws, table.places, table.parameters, table.memory, (position, velocity, acceleration),
+        np.ascontiguousarray(commands, dtype=np.float64) if table.reads_all_axes else np.empty((0, 0)),
         per_newton, force, 1 / sample_rate_hz,
     )  # fmt: skip
     return force
@@ -71,12 +71,12 @@ def _hold_light_axes(per_newton: FloatArray, velocity: FloatArray, commands: Flo
     The mass of an axis is negligible where the rms command would change its velocity within a step by more than the rms
     velocity: the mass is at a fit's lower bound, or the recording has no time axis. Friction would then be at rest at
     all times and would balance the whole missing force. With per_newton reduced, friction is at rest only where the
-    measured velocity is below about `RESTS` of its rms.
+    measured velocity is below about `REST_SPEED_SHARE` of its rms.
     """
-    force, speed = (np.sqrt(np.mean(each**2, axis=0)) for each in (commands, velocity))
-    light = (per_newton[2] * step_s * force > speed) & (speed > 0)
-    held = RESTS * speed[light] / force[light]
-    per_newton[:, light] = held * np.array([[step_s / 2], [1.0], [1 / step_s]])
+    force, speed = (np.sqrt(np.mean(signal**2, axis=0)) for signal in (commands, velocity))
+    is_light = (per_newton[2] * step_s * force > speed) & (speed > 0)
+    motion_per_newton = REST_SPEED_SHARE * speed[is_light] / force[is_light]
+    per_newton[:, is_light] = motion_per_newton * np.array([[step_s / 2], [1.0], [1 / step_s]])
 
 
 def _own_axis_rows(per_newton: FloatArray) -> FloatArray:

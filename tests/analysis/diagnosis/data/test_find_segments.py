@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.found_segments import exact_period, find_segments
-from analysis.diagnosis.noise.noise_floor import noise_floor
+from analysis.diagnosis.data.find_segments import exact_period, find_segments
+from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
 
-def tiled(period, times, seed=1):
+def tile_noise(period, times, seed=1):
     return np.tile(np.random.default_rng(seed).standard_normal(period), 12)[: int(times * period)]
 
 
-def recording(command, response=None, **meta):
+def make_recording(command, response=None, **meta):
     count = len(command)
     response = command if response is None else response
     return Recording(
@@ -26,17 +26,17 @@ def recording(command, response=None, **meta):
     )
 
 
-def parted(levels, period=500, times=5.0):
-    pieces = [level * tiled(period, times) for level in levels]
+def make_parts(levels, period=500, times=5.0):
+    pieces = [level * tile_noise(period, times) for level in levels]
     ends = np.cumsum([len(piece) for piece in pieces]).tolist()
     parts = [{"start": stop - len(piece), "stop": stop} for piece, stop in zip(pieces, ends, strict=True)]
     return np.concatenate(pieces), parts
 
 
 def test_each_part_becomes_a_segment_with_its_period_and_level():
-    command, parts = parted((0.5, 1.0, 2.0))
-    found, said = find_segments(recording(command, parts=parts))
-    top = np.abs(tiled(500, 1)).max()
+    command, parts = make_parts((0.5, 1.0, 2.0))
+    found, said = find_segments(make_recording(command, parts=parts))
+    top = np.abs(tile_noise(500, 1)).max()
     assert [(s.start, s.stop, s.kind, s.period, s.role) for s in found.segments] == [
         (0, 2500, "multisine", 500, ""), (2500, 5000, "multisine", 500, ""), (5000, 7500, "multisine", 500, "")
     ]  # fmt: skip
@@ -45,13 +45,13 @@ def test_each_part_becomes_a_segment_with_its_period_and_level():
 
 
 def test_noise_is_then_taken_from_the_repeats():
-    command = tiled(500, 8)
+    command = tile_noise(500, 8)
     noisy = 3 * command + 0.2 * np.random.default_rng(5).standard_normal(len(command))
-    found, _ = find_segments(recording(command, noisy))
-    floor = noise_floor(found)
-    assert floor.how == "repeats"
+    found, _ = find_segments(make_recording(command, noisy))
+    floor = estimate_noise_floor(found)
+    assert floor.method == "repeats"
     assert floor.response_rms[0] == pytest.approx(0.2, rel=0.1)
-    assert noise_floor(recording(command, noisy)).how != "repeats"
+    assert estimate_noise_floor(make_recording(command, noisy)).method != "repeats"
 
 
 @pytest.mark.parametrize("digits", [3, 6, 16])
@@ -65,11 +65,11 @@ def test_numbers_that_were_rounded_repeat_as_well(digits):
 
 def test_of_a_short_period_an_odd_multiple_is_stated():
     command = np.sin(2 * np.pi * np.arange(8000) / 100)
-    found, _ = find_segments(recording(command))
+    found, _ = find_segments(make_recording(command))
     assert [(s.kind, s.period) for s in found.segments] == [("sine", 1500)]
 
 
-def _slower():
+def _slow_sine():
     return np.sin(2 * np.pi * np.arange(4000) / 499.6)
 
 
@@ -77,13 +77,13 @@ def _slower():
     "command",
     [
         np.random.default_rng(1).standard_normal(4000),
-        tiled(1000, 2.9),
-        tiled(500, 8) + 1e-3 * np.random.default_rng(3).standard_normal(4000),
-        tiled(500, 8) * np.linspace(1, 1.01, 4000),
-        np.concatenate([tiled(500, 7), tiled(500, 1, seed=4)]),
-        np.concatenate([np.zeros(250), tiled(500, 7)]),
-        np.where(np.arange(4000) == 1234, np.nan, tiled(500, 8)),
-        _slower(),
+        tile_noise(1000, 2.9),
+        tile_noise(500, 8) + 1e-3 * np.random.default_rng(3).standard_normal(4000),
+        tile_noise(500, 8) * np.linspace(1, 1.01, 4000),
+        np.concatenate([tile_noise(500, 7), tile_noise(500, 1, seed=4)]),
+        np.concatenate([np.zeros(250), tile_noise(500, 7)]),
+        np.where(np.arange(4000) == 1234, np.nan, tile_noise(500, 8)),
+        _slow_sine(),
         np.ones(4000),
         np.sin(2 * np.pi * np.arange(900) / 30),
     ],
@@ -91,18 +91,18 @@ def _slower():
          "short"],
 )  # fmt: skip
 def test_no_period_is_invented(command):
-    before = recording(command)
+    before = make_recording(command)
     assert find_segments(before) == (before, "")
 
 
 def test_segments_of_its_own_stay():
-    before = replace(recording(tiled(500, 8)), segments=(Segment(0, 4000, "noise", role="fit"),))
+    before = replace(make_recording(tile_noise(500, 8)), segments=(Segment(0, 4000, "noise", role="fit"),))
     assert find_segments(before) == (before, "")
 
 
 def test_a_part_that_does_not_repeat_beside_one_that_does_is_not_taken_for_rest():
-    command = np.concatenate([tiled(500, 5), np.random.default_rng(9).standard_normal(2000)])
+    command = np.concatenate([tile_noise(500, 5), np.random.default_rng(9).standard_normal(2000)])
     parts = [{"start": 0, "stop": 2500}, {"start": 2500, "stop": 4500}]
-    found, said = find_segments(recording(command, parts=parts))
+    found, said = find_segments(make_recording(command, parts=parts))
     assert [(s.kind, s.period) for s in found.segments] == [("multisine", 500), ("noise", 0)]
     assert said.startswith("In 1 of 2 parts the command repeats exactly")

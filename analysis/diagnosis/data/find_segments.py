@@ -22,17 +22,17 @@ FEWEST_PERIODS = 3
 """Least number of periods of a part: the first contains the transient, and noise needs two more."""
 SHORTEST_DECLARED = 256
 """Least period in samples for a diagnosis: of a shorter one an odd multiple is declared, so that odd lines stay odd."""
-ALIKE, DIPPED = 0.98, 0.7
+REPEAT_CORRELATION, DIP_CORRELATION = 0.98, 0.7
 """Least correlation of a command with itself one period later, and level below which it must fall in between."""
 SINE_SHARE = 0.98
 """Share of the power on a single line above which a periodic command is a sine."""
-EXACT = 1e-6
+EXACT_TOLERANCE = 1e-6
 """Largest difference of a command between periods, relative to its peak: rounding of numbers stored with six digits."""
-ROUNDED = 1e-3
+ROUNDED_TOLERANCE = 1e-3
 """Largest rms difference between periods due to rounding, relative to the command's rms."""
 MOST_SAMPLES = 2**19
 """Number of samples in which a period is searched for, which limits the time of the correlation."""
-LARGEST = 1e100
+LARGEST_SAMPLE = 1e100
 """Largest sample whose squares can be summed without overflow; a damaged file may hold larger ones."""
 
 
@@ -58,21 +58,25 @@ def find_designed_command(recording: Recording) -> Signal:
     excitation = recording.excitation
     if excitation is None:
         return recording.command
-    known = excitation.samples[np.isfinite(excitation.samples).all(axis=1)]
-    return excitation if len(known) and np.ptp(known, axis=0).max() > 0 else recording.command
+    finite_samples = excitation.samples[np.isfinite(excitation.samples).all(axis=1)]
+    return excitation if len(finite_samples) and np.ptp(finite_samples, axis=0).max() > 0 else recording.command
 
 
 def exact_period(command: FloatArray) -> int:
     """Period in samples after which the command (n, m) repeats exactly; 0 where it does not, or not often enough. Where
     the shortest period has less than `SHORTEST_DECLARED` samples, an odd multiple of it."""
     period = find_period(command)
-    if not period or len(command) // period < FEWEST_PERIODS or not _is_same(command[period:], command[:-period]):
+    if (
+        not period
+        or len(command) // period < FEWEST_PERIODS
+        or not _repeats_exactly(command[period:], command[:-period])
+    ):
         return 0
     if period >= SHORTEST_DECLARED:
         return period
     # The largest odd multiple of which `MOST_PERIODS` and a period of transient fit in; it is a period, too.
-    times = len(command) // period // (MOST_PERIODS + 1)
-    multiple = period * max(1, times - 1 + times % 2)
+    periods_per_part = len(command) // period // (MOST_PERIODS + 1)
+    multiple = period * max(1, periods_per_part - 1 + periods_per_part % 2)
     return multiple if multiple >= SHORTEST_DECLARED else 0
 
 
@@ -80,17 +84,17 @@ def find_period(command: FloatArray) -> int:
     """The shortest period in samples after which the command (n, m) nearly repeats, by autocorrelation; 0 = none."""
     used = command[:MOST_SAMPLES]
     largest = float(np.abs(used).max(initial=0.0))
-    if LARGEST < largest < np.inf:
+    if LARGEST_SAMPLE < largest < np.inf:
         used = used / largest
     spread = np.std(used, axis=0) if used.size else np.zeros(command.shape[1])
     if not np.isfinite(used).all() or not (spread > 0).any() or len(used) < 2 * SHORTEST:
         return 0
     scaled = (used[:, spread > 0] - used[:, spread > 0].mean(axis=0)) / spread[spread > 0]
     correlation = _correlation(scaled)[: len(used) // 2 + 1]
-    dips = np.flatnonzero(correlation < DIPPED)
+    dips = np.flatnonzero(correlation < DIP_CORRELATION)
     if not len(dips):
         return 0
-    high = np.flatnonzero(correlation[dips[0] :] > ALIKE) + dips[0]
+    high = np.flatnonzero(correlation[dips[0] :] > REPEAT_CORRELATION) + dips[0]
     if not len(high) or high[0] < SHORTEST:
         return 0
     # The maximum of the first run of consecutive lags that are high enough.
@@ -103,24 +107,24 @@ def _correlation(samples: FloatArray) -> FloatArray:
     n = len(samples)
     size = 2 ** int(np.ceil(np.log2(2 * n)))
     spectrum = np.fft.rfft(samples, size, axis=0)
-    raw = np.fft.irfft(np.sum(np.abs(spectrum) ** 2, axis=1), size)[:n]
+    products = np.fft.irfft(np.sum(np.abs(spectrum) ** 2, axis=1), size)[:n]
     energy = np.concatenate([[0.0], np.cumsum(np.sum(samples**2, axis=1))])
     lags = np.arange(n)
-    both = energy[n - lags] * (energy[n] - energy[lags])
-    return np.asarray(raw / np.sqrt(np.maximum(both, np.finfo(np.float64).tiny)))
+    overlap_energy = energy[n - lags] * (energy[n] - energy[lags])
+    return np.asarray(products / np.sqrt(np.maximum(overlap_energy, np.finfo(np.float64).tiny)))
 
 
-def _is_same(later: FloatArray, before: FloatArray) -> bool:
+def _repeats_exactly(later_period: FloatArray, earlier_period: FloatArray) -> bool:
     """Whether each channel repeats, up to rounding: to six digits, or by one step of its own resolution with an rms
-    difference of at most `ROUNDED`."""
-    if not np.isfinite(later).all() or not np.isfinite(before).all():
+    difference of at most `ROUNDED_TOLERANCE`."""
+    if not np.isfinite(later_period).all() or not np.isfinite(earlier_period).all():
         return False
-    for column, other in zip(later.T, before.T, strict=True):
-        difference = np.abs(column - other)
-        if difference.max() <= EXACT * np.abs(column).max():
+    for later_column, earlier_column in zip(later_period.T, earlier_period.T, strict=True):
+        difference = np.abs(later_column - earlier_column)
+        if difference.max() <= EXACT_TOLERANCE * np.abs(later_column).max():
             continue
-        step = rounding_step(column)
-        if difference.max() > 1.5 * step or np.sqrt(np.mean(difference**2)) > ROUNDED * np.std(column):
+        step = rounding_step(later_column)
+        if difference.max() > 1.5 * step or np.sqrt(np.mean(difference**2)) > ROUNDED_TOLERANCE * np.std(later_column):
             return False
     return True
 
@@ -136,19 +140,19 @@ def _segment_kind(command: FloatArray, period: int) -> str:
 def _peak(command: Signal, start: int, stop: int) -> float:
     """Largest magnitude of the finite samples from start to stop, over all channels; 0 without any."""
     samples = command.samples[start:stop]
-    known = samples[np.isfinite(samples)]
-    return float(np.abs(known).max()) if known.size else 0.0
+    finite_samples = samples[np.isfinite(samples)]
+    return float(np.abs(finite_samples).max()) if finite_samples.size else 0.0
 
 
 def _segments_sentence(segments: Sequence[Segment]) -> str:
     periodic = [segment for segment in segments if segment.period]
     periods = conjoin([str(period) for period in sorted({segment.period for segment in periodic})])
     levels = conjoin([f"{level:.4g}" for level in sorted({segment.amplitude for segment in periodic})])
-    where = (
+    subject = (
         "The command" if len(periodic) == len(segments) else f"In {len(periodic)} of {len(segments)} parts the command"
     )
-    least = min((segment.stop - segment.start) // segment.period for segment in periodic)
+    fewest = min((segment.stop - segment.start) // segment.period for segment in periodic)
     return (
-        f"{where} repeats exactly, every {periods} samples, {least} times or more in each part: segments with that "
+        f"{subject} repeats exactly, every {periods} samples, {fewest} times or more in each part: segments with that "
         f"period were made, with peaks of {levels} (SI units)."
     )

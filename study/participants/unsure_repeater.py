@@ -1,7 +1,7 @@
 """Simulated participant who asks for a repetition of a trial when unsure, and decides on all its presentations.
 
 Signal detection theory with multiple looks: each presentation (look) gives evidence, normal around +d'/2 for direction
-1 and -d'/2 for direction 2 with unit standard deviation. Looks are independent and averaged, so that n of them have the
+1 and -d'/2 for direction 2 with unit standard deviation. Looks are independent and averaged, so that n looks have the
 sensitivity d' sqrt(n). The participant asks again where the average lies within `unsure` standard errors of the
 criterion. The evidence of earlier looks is drawn again from the numbers of their attempts, so that no state is kept.
 """
@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 
-from study.participants.chance import response_time_s, uniform
+from study.participants.chance import draw_response_time_s, draw_uniform
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.observer import PerceivedStimulus, Reply
 
@@ -34,17 +34,17 @@ class UnsureRepeater:
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """The answer from all looks so far, and whether the participant asks for another. A lapse is a random answer
         without asking again; its probability is twice `lapse`, because half of such answers are right."""
-        delay, lapsed, coin = uniform(felt, seed, 4)[1:]
+        time_draw, lapse_draw, answer_draw = draw_uniform(felt, seed, 4)[1:]
         evidence = self._evidence(felt, seed)
         answer = 1 if evidence > 0.0 else 2
-        if lapsed < 2.0 * self.feeler.lapse:
-            return Reply(1 if coin < 0.5 else 2, response_time_s(delay))
+        if lapse_draw < 2.0 * self.feeler.lapse:
+            return Reply(1 if answer_draw < 0.5 else 2, draw_response_time_s(time_draw))
         ask_again = abs(evidence) < self.unsure and felt.attempt + 1 < self.looks
-        return Reply(answer, response_time_s(delay), ask_again)
+        return Reply(answer, draw_response_time_s(time_draw), ask_again)
 
     def _evidence(self, felt: PerceivedStimulus, seed: int) -> float:
         """Average evidence of all looks minus the criterion, in standard errors of the average."""
         sign = 1.0 if felt.direction_shown == 1 else -1.0
-        middle = sign * self.feeler.d_prime(felt) / 2.0 - self.feeler.criterion_at(felt)
-        luck = [uniform(replace(felt, attempt=look), seed, 1)[0] for look in range(felt.attempt + 1)]
-        return sum(middle + _NORMAL.inv_cdf(each) for each in luck) / math.sqrt(len(luck))
+        mean_evidence = sign * self.feeler.d_prime(felt) / 2.0 - self.feeler.criterion_at(felt)
+        uniform_draws = [draw_uniform(replace(felt, attempt=look), seed, 1)[0] for look in range(felt.attempt + 1)]
+        return sum(mean_evidence + _NORMAL.inv_cdf(draw) for draw in uniform_draws) / math.sqrt(len(uniform_draws))

@@ -10,7 +10,7 @@ from study.devices.opening import DEVICES
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
-from study.workflows.views.list_sessions import home_view, session_lines
+from study.workflows.views.view_home import home_view, session_lines
 
 
 @pytest.fixture(scope="module")

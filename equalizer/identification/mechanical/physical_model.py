@@ -50,19 +50,22 @@ def tolerance_of(fit: AnyFit) -> Tolerance:
 def _oscillator_tolerance(structure: Structure, fit: AnyFit) -> Tolerance:
     """Tolerance of a structure of oscillators: the covariance of the unknowns, propagated to the values at the axes by
     their Jacobian. The unknowns of the modes are log frequencies: their deviations are relative."""
-    here = _axis_values(structure, fit.unknowns)
+    axis_values = _axis_values(structure, fit.unknowns)
     slope = numerical_jacobian(
-        lambda unknowns: _axis_values(structure, unknowns), fit.unknowns, here, np.full(structure.parameters, np.inf)
+        lambda unknowns: _axis_values(structure, unknowns),
+        fit.unknowns,
+        axis_values,
+        np.full(structure.parameters, np.inf),
     )
     covariance = _covariance(fit)
     spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))
-    spread, values = spread.reshape(3, -1).max(axis=1), here.reshape(3, -1).max(axis=1)
+    spread, values = spread.reshape(3, -1).max(axis=1), axis_values.reshape(3, -1).max(axis=1)
     mass, damping, stiffness = np.maximum(spread, LEAST_TOLERANCE * values).tolist()
-    of_modes = None
+    mode_tolerance = None
     if structure.modes:
-        each = np.sqrt(np.diag(covariance)[structure.slices["modes"]]).reshape(structure.modes, -1)
-        of_modes = max(float(np.median(each[:, 0])), LEAST_TOLERANCE)
-    return Tolerance(mass, damping, stiffness, of_modes)
+        deviations = np.sqrt(np.diag(covariance)[structure.slices["modes"]]).reshape(structure.modes, -1)
+        mode_tolerance = max(float(np.median(deviations[:, 0])), LEAST_TOLERANCE)
+    return Tolerance(mass, damping, stiffness, mode_tolerance)
 
 
 def _axis_values(structure: Structure, unknowns: FloatArray) -> FloatArray:
@@ -76,22 +79,26 @@ def _covariance(fit: AnyFit) -> FloatArray:
     slope = fit.slope
     size = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
     inverse = np.linalg.pinv((slope / size).T @ (slope / size), rcond=1e-10)
-    left = fit.squares / max(len(slope) - slope.shape[1], 1)
-    return np.asarray(left * inverse / np.outer(size, size))
+    residual_variance = fit.squares / max(len(slope) - slope.shape[1], 1)
+    return np.asarray(residual_variance * inverse / np.outer(size, size))
 
 
 def _to_absolute_coordinates(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:
     """The model with absolute positions z of the oscillators in place of their relative modal coordinates
     e = |L| (z - hᵀ x), where L is the participation, h = L / |L| the direction, and |L|² the mass of an oscillator.
     Unchanged where a participation is too small to divide by. m: number of driven axes."""
-    n, carrier, rest = model.coordinates, slice(m, 2 * m) if joint else slice(0, m), slice(2 * m if joint else m, None)
-    participation = model.mass[rest, carrier]
+    n, carrier, oscillators = (
+        model.coordinates,
+        slice(m, 2 * m) if joint else slice(0, m),
+        slice(2 * m if joint else m, None),
+    )
+    participation = model.mass[oscillators, carrier]
     roots = np.linalg.norm(participation, axis=1)
     if not len(roots) or roots.min() < 1e-6 * np.sqrt(model.mass[carrier, carrier].max()):
         return model
     change = np.eye(n)
-    change[rest, rest], change[rest, carrier] = np.diag(roots), -participation
+    change[oscillators, oscillators], change[oscillators, carrier] = np.diag(roots), -participation
     mass, damping, stiffness = (change.T @ part @ change for part in (model.mass, model.damping, model.stiffness))
     # The transformation makes these entries zero up to rounding.
-    mass[rest, carrier] = mass[carrier, rest] = 0.0
+    mass[oscillators, carrier] = mass[carrier, oscillators] = 0.0
     return replace(model, mass=(mass + mass.T) / 2, damping=damping, stiffness=stiffness, output=model.output @ change)

@@ -41,7 +41,7 @@ def test_a_wrong_key_is_named_and_asked_again(typed):
 
 def test_help_shows_the_picture_again(typed):
     typed.type("", "?", "1")
-    typed.display.welcome(Welcome("Title", PICTURE, 5, 1, "a device", felt=True, resumed_after=0))
+    typed.display.welcome(Welcome("Title", PICTURE, 5, 1, "a device", device_moves=True, resumed_after=0))
     before = typed.out.getvalue().count("1: up-left to down-right")
     ask(typed)
     assert typed.out.getvalue().count("1: up-left to down-right") == before + 1
@@ -49,8 +49,8 @@ def test_help_shows_the_picture_again(typed):
 
 def test_leaving_and_repeating_are_no_answers(typed):
     typed.type("q", "r")
-    assert ask(typed) == Unanswered("the participant left", leave=True)
-    assert ask(typed) == Unanswered("asked to repeat", leave=False, asked=True)
+    assert ask(typed) == Unanswered("the participant left", ends_sitting=True)
+    assert ask(typed) == Unanswered("asked to repeat", ends_sitting=False, repeat_requested=True)
 
 
 def test_a_used_up_repeat_says_so_and_waits_for_an_answer(typed):
@@ -64,12 +64,12 @@ def test_a_used_up_repeat_says_so_and_waits_for_an_answer(typed):
 
 def test_the_end_of_the_input_leaves(typed):
     typed.end()
-    assert ask(typed) == Unanswered("the input ended", leave=True)
+    assert ask(typed) == Unanswered("the input ended", ends_sitting=True)
 
 
 def test_a_stimulus_that_ended_by_a_fault_ends_the_question(typed):
     typed.type("1")
-    assert ask(typed, alive=False) == Unanswered("the stimulus ended early", leave=False)
+    assert ask(typed, alive=False) == Unanswered("the stimulus ended early", ends_sitting=False)
 
 
 def test_the_time_limit_ends_the_question(typed):
@@ -105,7 +105,7 @@ def test_a_repeated_trial_says_so(typed):
 
 def test_practice_on_a_simulation_is_called_practice(typed):
     typed.type("")
-    typed.display.welcome(Welcome("Title", PICTURE, 5, 0, "simulated omega.3", felt=False, resumed_after=12))
+    typed.display.welcome(Welcome("Title", PICTURE, 5, 0, "simulated omega.3", device_moves=False, resumed_after=12))
     text = " ".join(typed.out.getvalue().split())
     assert "Practice: the device is a simulation (simulated omega.3), so nothing moves here." in text
     assert "never enter an analysis of people" in text
@@ -121,7 +121,7 @@ def test_after_a_void_trial_nothing_is_played_before_a_key_press(typed):
 
 def test_a_pause_is_asked_for_in_any_trial(typed):
     typed.type("p")
-    assert ask(typed) == Unanswered("asked for a pause", leave=False, asked=True, pause=True)
+    assert ask(typed) == Unanswered("asked for a pause", ends_sitting=False, repeat_requested=True, pause=True)
 
 
 def test_keys_of_ones_own_answer_and_the_digits_still_do(typed_in):
@@ -162,7 +162,7 @@ def test_progress_is_reported_once_in_a_run(typed):
 )
 def test_the_end_of_a_practice_is_reported_and_read(typed, passed, words):
     typed.type("")
-    typed.display.practice_over(PracticeResult(passed, right=3, of=5))
+    typed.display.practice_over(PracticeResult(passed, correct_count=3, answer_count=5))
     assert "Right answers: 3 of the last 5." in typed.said
     assert words in typed.said
 
@@ -170,7 +170,7 @@ def test_the_end_of_a_practice_is_reported_and_read(typed, passed, words):
 @pytest.mark.parametrize("call", ["welcome", "practice_over", "await_return"])
 def test_a_wait_for_enter_can_be_left(typed, call):
     values = {
-        "welcome": Welcome("Title", PICTURE, 5, 0, "a device", felt=True, resumed_after=0),
+        "welcome": Welcome("Title", PICTURE, 5, 0, "a device", device_moves=True, resumed_after=0),
         "practice_over": PracticeResult(True, 4, 5),
         "await_return": "held too long",
     }

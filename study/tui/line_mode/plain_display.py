@@ -44,76 +44,78 @@ class PlainDisplay:
     def __init__(
         self,
         lines: LineInput,
-        out: TextIO,
+        output: TextIO,
         clock: Clock,
         keys: AnswerKeys = DIGITS,
         note: Callable[[NoteAsked], None] | None = None,
         words: Words = ENGLISH_WORDS,
     ) -> None:
         self._words = words
-        self._talk = Conversation(lines, out, clock, words)
+        self._conversation = Conversation(lines, output, clock, words)
         self._keys = keys
         self._note = note
         self._demo_shown = False
-        self._run_told: tuple[str, int] | None = None
+        self._announced_run: tuple[str, int] | None = None
         """Run whose progress was written last, so that it is written once per run."""
 
     def fill_in(self, form: Form) -> FormReply:
-        return plain_forms.fill_in(form, self._talk)
+        return plain_forms.ask_form(form, self._conversation)
 
     def device_checked(self, report: DeviceReport) -> bool:
-        return plain_forms.device_checked(report, self._talk)
+        return plain_forms.device_checked(report, self._conversation)
 
     def welcome(self, notice: Welcome) -> None:
-        plain_question.welcome(notice, self._talk, self._keys)
+        plain_question.welcome(notice, self._conversation, self._keys)
 
     def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
         if not self._demo_shown:
-            self._talk.say("", self._words["line_demo"], *plain_question.picture_lines(menu.picture, self._words))
+            self._conversation.say(
+                "", self._words["line_demo"], *plain_question.picture_lines(menu.picture, self._words)
+            )
             self._demo_shown = True
-        return plain_demo.choose_demo(menu, self._talk, self._keys, sign_of_life)
+        return plain_demo.choose_demo(menu, self._conversation, self._keys, sign_of_life)
 
     def show_playing(self, notice: PlayingNotice, sign_of_life: SignOfLife) -> Unanswered | None:
-        return plain_demo.show_playing(notice, self._talk, sign_of_life)
+        return plain_demo.show_playing(notice, self._conversation, sign_of_life)
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        return plain_demo.await_handle(look, self._talk, sign_of_life)
+        return plain_demo.await_handle(look, self._conversation, sign_of_life)
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
         run = (run_key(question), question.run_number)
-        if question.progress is not None and run != self._run_told:
-            self._talk.say("", progress_sentence(question.progress, self._words))
-            self._run_told = run
-        return plain_question.ask(question, self._talk, self._keys, sign_of_life)
+        if question.progress is not None and run != self._announced_run:
+            self._conversation.say("", progress_sentence(question.progress, self._words))
+            self._announced_run = run
+        return plain_question.ask(question, self._conversation, self._keys, sign_of_life)
 
     def feedback(self, correct: bool) -> None:
-        self._talk.speak("right" if correct else "wrong")
+        self._conversation.say_texts("right" if correct else "wrong")
 
     def practice_over(self, result: PracticeResult) -> None:
-        plain_question.practice_over(result, self._talk)
+        plain_question.practice_over(result, self._conversation)
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
-        return plain_pause.rest(notice, self._talk, sign_of_life)
+        return plain_pause.run_rest(notice, self._conversation, sign_of_life)
 
     def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
-        return plain_pause.pause(notice, self._talk, self._note, sign_of_life)
+        return plain_pause.pause(notice, self._conversation, self._note, sign_of_life)
 
     def await_return(self, reason: str) -> None:
-        self._talk.forget()
-        self._talk.say("", f"{self._words['void_title']}. {void_words(reason, self._words)}")
-        self._talk.speak("line_ready_again")
-        self._talk.answer_or_leave()
+        self._conversation.discard_early_lines()
+        self._conversation.say("", f"{self._words['void_title']}. {void_words(reason, self._words)}")
+        self._conversation.say_texts("line_ready_again")
+        self._conversation.answer_or_leave()
 
     def goodbye(self, notice: Goodbye) -> None:
         words = self._words
         if notice.outcome:
-            self._talk.say("", *refusal_words(notice.outcome, words))
+            self._conversation.say("", *refusal_words(notice.outcome, words))
         elif notice.finished:
-            self._talk.say("", words.counted("line_finished", notice.answers))
+            self._conversation.say("", words.fill_count("line_finished", notice.answers))
         else:
             because = words.fill("line_over_because", {"reason": words.fact(notice.reason)})
-            over = because if notice.reason else words["line_over"]
-            self._talk.say("", f"{over} {words.counted('saved', notice.answers)} {words['line_thanks']}")
+            ending = because if notice.reason else words["line_over"]
+            self._conversation.say("", f"{ending} {words.fill_count('saved', notice.answers)} {words['line_thanks']}")
 
     def trouble(self, sentence: str) -> None:
-        self._talk.say(self._words.fact(sentence))
+        self._conversation.say(self._words.fact(sentence))

@@ -25,9 +25,9 @@ from analysis.diagnosis.contrast.bases import (
     bases_of,
     compute_unexplained_share,
     compute_unexplained_share_of_rows,
-    move_alike,
+    have_similar_motion,
 )
-from analysis.diagnosis.contrast.compared_base import Base, ComparedBase, compare_base, rows_with_fault_undone
+from analysis.diagnosis.contrast.compared_base import Base, ComparedBase, compare_base, undo_fault_in_rows
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
 from analysis.diagnosis.contrast.fault import Fault, Rows, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
@@ -39,12 +39,12 @@ from analysis.diagnosis.contrast.joint_products import (
     fit_sizes,
     held_out_error,
 )
-from analysis.diagnosis.contrast.likely_delays import likely_clock_rates, likely_delays_s
+from analysis.diagnosis.contrast.likely_delays import suggest_clock_rates, suggest_delays_s
 from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
-from analysis.diagnosis.contrast.try_faults import ALL, TriedFaults, TriedVariant, restrict_sizes, try_faults
+from analysis.diagnosis.contrast.try_faults import ALL_BLOCKS, TriedFaults, TriedVariant, restrict_sizes, try_faults
 from analysis.diagnosis.data.correlated_residuals import bootstrap_draws
 from analysis.diagnosis.settings import (
     BALANCE_HOLDS,
@@ -57,41 +57,44 @@ from analysis.diagnosis.types import Mask, TimeBudget
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-SIXTHS, THIRDS = (tuple(tuple(ALL[k : k + size]) for k in ALL[::size]) for size in (len(ALL) // 6, len(ALL) // 3))
+SIXTHS, THIRDS = (
+    tuple(tuple(ALL_BLOCKS[k : k + size]) for k in ALL_BLOCKS[::size])
+    for size in (len(ALL_BLOCKS) // 6, len(ALL_BLOCKS) // 3)
+)
 """The blocks of a set in six and in three groups of consecutive blocks."""
 FOLDS = len(SIXTHS)
 """Groups of blocks of each set that are left out in turn (jackknife)."""
-APART = (*THIRDS, ALL[: CONTRAST_BLOCKS // 2])
+CONTROL_STRETCHES = (*THIRDS, ALL_BLOCKS[: CONTRAST_BLOCKS // 2])
 """Stretches for the negative control: each third and the first half of a set's blocks, which are compared with its
 other blocks as if they were separate recordings."""
 
 
-def compare(
-    recordings: Sequence[Recording], clean: Sequence[Recording], without: frozenset[str], time_left: TimeBudget
+def rank_faults(
+    recordings: Sequence[Recording], clean: Sequence[Recording], excluded: frozenset[str], time_left: TimeBudget
 ) -> Comparison | None:
     """Comparison of the faulty recordings with the clean ones, by the first kind of base that fits: force balances,
     else autoregressive models. without: names of effects that are not tested. None where there is too little data, no
     base fits, or one set moves far less than the other."""
     sides = split_into_parts(clean), split_into_parts(recordings)
-    if not all(sides) or not move_alike(*sides):
+    if not all(sides) or not have_similar_motion(*sides):
         return None
     for bases, motions in bases_of(*sides):
         with suppress(np.linalg.LinAlgError, ValueError):
-            compared_bases, faults = _set_up(*sides, bases, motions)
-            trial = try_faults(compared_bases, [fault for fault in faults if fault.effect not in without], time_left)
-            if not isinstance(bases[0], ForceBase) or _balances(compared_bases, trial.tried):
+            compared_bases, faults = _prepare_bases(*sides, bases, motions)
+            trial = try_faults(compared_bases, [fault for fault in faults if fault.effect not in excluded], time_left)
+            if not isinstance(bases[0], ForceBase) or _do_forces_balance(compared_bases, trial.tried):
                 return _judge_faults(compared_bases, trial)
     return None
 
 
-def _set_up(
+def _prepare_bases(
     clean: tuple[Part, ...], faulty: tuple[Part, ...], bases: Sequence[Base], motions: tuple[Motion, ...]
 ) -> tuple[list[ComparedBase], list[Fault]]:
     """The bases on both sets, including those that predict one sensor from another, and all faults to test. Faults of
     the mechanism need velocities and so a time axis; an imposed motion was not produced by an actuator."""
     recording = clean[0].recording
     by_force = isinstance(bases[0], ForceBase)
-    timed = bool(motions) and np.isfinite(motions[0].band_hz)
+    has_time_axis = bool(motions) and np.isfinite(motions[0].band_hz)
     band_hz, step = (motions[0].band_hz, motions[0].step) if motions else (np.inf, 1)
     # `motions` is empty where none was measured.
     motion_of = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=False)}
@@ -101,12 +104,12 @@ def _set_up(
             compared_bases.append(compare_base(base, clean, faulty))
     row_s = compared_bases[0].row_s
     lag_samples = 1 if by_force else round(row_s * clean[0].rate_hz)
-    rows = Rows(lag_samples, likely_delays_s(compared_bases), LATE_STEP * row_s, likely_clock_rates(compared_bases))
+    rows = Rows(lag_samples, suggest_delays_s(compared_bases), LATE_STEP * row_s, suggest_clock_rates(compared_bases))
     faults: list[Fault] = []
-    turns = recording.is_rotational
+    rotational = recording.is_rotational
     for axis, name in enumerate(recording.command.channels):
-        if timed:
-            faults += mechanism_faults(axis, name, motions, lambda part: motion_of[id(part.recording)], turns)
+        if has_time_axis:
+            faults += mechanism_faults(axis, name, motions, lambda part: motion_of[id(part.recording)], rotational)
         if not recording.meta.get("imposed"):
             faults += actuator_faults(axis, name, (*clean, *faulty), by_force, rows)
     for channel, name in enumerate(recording.response.channels):
@@ -120,108 +123,119 @@ def _set_up(
 
 def _judge_faults(compared_bases: Sequence[ComparedBase], trial: TriedFaults) -> Comparison:
     """All tried faults with their gains, the smallest error first, and the errors with no fault undone."""
-    bare = trial.bare
-    plain = fit_sizes(bare, None)
+    unchanged_pairs = trial.unchanged_pairs
+    baseline_fit = fit_sizes(unchanged_pairs, None)
     faulty_samples = sum(compared.faulty.count for compared in compared_bases)
     samples = faulty_samples + sum(compared.clean.count for compared in compared_bases)
-    judged = sorted(
-        (_judge_fault(compared_bases, found, plain, samples) for found in trial.tried),
-        key=lambda each: float(each.errors.sum()),
+    judged_faults = sorted(
+        (_judge_fault(compared_bases, tried_variant, baseline_fit, samples) for tried_variant in trial.tried),
+        key=lambda judged_fault: float(judged_fault.errors.sum()),
     )
-    folds = zip(SIXTHS, _leave_out_sixths(bare), strict=True)
-    held_out = sum(held_out_error(kept, np.zeros(0), out) for out, kept in folds)
-    clean, faulty = [pair.without for pair in bare], [pair.with_it.blocks for pair in bare]
-    usual = [max(_excesses_within_a_set([np.array(products) for products in side])) for side in (clean, faulty)]
+    folds = zip(SIXTHS, _leave_out_sixths(unchanged_pairs), strict=True)
+    held_out_squares = sum(held_out_error(fold_pairs, np.zeros(0), left_out) for left_out, fold_pairs in folds)
+    clean, faulty = [pair.unchanged for pair in unchanged_pairs], [pair.undone.blocks for pair in unchanged_pairs]
+    control_excesses = [
+        max(_yield_control_excesses([np.array(products) for products in side])) for side in (clean, faulty)
+    ]
     first = compared_bases[0]
     return Comparison(
-        faults=tuple(judged),
-        plain=plain.errors,
+        faults=tuple(judged_faults),
+        errors=baseline_fit.errors,
         samples=samples,
         faulty_samples=faulty_samples,
-        held_out=held_out,
+        held_out_squares=held_out_squares,
         faulty_share=min(compute_unexplained_share(first.base, first.faulty.parts), 1.0),
-        usual=max(usual),
-        usual_clean=usual[0],
+        control_excess=max(control_excesses),
+        clean_control_excess=control_excesses[0],
         by_force=isinstance(first.base, ForceBase),
         step_s=first.row_s,
         complete=trial.complete,
     )
 
 
-def _balances(compared_bases: Sequence[ComparedBase], tried: Sequence[TriedVariant]) -> bool:
-    """Whether the force balances fit the faulty set, either with no fault or with the best fault undone. tried: the
+def _do_forces_balance(compared_bases: Sequence[ComparedBase], trials: Sequence[TriedVariant]) -> bool:
+    """Whether the force balances fit the faulty set, either with no fault or with the best fault undone. trials: the
     best first."""
     axes = [compared for compared in compared_bases if isinstance(compared.base, ForceBase)]
     if all(
-        compute_unexplained_share_of_rows(each.base, each.faulty.rows, each.faulty.masks) < BALANCE_HOLDS
-        for each in axes
+        compute_unexplained_share_of_rows(axis_base.base, axis_base.faulty.rows, axis_base.faulty.masks) < BALANCE_HOLDS
+        for axis_base in axes
     ):
         return True
     return any(
-        all(compute_unexplained_share_of_rows(each.base, *_undo(each, found)) < BALANCE_HOLDS for each in axes)
-        for found in tried[:1]
+        all(
+            compute_unexplained_share_of_rows(axis_base.base, *_undo_fault(axis_base, best_variant)) < BALANCE_HOLDS
+            for axis_base in axes
+        )
+        for best_variant in trials[:1]
     )
 
 
-def _undo(compared: ComparedBase, found: TriedVariant) -> tuple[list[FloatArray], list[Mask]]:
+def _undo_fault(compared: ComparedBase, tried_variant: TriedVariant) -> tuple[list[FloatArray], list[Mask]]:
     """Rows of the faulty set with a fault undone at its fitted sizes, and masks of the rows with known values."""
-    fit, fault, variant, _ = found
-    changed = rows_with_fault_undone(compared, compared.faulty, fault, variant)
+    fit, fault, variant, _ = tried_variant
+    undone_rows = undo_fault_in_rows(compared, compared.faulty, fault, variant)
     rows, masks = list(compared.faulty.rows), list(compared.faulty.masks)
-    for k, (plain, mask) in enumerate(zip(compared.faulty.rows, compared.faulty.masks, strict=True)):
-        rows[k] = plain + sum(size * (each.rows[k] - plain) for size, each in zip(fit.sizes, changed, strict=True))
-        masks[k] = mask & ~np.any([each.lost[k] for each in changed if each.lost], axis=0)
+    for k, (unchanged_rows, mask) in enumerate(zip(compared.faulty.rows, compared.faulty.masks, strict=True)):
+        rows[k] = unchanged_rows + sum(
+            size * (undone.rows[k] - unchanged_rows) for size, undone in zip(fit.sizes, undone_rows, strict=True)
+        )
+        masks[k] = mask & ~np.any([undone.lost[k] for undone in undone_rows if undone.lost], axis=0)
     return rows, masks
 
 
-def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
+def _yield_control_excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
     """Relative excess error within one set: for each division into two stretches, the error of a single fit to both
     over the sum of separate fits, less 1. sides: per base, the set's products (blocks, k, k)."""
 
     def error(blocks: Sequence[int]) -> float:
         return sum(error_of_own_fit(side[list(blocks)].sum(axis=0)) for side in sides)
 
-    together = error(ALL)
-    for stretch in APART:
-        separate = error(stretch) + error([block for block in ALL if block not in stretch])
-        yield together / max(separate, 1e-300) - 1
+    joint_error = error(ALL_BLOCKS)
+    for stretch in CONTROL_STRETCHES:
+        separate = error(stretch) + error([block for block in ALL_BLOCKS if block not in stretch])
+        yield joint_error / max(separate, 1e-300) - 1
 
 
-def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, plain: Fit, samples: int) -> JudgedFault:
-    """The fault with its values and their standard errors, its gain, and the gains of the negative control. plain: the
-    fit with no fault undone. samples: number in both sets, over all bases."""
-    accepted, fault, variant, pairs = found
-    values = variant.parameters_of(accepted.sizes)
+def _judge_fault(
+    compared_bases: Sequence[ComparedBase], tried_variant: TriedVariant, baseline_fit: Fit, samples: int
+) -> JudgedFault:
+    """The fault with its values and their standard errors, its gain, and the gains of the negative control.
+    baseline_fit: the fit with no fault undone. samples: number in both sets, over all bases."""
+    fit, fault, variant, pairs = tried_variant
     folds = _leave_out_sixths(pairs)
-    fits = [fit_sizes(kept, variant) for kept in folds]
+    fits = [fit_sizes(fold_pairs, variant) for fold_pairs in folds]
     # Errors count at the size that was accepted; only the standard errors need the free size of a timing fault.
     allowed = restrict_sizes(variant)
-    fixed = [fit_sizes(kept, allowed) for kept in folds] if variant.exact else fits
-    held_out = sum(held_out_error(kept, fit.sizes, out) for out, kept, fit in zip(SIXTHS, folds, fixed, strict=True))
+    allowed_fits = [fit_sizes(fold_pairs, allowed) for fold_pairs in folds] if variant.exact else fits
+    held_out_squares = sum(
+        held_out_error(fold_pairs, fold_fit.sizes, left_out)
+        for left_out, fold_pairs, fold_fit in zip(SIXTHS, folds, allowed_fits, strict=True)
+    )
     # The negative control takes long, and a fault with hardly any gain needs none.
     gains = (
-        list(_gains_within_a_set(compared_bases, fault, allowed, accepted.sizes))
-        if plain.error > (1 + LEAST_FAULT_GAIN) * accepted.error
+        list(_yield_control_gains(compared_bases, fault, allowed, fit.sizes))
+        if baseline_fit.error > (1 + LEAST_FAULT_GAIN) * fit.error
         else [0.0]
     )
-    typical = max(float(np.median(gains)), 0.0)
-    errors = accepted.errors * (1 + typical)
-    drawn = bootstrap_draws(len(errors))
-    drawn_gains = plain.errors[drawn].sum(axis=1) / np.maximum(errors[drawn].sum(axis=1), 1e-300) - 1
+    median_control_gain = max(float(np.median(gains)), 0.0)
+    errors = fit.errors * (1 + median_control_gain)
+    draws = bootstrap_draws(len(errors))
+    drawn_gains = baseline_fit.errors[draws].sum(axis=1) / np.maximum(errors[draws].sum(axis=1), 1e-300) - 1
     # With a separate base for each set, errors are white with rms 1: their sum of squares is the number of samples.
-    error, excess = float(errors.sum()), plain.error - samples
+    error, excess = float(errors.sum()), baseline_fit.error - samples
     return JudgedFault(
         fault=fault,
-        values=values,
-        spread=_standard_errors(variant, [each.sizes for each in fits], _sizes_without_clean_sixths(pairs, variant)),
+        values=variant.parameters_of(fit.sizes),
+        spread=_standard_errors(variant, [fold.sizes for fold in fits], _fit_without_clean_sixths(pairs, variant)),
         errors=errors,
-        gain=plain.error / max(error, 1e-300) - 1,
-        usual=max([0.0, *gains]) - typical,
-        typical=typical,
-        share=(plain.error - error) / excess if excess > 0 else 0.0,
-        held_out=held_out,
+        gain=baseline_fit.error / max(error, 1e-300) - 1,
+        control_gain=max([0.0, *gains]) - median_control_gain,
+        median_control_gain=median_control_gain,
+        share=(baseline_fit.error - error) / excess if excess > 0 else 0.0,
+        held_out_squares=held_out_squares,
         gain_low=float(np.quantile(drawn_gains, BOOTSTRAP_LEVEL)),
-        apart=max(_excesses_within_a_set([pair.with_it.undo_sizes(accepted.sizes) for pair in pairs])),
+        control_excess=max(_yield_control_excesses([pair.undone.undo_sizes(fit.sizes) for pair in pairs])),
     )
 
 
@@ -230,7 +244,7 @@ def _standard_errors(
 ) -> dict[str, float]:
     """Standard error of each value of a fault: root of the sum of the jackknife variances of both sets, from the sizes
     with each sixth left out, and of the squared error due to the spacing of the variants."""
-    sets = [[variant.parameters_of(sizes) for sizes in each] for each in (without_faulty, without_clean)]
+    sets = [[variant.parameters_of(sizes) for sizes in fold_sizes] for fold_sizes in (without_faulty, without_clean)]
     return {
         name: float(
             np.sqrt(variant.grid_error**2 + sum(_jackknife_variance([fold[name] for fold in side]) for side in sets))
@@ -239,13 +253,16 @@ def _standard_errors(
     }
 
 
-def _sizes_without_clean_sixths(pairs: Sequence[Pair], variant: Variant) -> list[FloatArray]:
+def _fit_without_clean_sixths(pairs: Sequence[Pair], variant: Variant) -> list[FloatArray]:
     """The fault's sizes, with each sixth of the clean set left out in turn."""
-    kept = [
-        [replace(pair, without=(*pair.without[: out[0]], *pair.without[out[-1] + 1 :])) for pair in pairs]
-        for out in SIXTHS
+    folds = [
+        [
+            replace(pair, unchanged=(*pair.unchanged[: left_out[0]], *pair.unchanged[left_out[-1] + 1 :]))
+            for pair in pairs
+        ]
+        for left_out in SIXTHS
     ]
-    return [fit_sizes(each, variant).sizes for each in kept]
+    return [fit_sizes(fold, variant).sizes for fold in folds]
 
 
 def _jackknife_variance(values: Sequence[float]) -> float:
@@ -256,10 +273,13 @@ def _jackknife_variance(values: Sequence[float]) -> float:
 
 def _leave_out_sixths(pairs: Sequence[Pair]) -> list[list[Pair]]:
     """The pairs with each sixth of the faulty set left out in turn."""
-    return [[replace(pair, at=tuple(block for block in ALL if block not in out)) for pair in pairs] for out in SIXTHS]
+    return [
+        [replace(pair, undone_blocks=tuple(block for block in ALL_BLOCKS if block not in left_out)) for pair in pairs]
+        for left_out in SIXTHS
+    ]
 
 
-def _gains_within_a_set(
+def _yield_control_gains(
     compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant, sizes: FloatArray
 ) -> Iterator[float]:
     """The fault's gains between stretches of one set (negative control). Clean set: error with nothing undone over
@@ -267,13 +287,13 @@ def _gains_within_a_set(
     first, because a base that does not fit the faulty rows would give a gain in any stretch. A fault that varies with
     time also differs between stretches of the faulty set, which is then no control."""
     for is_clean in (True,) if fault.varies else (True, False):
-        common = np.zeros_like(sizes) if is_clean else sizes
+        common_sizes = np.zeros_like(sizes) if is_clean else sizes
         sides = [compared.clean if is_clean else compared.faulty for compared in compared_bases]
         products = [
-            compared.grams(side, rows_with_fault_undone(compared, side, fault, variant))
+            compared.compute_grams(side, undo_fault_in_rows(compared, side, fault, variant))
             for compared, side in zip(compared_bases, sides, strict=True)
         ]
-        for stretch in APART:
-            rest = [block for block in ALL if block not in stretch]
-            pairs = [Pair(grams, stretch, tuple(grams.undo_sizes(common)[rest])) for grams in products]
-            yield error_with_sizes(pairs, common) / max(fit_sizes(pairs, variant).error, 1e-300) - 1
+        for stretch in CONTROL_STRETCHES:
+            other_blocks = [block for block in ALL_BLOCKS if block not in stretch]
+            pairs = [Pair(grams, stretch, tuple(grams.undo_sizes(common_sizes)[other_blocks])) for grams in products]
+            yield error_with_sizes(pairs, common_sizes) / max(fit_sizes(pairs, variant).error, 1e-300) - 1

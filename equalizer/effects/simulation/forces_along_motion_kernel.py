@@ -1,0 +1,107 @@
+"""Compiled loop that evaluates motion-dependent force laws along a known motion, for `forces_along_motion`.
+
+A law reads the motion at a step's start and the motion that the step would have without the law's force (layout in
+`instant`). The latter is the measured motion at the step's end plus the effect of the force that is still unbalanced.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import njit, types
+
+from equalizer.effects.simulation.instant import (
+    A_FREE,
+    A_PER_N,
+    AXIS_A,
+    AXIS_A_PER_N,
+    AXIS_COMMAND,
+    AXIS_V,
+    AXIS_V_END,
+    AXIS_V_PER_N,
+    AXIS_X,
+    AXIS_X_END,
+    AXIS_X_PER_N,
+    BLOCK_SIZE,
+    F_END,
+    LENGTH,
+    STEP_S,
+    TIME_S,
+    V_FREE,
+    V_PER_N,
+    X_FREE,
+    X_PER_N,
+    V,
+    X,
+)
+from equalizer.effects.simulation.mechanism_kernel import LAW, MAX_LAWS, READ_ONLY, Integers
+from equalizer.signals.signal import FloatArray
+
+_VECTOR = types.float64[::1]
+_MATRIX = types.float64[:, ::1]
+_THREE = types.UniTuple(_MATRIX, 3)  # type: ignore[no-untyped-call]
+_LAWS = types.UniTuple(types.FunctionType(LAW), MAX_LAWS)  # type: ignore[no-untyped-call]
+
+Motion = tuple[FloatArray, FloatArray, FloatArray]
+"""Positions, velocities and accelerations, (n, m) each."""
+
+
+@njit(inline="always")
+def _write_seen_axes(
+    k: int, axis: int, motion: Motion, commands: FloatArray, per_newton: FloatArray, at: FloatArray
+) -> None:
+    """Write the motion of all axes into `at`. The effect of one axis's force on the others is contained in their
+    measured motion."""
+    for seen_axis in range(commands.shape[1]):
+        block, own_axis = LENGTH + BLOCK_SIZE * seen_axis, 1.0 if seen_axis == axis else 0.0
+        at[block + AXIS_X], at[block + AXIS_V] = motion[0][k, seen_axis], motion[1][k, seen_axis]
+        at[block + AXIS_X_END], at[block + AXIS_V_END] = motion[0][k + 1, seen_axis], motion[1][k + 1, seen_axis]
+        at[block + AXIS_X_PER_N], at[block + AXIS_V_PER_N] = (
+            own_axis * per_newton[0, seen_axis],
+            own_axis * per_newton[1, seen_axis],
+        )
+        at[block + AXIS_A], at[block + AXIS_A_PER_N] = motion[2][k, seen_axis], own_axis * per_newton[2, seen_axis]
+        at[block + AXIS_COMMAND] = commands[k, seen_axis]
+
+
+@njit(
+    types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, READ_ONLY, _MATRIX, _MATRIX, types.float64),
+    cache=True, nogil=True, error_model="numpy",
+)  # fmt: skip
+def evaluate_laws_along_motion(  # noqa: PLR0913 - a kernel takes flat arrays
+    laws: Any, places: Integers, parameters: FloatArray, memory: FloatArray,
+    motion: Motion, commands: FloatArray, per_newton: FloatArray,
+    force: FloatArray, step_s: float,
+) -> None:  # fmt: skip
+    """Overwrite force (n, m) by the sum of the laws' forces over the step that begins at each sample.
+
+    force, on entry: unbalanced force over each step (see `forces_along_motion.effect_forces_along_motion`), from which
+    friction at rest follows, because it does not follow from the motion. motion: positions, velocities and
+    accelerations, (n, m) each. commands: (n, m), or (0, 0) where no law reads them. per_newton: (3, m), what 1 N over a
+    step adds to the motion. places: (items, 6) law, axis, begin and end in `parameters`, begin and end in `memory`."""
+    position, velocity, acceleration = motion
+    sees = commands.shape[0] > 0
+    at = np.zeros(LENGTH + BLOCK_SIZE * force.shape[1] if sees else LENGTH)
+    at[STEP_S] = step_s
+    for k in range(len(position) - 1):
+        at[TIME_S] = k * step_s
+        unbalanced = force[k].copy()
+        force[k] = 0.0
+        for item in range(places.shape[0]):
+            axis = places[item, 1]
+            at[X], at[V] = position[k, axis], velocity[k, axis]
+            at[X_PER_N], at[V_PER_N], at[A_PER_N] = per_newton[0, axis], per_newton[1, axis], per_newton[2, axis]
+            at[X_FREE] = position[k + 1, axis] + at[X_PER_N] * unbalanced[axis]
+            at[V_FREE] = velocity[k + 1, axis] + at[V_PER_N] * unbalanced[axis]
+            at[A_FREE] = acceleration[k, axis] + at[A_PER_N] * unbalanced[axis]
+            at[F_END] = np.nan
+            if sees:
+                _write_seen_axes(k, axis, motion, commands, per_newton, at)
+                at[LENGTH + BLOCK_SIZE * axis + AXIS_X_END] = at[X_FREE]
+                at[LENGTH + BLOCK_SIZE * axis + AXIS_V_END] = at[V_FREE]
+                at[LENGTH + BLOCK_SIZE * axis + AXIS_A] = at[A_FREE]
+            law_memory = memory[places[item, 4] : places[item, 5]]
+            # The law's force balances a part of the unbalanced force; the next law sees what remains.
+            law_force = laws[places[item, 0]](parameters[places[item, 2] : places[item, 3]], law_memory, at)
+            force[k, axis] += law_force
+            unbalanced[axis] += law_force
+    force[len(position) - 1] = force[len(position) - 2]
