@@ -77,7 +77,7 @@ def search_structures(
     time_left: TimeBudget,
     base: BaseTerms | GivenBase | None = None,
 ) -> StructureSearch:
-    """Beam search for the sum of at most three laws with the least cross-validated error. without: effects that are
+    """Beam search for the sum of at most three laws with the least cross-validated error. excluded: effects that are
     left out. base: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
     if not any(motion.valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")

@@ -73,7 +73,7 @@ def rank_faults(
     recordings: Sequence[Recording], clean: Sequence[Recording], excluded: frozenset[str], time_left: TimeBudget
 ) -> Comparison | None:
     """Comparison of the faulty recordings with the clean ones, by the first kind of base that fits: force balances,
-    else autoregressive models. without: names of effects that are not tested. None where there is too little data, no
+    else autoregressive models. excluded: names of effects that are not tested. None where there is too little data, no
     base fits, or one set moves far less than the other."""
     sides = split_into_parts(clean), split_into_parts(recordings)
     if not all(sides) or not have_similar_motion(*sides):

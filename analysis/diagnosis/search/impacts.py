@@ -39,6 +39,7 @@ from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.identifiability import find_undetermined
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.second_effect_with_play import (
+    PLAY,
     RIVAL,
     SecondEffects,
     fit_second_effects,
@@ -69,14 +70,14 @@ def explain_impacts(
     it, or where responses are not simulated freely. floors: noise per recording. time_left: called before a second
     effect is looked for."""
     effects = {effect.name: effect for effect in catalogue}
-    if "backlash" not in effects or not isinstance(context.whole, FreeSimulation):
+    if PLAY not in effects or not isinstance(context.whole, FreeSimulation):
         return None
     if not is_irregular(context, explanation, floors):
         return None
     given_fit = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
     evidence = gather_evidence(context.measure, context.tuning, given_fit)[0]
     problem = BandPowerProblem(BandPower(context.measure), context.tuning, context.map_)
-    play_claims = [Claim(effects["backlash"], "one", (axis,)) for axis in range(context.tuning.model.inputs)]
+    play_claims = [Claim(effects[PLAY], "one", (axis,)) for axis in range(context.tuning.model.inputs)]
     placed_fits = sorted((_fit_claim(problem, evidence, claim) for claim in play_claims), key=lambda claim: claim.cost)
     if placed_fits[0].cost >= evaluate_hypothesis(problem, given_fit.deviations, NO_EFFECTS).cost:
         return None
@@ -85,32 +86,40 @@ def explain_impacts(
     if RIVAL in effects:
         rivals.append(_fit_claim(problem, evidence, Claim(effects[RIVAL], "one", play_fit.hypothesis.claims[0].sites)))
     rival_hypotheses = [rival.hypothesis for rival in rivals if rival.hypothesis.claims and np.isfinite(rival.cost)]
-    comparison = comparison_of(context, play_fit)
-    play_candidate = comparison.score_candidate(play_fit.deviations, play_fit.hypothesis)
+    play_comparison = comparison_of(context, play_fit)
+    play_candidate = play_comparison.score_candidate(play_fit.deviations, play_fit.hypothesis)
     is_explained = worst_part(play_candidate) <= EXPLAINED_BY_CHANCE
     second_effects = SecondEffects((), complete=is_explained)
     if not is_explained and time_left():
         suggested = suggest_second_effects(context, explanation, play_fit, catalogue)
         second_effects = fit_second_effects(context, problem, play_fit, suggested, time_left)
-    # Where the best pair is not confirmed, the next one is judged, and at last play alone.
-    for pair_index in range(len(second_effects.fits) + 1):
-        pair_fits = second_effects.fits[pair_index:]
+    fits = (play_fit, second_effects.fits)
+    named = _name_confirmed(context, explanation, problem, fits, rival_hypotheses, play_comparison)
+    return named and replace(named, ended_early=named.ended_early or not second_effects.complete)
+
+
+def _name_confirmed(
+    context: SearchContext,
+    explanation: Explanation,
+    problem: BandPowerProblem,
+    fits: tuple[BandPowerFit, Sequence[BandPowerFit]],
+    rival_hypotheses: Sequence[Hypothesis],
+    play_comparison: BandPowerComparison,
+) -> Explanation | None:
+    """The first explanation that the recordings confirm: by the best pair, else the next one, at last by play alone. No
+    parameter is open, and the gap is needed: play of no gap is no cause of an irregular response. fits, rivals: as for
+    `_judge_play`. play_comparison: with the chance variation of play alone."""
+    play_fit, pairs = fits
+    for pair_index in range(len(pairs) + 1):
+        pair_fits = pairs[pair_index:]
         best_fit = (*pair_fits, play_fit)[0]
-        comparison = comparison_of(context, best_fit)
+        comparison = comparison_of(context, best_fit) if pair_fits else play_comparison
         named = _judge_play(comparison, explanation, problem, (play_fit, pair_fits), rival_hypotheses)
-        if named is not None and _is_determined(context, problem, named, best_fit):
-            return replace(named, ended_early=named.ended_early or not second_effects.complete)
+        if named is None or any(find_undetermined(context, named)):
+            continue
+        if _needs_gap(comparison, problem, best_fit):
+            return named
     return None
-
-
-def _is_determined(
-    context: SearchContext, problem: BandPowerProblem, explanation: Explanation, play_fit: BandPowerFit
-) -> bool:
-    """Whether the recordings determine the effects: none has an open parameter, and the gap is needed, because play of
-    no gap is not the cause of the irregular response."""
-    return not any(find_undetermined(context, explanation)) and _needs_gap(
-        comparison_of(context, play_fit), problem, play_fit
-    )
 
 
 def _needs_gap(comparison: BandPowerComparison, problem: BandPowerProblem, best_fit: BandPowerFit) -> bool:

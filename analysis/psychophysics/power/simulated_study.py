@@ -201,7 +201,7 @@ def _simulate_sessions(
     habit_seed: tuple[int, ...],
 ) -> list[SimulatedRun]:
     """Fill the tracks, person by person, with the runs of each person in random order. Returns the result of each run,
-    in the order of the tracks. seeds: (runs,); key: seed of the habits."""
+    in the order of the tracks. seeds: (runs,); habit_seed: seed of the habits."""
     habit_rng, k = np.random.default_rng(habit_seed), len(crowd.frequencies_hz)
     simulate_run = (
         partial(play_psi, pack_psi(rule)) if rule.is_bayesian else partial(play_run, pack_rule(rule, crowd.rove_db))

@@ -122,7 +122,7 @@ def _predict_ports(output: FloatArray, state: FloatArray, ports: FloatArray) -> 
 
 @njit(inline="always")
 def _apply_forces(force_effects: FloatArray, state: FloatArray, ports: FloatArray) -> None:
-    """Add the forces' effect to the state, and move the ports to the step's end. by_force: (r, s)"""
+    """Add the forces' effect to the state, and move the ports to the step's end. force_effects: (r, s)"""
     for port in range(ports.shape[1]):
         ports[_NOW_X, port], ports[_NOW_V, port] = ports[_NEXT_X, port], ports[_NEXT_V, port]
         force = ports[_FORCE, port]

@@ -190,7 +190,7 @@ def _extract_evidence_series(evidence: Sequence[Evidence], axis: int) -> _AxisSe
 
 
 def _make_maps(series: _AxisSeries, labels: tuple[str, str, str, str], length_unit: str) -> StateMaps:
-    """The maps of one axis. labels: axis, unit of the force, model, completed. length: unit of the position."""
+    """The maps of one axis. labels: axis, unit of the force, model, completed. length_unit: of the position."""
     axis, unit, model, completed = labels
     # As the missing force on the device: friction then points against the motion.
     missing_force = series.model_force - series.force
