@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -16,6 +17,7 @@ def sessions(drift, sd, seed):
     return [simulated_session(drift, sd, (seed, number)) for number in SESSIONS]
 
 
+@pytest.mark.slow
 def test_criteria_that_vary_from_run_to_run_are_seldom_named_and_a_drift_mostly():
     """Where the dispersion was taken as binomial 14 % of the first were named, and 82 % of the second."""
     quiet = sessions(0.0, 0.0, 1)

@@ -51,6 +51,7 @@ def once(rubbing_handle, tmp_path_factory):
     return handle, closed_loop(handle, QUICKLY, "--no-discovery")
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_friction_is_named_with_its_size_and_the_first_play_gets_better(once):
     _, (diagnosis, plain, freed, _) = once
@@ -60,6 +61,7 @@ def test_friction_is_named_with_its_size_and_the_first_play_gets_better(once):
     assert freed[0] < 0.3 * plain[0]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_what_is_added_against_friction_stays_under_the_cap_with_the_rest(once):
     handle, (_, _, _, largest_n) = once

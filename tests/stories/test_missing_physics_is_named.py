@@ -57,7 +57,7 @@ def all_but(*names):
         (FRICTION, "level"),
         pytest.param({"hardening_stiffness": {"k3": 4e5}}, "k3", marks=pytest.mark.slow),
         pytest.param({"sensor_lag": {"bandwidth": 85.0}}, "bandwidth", marks=pytest.mark.slow),
-        (SATURATION, "limit"),
+        pytest.param(SATURATION, "limit", marks=pytest.mark.slow),
     ],
     ids=lambda given: next(iter(given)) if isinstance(given, dict) else "",
 )

@@ -81,7 +81,12 @@ def played(device, equalizer, axis):
     return np.fft.rfft(truth[-LOOP:], axis=0)[BAND] / np.fft.rfft(wanted[:, axis])[BAND, None]
 
 
-@pytest.mark.parametrize("hand", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["alone", "in a hand"])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "hand",
+    [False, True],
+    ids=["alone", "in a hand"],
+)
 def test_the_linear_device_is_flat_and_uncoupled(hand):
     found = equalized(hand, seed=1)
     assert found.flatness_db <= 0.1

@@ -69,6 +69,7 @@ def test_without_a_model_the_first_one_is_of_the_clean_recordings(monkeypatch):
     assert "fitted" in found["remarks"]
 
 
+@pytest.mark.slow
 def test_the_improved_model_is_of_the_commands_as_they_were_recorded():
     """Dry friction and a constant pull, and a command counted against its motion."""
     model = MechanicalModel("slide", "velocity", 0.5 * np.eye(1), 2 * np.eye(1), np.zeros((1, 1)), np.eye(1), np.eye(1))

@@ -94,6 +94,7 @@ def test_thresholds_of_zero_are_left_out_of_a_ratio_scale(analysis):
     assert "units" not in [picture.name for picture in study_pictures(replace(analysis, thresholds=still))]
 
 
+@pytest.mark.slow
 def test_above_detection_is_the_ratio_of_both_thresholds_where_both_are(all_trial_kinds, full_protocol):
     analysis = analyse_study(all_trial_kinds, full_protocol)
     table = above_detection(analysis.table, analysis.detection_table)

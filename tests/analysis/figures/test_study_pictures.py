@@ -97,6 +97,7 @@ def test_the_threshold_figure_says_its_units_cap_and_intervals(study_drawings):
         assert words in said
 
 
+@pytest.mark.slow
 def test_means_carry_the_comparison_intervals(study_drawings, study_trials, protocol):
     axes = study_drawings["thresholds"].figure.axes[0]
     drawn = [

@@ -74,6 +74,7 @@ def test_the_caption_says_what_the_estimate_says_of_itself(response):
     assert picture.caption.endswith("Below 4 Hz nothing is known.")
 
 
+@pytest.mark.slow
 def test_fifteen_thousand_lines_are_no_burden_for_a_page(response):
     assert len(render_picture_svg(transfer_functions_picture(response))) < 1_000_000
 

@@ -48,6 +48,7 @@ def test_a_damaged_session_is_left_out_and_named(run, data):
     assert "25 Hz" in out
 
 
+@pytest.mark.slow
 def test_ellipsoids_enter_the_report(run, data, tmp_path):
     assert run("record", "ellipsoid", "--out", tmp_path / "e.h5")[0] == 0
     assert run("analyze", data, "--out", tmp_path / "out", "--ellipsoid", tmp_path / "e.h5")[0] == 0

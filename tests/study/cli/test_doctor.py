@@ -129,6 +129,7 @@ raw_range = [13800, 51200]
 """
 
 
+@pytest.mark.slow
 def test_a_sensor_that_is_not_plugged_in_is_a_line_of_its_own_and_all_else_is_checked(run, stub, tmp_path):
     (tmp_path / "none.toml").write_text(SENSOR_TABLE)
     code, out = run("--device", "omega3", "--data", tmp_path, "--timing", 0.2)

@@ -76,7 +76,7 @@ def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, cap
 
 
 @pytest.mark.usefixtures("sketched")
-@pytest.mark.parametrize("form", ["psych-ds", "csv"])
+@pytest.mark.parametrize("form", [pytest.param("psych-ds", marks=pytest.mark.slow), "csv"])
 def test_what_was_left_out_before_an_export_is_counted_after_it_without_a_name(data, tmp_path, capsys, form):
     mine = tmp_path / "data"
     shutil.copytree(data, mine)

@@ -35,6 +35,7 @@ def test_a_device_that_is_not_there_is_exit_code_3(run, small_file, tmp_path):
     assert not (tmp_path / "d").exists()
 
 
+@pytest.mark.slow
 def test_an_interruption_is_exit_code_130(run, small_file, tmp_path, monkeypatch):
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
@@ -122,6 +123,7 @@ def test_the_help_names_every_observer(run):
     assert all(name in said for name in OBSERVERS)
 
 
+@pytest.mark.slow
 def test_a_session_begins_beside_a_damaged_protocol_text(run, data, small_file):
     log = data / "P01_001" / "events.jsonl"
     log.write_text(log.read_text().replace("start_n = 1.0", "start_n = = 1.0", 1))

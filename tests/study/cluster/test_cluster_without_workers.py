@@ -99,6 +99,7 @@ def test_without_workers_it_ends_in_words_and_goes_on_with_another(address, here
     assert (out / "studies.jsonl").read_text("utf-8").splitlines()[: len(kept)] == kept
 
 
+@pytest.mark.slow
 def test_another_worker_within_the_time_goes_on(address, here, tmp_path):
     with a_worker(address) as worker, cluster_workers(address) as pool:
         late = []
@@ -109,6 +110,7 @@ def test_another_worker_within_the_time_goes_on(address, here, tmp_path):
         late[0].__exit__(None, None, None)
 
 
+@pytest.mark.slow
 def test_the_wait_for_a_worker_ends_at_once_by_ctrl_c(address, tmp_path):
     main = threading.main_thread().ident
     interrupt = threading.Timer(3.0, lambda: signal.pthread_kill(main, signal.SIGINT))

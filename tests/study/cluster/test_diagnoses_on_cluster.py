@@ -28,8 +28,9 @@ def answers(path):
     return {str(each.relative_to(path)): without_times(each.read_text()) for each in path.rglob(ANSWER)}
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("cases", [1, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("cases", [1, 3])
 def test_a_bank_is_answered_on_a_cluster_as_it_is_here(local, kill_a_worker, tmp_path, cases):
     plan = BankPlan(51_404, cases, brief=True)
     here = prove(tmp_path / "here", plan, BankOptions(keep=True), lambda *_: None)

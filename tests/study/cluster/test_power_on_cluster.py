@@ -71,6 +71,7 @@ def test_workers_with_several_threads_are_refused_for_work_that_needs_a_process(
         pass
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_a_scheduler_that_is_lost_is_reported(plan, tmp_path):
     lost = distributed.LocalCluster(n_workers=1, host="127.0.0.1", dashboard_address="127.0.0.1:0")
@@ -80,6 +81,7 @@ def test_a_scheduler_that_is_lost_is_reported(plan, tmp_path):
     assert 1 < len(kept) < 7  # the plan, and some of six pieces
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_an_error_of_the_executor_is_a_lost_scheduler_only_where_one_is_lost():
     here = distributed.LocalCluster(n_workers=1, host="127.0.0.1", dashboard_address="127.0.0.1:0")
@@ -91,6 +93,7 @@ def test_an_error_of_the_executor_is_a_lost_scheduler_only_where_one_is_lost():
         raise ValueError("too many values to unpack")
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("given", ["before", "after"])
 def test_work_of_a_client_that_gave_its_scheduler_up_is_reported(given, monkeypatch):
@@ -124,6 +127,7 @@ def test_without_the_package_it_is_said_what_to_install(monkeypatch):
         pass
 
 
+@pytest.mark.slow
 def test_the_numbers_depend_on_the_seed(plan, here, tmp_path):
     with ThreadPoolExecutor(1) as pool:
         other = simulate_power(replace(plan, seed=4), tmp_path / "power", pool, lambda _: None)

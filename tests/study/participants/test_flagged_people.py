@@ -97,14 +97,17 @@ def named(texts, words):
     return sum(words in text for text in texts)
 
 
+@pytest.mark.slow
 def test_who_asks_again_when_unsure_is_named_each_time(said):
     assert named(said["repeating"], REPEATED) == len(said["repeating"])
 
 
+@pytest.mark.slow
 def test_who_guesses_is_named_each_time(said):
     assert named(said["guessing"], AT_CHANCE) == len(said["guessing"])
 
 
+@pytest.mark.slow
 def test_a_criterion_that_drifts_by_0_3_in_100_trials_is_named_mostly(said):
     """A session of some 350 trials moves it by 1. Of other sessions, each among nine honest people, the drift was named
     in 438 of 1000, it or a leaning in 875 (tests/references/drift_flag.py)."""
@@ -113,6 +116,7 @@ def test_a_criterion_that_drifts_by_0_3_in_100_trials_is_named_mostly(said):
     assert sum(DRIFTS in text or LEANS in text for text in drifting) >= 28
 
 
+@pytest.mark.slow
 def test_honest_people_are_hardly_ever_named(said):
     """Of 60. Of 1000 other honest sessions 3 were named for a drift, 56 for either: bounds are three standard errors
     above, or less."""

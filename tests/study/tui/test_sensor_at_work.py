@@ -55,6 +55,7 @@ def lab_file(tmp_path, monkeypatch):
     return tmp_path / "device.toml"
 
 
+@pytest.mark.slow
 def test_by_keys_from_the_start_screen_to_the_lab_s_file(tmp_path, lab_file):
     with contextlib.closing(Board(2000.0)) as board:
 

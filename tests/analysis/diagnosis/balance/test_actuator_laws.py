@@ -44,6 +44,7 @@ def test_a_dead_band_is_recovered_with_its_width(dead_band):
     assert set(laws_by_name(dead_band)) == {"force_deadband"}
 
 
+@pytest.mark.slow
 def test_a_limit_of_the_force_is_recovered(find_laws):
     balance = find_laws(lambda u: np.clip(u, -4.0, 4.0))
     assert laws_by_name(balance)["force_saturation"].values["limit"] == pytest.approx(4.0, rel=0.1)
@@ -55,6 +56,7 @@ def rubbing_dead_band(find_laws, axis_module):
     return find_laws(lambda u: u - np.clip(u, -1.5, 1.5), replace(axis_module.Physics(), coulomb=0.5))
 
 
+@pytest.mark.slow
 def test_a_dead_band_leaves_the_dry_friction_beside_it(rubbing_dead_band):
     balance = rubbing_dead_band
     assert set(laws_by_name(balance)) == {"force_deadband", "coulomb_friction"}
@@ -65,8 +67,10 @@ def test_the_error_before_is_that_of_the_force_as_commanded(dead_band):
     assert dead_band.error < 0.5 * dead_band.linear
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "physics", [pytest.param({"coulomb": 0.8}, marks=pytest.mark.slow), {"coulomb": 0.4, "stiction": 0.6, "cubic": 2e5}]
+    "physics",
+    [{"coulomb": 0.8}, {"coulomb": 0.4, "stiction": 0.6, "cubic": 2e5}],
 )
 def test_a_linear_actuator_has_no_deadband_saturation_or_nonlinearity(find_laws, axis_module, physics):
     balance = find_laws(lambda u: u, replace(axis_module.Physics(), **physics))
@@ -124,6 +128,7 @@ def test_a_gain_that_falls_with_the_command_is_no_drag(find_speed_balance):
     assert "quadratic_damping" not in laws_by_name(balance)
 
 
+@pytest.mark.slow
 def test_a_drag_is_none_of_the_actuator(find_speed_balance):
     assert set(laws_by_name(find_speed_balance(lambda u: u, 2.0))) == {"quadratic_damping"}
 
@@ -151,7 +156,9 @@ def record_noisy_speed(curve, drag, seed=3, rate_hz=10.0, count=4000):
     return Recording("invented", *signals, hold=Hold.ZERO_ORDER)
 
 
-@pytest.mark.parametrize(("curve", "drag", "drags"), [(0.55, 0.0, False), (1.0, 0.1, True)])
+@pytest.mark.parametrize(
+    ("curve", "drag", "drags"), [(0.55, 0.0, False), pytest.param(1.0, 0.1, True, marks=pytest.mark.slow)]
+)
 def test_a_drag_is_named_only_where_no_curve_of_the_command_does_as_well(find_balance, curve, drag, drags):
     """Though noise hides which of both leaves less by far."""
     balance = find_balance(record_noisy_speed(curve, drag))[0]
@@ -223,6 +230,7 @@ def test_a_law_of_the_command_is_tried_in_order_and_never_twice():
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", [True, False])
 def test_laws_behind_a_dead_band_in_doubt_are_not_named(rubbing_dead_band, monkeypatch, inertia):
     balance = rubbing_dead_band

@@ -50,6 +50,7 @@ def test_friction_of_an_axis_that_rests_at_its_targets_is_named(hunting_balance)
     assert named.values["level"] == pytest.approx(LEVEL, rel=0.15)
 
 
+@pytest.mark.slow
 def test_an_axis_that_follows_without_friction_gets_no_name(record_samples, find_balance):
     (balance,) = find_balance(record_samples(*_simulate_hunting(0.0, seconds=60.0), RATE_HZ))
 

@@ -68,7 +68,8 @@ def test_friction_of_the_hub_is_named_beside_the_beam(record_hub, find_balance, 
     assert balance.named[0].values["level"] == pytest.approx(FRICTION, rel=0.2)
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 4])
 def test_without_friction_nothing_is_named(record_hub, find_balance, seed):
     assert not find_balance(record_hub(0.0, seed))[0].named
 
@@ -93,6 +94,7 @@ def test_where_no_law_is_named_the_linear_numbers_that_leave_less_of_the_forces_
     assert left[1] < 0.3 * left[0]
 
 
+@pytest.mark.slow
 def test_a_given_model_that_leaves_less_stays(record_samples, find_balance):
     """One body under a broad force: the true model's error is the noise, and the balance's numbers are fitted."""
     rng = np.random.default_rng(5)

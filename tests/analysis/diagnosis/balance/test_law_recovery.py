@@ -113,6 +113,7 @@ def test_a_stop_beyond_zero_is_named_with_its_side(axis_module, find_balance):
     assert law.values["position"] == pytest.approx(-0.02, abs=0.008)
 
 
+@pytest.mark.slow
 def test_of_two_axes_each_has_its_own(axis_module, find_balance):
     rubbing = axis_module.record_axis(axis_module.Physics(coulomb=1.0), seed=1)
     stiff = axis_module.record_axis(axis_module.Physics(cubic=3e4), seed=2)

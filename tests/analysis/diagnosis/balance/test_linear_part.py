@@ -64,6 +64,7 @@ def balances_of_both(two_bodies, record_samples, find_balance):
     return recording, find_balance(recording)
 
 
+@pytest.mark.slow
 def test_a_late_command_is_seen_and_its_friction_named(late_axis, record_samples, find_balance):
     force, motion = late_axis
 
@@ -81,7 +82,7 @@ def test_a_command_in_time_is_not_shifted(balances_of_both):
     assert abs(balance.search.regression.base_terms.delay_s) < 1 / RATE_HZ
 
 
-@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("order", [(0, 1), pytest.param((1, 0), marks=pytest.mark.slow)])
 def test_of_two_measured_motions_the_driven_one_is_found_and_its_friction_named(
     two_bodies, record_samples, find_balance, balances_of_both, order
 ):

@@ -35,6 +35,7 @@ def record_arm(record_samples):
     return made
 
 
+@pytest.mark.slow
 def test_a_spring_that_hardens_shows_in_the_band_of_the_motion(record_arm, find_balance):
     recording = record_arm(1.5)
     motions = compute_motions(observe_parts([recording], 1))

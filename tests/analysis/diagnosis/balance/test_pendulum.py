@@ -32,6 +32,7 @@ def find_lever_balance(record_samples, find_balance):
     return found
 
 
+@pytest.mark.slow
 def test_the_weight_of_a_lever_is_recovered(find_lever_balance):
     named = {law.law.effect: law.values for law in find_lever_balance(TURN, RUBBING).named}
     assert named["gravity_torque"]["torque"] == pytest.approx(TURN, rel=0.02)

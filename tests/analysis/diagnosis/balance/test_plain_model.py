@@ -39,6 +39,7 @@ def test_without_a_named_law_another_fit_is_asked_for(play_axis, axis_module):
     assert plain_model(*play_axis(axis_module.Physics()), "first") is None
 
 
+@pytest.mark.slow
 def test_a_second_body_asks_for_another_fit(play_axis, axis_module):
     from analysis.diagnosis.first_model.model_from_balance import plain_model
 

@@ -25,6 +25,7 @@ def find_move_balance(axis_module, find_balance):
     return found
 
 
+@pytest.mark.slow
 def test_a_single_step_tests_and_names_no_law(find_move_balance):
     found = find_move_balance(1)
     assert not found.tested

@@ -35,6 +35,7 @@ def test_an_offset_of_the_reading_is_a_number_and_no_effect(diagnose_changed_rea
     assert diagnosis.verdict in ("no_mismatch", "parameters", "unexplained")
 
 
+@pytest.mark.slow
 def test_a_late_reading_is_a_class_and_not_explained_without_repeats(diagnose_changed_reading):
     diagnosis = diagnose_changed_reading(lambda read: np.vstack([read[:3] * 0, read[:-3]]))
     assert diagnosis.verdict != "explained"

@@ -85,7 +85,8 @@ def test_friction_that_a_setting_changes_is_named_where_the_motion_is_imposed():
     assert found.fit.test.after < 0.15 * found.fit.test.before
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_condition_that_does_nothing_is_not_named(seed):
     found = diagnose_values(record_rubbing_mass(np.full(SAMPLES, 2.0), temperature_course(seed), seed)).diagnosis
     names = {name for effect in found.effects for name in (effect.effect, *effect.class_)}

@@ -48,5 +48,6 @@ def test_the_curve_of_a_valve_is_named_with_its_formula(seed):
     assert power == pytest.approx(0.4, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_drive_in_order_has_no_curve():
     assert "discovered_law" not in effects_by_name(diagnose_values([record_driven_mass(lambda u: u, 1)]))

@@ -10,7 +10,8 @@ from analysis.diagnosis.contrast.rank_faults import rank_faults
 from equalizer.signals.recording import Recording
 
 
-@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 3])
 def test_another_recording_of_the_same_device_names_nothing(rig, seed):
     found = rig.make_contrast(seed=seed).decision
     assert found is not None and found.named is None
@@ -28,6 +29,7 @@ def test_a_fault_that_may_sit_on_either_of_two_axes_is_not_named(rig):
     assert "fy" in answer.unnamed[0][1]
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_not_to_be_considered_is_not_named(rig):
     found = rig.make_contrast("added_mass", 0.3, ("added_mass",)).decision
     assert found is not None

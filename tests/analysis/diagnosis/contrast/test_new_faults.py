@@ -14,14 +14,15 @@ from analysis.diagnosis.settings import BALANCE_HOLDS, CONTRAST_BLOCKS
 from equalizer.signals.signal import FloatArray
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "level", "number", "place"),
     [
-        pytest.param("added_mass", 0.3, "mass", "mechanism", marks=pytest.mark.slow),
-        pytest.param("viscous_damping", 2.0, "damping", "mechanism", marks=pytest.mark.slow),
-        pytest.param("coulomb_friction", 0.6, "level", "mechanism", marks=pytest.mark.slow),
+        ("added_mass", 0.3, "mass", "mechanism"),
+        ("viscous_damping", 2.0, "damping", "mechanism"),
+        ("coulomb_friction", 0.6, "level", "mechanism"),
         ("force_gain", 0.75, "gain", "actuator"),
-        pytest.param("sensor_gain", 1.3, "gain", "sensor", marks=pytest.mark.slow),
+        ("sensor_gain", 1.3, "gain", "sensor"),
     ],
 )
 def test_what_came_since_is_named_with_its_place_and_number(rig, change, level, number, place):
@@ -31,6 +32,7 @@ def test_what_came_since_is_named_with_its_place_and_number(rig, change, level, 
     assert found.named.values[number] == pytest.approx(level, rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_law_that_holds_the_named_one_takes_nothing_from_its_probability(rig):
     found = rig.make_contrast("coulomb_friction", 0.6).decision
     assert found is not None and found.named is not None

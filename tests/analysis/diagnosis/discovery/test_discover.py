@@ -51,10 +51,10 @@ def discover_laws(recording):
     ("true", "shape"),
     [
         (DRAG, "p0*abs(vx)**1.5*sign(vx)"),
-        (law("-p0*x**3", 1e5), "p0*x**3"),
-        (law("p0*fx*sin(2*pi*x/p1)", 0.2, 0.013), "p0*fx*sin(2*pi*x/p1 + p2)"),
+        pytest.param(law("-p0*x**3", 1e5), "p0*x**3", marks=pytest.mark.slow),
+        pytest.param(law("p0*fx*sin(2*pi*x/p1)", 0.2, 0.013), "p0*fx*sin(2*pi*x/p1 + p2)", marks=pytest.mark.slow),
         # The fitted stretches travel 26.5 mm, at most 14 mm to one side: just one pitch.
-        (law("p0*fx*sin(2*pi*x/p1)", 0.3, 0.026), "p0*fx*sin(2*pi*x/p1 + p2)"),
+        pytest.param(law("p0*fx*sin(2*pi*x/p1)", 0.3, 0.026), "p0*fx*sin(2*pi*x/p1 + p2)", marks=pytest.mark.slow),
         (law("p0*lag(x, p1)", 40.0, 0.05), "p0*lag(x, p1)"),
     ],
 )
@@ -67,6 +67,7 @@ def test_a_law_is_found_with_its_numbers(true, shape, seed):
     assert laws[0].numbers[1 : len(true.numbers)] == pytest.approx(true.numbers[1:], rel=0.05)
 
 
+@pytest.mark.slow
 def test_an_attraction_is_found_where_the_axis_was(seed=5):
     """Its place and exponent are hardly known apart; its force is, within 5 %."""
     recording = recorded((law("p0*(1/abs(p1 - x)**2 - 1/p1**2)", 5e-4, 0.07),), seed)

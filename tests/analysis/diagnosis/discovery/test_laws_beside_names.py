@@ -104,6 +104,7 @@ def test_the_shorter_law_takes_the_place_of_names_that_fit(hardening_context):
     assert said.judgement.verdict == "explained"
 
 
+@pytest.mark.slow
 def test_a_name_that_is_as_short_stays(hardening_context):
     context, _ = hardening_context
     cube = make_named_search(hardening_context, make_hypothesis("hardening_stiffness", k3=CUBIC))

@@ -126,6 +126,7 @@ def test_shares_are_of_what_is_no_noise():
     assert by_chance == pytest.approx(0.0076 * 1.13 / 0.13)
 
 
+@pytest.mark.slow
 def test_a_force_that_undoes_the_command_hides_no_law():
     """With mass, damping and stiffness shrinking alongside, it balances everything: it came first, and led nowhere."""
     context, known = arena_of(recorded((law("-p0*maximum(sign(-x - p1), 0)*vx", 4.0, 0.002),), 1))

@@ -82,7 +82,8 @@ def test_the_same_samples_are_searched_for_laws_once(seed=14):
     assert list_fitted_laws(once.found.after.fitted.hypothesis) == list_fitted_laws(again.found.after.fitted.hypothesis)
 
 
-@pytest.mark.parametrize("hears", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("hears", [True, False])
 def test_out_of_time_over_a_pair_the_law_that_leaves_a_part_is_kept(hears, seed=15):
     """hears: whether a law was found before the time ended."""
     context, _ = arena_of(recorded((DRAG_15,), seed))

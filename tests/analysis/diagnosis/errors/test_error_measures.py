@@ -66,6 +66,7 @@ def test_a_window_holds_many_readings_per_number_of_its_state_at_any_rate(drifti
     assert np.std(measure.residuals(heavy, ())[0]) > 0
 
 
+@pytest.mark.slow
 def test_friction_of_a_drifting_plant_is_recovered_in_windows(drifting_recording: Recording) -> None:
     findings = diagnose_plant(drifting_recording, "coulomb_friction", "viscous_damping", "hardening_stiffness")
     (effect,) = findings.diagnosis.effects

@@ -22,6 +22,7 @@ def test_a_rigid_model_is_fitted_to_the_forces_under_a_controller() -> None:
     assert fitted.stiffness[0, 0] == 0.0
 
 
+@pytest.mark.slow
 def test_friction_is_named_beside_a_model_that_was_fitted_first(controlled_recording: Recording) -> None:
     others = tuple(each.name for each in CATALOGUE if each.name not in ("coulomb_friction", "transport_delay"))
     fitted = rigid_model([controlled_recording], "fitted")

@@ -62,7 +62,7 @@ def linear_acceleration(q: float, v: float) -> float:
     return -SPRING * q - DAMPING * v
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_the_weight_of_a_pendulum_is_named_from_its_decays(seed):
     found = diagnose_values(
         make_recording(

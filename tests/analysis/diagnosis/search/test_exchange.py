@@ -200,6 +200,7 @@ def three_effects(make_context, k3):
     return context, explain_by(context, *(claim(name, **values) for name, values in physics.items()))
 
 
+@pytest.mark.slow
 def test_three_stay_where_any_two_leave_more_than_laws_of_real_devices_do(make_context):
     context, found = three_effects(make_context, 1e5)
     assert not leaves_little(found.retuned, found.steps[1])
@@ -278,6 +279,7 @@ def test_the_last_goes_where_it_only_led_the_others_out_of_a_local_minimum(satur
     assert [each.newest for each in left.rounds[-1]] == ["sensor_lag"]
 
 
+@pytest.mark.slow
 def test_a_refinement_beside_a_wrong_second_must_gain_as_much_as_in_any_step(make_context):
     rubs = PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.08})
     hardens = PlacedEffect(EFFECTS["hardening_stiffness"], (0,), {"k3": 3e6})

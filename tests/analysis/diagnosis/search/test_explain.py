@@ -156,6 +156,7 @@ def test_a_refined_law_is_not_named_for_the_plain_one_that_was_to_be_left_out(fr
     assert ONLY_REFINES in found.remarks
 
 
+@pytest.mark.slow
 def test_a_refined_law_is_named_where_its_refinement_shows(diagnosed):
     uneven = PlacedEffect(EFFECTS["asymmetric_friction"], (0,), {"level_positive": 0.3, "level_negative": 0.1})
     found = diagnose_recording(diagnosed.recorded(1, (uneven,)), diagnosed.device(1), ("asymmetric_friction",))

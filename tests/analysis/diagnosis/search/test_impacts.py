@@ -79,18 +79,21 @@ def test_errors_stay_small_where_parameters_are_correlated():
     assert errors == pytest.approx([0.34 * np.sqrt(1.5)] * 2, rel=0.01)
 
 
+@pytest.mark.slow
 def test_it_is_as_far_from_the_record_as_chance_takes_it(told):
     assert judge(told).verdict == "explained"
     assert told.after.score.worst_channel < 2.5 < told.retuned.score.worst_channel
     assert np.all(told.statistic.chance >= 0.05)
 
 
+@pytest.mark.slow
 def test_its_numbers_come_with_errors(told):
     errors = told.statistic.errors
     assert errors.shape == told.after.fitted.hypothesis.point.shape
     assert np.all((errors > 0) & (errors < 0.5))
 
 
+@pytest.mark.slow
 def test_a_gap_whose_interval_contains_zero_is_open(loose, told):
     assert not any(find_undetermined(loose[0], told))
     wide = replace(told.statistic, errors=np.ones_like(told.statistic.errors))
@@ -143,6 +146,7 @@ def test_without_time_no_second_effect_is_looked_for(diagnosed):
     assert late is None or len(late.steps) == 1
 
 
+@pytest.mark.slow
 def test_beside_play_alone_no_fault_of_the_sensor_is_named(told):
     assert len(told.steps) == 1
 
@@ -190,6 +194,7 @@ def test_two_courses_of_one_play_agree_in_their_band_powers_but_not_sample_by_sa
     assert np.std(courses[0][0] - courses[1][0], axis=0)[AXIS] > 10
 
 
+@pytest.mark.slow
 def test_what_is_left_is_reported_by_channel_and_not_by_the_sequence_of_impacts(loose, told):
     assert list_impact_remainder(loose[0].whole, told) == ()
     further = replace(told, after=replace(told.after, score=FitScore(*np.array([[1, 4, 1, 1.0]] * 3))))
@@ -219,6 +224,7 @@ def looked(loose, told, monkeypatch):
     return _ImpactSearch(fitting, CATALOGUE, DiagnosisSettings(), lambda said, share: None), asked
 
 
+@pytest.mark.slow
 def test_play_is_looked_for_before_a_third_effect_and_once(loose, told, looked):
     context, (impacts, asked) = loose[0], looked
     few = [EFFECTS["coulomb_friction"], EFFECTS["added_mass"]]
@@ -234,6 +240,7 @@ def test_play_is_looked_for_before_a_third_effect_and_once(loose, told, looked):
     assert len(asked) == 2
 
 
+@pytest.mark.slow
 def test_play_is_not_looked_for_beside_what_explains_or_is_named_or_without_time(loose, told, looked):
     context, (impacts, asked) = loose[0], looked
     for seen in (

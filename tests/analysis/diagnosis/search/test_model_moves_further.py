@@ -41,6 +41,7 @@ def far_diagnosis():
     return diagnose_with(model_off_by(9.0))
 
 
+@pytest.mark.slow
 def test_friction_is_found_beside_a_stiffness_far_from_its_calibration(far_diagnosis):
     assert far_diagnosis.diagnosis.verdict == "explained"
     (named,) = far_diagnosis.diagnosis.effects

@@ -36,6 +36,7 @@ def test_it_is_found_in_a_part_of_the_test_and_confirmed_by_the_rest(case):
     assert search.MILDER_TEST_USED in remarks
 
 
+@pytest.mark.slow
 def test_where_the_time_ends_with_the_opened_part_the_first_alone_is_named_and_that_is_said(case, monkeypatch):
     opened, find = [], search._find_with_opened
 
@@ -49,6 +50,7 @@ def test_where_the_time_ends_with_the_opened_part_the_first_alone_is_named_and_t
     assert len(opened) == 1 and OUT_OF_TIME in remarks
 
 
+@pytest.mark.slow
 def test_time_that_ends_there_hides_no_mismatch_of_the_held_out_samples(case, monkeypatch):
     def ends(*given):
         raise OutOfTimeError

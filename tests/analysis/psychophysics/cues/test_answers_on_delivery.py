@@ -57,6 +57,7 @@ def test_a_participant_who_goes_by_strength_is_found_with_the_slope_of_his_noise
     assert said.startswith("Within a direction, answers followed what was delivered")
 
 
+@pytest.mark.slow
 def test_feeling_directions_better_when_they_are_stronger_is_not_taken_for_the_cue(template):
     """The share of p below 5 % over 200 studies in which strength helps, but tells nothing: binomial, 4 errors."""
     p = [

@@ -109,6 +109,7 @@ def test_nothing_is_known_of_differences_between_frequencies_that_no_one_tells()
     assert found.overall.notes == (FAR_ABOVE_NOTE,)
 
 
+@pytest.mark.slow
 def test_a_contrast_that_is_not_told_stays_in_holms_family():
     """The data choose which contrasts are told; the family that they are corrected for was planned."""
     (study,) = simulate_studies(Crowd((5.0, 35.0, 45.0), (1e4, 2.5, 1e4)), 1, people=6)
@@ -131,6 +132,7 @@ def test_people_with_the_same_answers_have_no_spread_and_no_error_is_raised():
         assert median.lower_db == pytest.approx(median.db) == pytest.approx(median.upper_db)
 
 
+@pytest.mark.slow
 def test_flat_thresholds_are_equal_and_equivalent():
     crowd = Crowd((5.0, 15.0, 25.0), (0.5, 0.5, 0.5), frequency_sd_db=0.5)
     (study,) = simulate_studies(crowd, 1, people=24)

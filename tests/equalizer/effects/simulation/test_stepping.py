@@ -142,7 +142,7 @@ ALIKE = [("coulomb_friction", (0, 1, 2), {"level": 0.2}), ("hardening_stiffness"
     [
         ([], 1, 1), ([], 4, 1), ([], 4, 4),
         ([STIFF], 4, 1), ([STIFF], 4, 4), ([SMOOTH], 4, 4), ([LOOSE], 8, 1),
-        (SEVERAL, 8, 1), (ALIKE, 4, 1),
+        pytest.param(SEVERAL, 8, 1, marks=pytest.mark.slow), (ALIKE, 4, 1),
     ],
 )  # fmt: skip
 def test_three_axes_move_as_the_plain_recipe_says(bench, named, steps, fine):
@@ -202,7 +202,7 @@ def _heavier(of: np.ndarray, memory: np.ndarray, at: np.ndarray) -> float:
     return -of[0] * at[A_FREE] / (1 + of[0] * at[A_PER_N])
 
 
-@pytest.mark.parametrize("asked", [True, False])
+@pytest.mark.parametrize("asked", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_a_law_knows_the_acceleration_if_its_effect_asks_for_it(bench, asked):
     acts = AxisForce(_heavier, lambda model, axis, values: np.array([0.05]), acceleration=asked)
     effects = [PlacedEffect(replace(EFFECTS["coulomb_friction"], action=acts), (axis,), {}) for axis in (0, 1)]

@@ -14,6 +14,7 @@ def pairs(plants, synthetic):
     return [(estimate, smooth_response(estimate)) for estimate in estimates]
 
 
+@pytest.mark.slow
 def test_the_error_falls_by_the_factor_of_seventeen_lines_and_a_parabola(pairs, plants, synthetic):
     truth = plants.omega_like()
     for estimate, smooth in pairs:

@@ -39,6 +39,7 @@ def test_noise_does_not_bias_the_damping():
     assert np.nanmedian(damping) == pytest.approx(0.05, rel=0.06)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("frequency_hz", "damping"), [(11.0, 0.06), (22.5, 0.05), (84.0, 0.022), (110.0, 0.03), (146.0, 0.025)]
 )
@@ -50,11 +51,13 @@ def test_the_modes_of_the_synthetic_device_are_found(found, frequency_hz, dampin
         assert found_there.width_hz == pytest.approx(2 * found_there.damping_ratio * found_there.frequency_hz)
 
 
+@pytest.mark.slow
 def test_what_couples_is_distinguished_from_what_is_only_loud(found):
     eleven = nearest(found[0], 11.0)
     assert eleven.seen_in == (COUPLING, GAIN)
 
 
+@pytest.mark.slow
 def test_intervals_are_as_wide_as_the_estimates_spread(found):
     for frequency_hz in (11.0, 22.5, 84.0):
         ones = [nearest(resonances, frequency_hz) for resonances in found]

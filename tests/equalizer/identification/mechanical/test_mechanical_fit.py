@@ -156,6 +156,7 @@ def test_a_sensor_that_counts_the_other_way_is_reported():
     assert any("opposite to the command" in remark for remark in fit.remarks)
 
 
+@pytest.mark.slow
 def test_a_delay_is_found_where_there_is_one():
     source = single(noise=0.003)
     late = np.concatenate([np.zeros((4, 1)), source.response.samples[:-4]])

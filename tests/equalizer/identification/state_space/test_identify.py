@@ -51,6 +51,7 @@ def test_no_pole_outlives_the_bound(found):
     assert max(candidate.outside_gain for candidate in [found.chosen]) < 100
 
 
+@pytest.mark.slow
 def test_the_same_data_give_the_same_model(response):
     found, again = (identify(response, replace(QUICK, order=12, draws=3)) for _ in range(2))
     np.testing.assert_array_equal(again.model.parameters, found.model.parameters)
@@ -89,6 +90,7 @@ def test_two_estimates_together_are_better_than_each(plants, measuring, centre, 
     assert errors[0] < min(errors[1:])
 
 
+@pytest.mark.slow
 def test_time_records_give_a_start_of_their_own(plants, measuring, synthetic, centre):
     recording = synthetic.sweeps(plants, 4.5, 37.0, 20.0, seed=4)
     settings = replace(QUICK, order=20)

@@ -29,6 +29,7 @@ def said_of(recording) -> str:
     return " ".join(identify_recordings((recording,), QUICK).identified.remarks)
 
 
+@pytest.mark.slow
 def test_friction_is_distinguished_from_an_order_that_is_too_low(plants, rubbing, synthetic):
     said = said_of(recorded(plants, synthetic, rubbing.rubbing(modes_of(plants, 0.06), 0.2)))
     assert NOT_LINEAR in said and "the lines do not show which" in said

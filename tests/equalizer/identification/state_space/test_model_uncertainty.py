@@ -23,6 +23,7 @@ def found_at(measuring, plant, noise, deviation=0.3, **changes):
     return identify(response, replace(SETTINGS, **changes)).model
 
 
+@pytest.mark.slow
 def test_the_interval_holds_the_truth_as_often_as_it_says(measuring, plant):
     """|error| of a complex entry exceeds 1.52 standard errors in a tenth of all cases."""
     frequency = np.arange(6, 35, 3.0)

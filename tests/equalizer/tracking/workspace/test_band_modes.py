@@ -17,7 +17,7 @@ def model_of(A, B, C, D=None) -> IdentifiedModel:
     )
 
 
-@pytest.mark.parametrize("index", [0, 1, 2])
+@pytest.mark.parametrize("index", [pytest.param(0, marks=pytest.mark.slow), 1, 2])
 def test_the_device_s_own_resonances_are_found_in_an_identified_model(three, index):
     shift = 1 + 0.1 * index
     modes = band_modes(three.models[index], BAND)

@@ -235,7 +235,7 @@ def test_packets_that_were_stamped_just_before_the_next_count(period_us, late_us
     assert (parser.counts.lost, parser.counts.spoiled_bytes, parser.counts.restarts) == (0, 0, 0)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow), 3])
 def test_packets_that_come_again_or_lie_are_told_apart_among_garbled_ones(seed):
     """Repeats, old ones sent again, ones from the near future and from anywhere, two in a row as well."""
     random = np.random.default_rng(seed)

@@ -46,7 +46,7 @@ def draw_trials(random, gain: float, age: int, step_n: float, noise_n: float, am
     return force, step_n * np.round(told / step_n) if step_n else told
 
 
-@pytest.mark.parametrize("age", range(MEMORY))
+@pytest.mark.parametrize("age", [pytest.param(0, marks=pytest.mark.slow), *range(1, MEMORY)])
 def test_a_report_that_is_late_rounded_noisy_and_off_by_a_weight_is_not_suspected(age):
     random = np.random.default_rng(age)
     for _ in range(200):

@@ -36,8 +36,9 @@ def bank(tmp_path):
     return open_proof_folder(tmp_path / "bank", PLAN.seed, PLAN.brief)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(120)
-@pytest.mark.parametrize("when", ["before", pytest.param("after", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("when", ["before", "after"])
 def test_a_killed_sealing_goes_on_with_every_case_labelled(bank, when):
     killed = subprocess.run([sys.executable, "-c", KILLED, bank.path, when], check=False)
     assert killed.returncode == -signal.SIGKILL

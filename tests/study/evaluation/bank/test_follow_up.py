@@ -111,6 +111,7 @@ def test_the_same_call_continues_without_doing_anything_twice(followed):
     } == before
 
 
+@pytest.mark.slow
 def test_where_nothing_is_proposed_the_start_stays_open_and_the_random_one_is_played(tmp_path, monkeypatch):
     folder, outcome, _ = started(tmp_path / "bank", False)
     asked = []

@@ -3,6 +3,7 @@
 from dataclasses import asdict, replace
 
 import numpy as np
+import pytest
 
 from study.evaluation.bank.seal_cases import BankPlan, drawable_cases
 from study.evaluation.challenge.draw_bank import generate_case
@@ -10,6 +11,7 @@ from study.evaluation.challenge.draw_bank import generate_case
 SEED = 881_203_452
 
 
+@pytest.mark.slow
 def test_two_names_give_one_device_that_bears_its_name_and_nothing_of_its_draw():
     drawn = drawable_cases(BankPlan(SEED, cases=1, brief=True))[0]
     first, second = (generate_case(drawn, name) for name in ("a1b2", "c3d4"))

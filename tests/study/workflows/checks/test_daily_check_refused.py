@@ -142,6 +142,7 @@ def test_what_was_played_otherwise_is_not_compared(two_days, device_like, record
             check_on(device, other, MotionCallbacks(never, lambda done: None))
 
 
+@pytest.mark.slow
 def test_a_pass_ends_with_another_acceptance_and_with_a_check_that_broke_off(
     two_days, device_like, vendor, monkeypatch
 ):

@@ -71,7 +71,8 @@ def answer_or_refusal(seed, folder):
         return None
 
 
-@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 3])
 def test_any_recording_has_an_answer_or_a_refusal(seed, tmp_path):
     found = answer_or_refusal(seed, tmp_path)
     assert found is None or found.diagnosis.verdict in VERDICTS

@@ -71,6 +71,7 @@ def test_the_model_predicts_what_was_kept_for_a_test(twin):
     assert model.sensor.bandwidth_hz == 500.0
 
 
+@pytest.mark.slow
 def test_what_friction_put_into_the_damping_is_taken_off_and_said(twin):
     written = twin[1]
     # The device's own, with its friction apart: 10.2 N s/m.
@@ -81,6 +82,7 @@ def test_what_friction_put_into_the_damping_is_taken_off_and_said(twin):
     assert any("were attributed to friction and subtracted" in note for note in written.notes)
 
 
+@pytest.mark.slow
 def test_the_model_is_a_few_bodies_with_tolerances_as_a_laboratory_states_them(twin):
     model = twin[1].model
     assert model.coordinates <= 12
@@ -91,16 +93,19 @@ def test_the_model_is_a_few_bodies_with_tolerances_as_a_laboratory_states_them(t
     assert tolerance.mass_kg < 0.03 and tolerance.stiffness_n_per_m < 50.0
 
 
+@pytest.mark.slow
 def test_the_spring_is_said_to_be_in_the_command(twin):
     assert any("virtual spring of 137 N/m" in note for note in twin[1].notes)
     assert twin[1].model.provenance["from"] == "command, the virtual spring's force in it"
 
 
+@pytest.mark.slow
 def test_progress_rises_to_one(twin):
     shares = twin[2]
     assert shares == sorted(shares) and shares[-1] == 1.0
 
 
+@pytest.mark.slow
 def test_a_model_is_never_overwritten(twin):
     plan = twin[0]
     before = plan.out.read_bytes()

@@ -93,6 +93,7 @@ def test_another_frequency_does_not_stand_in_for_the_highest():
     assert verdict.means_error_db == pytest.approx(8.0 - 20 * np.log10(2.0))
 
 
+@pytest.mark.slow
 def test_a_broken_run_continues_and_any_number_of_workers_gives_the_same_numbers(run, tmp_path):
     plan = replace(PLAN, people=(3,))
     whole = run(plan)
@@ -106,6 +107,7 @@ def test_a_broken_run_continues_and_any_number_of_workers_gives_the_same_numbers
     assert judge_chunk(plan, (3, 10)) == judge_chunk(plan, (3, 10))
 
 
+@pytest.mark.slow
 def test_a_run_that_was_killed_anywhere_goes_on_with_the_same_numbers(run, tmp_path):
     """Also where it had written nothing, or a part of the plan."""
     plan = replace(PLAN, people=(2,), studies=2)

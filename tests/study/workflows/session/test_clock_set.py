@@ -66,7 +66,10 @@ def notes(folder) -> list[str]:
     return [event.text for event in read_log(folder.log).events if isinstance(event, NoteTaken)]
 
 
-@pytest.mark.parametrize(("hours", "said"), [(10, "set forward by 10 h 0 min"), (-3, "set back by 3 h 0 min")])
+@pytest.mark.parametrize(
+    ("hours", "said"),
+    [pytest.param(10, "set forward by 10 h 0 min", marks=pytest.mark.slow), (-3, "set back by 3 h 0 min")],
+)
 def test_a_clock_that_is_set_in_a_sitting_changes_nothing_and_is_said_everywhere(sitter, at, hours, said):
     seat = at(NOON, set_at=3, by_s=3600.0 * hours)
     end = conduct_new(sitter.plan(), "simulated", seat)

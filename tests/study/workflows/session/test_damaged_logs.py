@@ -237,6 +237,7 @@ def fuzz(session: Path, session_logs, count: int) -> None:
         read_by_all(session)
 
 
+@pytest.mark.slow
 def test_no_reader_fails_on_a_mutated_log(session, session_logs):
     fuzz(session, session_logs, 80)
 

@@ -211,6 +211,7 @@ def test_the_report_says_first_how_good_the_model_is(conducted, plan, tmp_path):
     assert f"S1_001: {NOT_STORED}" in page
 
 
+@pytest.mark.slow
 def test_the_report_gives_the_error_that_was_measured(plan, tmp_path):
     quality = ModelQuality(0.13, 0.12, 0.001, 0.13, 0.004, 10.0)
     write_identified_model(tmp_path / "tested.h5", rigid(quality=quality))

@@ -36,6 +36,7 @@ def test_what_is_felt_is_what_the_session_measures(sitter, monkeypatch):
     assert np.abs(across).max() < 0.3
 
 
+@pytest.mark.slow
 def test_the_same_seed_feels_the_same(sitter):
     first = [(t.level_n, t.answer) for t in conducted(sitter, "delivered").state.trials]
     sitter.data = sitter.data.parent / "again"

@@ -81,7 +81,8 @@ def equalized(small_text, tmp_path) -> Rehearsal:
     return Rehearsal(load_protocol(text, "small.toml"), text, 1, 5, tmp_path / "r", tmp_path / "model.h5")
 
 
-@pytest.mark.parametrize("locked", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.slow
+@pytest.mark.parametrize("locked", [False, True])
 def test_a_rehearsal_says_whether_its_protocol_was_locked(sitter, locked):
     rehearsal = Rehearsal(sitter.protocol, sitter.text, subjects=1, seed=5, data=sitter.data, locked=locked)
     rehearse_study(rehearsal, workers=1, on_finished=lambda _: None)

@@ -16,6 +16,7 @@ from study.devices.telemetry import Ring
 from study.session.watching.live import Live
 from study.store.sessions.live_file import write_live
 from study.workflows.views.lsl_outlets import MarkerOutlet, make_source_id
+from study.workflows.views.stream_session import measure_offset_s
 from study.workflows.views.stream_signals import LOOK_EVERY, STREAMS, SignalStreams
 
 UTC = "2026-01-01T00:00:00+00:00"
@@ -126,7 +127,7 @@ def test_force_and_acceleration_arrive_at_another_end_while_the_trial_runs(tmp_p
         streams.push(OFFSET_S)
         inlets = {name: inlet_of(pylsl, log, name) for name in ("hapteq force", "hapteq acceleration")}
         over = threading.Event()
-        sending = threading.Thread(target=send, args=(streams, outlet.clock_s, over))
+        sending = threading.Thread(target=send, args=(streams, outlet, over))
         sending.start()
         device.hold(rigs.sine(2.0))
         during = 0
@@ -146,10 +147,10 @@ def test_force_and_acceleration_arrive_at_another_end_while_the_trial_runs(tmp_p
     assert inlets["hapteq force"].info().desc().child("channels").child("channel").child_value("unit") == "N"
 
 
-def send(streams: SignalStreams, lsl_s, over: threading.Event) -> None:
+def send(streams: SignalStreams, outlet: MarkerOutlet, over: threading.Event) -> None:
     while not over.wait(0.02):
-        streams.push(lsl_s() - time.monotonic())
-    streams.push(lsl_s() - time.monotonic())
+        streams.push(measure_offset_s(outlet, time.monotonic))
+    streams.push(measure_offset_s(outlet, time.monotonic))
 
 
 def inlet_of(pylsl, log: Path, name: str):

@@ -15,6 +15,7 @@ from tests.study.workflows.diagnosis.recordings.scripted import asked_of_engine,
 pytestmark = pytest.mark.usefixtures("sketched")
 
 
+@pytest.mark.slow
 def test_where_no_model_can_be_fitted_it_is_asked_for(files, findings, tmp_path, recording):
     # A sixteenth of it: three commands and two responses are weighed for long before nothing holds.
     count = len(recording) // 16

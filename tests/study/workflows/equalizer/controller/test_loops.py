@@ -206,6 +206,7 @@ def chai3d(vendor, exported, tmp_path):
     return looped
 
 
+@pytest.mark.slow
 def test_tap_and_floor_together_are_shortened_to_the_cap_and_keep_their_direction(chai3d):
     shallow, deep = chai3d(-0.001), chai3d(-0.05)
     assert not shallow[-1].any() and not deep[-1].any()

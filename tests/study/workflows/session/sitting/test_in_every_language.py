@@ -119,6 +119,7 @@ def facts_text(end):
     return json.loads((end.folder.path / LOG_NAME).read_text("utf-8").splitlines()[0])["protocol_text"]
 
 
+@pytest.mark.slow
 def test_thresholds_are_the_same_in_every_language(sat):
     tables = {code: end_sitting(end, "2024-05-01T09:00:00+00:00").thresholds for code, (end, _, _) in sat.items()}
     assert tables["en"]

@@ -92,6 +92,7 @@ def test_practice_says_how_it_went(plan, full, seat, person):
     assert (results[0].correct_count, results[0].answer_count) == (2, 2)
 
 
+@pytest.mark.slow
 def test_the_same_seed_and_answers_give_the_same_trials_for_any_participant(plan, small_protocol, seat, tmp_path):
     """A person with forms and checks, and a simulated participant without: equal draws, equal levels."""
     person = conduct_new(plan(small_protocol), "simulated", seat)
