@@ -1,9 +1,9 @@
 """Convergence test of iterative learning control, before anything is played.
 
-On a linear device with response G, a correction of the forces u <- u + beta Gm⁻¹ e, with the model Gm and the gain
-beta, leaves the error (I - beta G Gm⁻¹) e. The largest singular value of this matrix at a spectral line is the
-worst-case share of the error that remains. Where it is below 1 at every line, the 2-norm of the error decreases
-monotonically.
+On a linear device with response G, a correction of the forces u <- u + beta L e, with the learning operator L (the
+inverse of a model) and the gain beta, leaves the error (I - beta G L) e. The largest singular value of this matrix at a
+spectral line is the worst-case share of the error that remains. Where it is below 1 at every line, the 2-norm of the
+error decreases monotonically.
 
 Reference: Bristow, Tharayil and Alleyne, A Survey of Iterative Learning Control, IEEE Control Systems 26 (2006), 96.
 """
@@ -23,7 +23,7 @@ class Convergence:
     frequency_hz: FloatArray
     """(lines,): frequencies within the band."""
     surviving: FloatArray
-    """(lines,): largest singular value of I - beta G Gm⁻¹, the largest of all draws where several responses were
+    """(lines,): largest singular value of I - beta G L, the largest of all draws where several responses were
     given."""
     beta: float
     """Gain of the correction."""
@@ -43,35 +43,36 @@ class Convergence:
 
 
 def convergence(
-    model: ComplexArray,
+    inverse: ComplexArray,
     device: ComplexArray,
     frequency_hz: FloatArray,
     band_hz: tuple[float, float],
     beta: float = 1.0,
 ) -> Convergence:
-    """Convergence of learning with the inverse of the response `model`, (lines, p, p), on a device with the response
-    `device`, (lines, p, p) or (draws, lines, p, p): a second measurement, or draws from the model's uncertainty. Both
-    in m/s² per N. Raises ValueError for other shapes, and where no line is in the band.
+    """Convergence of learning with the operator L = `inverse`, (lines, p, p), N per m/s², on a device with the response
+    `device`, (lines, p, p) or (draws, lines, p, p), m/s² per N: a second measurement, or draws from the model's
+    uncertainty. L may be singular: in one direction nothing is then corrected, and no gain converges. Raises ValueError
+    for other shapes, and where no line is in the band.
     """
     device = np.asarray(device)[np.newaxis] if np.ndim(device) == 3 else np.asarray(device)
-    if model.ndim != 3 or model.shape[1] != model.shape[2] or device.shape[1:] != model.shape:
+    if inverse.ndim != 3 or inverse.shape[1] != inverse.shape[2] or device.shape[1:] != inverse.shape:
         raise ValueError(
-            f"responses have shapes {model.shape} and {device.shape[1:]}; both must be (lines, p, p): as many forces "
-            "as responses"
+            f"inverse and response have shapes {inverse.shape} and {device.shape[1:]}; both must be (lines, p, p): "
+            "as many forces as responses"
         )
     in_band = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
     if not in_band.any():
         raise ValueError(f"no line lies in the band of {band_hz[0]:g} to {band_hz[1]:g} Hz")
-    loop_response = np.asarray(device[:, in_band] @ np.linalg.inv(model[in_band]), dtype=np.complex128)
-    survivors = np.linalg.svd(np.eye(model.shape[1]) - beta * loop_response, compute_uv=False)[..., 0]
+    loop_response = np.asarray(device[:, in_band] @ inverse[in_band], dtype=np.complex128)
+    survivors = np.linalg.svd(np.eye(inverse.shape[1]) - beta * loop_response, compute_uv=False)[..., 0]
     return Convergence(frequency_hz[in_band], survivors.max(axis=0), beta, _safe_beta(loop_response))
 
 
 def _safe_beta(loop_response: ComplexArray) -> float:
     """Upper bound, 0 to 2, of the gains with |I - beta T| < 1 for all T of `loop_response`, (..., lines, p, p). As
     matrix inequalities the condition is T + T* > beta T* T, hence T⁻¹ + T⁻* > beta I: the smallest eigenvalue is the
-    bound. 0 where a T is singular to rounding: in one direction the device then never moves, and no gain lessens an
-    error."""
+    bound. 0 where a T is singular to rounding: in one direction the device then never moves, or nothing is corrected,
+    and no gain lessens an error."""
     if np.any(np.linalg.cond(loop_response) > 1 / np.finfo(float).eps):
         return 0.0
     inverse = np.linalg.inv(loop_response)

@@ -37,8 +37,7 @@ def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta
     if not devices:
         return None
     closed_loops = np.array([_close_spring_loop(device, lines_hz, spring) for device in devices])
-    learned_by = np.asarray(np.linalg.inv(at.inverse(lines_hz, weight, spring)), dtype=np.complex128)
-    return convergence(learned_by, closed_loops, lines_hz, band_hz, beta)
+    return convergence(at.inverse(lines_hz, weight, spring), closed_loops, lines_hz, band_hz, beta)
 
 
 def _close_spring_loop(device: ComplexArray, frequency_hz: FloatArray, spring: VirtualSpring) -> ComplexArray:

@@ -123,9 +123,9 @@ def test_the_floor_from_two_plays_is_the_sensors(rubbing, plants, repetition, wa
 
 
 def test_at_a_place_shifted_by_a_fifth_divergence_is_predicted(plants, model):
-    answers = model_response(model, LINES_HZ)
-    here = convergence(answers, plants.omega_like().response(LINES_HZ), LINES_HZ, BAND_HZ)
-    there = convergence(answers, plants.omega_like(0.2, 10.0).response(LINES_HZ), LINES_HZ, BAND_HZ)
+    inverse = np.linalg.inv(model_response(model, LINES_HZ))
+    here = convergence(inverse, plants.omega_like().response(LINES_HZ), LINES_HZ, BAND_HZ)
+    there = convergence(inverse, plants.omega_like(0.2, 10.0).response(LINES_HZ), LINES_HZ, BAND_HZ)
     assert here.converges
     assert here.safe_beta == pytest.approx(2, abs=1e-6)
     assert not there.converges
@@ -133,34 +133,42 @@ def test_at_a_place_shifted_by_a_fifth_divergence_is_predicted(plants, model):
 
 
 def test_the_safe_gain_is_where_errors_begin_to_grow(plants, model):
-    answers, device = model_response(model, LINES_HZ), plants.omega_like(0.1, 5.0).response(LINES_HZ)
-    safe = convergence(answers, device, LINES_HZ, BAND_HZ).safe_beta
+    inverse, device = np.linalg.inv(model_response(model, LINES_HZ)), plants.omega_like(0.1, 5.0).response(LINES_HZ)
+    safe = convergence(inverse, device, LINES_HZ, BAND_HZ).safe_beta
     assert 0 < safe < 2
-    assert convergence(answers, device, LINES_HZ, BAND_HZ, 0.999 * safe).converges
-    assert not convergence(answers, device, LINES_HZ, BAND_HZ, 1.001 * safe).converges
+    assert convergence(inverse, device, LINES_HZ, BAND_HZ, 0.999 * safe).converges
+    assert not convergence(inverse, device, LINES_HZ, BAND_HZ, 1.001 * safe).converges
 
 
 def test_no_gain_is_safe_for_a_device_that_does_not_move_in_one_direction(plants, model):
-    answers, device = model_response(model, LINES_HZ), plants.omega_like().response(LINES_HZ)
+    inverse, device = np.linalg.inv(model_response(model, LINES_HZ)), plants.omega_like().response(LINES_HZ)
     device[:, 1] = device[:, 0]
-    found = convergence(answers, device, LINES_HZ, BAND_HZ)
+    found = convergence(inverse, device, LINES_HZ, BAND_HZ)
+    assert found.safe_beta == 0
+    assert not found.converges
+
+
+def test_no_gain_is_safe_where_the_learned_inverse_corrects_one_direction_less(plants, model):
+    inverse, device = np.linalg.inv(model_response(model, LINES_HZ)), plants.omega_like().response(LINES_HZ)
+    inverse[:, 1] = inverse[:, 0]
+    found = convergence(inverse, device, LINES_HZ, BAND_HZ)
     assert found.safe_beta == 0
     assert not found.converges
 
 
 def test_of_several_possible_devices_the_worst_counts(plants, model):
-    answers = model_response(model, LINES_HZ)
+    inverse = np.linalg.inv(model_response(model, LINES_HZ))
     one, other = (plants.omega_like(shift).response(LINES_HZ) for shift in (0.0, 0.1))
-    both = convergence(answers, np.stack([one, other]), LINES_HZ, BAND_HZ)
-    assert both.safe_beta == convergence(answers, other, LINES_HZ, BAND_HZ).safe_beta
+    both = convergence(inverse, np.stack([one, other]), LINES_HZ, BAND_HZ)
+    assert both.safe_beta == convergence(inverse, other, LINES_HZ, BAND_HZ).safe_beta
 
 
 def test_responses_that_do_not_belong_together_are_refused(plants, model):
-    answers = model_response(model, LINES_HZ)
+    inverse = np.linalg.inv(model_response(model, LINES_HZ))
     with pytest.raises(ValueError, match="as many forces as responses"):
-        convergence(answers, answers[:5], LINES_HZ, BAND_HZ)
+        convergence(inverse, inverse[:5], LINES_HZ, BAND_HZ)
     with pytest.raises(ValueError, match="no line lies in the band"):
-        convergence(answers, answers, LINES_HZ, (80.0, 90.0))
+        convergence(inverse, inverse, LINES_HZ, (80.0, 90.0))
 
 
 def test_at_a_shifted_place_a_smaller_gain_gets_there(rubbing, plants, repetition, wanted):
