@@ -203,7 +203,7 @@ def _parse_next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
         return extended, parse_event(event)
     except ValueError as problem:
         number = chain.lines + 1
-        if number == 1 and _has_other_version(line):
+        if number == 1 and _has_newer_version(line):
             raise StudyError(
                 "This session was written by a newer hapteq",
                 f"The log of {path.parent.name} is of a version that this program does not know.",
@@ -223,14 +223,16 @@ def _parse_next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
         ) from problem
 
 
-def _has_other_version(line: bytes) -> bool:
-    """Whether a first line opens a session in another version of the format than `SESSION_VERSION`, the first."""
+def _has_newer_version(line: bytes) -> bool:
+    """Whether a first line opens a session in a later version of the format than `SESSION_VERSION`."""
     try:
         first_event = json.loads(line)
     except (ValueError, RecursionError):
         return False
-    is_session = isinstance(first_event, dict) and first_event.get("format") == SESSION_FORMAT
-    return is_session and first_event.get("version") != SESSION_VERSION
+    if not isinstance(first_event, dict) or first_event.get("format") != SESSION_FORMAT:
+        return False
+    version = first_event.get("version")
+    return isinstance(version, int) and version > SESSION_VERSION
 
 
 def _write_all(descriptor: int, data: bytes) -> None:

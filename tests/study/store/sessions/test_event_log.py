@@ -85,6 +85,15 @@ def test_a_log_of_a_newer_version_is_called_newer_and_not_damaged(tmp_path):
         read_log(path)
 
 
+@pytest.mark.parametrize("version", ["0", "-1", "true", '"2"', "null", "1.5"])
+def test_a_log_of_no_version_is_damaged_and_not_newer(tmp_path, version):
+    path = tmp_path / "P01_001" / "events.jsonl"
+    path.parent.mkdir()
+    path.write_text(f'{{"event": "session_opened", "format": "hapteq-session", "version": {version}}}\n')
+    with pytest.raises(StudyError, match="The session log is damaged|is not an event that this version knows"):
+        read_log(path)
+
+
 def test_ctrl_c_in_the_middle_of_a_write_leaves_no_half_line(written, monkeypatch):
     before = written.read_bytes()
     real = os.write
