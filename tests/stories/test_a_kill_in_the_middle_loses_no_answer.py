@@ -35,7 +35,6 @@ def check(results: list[dict], sessions: int) -> None:
         assert [r["session"] for r in results if not r[fact]] == [], fact
 
 
-@pytest.mark.slow
 def test_a_few_killed_sessions_finish_with_the_same_results(tmp_path, small_text):
     results = run(tmp_path, 2, seed=5, text=small_text)
     check(results, 2)

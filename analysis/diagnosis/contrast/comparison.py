@@ -26,15 +26,14 @@ class JudgedFault:
     gain: float
     """Error with the fault over the error with it undone, less 1."""
     control_gain: float
-    """The largest gain between stretches of one set, less `median_control_gain`."""
-    median_control_gain: float
-    """Median gain between stretches of one set: the gain due to the flexibility of the fault alone."""
+    """The largest gain between stretches of one set, less their median: the gain due to the flexibility of the fault
+    alone."""
     share: float
     """Share of the excess error that the fault explains; excess: see `Comparison.excess`."""
     held_out_squares: float
     """Cross-validated sum of squares of the faulty set."""
     gain_low: float
-    """Lower confidence bound of the gain less `median_control_gain`, by bootstrap over blocks."""
+    """Lower confidence bound of the gain less the median gain between stretches of a set, by bootstrap over blocks."""
     control_excess: float
     """The largest excess between stretches of one set, in the faulty one with the fault undone; see `Comparison`."""
 

@@ -231,7 +231,6 @@ def _judge_fault(
         errors=errors,
         gain=baseline_fit.error / max(error, 1e-300) - 1,
         control_gain=max([0.0, *gains]) - median_control_gain,
-        median_control_gain=median_control_gain,
         share=(baseline_fit.error - error) / excess if excess > 0 else 0.0,
         held_out_squares=held_out_squares,
         gain_low=float(np.quantile(drawn_gains, BOOTSTRAP_LEVEL)),

@@ -105,10 +105,6 @@ class BandPowerFit:
     errors: FloatArray
     """(parameters,): standard errors of the point; empty before a step."""
 
-    def log_amplitude_ratio(self, problem: BandPowerProblem) -> FloatArray:
-        """(stretches, bands, c): ln of the measured over the predicted amplitude; NaN below the noise."""
-        return np.asarray(problem.power.measured - self.predicted)
-
 
 def evaluate_hypothesis(problem: BandPowerProblem, deviations: FloatArray, hypothesis: Hypothesis) -> BandPowerFit:
     """Predicted band powers and their cost at given parameters, without fitting. The cost is infinite where a

@@ -28,8 +28,6 @@ class LevelTrend:
     whole_band: bool
     """True: the whole driven band; False: one octave of it."""
     kind: Kind
-    relative_db: float
-    """Rms distortion over the rms response on driven lines, at the highest level (dB)."""
     p_value: float
     """p-value of no distortion: the smallest over the levels times their number (Bonferroni)."""
     db_per_doubling: float | None
@@ -78,7 +76,7 @@ def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distorti
     if key[4]:
         band = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)
         key = (*key[:3], band, *key[4:])
-    return LevelTrend(*key, float(relative_db[-1]), p_value, slope, bool(significant.any() and not significant[0]))
+    return LevelTrend(*key, p_value, slope, bool(significant.any() and not significant[0]))
 
 
 def _slope_with_limits(

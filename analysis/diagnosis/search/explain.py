@@ -60,8 +60,6 @@ MOST_REFITTED_RIVALS = 3
 class Statistic:
     """A statistic of the response, by which candidates are compared where waveforms cannot be predicted."""
 
-    name: str
-    """Name of the statistic."""
     chance: FloatArray
     """(c,): chance variation of the statistic, between two simulations of one model; used in place of the noise."""
     errors: FloatArray

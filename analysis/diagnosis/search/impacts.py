@@ -51,8 +51,6 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.starts.evidence import Evidence
 
-STATISTIC_NAME = "band power of the response"
-"""Name of the compared quantity (`Statistic`)."""
 GAP_FACTORS = np.geomspace(0.02, 5.0, 13)
 """Starting values of the gap, relative to the estimated gap. By hand."""
 FIRST_FIT_ROUNDS = 5
@@ -205,7 +203,7 @@ def _judge_play(
         if is_as_good(comparison.score_candidate(rival_pair.deviations, rival_pair.hypothesis), best_candidate):
             return None
     rivals = sorted([*rivals, *waveform_candidates], key=lambda rival: rival.score.mean_log_error)
-    statistic = Statistic(STATISTIC_NAME, comparison.chance, best_fit.errors)
+    statistic = Statistic(comparison.chance, best_fit.errors)
     rounds = ((play_candidate, *rivals), *((pair_candidates,) if pair_candidates else ()))
     steps = (play_candidate, *pair_candidates[:1])
     return Explanation(given_candidate, retuned_candidate, best_candidate, rounds, steps, statistic)

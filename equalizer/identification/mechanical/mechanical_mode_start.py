@@ -38,8 +38,6 @@ class ModeStart:
     structure: Structure
     unknowns: FloatArray
     frequency_hz: float
-    explained_squares: float
-    """Fall of the residual sum of squares by the mode, to first order in its mass."""
 
 
 def estimate_mode_starts(
@@ -59,13 +57,14 @@ def estimate_mode_starts(
             columns = _mode_columns(motions, current.structure, 2 * np.pi * frequency_hz, damping_ratio)
             columns = columns - tangent @ (tangent.T @ columns)
             coefficients = solve_scaled(columns, misfit)
+            # Fall of the residual sum of squares by the mode, to first order in its mass.
             explained_squares = float(misfit @ misfit - np.sum((misfit - columns @ coefficients) ** 2))
             candidates.append((explained_squares, float(frequency_hz), damping_ratio, coefficients))
     chosen: list[tuple[float, float, float, FloatArray]] = []
     for candidate in sorted(candidates, key=lambda item: -item[0]):
         if all(abs(np.log(candidate[1] / accepted[1])) > 0.1 for accepted in chosen):
             chosen.append(candidate)
-    return tuple(_make_start(current, *candidate) for candidate in chosen[:most_starts])
+    return tuple(_make_start(current, *candidate[1:]) for candidate in chosen[:most_starts])
 
 
 def _tangent_basis(groups: Sequence[LineGroup], current: RefinedFit[Structure], misfit: FloatArray) -> FloatArray:
@@ -148,11 +147,7 @@ def _mode_columns(
 
 
 def _make_start(
-    current: RefinedFit[Structure],
-    explained_squares: float,
-    frequency_hz: float,
-    damping_ratio: float,
-    coefficients: FloatArray,
+    current: RefinedFit[Structure], frequency_hz: float, damping_ratio: float, coefficients: FloatArray
 ) -> ModeStart:
     structure, inputs = current.structure, current.structure.inputs
     extended = replace(structure, modes=structure.modes + 1)
@@ -180,4 +175,4 @@ def _make_start(
     )
     mode_slice = extended.slices["modes"]
     unknowns[mode_slice.stop - len(mode_unknowns) : mode_slice.stop] = mode_unknowns
-    return ModeStart(extended, unknowns, frequency_hz, explained_squares)
+    return ModeStart(extended, unknowns, frequency_hz)

@@ -80,14 +80,10 @@ def test_errors_stay_small_where_parameters_are_correlated():
 
 
 @pytest.mark.slow
-def test_it_is_as_far_from_the_record_as_chance_takes_it(told):
+def test_it_is_as_far_from_the_record_as_chance_takes_it_and_its_parameters_have_errors(told):
     assert judge(told).verdict == "explained"
     assert told.after.score.worst_channel < 2.5 < told.retuned.score.worst_channel
     assert np.all(told.statistic.chance >= 0.05)
-
-
-@pytest.mark.slow
-def test_its_numbers_come_with_errors(told):
     errors = told.statistic.errors
     assert errors.shape == told.after.fitted.hypothesis.point.shape
     assert np.all((errors > 0) & (errors < 0.5))

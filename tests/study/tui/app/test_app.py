@@ -194,7 +194,6 @@ def test_an_engine_that_dies_leaves_a_panel_and_a_way_on(sitting, log):
     assert app.outcome.error.saved == "1 answer is on disk."
 
 
-@pytest.mark.slow
 def test_an_event_loop_that_hangs_frees_the_hand(sitting, log):
     async def story(person: Person) -> None:
         await person.until("TrialScreen")

@@ -24,7 +24,6 @@ def changed_kinds(baseline, today) -> set[str]:
     return {change.kind for change in compare_recordings(baseline, today) if change.changed}
 
 
-@pytest.mark.slow
 def test_an_unchanged_device_passes_and_what_was_planted_is_named(recorded):
     baseline = recorded(1)
     assert changed_kinds(baseline, recorded(2)) == set()
@@ -77,7 +76,6 @@ def test_a_handle_that_does_not_move_any_more_has_changed():
     assert "the handle did not move" in found.value and found.wrong
 
 
-@pytest.mark.slow
 def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, stepped_stub, capsys):
     _, check = two_days
     assert last_check(INFO).value == "none yet" and last_check(INFO).warning
