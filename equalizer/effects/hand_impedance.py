@@ -62,5 +62,5 @@ EFFECT = Effect(
     action=Structure(_change),
     starts=_starts,
     sites=("each",),
-    simpler=("added_mass",),
+    simpler=("added_mass", "viscous_damping"),
 )

@@ -20,7 +20,7 @@ References: Ljung, System Identification (1999), section 16.6 (validation on fre
 Control Systems 27(5):58 (2007) (laws by inverse dynamics, validated by simulation).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,6 +46,7 @@ from analysis.diagnosis.search.search_context import FittedCandidate, SearchCont
 from analysis.diagnosis.search.verdict import Judgement, SearchResult, as_good_as_noise
 from analysis.diagnosis.settings import CONFIRMED_LEAVES, HELD_OUT_ERROR, INTERVAL_FACTOR
 from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
 
 INTERVAL_HALF_WIDTH = 1.96 * INTERVAL_FACTOR
@@ -201,8 +202,8 @@ def _fit_steps(
 
 def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constants: int) -> int | None:
     """Index of a named law that may be absent; None if there is none. A law may be absent if the intervals of all
-    parameters that can make it vanish contain the vanishing value, or those of all signed parameters that its special
-    case lacks. Where the law only refines another of its family, or is outside the catalogue, one such parameter is
+    parameters that can make it vanish contain the vanishing value, or those of all signed parameters that a special
+    case of it lacks. Where the law only refines another of its family, or is outside the catalogue, one parameter is
     enough. errors: standard errors of the parameters; constants: number of constant forces before the laws."""
     first_parameter, hypothesis = 0, explanation.steps[-1].fitted.hypothesis
     law_families = [family_of(claim.effect.name) for claim in hypothesis.claims]
@@ -211,8 +212,8 @@ def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constan
         any_suffices = (
             index > constants and law_families[index] in law_families[constants:index]
         ) or claim.effect.law is not None
-        special_case_names = {parameter.name for name in claim.effect.simpler for parameter in EFFECTS[name].parameters}
-        undetermined, extra_undetermined = [], []
+        undetermined: list[bool] = []
+        zero_by_name: dict[str, bool] = {}
         for parameter_index, parameter in enumerate(free_parameters, first_parameter):
             vanishing_distance = {
                 "log": 1.0,
@@ -221,14 +222,26 @@ def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constan
             }[parameter.scale]
             if any_suffices or parameter.none is not None:
                 undetermined.append(INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance)
-            if special_case_names and parameter.scale == "signed" and parameter.name not in special_case_names:
-                extra_undetermined.append(INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance)
+            if claim.effect.simpler and parameter.scale == "signed":
+                zero_by_name[parameter.name] = INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance
         if index >= constants and (
-            any(undetermined) if any_suffices else _has_only_true(undetermined) or _has_only_true(extra_undetermined)
+            any(undetermined)
+            if any_suffices
+            else _has_only_true(undetermined) or _may_be_special_case(claim.effect, zero_by_name)
         ):
             return index - constants
         first_parameter += len(free_parameters)
     return None
+
+
+def _may_be_special_case(effect: Effect, zero_by_name: Mapping[str, bool]) -> bool:
+    """Whether all signed parameters that a special case of the effect lacks may be zero. zero_by_name: whether the
+    interval of a signed parameter contains zero."""
+    special_cases = [{parameter.name for parameter in EFFECTS[name].parameters} for name in effect.simpler]
+    return any(
+        _has_only_true([zero_by_name[name] for name in zero_by_name if name not in kept_names])
+        for kept_names in special_cases
+    )
 
 
 def _has_only_true(flags: Sequence[bool]) -> bool:

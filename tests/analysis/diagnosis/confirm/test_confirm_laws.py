@@ -32,6 +32,7 @@ DRY = ("coulomb_friction", {"level": 2.0})
 BENDING = ("presliding_hysteresis", {"level": 0.5, "stiffness": 100.0})
 STOP = ("end_stop", {"position": 0.01, "stiffness": 1e4, "opposite": 0.0})
 BENT = ("position_dependent_friction", {"level": 0.5, "slope_per_m": 9.0, "bend_per_m2": 4.0})
+HAND = ("hand_impedance", {"mass": 0.1, "damping": 5.0, "stiffness": 200.0})
 RIPPLE = ("cogging", {"amplitude": 0.5, "pitch": 0.01, "phase": 0.0})
 
 
@@ -55,10 +56,15 @@ def make_explanation(*laws):
         ((STOP,), (OPEN, SURE), None),
         ((BENT,), (SURE, 9.0 * OPEN, 4.0 * SURE), None),
         ((BENT,), (SURE, 9.0 * OPEN, 4.0 * OPEN), 0),
+        ((HAND,), (OPEN, SURE, SURE), None),
+        ((HAND,), (SURE, SURE, OPEN), None),
+        ((HAND,), (SURE, OPEN, OPEN), 0),
+        ((HAND,), (OPEN, SURE, OPEN), 0),
     ],
     ids=[
         "all known", "refinement open", "secondary open alone", "main open", "another family", "first open",
         "no stiffness", "place open", "bent", "not shown to be bent",
+        "damped and stiff", "heavy and damped", "heavy alone", "damped alone",
     ],
 )  # fmt: skip
 def test_a_law_goes_by_its_main_number_and_a_refinement_by_any(laws, errors, dropped):
