@@ -25,7 +25,7 @@ from analysis.diagnosis.errors.hypothesis import (
     remove_claim,
 )
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
-from analysis.diagnosis.errors.refine_band_power import refine_band_power
+from analysis.diagnosis.errors.refine_band_power import refine_band_power, weight_by_chance_variation
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.search.band_power_comparison import (
@@ -39,11 +39,11 @@ from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.identifiability import find_undetermined
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.second_effect_with_play import (
+    NEAR_CHANCE,
     PLAY,
     RIVAL,
     SecondEffects,
-    fit_second_effects,
-    suggest_second_effects,
+    search_second_effects,
 )
 from analysis.diagnosis.search.time_budget import unlimited_time
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, PEAKED_KURTOSIS, VARIES_ERROR
@@ -79,6 +79,10 @@ def explain_impacts(
     placed_fits = sorted((_fit_claim(problem, evidence, claim) for claim in play_claims), key=lambda claim: claim.cost)
     if placed_fits[0].cost >= evaluate_hypothesis(problem, given_fit.deviations, NO_EFFECTS).cost:
         return None
+    chance_weighted = weight_by_chance_variation(problem, placed_fits[0])
+    retuned_deviations = explanation.retuned.fitted.deviations
+    if evaluate_hypothesis(chance_weighted, retuned_deviations, NO_EFFECTS).cost <= NEAR_CHANCE:
+        return None  # the band powers of the model without play differ from the recorded ones by chance alone
     play_fit = refine_band_power(problem, placed_fits[0])
     rivals = list(placed_fits[1:])
     if RIVAL in effects:
@@ -87,10 +91,9 @@ def explain_impacts(
     play_comparison = comparison_of(context, play_fit)
     play_candidate = play_comparison.score_candidate(play_fit.deviations, play_fit.hypothesis)
     is_explained = worst_part(play_candidate) <= EXPLAINED_BY_CHANCE
-    second_effects = SecondEffects((), complete=is_explained)
-    if not is_explained and time_left():
-        suggested = suggest_second_effects(context, explanation, play_fit, catalogue)
-        second_effects = fit_second_effects(context, problem, play_fit, suggested, time_left)
+    second_effects = SecondEffects((), complete=True)
+    if not is_explained:
+        second_effects = search_second_effects(context, explanation, problem, play_fit, catalogue, time_left)
     fits = (play_fit, second_effects.fits)
     named = _name_confirmed(context, explanation, problem, fits, rival_hypotheses, play_comparison)
     return named and replace(named, ended_early=named.ended_early or not second_effects.complete)

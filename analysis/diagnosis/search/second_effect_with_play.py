@@ -32,8 +32,10 @@ falls. They cover a decade and a half downwards, where the scatter of impacts le
 MOST_FITTED, FIRST_ROUNDS, MOST_REFINED = 6, 3, 3
 """Most effects, of different names, that are fitted as a second effect with play; steps of that first fit, in which the
 model's parameters are fixed; and most of the fits that are refined, which takes ten times as long. By hand."""
+CHANCE_COST = 1.0
+"""Expected cost of the right hypothesis: chance variation alone, by the definition of the weights."""
 NEAR_CHANCE = 1.2
-"""Cost at which no further candidate is fitted: the difference is then the chance variation's. By hand."""
+"""Cost at which nothing further is fitted: the difference is then the chance variation's. By hand."""
 BATCH_SIZE = 8
 """Candidates that are evaluated between two looks at the time."""
 
@@ -48,7 +50,35 @@ class SecondEffects:
     """Whether the time sufficed for all candidates."""
 
 
-def suggest_second_effects(
+def search_second_effects(
+    context: SearchContext,
+    explanation: Explanation,
+    problem: BandPowerProblem,
+    play_fit: BandPowerFit,
+    catalogue: Sequence[Effect],
+    time_left: TimeBudget,
+) -> SecondEffects:
+    """Fits of play with a second effect: those that remove at least `IMPACTS_SHARE` of the cost of play alone, on the
+    samples to fit and to choose by. None is looked for where even the right pair could not remove so much."""
+    weighted = weight_by_chance_variation(problem, play_fit)
+    play_cost = evaluate_hypothesis(weighted, play_fit.deviations, play_fit.hypothesis).cost
+    if (1 - IMPACTS_SHARE) * play_cost < CHANCE_COST:
+        return SecondEffects((), complete=True)
+    if not time_left():
+        return SecondEffects((), complete=False)
+    suggested_hypotheses = _suggest_second_effects(context, explanation, play_fit, catalogue)
+    guarded = replace(weighted, map_=context.guard.wrap(weighted.map_, SCREENING))
+    starts, has_all_starts = _evaluate_starts(guarded, play_fit, suggested_hypotheses, time_left)
+    promising = _select_best_per_effect([start for start in starts if start.cost < play_cost])[:MOST_FITTED]
+    first_fits, has_all_fits = _fit_starts(context, weighted, promising, time_left)
+    refined, has_all_refined = _refine_fits(context, (problem, weighted), first_fits[:MOST_REFINED], time_left)
+    return SecondEffects(
+        tuple(fit for cost, fit in refined if cost <= (1 - IMPACTS_SHARE) * play_cost),
+        has_all_starts and has_all_fits and has_all_refined,
+    )
+
+
+def _suggest_second_effects(
     context: SearchContext, explanation: Explanation, play_fit: BandPowerFit, catalogue: Sequence[Effect]
 ) -> list[Hypothesis]:
     """Hypotheses of a second effect in addition to play: each effect of the catalogue with starting values from the
@@ -67,43 +97,43 @@ def suggest_second_effects(
     return [*list_candidates(allowed, evidence, context.guard.wrap(context.map_, STARTING)), *fitted_hypotheses]
 
 
-def fit_second_effects(
-    context: SearchContext,
-    problem: BandPowerProblem,
-    play_fit: BandPowerFit,
-    suggested_hypotheses: Sequence[Hypothesis],
-    time_left: TimeBudget,
-) -> SecondEffects:
-    """Fits of play with a second effect: those that remove at least `IMPACTS_SHARE` of the cost of play alone, on the
-    samples to fit and to choose by."""
-    weighted = weight_by_chance_variation(problem, play_fit)
-    play_cost = evaluate_hypothesis(weighted, play_fit.deviations, play_fit.hypothesis).cost
-    guarded = replace(weighted, map_=context.guard.wrap(weighted.map_, SCREENING))
-    starts, is_complete = _evaluate_starts(guarded, play_fit, suggested_hypotheses, time_left)
-    promising = _select_best_per_effect([start for start in starts if start.cost < play_cost])[:MOST_FITTED]
+def _fit_starts(
+    context: SearchContext, weighted: BandPowerProblem, starts: Sequence[BandPowerFit], time_left: TimeBudget
+) -> tuple[list[BandPowerFit], bool]:
+    """Each start fitted with the model's parameters fixed, the likeliest first, and whether the time sufficed for
+    all."""
     single = replace(weighted, ensemble=1)
-    guarded_map = context.guard.wrap(map, FITTING)
-    first_fits: list[BandPowerFit] = list(guarded_map(partial(_fit_first, single), promising))  # type: ignore[arg-type]
-    # Akaike's criterion over the compared bands: a law with more parameters must gain more.
-    bands = max(int(np.count_nonzero(weighted.weights)), 1)
-    first_fits.sort(key=lambda fit: fit.cost + 2 * len(fit.hypothesis.point) / bands)
-    fits: list[tuple[float, BandPowerFit]] = []
-    for start in first_fits[:MOST_REFINED]:
-        if fits and not time_left():
-            is_complete = False
+    first_fits: list[BandPowerFit] = []
+    for start in starts:
+        if not time_left():
             break
         name = start.hypothesis.claims[-1].effect.name
+        first_fits.append(context.guard.run(name, FITTING, partial(fit_band_power, single, start, FIRST_ROUNDS), start))
+    # Akaike's criterion over the compared bands: a law with more parameters must gain more.
+    bands = max(int(np.count_nonzero(weighted.weights)), 1)
+    ranked = sorted(first_fits, key=lambda fit: fit.cost + 2 * len(fit.hypothesis.point) / bands)
+    return ranked, len(first_fits) == len(starts)
+
+
+def _refine_fits(
+    context: SearchContext,
+    problems: tuple[BandPowerProblem, BandPowerProblem],
+    first_fits: Sequence[BandPowerFit],
+    time_left: TimeBudget,
+) -> tuple[list[tuple[float, BandPowerFit]], bool]:
+    """Fits with the model's parameters and their costs, the best first, and whether the time sufficed for all.
+    problems: without weights, and weighted by the chance variation of play, for the costs."""
+    problem, weighted = problems
+    fits: list[tuple[float, BandPowerFit]] = []
+    for start in first_fits:
+        if not time_left():
+            return sorted(fits, key=lambda fit: fit[0]), False
+        name = start.hypothesis.claims[-1].effect.name
         fitted = context.guard.run(name, FITTING, partial(refine_band_power, problem, start), start)
-        cost = evaluate_hypothesis(weighted, fitted.deviations, fitted.hypothesis).cost
-        fits.append((cost, fitted))
-        if cost <= NEAR_CHANCE:
+        fits.append((evaluate_hypothesis(weighted, fitted.deviations, fitted.hypothesis).cost, fitted))
+        if fits[-1][0] <= NEAR_CHANCE:
             break
-    ranked = sorted(fits, key=lambda fit: fit[0])
-    return SecondEffects(tuple(fit for cost, fit in ranked if cost <= (1 - IMPACTS_SHARE) * play_cost), is_complete)
-
-
-def _fit_first(problem: BandPowerProblem, start: BandPowerFit) -> BandPowerFit:
-    return fit_band_power(problem, start, FIRST_ROUNDS)
+    return sorted(fits, key=lambda fit: fit[0]), True
 
 
 def _evaluate_starts(
