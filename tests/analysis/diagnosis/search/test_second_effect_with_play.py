@@ -1,18 +1,21 @@
 """The strength of a second effect is searched over a decade and a half, and fits end in order and in time."""
 
+import contextlib
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import analysis.diagnosis.search.impacts as impacts
 import analysis.diagnosis.search.second_effect_with_play as second_effect
+from analysis.diagnosis.errors.band_power_fit import BandPowerProblem
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.impacts import explain_impacts
+from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.time_budget import CountedBudget
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
@@ -21,6 +24,7 @@ from equalizer.effects.effect import PlacedEffect
 
 PLAY = SimpleNamespace(hypothesis=NO_EFFECTS, deviations=np.zeros(0), cost=9.0)
 VIEW = SimpleNamespace(map_=map)
+GAINS = [hypothesis_of_claim(Claim(EFFECTS["sensor_gain"], "one", (0,)), [{"gain": 1.1}])]
 
 
 def friction(level_n: float):
@@ -84,8 +88,55 @@ def test_of_each_effect_only_its_best_start_is_kept(true_level):
     assert level_of(best) == pytest.approx(1.1)
 
 
-@pytest.mark.slow
-def test_a_dead_band_that_no_waveform_shows_is_named_with_play(diagnosed):
+@pytest.fixture
+def search_at_cost(monkeypatch):
+    """A search whose play alone leaves the given cost, and which refines nothing; with the names of what it fits."""
+
+    def search(play_cost: float, calls: int):
+        fitted_names: list[str] = []
+        context = SimpleNamespace(guard=Guard())
+        problem = BandPowerProblem(SimpleNamespace(), SimpleNamespace(), map)
+        monkeypatch.setattr(second_effect, "weight_by_chance_variation", lambda problem, fit: problem)
+        monkeypatch.setattr(
+            second_effect,
+            "evaluate_hypothesis",
+            lambda problem, deviations, hypothesis: SimpleNamespace(
+                hypothesis=hypothesis, deviations=deviations, cost=play_cost if hypothesis is NO_EFFECTS else 1.0
+            ),
+        )
+        monkeypatch.setattr(second_effect, "_suggest_second_effects", lambda *_: [friction(1.0), *GAINS])
+        monkeypatch.setattr(BandPowerProblem, "weights", np.ones(1))
+
+        def fit(problem, start, rounds=0):
+            fitted_names.append(start.hypothesis.claims[-1].effect.name)
+            return start
+
+        monkeypatch.setattr(second_effect, "fit_band_power", fit)
+        monkeypatch.setattr(second_effect, "refine_band_power", fit)
+        found = second_effect.search_second_effects(context, None, problem, PLAY, CATALOGUE, CountedBudget(calls))
+        return found, fitted_names
+
+    return search
+
+
+@pytest.mark.parametrize(("play_cost", "tried"), [(0.8, False), (2.4, False), (2.6, True), (13.0, True)])
+def test_a_second_effect_is_looked_for_only_where_it_can_remove_three_fifths(search_at_cost, play_cost, tried):
+    """Chance alone leaves a cost of 1: of 2.5 three fifths are above it."""
+    found, fitted_names = search_at_cost(play_cost, 99)
+    assert found.complete
+    assert bool(found.fits) == bool(fitted_names) == tried
+
+
+@pytest.mark.parametrize(("calls", "count"), [(0, 0), (1, 0), (2, 1), (3, 2), (99, 3)])
+def test_each_fit_ends_in_time(search_at_cost, calls, count):
+    found, fitted_names = search_at_cost(13.0, calls)
+    assert len(fitted_names) == count
+    assert found.complete == (calls == 99)
+
+
+@pytest.fixture(scope="module")
+def recorded(diagnosed):
+    """A search of a device with play and a dead band, before anything was found."""
     play = {"gap": 5e-5, "motor_mass": 0.06, "contact_stiffness": 2e5, "contact_damping": 5.0}
     effects = [
         PlacedEffect(EFFECTS["backlash"], (1,), play),
@@ -96,7 +147,26 @@ def test_a_dead_band_that_no_waveform_shows_is_named_with_play(diagnosed):
     context = SearchContext(chosen.measure.shorten(), chosen.measure, tuning, map)
     unchanged = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
     given = context.with_test_score(context.candidate(unchanged))
-    found = explain_impacts(context, Explanation(given, given, given, (), ()), chosen.floors, CATALOGUE)
+    return context, Explanation(given, given, given, (), ()), chosen.floors
+
+
+@pytest.mark.parametrize(("spread", "refined"), [(0.05, True), (50.0, False)], ids=["more than chance", "chance alone"])
+def test_where_chance_alone_explains_the_band_powers_play_is_not_refined(recorded, monkeypatch, spread, refined):
+    class RefinedError(Exception):
+        pass
+
+    def refuse(problem, start):
+        raise RefinedError
+
+    monkeypatch.setattr(impacts, "refine_band_power", refuse)
+    monkeypatch.setattr(impacts, "weight_by_chance_variation", lambda problem, fit: replace(problem, spread=spread))
+    with pytest.raises(RefinedError) if refined else contextlib.nullcontext():
+        assert impacts.explain_impacts(*recorded, CATALOGUE) is None
+
+
+@pytest.mark.slow
+def test_a_dead_band_that_no_waveform_shows_is_named_with_play(recorded):
+    found = impacts.explain_impacts(*recorded, CATALOGUE)
     assert [claim.effect.name for claim in found.after.fitted.hypothesis.claims] == ["backlash", "force_deadband"]
     width_n = found.after.fitted.hypothesis.list_placed_effects()[-1].values["width"]
     assert width_n == pytest.approx(0.3, rel=0.15)
