@@ -69,7 +69,16 @@ def summer_and_winter(monkeypatch) -> Iterator[None]:
 PAUSES = PauseMeter()
 IN_PROCESS = tuple(
     f"tests/study/devices/{room}/"
-    for room in ("hung_driver", "drive", "safe", "governor", "loop_process", "accelerometer", "replay")
+    for room in (
+        "hung_driver",
+        "drive",
+        "safe",
+        "governor",
+        "loop_process",
+        "accelerometer",
+        "replay",
+        "force_dimension",
+    )
 )
 """Tests here run the haptic loop or a sensor's board in the tests' own process, or must give a loop signs of life."""
 
