@@ -12,7 +12,8 @@ from study.devices.accelerometer.serial_reader import open_serial
 from study.devices.rig import OwnClockSensor
 from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, Board, table_of, within
 
-pytestmark = pytest.mark.real_time
+# The board is a thread of this process behind a pseudo-terminal: with all cores full it may send late.
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 TONE_HZ, AMPLITUDE = 45.0, 8.0
 WORST_S = 5e-4
@@ -123,7 +124,6 @@ def test_a_board_that_falls_silent_leaves_the_ticks_without_a_value():
     assert (sensed.health.unplaced_ticks, sensed.health.missing) == (200, 1.0)
 
 
-@pytest.mark.may_be_late  # once 7 ms early with both cores full, in no run by itself
 def test_a_trial_on_the_driver_is_recorded_on_its_ticks_missed_ones_too(stub, rigs, tmp_path, monkeypatch):
     from study.devices.clock import RealClock
     from study.devices.opening import open_device
