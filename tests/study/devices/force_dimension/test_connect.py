@@ -127,6 +127,9 @@ def test_a_failed_opening_names_the_cause_and_leaves_the_brakes_on(stub, opened,
 def test_without_a_watchdog_it_opens_where_no_hand_is_on_the_handle(stub, opened):
     stub.set("watchdog_settable", 0)
     with opened(hand=False) as device:
+        until_s = time.monotonic() + 5.0
+        while device.look().position_m is None and time.monotonic() < until_s:
+            time.sleep(0.005)
         assert device.look().position_m is not None
     assert stub.safe
 
