@@ -133,7 +133,8 @@ class _ImpactSearch:
         return self._look(result) or result
 
     def _look(self, result: SearchResult) -> SearchResult | None:
-        """The result with play, or None where play does not explain the recordings; cached (see the class)."""
+        """The result with play, or None where play does not explain the recordings; cached (see the class). Where the
+        time ended before that is known, the result as it is, which then says so."""
         if self._steps < 0 or (self._found is not None and len(result.found.steps) > self._steps):
             # Imported here, because only a diagnosis that leaves a mismatch looks for impacts.
             from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
@@ -143,7 +144,9 @@ class _ImpactSearch:
             floors, time_left = self._fitting.chosen.floors, self._settings.time_left
             explanation = explain_impacts(result.context, result.found, floors, self._catalogue, time_left)
             self._found, self._steps = None, len(result.found.steps)
-            if explanation is not None:
+            if explanation is None and not time_left():
+                self._found = replace(result, remarks=tuple(dict.fromkeys((*result.remarks, OUT_OF_TIME))))
+            elif explanation is not None:
                 remarks = (IMPACTS_COMPARED, *((OUT_OF_TIME,) if explanation.ended_early else ()))
                 self._found = SearchResult(result.context, explanation, judge(explanation), remarks)
         return self._found

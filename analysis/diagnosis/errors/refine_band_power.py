@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.errors.band_power_fit import BandPowerFit, BandPowerProblem, fit_band_power, perturb
 from analysis.diagnosis.errors.output_error import expect_gain
+from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 SIMULATIONS = 4
@@ -18,18 +19,18 @@ LEAST_GAIN = 0.02
 """Expected relative reduction of the cost above which a further linearisation follows."""
 
 
-def refine_band_power(problem: BandPowerProblem, start: BandPowerFit) -> BandPowerFit:
+def refine_band_power(weighted: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
     """The joint fit of the hypothesis's and the model's parameters. The sensitivity to the model's parameters is
-    renewed up to `ROUNDS` times, because an effect changes it."""
-    problem = weight_by_chance_variation(problem, start)
+    renewed up to `ROUNDS` times, because an effect changes it, while time is left. weighted: by the chance variation of
+    `start` (`weight_by_chance_variation`)."""
     best = start
     last_gain = 0.0
     for _ in range(ROUNDS):
-        problem = replace(problem, jacobian_by_deviations=_differentiate_by_deviations(problem, best))
+        problem = replace(weighted, jacobian_by_deviations=_differentiate_by_deviations(weighted, best))
         refined = fit_band_power(problem, best, STEPS)
         gain = 1 - refined.cost / best.cost if best.cost > 0 else 0.0
         best, expected, last_gain = refined, expect_gain(gain, last_gain), gain
-        if expected <= LEAST_GAIN:
+        if expected <= LEAST_GAIN or not time_left():
             break
     return best
 

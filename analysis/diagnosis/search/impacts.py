@@ -65,8 +65,8 @@ def explain_impacts(
     time_left: TimeBudget = unlimited_time,
 ) -> Explanation | None:
     """The explanation by play, compared by band power; None where the response is regular, where play does not explain
-    it, or where responses are not simulated freely. floors: noise per recording. time_left: called before a second
-    effect is looked for."""
+    it, where the time ends before that is known, or where responses are not simulated freely. floors: noise per
+    recording. time_left: called before each refinement, and between its linearisations."""
     effects = {effect.name: effect for effect in catalogue}
     if PLAY not in effects or not isinstance(context.whole, FreeSimulation):
         return None
@@ -83,7 +83,9 @@ def explain_impacts(
     retuned_deviations = explanation.retuned.fitted.deviations
     if evaluate_hypothesis(chance_weighted, retuned_deviations, NO_EFFECTS).cost <= NEAR_CHANCE:
         return None  # the band powers of the model without play differ from the recorded ones by chance alone
-    play_fit = refine_band_power(problem, placed_fits[0])
+    if not time_left():
+        return None
+    play_fit = refine_band_power(chance_weighted, placed_fits[0], time_left)
     rivals = list(placed_fits[1:])
     if RIVAL in effects:
         rivals.append(_fit_claim(problem, evidence, Claim(effects[RIVAL], "one", play_fit.hypothesis.claims[0].sites)))
@@ -136,7 +138,10 @@ def _needs_gap(comparison: BandPowerComparison, problem: BandPowerProblem, best_
         hypothesis_of_claim(replace(claim, effect=gapless_effect), [{**placed_effect.values, "gap": smallest_gap}]),
         remove_claim(best_fit.hypothesis, 0),
     )
-    gapless_fit = refine_band_power(problem, evaluate_hypothesis(problem, best_fit.deviations, hypothesis))
+    gapless_start = evaluate_hypothesis(problem, best_fit.deviations, hypothesis)
+    gapless_fit = refine_band_power(
+        weight_by_chance_variation(problem, gapless_start), gapless_start, time_left=unlimited_time
+    )
     if not np.isfinite(gapless_fit.cost):
         return False
     scored = [comparison.score_candidate(fitted.deviations, fitted.hypothesis) for fitted in (best_fit, gapless_fit)]

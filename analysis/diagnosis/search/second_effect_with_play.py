@@ -102,17 +102,23 @@ def _fit_starts(
 ) -> tuple[list[BandPowerFit], bool]:
     """Each start fitted with the model's parameters fixed, the likeliest first, and whether the time sufficed for
     all."""
-    single = replace(weighted, ensemble=1)
+    guarded_map = context.guard.wrap(map, FITTING)
+    fit_first = partial(_fit_first, replace(weighted, ensemble=1))
     first_fits: list[BandPowerFit] = []
+    is_complete = True
     for start in starts:
-        if not time_left():
+        is_complete = time_left()
+        if not is_complete:
             break
-        name = start.hypothesis.claims[-1].effect.name
-        first_fits.append(context.guard.run(name, FITTING, partial(fit_band_power, single, start, FIRST_ROUNDS), start))
+        first_fits += guarded_map(fit_first, [start])  # type: ignore[arg-type]
     # Akaike's criterion over the compared bands: a law with more parameters must gain more.
     bands = max(int(np.count_nonzero(weighted.weights)), 1)
     ranked = sorted(first_fits, key=lambda fit: fit.cost + 2 * len(fit.hypothesis.point) / bands)
-    return ranked, len(first_fits) == len(starts)
+    return ranked, is_complete
+
+
+def _fit_first(problem: BandPowerProblem, start: BandPowerFit) -> BandPowerFit:
+    return fit_band_power(problem, start, FIRST_ROUNDS)
 
 
 def _refine_fits(
@@ -129,11 +135,15 @@ def _refine_fits(
         if not time_left():
             return sorted(fits, key=lambda fit: fit[0]), False
         name = start.hypothesis.claims[-1].effect.name
-        fitted = context.guard.run(name, FITTING, partial(refine_band_power, problem, start), start)
+        fitted = context.guard.run(name, FITTING, partial(_refine, problem, start, time_left), start)
         fits.append((evaluate_hypothesis(weighted, fitted.deviations, fitted.hypothesis).cost, fitted))
         if fits[-1][0] <= NEAR_CHANCE:
             break
     return sorted(fits, key=lambda fit: fit[0]), True
+
+
+def _refine(problem: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
+    return refine_band_power(weight_by_chance_variation(problem, start), start, time_left)
 
 
 def _evaluate_starts(

@@ -9,6 +9,7 @@ import pytest
 
 import analysis.diagnosis.search.impacts as impacts
 import analysis.diagnosis.search.second_effect_with_play as second_effect
+import analysis.diagnosis.search_by_simulation as search_by_simulation
 from analysis.diagnosis.errors.band_power_fit import BandPowerProblem
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, hypothesis_of_claim
@@ -18,6 +19,7 @@ from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.time_budget import CountedBudget
+from analysis.diagnosis.search.verdict import OUT_OF_TIME, Judgement, SearchResult
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.coulomb_friction import EFFECT as DRY
 from equalizer.effects.effect import PlacedEffect
@@ -107,7 +109,7 @@ def search_at_cost(monkeypatch):
         monkeypatch.setattr(second_effect, "_suggest_second_effects", lambda *_: [friction(1.0), *GAINS])
         monkeypatch.setattr(BandPowerProblem, "weights", np.ones(1))
 
-        def fit(problem, start, rounds=0):
+        def fit(problem, start, _):
             fitted_names.append(start.hypothesis.claims[-1].effect.name)
             return start
 
@@ -155,13 +157,30 @@ def test_where_chance_alone_explains_the_band_powers_play_is_not_refined(recorde
     class RefinedError(Exception):
         pass
 
-    def refuse(problem, start):
+    def refuse(problem, start, time_left):
         raise RefinedError
 
     monkeypatch.setattr(impacts, "refine_band_power", refuse)
     monkeypatch.setattr(impacts, "weight_by_chance_variation", lambda problem, fit: replace(problem, spread=spread))
     with pytest.raises(RefinedError) if refined else contextlib.nullcontext():
         assert impacts.explain_impacts(*recorded, CATALOGUE) is None
+
+
+def test_play_is_not_refined_once_the_time_has_ended(recorded, monkeypatch):
+    monkeypatch.setattr(impacts, "refine_band_power", None)
+    assert impacts.explain_impacts(*recorded, CATALOGUE, CountedBudget(0)) is None
+
+
+@pytest.mark.parametrize(("calls", "said"), [(1, (OUT_OF_TIME,)), (2, ())], ids=["out of time", "no play"])
+def test_a_search_for_play_that_ends_early_is_reported(monkeypatch, calls, said):
+    monkeypatch.setattr(impacts, "explain_impacts", lambda *_: None)
+    monkeypatch.setattr(search_by_simulation, "names_discovered_law", lambda result: False)
+    fitting = SimpleNamespace(chosen=SimpleNamespace(floors=()))
+    settings = SimpleNamespace(time_left=CountedBudget(calls))
+    search = search_by_simulation._ImpactSearch(fitting, CATALOGUE, settings, lambda said, share: None)
+    context, explanation = SimpleNamespace(certain=()), SimpleNamespace(steps=())
+    result = search.at_end(SearchResult(context, explanation, Judgement("unexplained", named=False)))
+    assert (result.judgement.verdict, result.remarks) == ("unexplained", said)
 
 
 @pytest.mark.slow
