@@ -10,7 +10,8 @@ from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.serial_reader import open_serial
 from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, Board
 
-pytestmark = pytest.mark.real_time
+# The board is a thread of this process behind a pseudo-terminal: with all cores full it may send late.
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 
 def noisy(noise_mps2):
