@@ -25,6 +25,7 @@ from study.evaluation.real.injected_halves import blank_lead_responses, draw_hal
 from study.evaluation.real.real_folder import RealRecording
 from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import write_text
+from study.store.formats.diagnosis_file import MODEL_NAME
 from study.store.formats.mechanical_model_file import read_mechanical_model, write_mechanical_model
 from study.store.formats.recording_file import write_recording
 
@@ -54,7 +55,7 @@ def load_carriers(out: Path, recordings: Sequence[RealRecording], answers: Seque
     return tuple(
         Carrier(
             real_recording.name,
-            read_mechanical_model(out / real_recording.folder.name / real_recording.name / "improved.toml"),
+            read_mechanical_model(out / real_recording.folder.name / real_recording.name / MODEL_NAME),
             import_real_recording(real_recording.found_map),
         )
         for real_recording, answer in zip(recordings, answers, strict=True)

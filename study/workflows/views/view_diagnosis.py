@@ -16,7 +16,7 @@ from analysis.wording import MISSING, conjoin, format_p
 from study.errors import StudyError
 from study.session.views.archive_views import DiagnosisView
 from study.session.views.printable import printable
-from study.store.formats.diagnosis_file import read_diagnosis
+from study.store.formats.diagnosis_file import MODEL_NAME, read_diagnosis
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
 MISMATCH_HEADER = ("output", "input", "band", "amplitude", "where", "share", "p")
@@ -30,7 +30,7 @@ named effects, and the noise between repeats."""
 def diagnosis_view(path: Path) -> DiagnosisView:
     """The view of a diagnosis. path: its document; the improved model and the HTML report are looked for in the same
     folder. Raises CannotReadError or UnusableFileError where the document cannot be used."""
-    diagnosis, device = read_diagnosis(path), _device(path.parent / "improved.toml")
+    diagnosis, device = read_diagnosis(path), _device(path.parent / MODEL_NAME)
     report = path.parent / "report.html"
     view = DiagnosisView(
         path=str(path),
