@@ -36,6 +36,7 @@ def test_where_nothing_changes_nothing_is_named(session, seed):
     assert find_drifts(session(seed), 1000) == ()
 
 
+@pytest.mark.slow
 def test_more_friction_is_named_on_every_axis_with_its_number_and_time(session):
     found = find_drifts(session(1, friction_n=0.2), 1000)
     assert {(each.cause, each.axis) for each in found} == {("friction", axis) for axis in "xyz"}
@@ -73,6 +74,7 @@ def test_a_millisecond_of_delay_is_a_delay_and_nothing_else(session):
     assert found.change == pytest.approx(1e-3, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_lighter_grip_is_named_by_its_mass(session):
     found = find_drifts(session(1, hand_kg=0.045, hand_n_s_per_m=2.0, hand_n_per_m=60.0), 1000)
     masses = {each.axis: each.change for each in found if each.number == "mass"}
@@ -87,6 +89,7 @@ def test_a_firmer_grip_is_named_or_not_told_from_a_gain_and_says_so(session):
     assert all(each.cause == "grip" or "grip" in each.rivals for each in found)
 
 
+@pytest.mark.slow
 def test_two_of_each_level_are_the_yardstick_and_name_nothing_by_themselves(session):
     assert find_drifts(session(1, friction_n=0.5)[:6], 1000) == ()
     assert find_drifts([], 1000) == ()

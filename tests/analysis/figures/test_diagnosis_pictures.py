@@ -28,6 +28,7 @@ def axes_texts(figure):
     return [text.get_text() for axes in figure.axes for text in axes.texts]
 
 
+@pytest.mark.slow
 def test_a_diagnosis_has_every_picture_and_each_is_reported_in_words(friction_pictures):
     names = [picture.name for picture in friction_pictures]
     assert names == ["mismatch-map-1", "state-map", "state-loops", "signature-1", "rivals-1", "held-out", "remainder"]

@@ -30,6 +30,7 @@ def plotted_percent(axes) -> list[float]:
     return [line.get_ydata()[0] for line in axes.lines if line.get_marker() == "o"]
 
 
+@pytest.mark.slow
 def test_every_frequency_has_its_points_and_its_curve(analysis, answers):
     figure = draw_people_curves(answers, analysis.primary)
     for place, axes in enumerate(figure.axes[:5]):
@@ -52,6 +53,7 @@ def test_a_persons_curve_crosses_its_threshold_line_where_it_is_written(analysis
     assert "above the cap" in figure.axes[4].get_title(loc="left")
 
 
+@pytest.mark.slow
 def test_a_study_has_them_page_wide_as_svg_and_png(analysis):
     pictures = {picture.name: picture for picture in study_pictures(analysis)}
     for name in ("thresholds", "units", "psychometric", "psychometric-2-s02", "staircases-2-s02", "delivered"):
@@ -85,6 +87,7 @@ def test_units_stand_side_by_side_with_cuts_and_medians(analysis):
     )
 
 
+@pytest.mark.slow
 def test_thresholds_of_zero_are_left_out_of_a_ratio_scale(analysis):
     """An accelerometer that says the same all the time delivers nothing, as it says."""
     table = threshold_table(analysis.thresholds, analysis.table.frequencies_hz, "threshold_mps2")
@@ -105,6 +108,7 @@ def test_above_detection_is_the_ratio_of_both_thresholds_where_both_are(all_tria
     assert "units" in [picture.name for picture in study_pictures(analysis)]
 
 
+@pytest.mark.slow
 def test_where_nothing_was_measured_there_is_no_figure_of_units(simulate_study, protocol):
     trials = [replace(t, delivered_mps2=None, displacement_mm=None) for t in simulate_study(subjects=2)]
     assert "units" not in [picture.name for picture in study_pictures(analyse_study(trials, protocol))]

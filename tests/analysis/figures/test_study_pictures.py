@@ -43,6 +43,7 @@ def plotted_markers(figure: Figure) -> list[str]:
     return [str(line.get_marker()) for line in figure.axes[0].lines if line.get_marker() not in ("None", "_", None)]
 
 
+@pytest.mark.slow
 def test_a_study_has_its_figures_in_the_order_of_the_report(draw_pictures, simulate_study):
     assert list(draw_pictures(simulate_study(subjects=3))) == [
         "thresholds", "units", "medians", "psychometric", "psychometric-1-s01", "psychometric-2-s02",
@@ -50,6 +51,7 @@ def test_a_study_has_its_figures_in_the_order_of_the_report(draw_pictures, simul
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_every_threshold_keeps_its_participants_marker_and_is_hollow_where_the_cap_cut(
     study_drawings, study_trials, protocol
 ):
@@ -71,6 +73,7 @@ def test_each_participant_has_a_line_and_each_mean_stands_over_its_tick(study_dr
     assert [float(container.lines[0].get_xdata()[0]) for container in axes.containers] == list(axes.get_xticks())
 
 
+@pytest.mark.slow
 def test_a_run_that_the_trial_limit_stopped_is_drawn_and_said(simulate_study, protocol):
     limited = replace(protocol, staircase=replace(protocol.staircase, trial_limit=90))
     trials = simulate_study(subjects=3, true_n=(0.4, 0.4, 0.4, 0.4, float("inf")), rule=limited.staircase)

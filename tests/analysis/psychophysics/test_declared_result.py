@@ -60,6 +60,7 @@ def test_equivalence_is_asked_where_both_frequencies_are_low():
     assert pair_contrast((5.0, 25.0), values, (5.0, 25.0), 0.95).p_equivalence is not None
 
 
+@pytest.mark.slow
 def test_the_declared_contrast_is_computed_by_both_analyses_the_declared_first(hierarchical_declared, analyse_declared):
     by_model, published = hierarchical_declared.declared_result.results
     assert (by_model.analysis, by_model.declared, by_model.unit) == ("hierarchical", True, "dB")
@@ -97,6 +98,7 @@ def test_the_terminal_and_the_document_have_it(hierarchical_declared):
     assert "S07" not in json.dumps(written)  # who withdrew is named in the report alone
 
 
+@pytest.mark.slow
 def test_nothing_declared_takes_a_sentence(analyse_declared):
     undeclared = analyse_declared()
     assert undeclared.declared_result.results == ()

@@ -21,6 +21,7 @@ def test_differences_agree_with_the_paired_t_test():
         assert found.effect_size == pytest.approx(peer.statistic / np.sqrt(10))
 
 
+@pytest.mark.slow
 def test_equivalence_and_holm_agree_with_statsmodels():
     found = contrasts(HZ, VALUES, 0.95)
     for place, contrast in enumerate(found[:2], start=1):

@@ -89,6 +89,7 @@ def test_what_a_single_person_played_has_no_interval(count):
     assert found.limit.lower_hz is None or found.limit.lower_hz > 25.0
 
 
+@pytest.mark.slow
 def test_few_people_at_a_frequency_count_as_few():
     few, all_of_them = primary_analysis(with_few(STUDY, 3, 0), 3.0), primary_analysis(STUDY, 3.0)
     assert [c.participants for c in few.contrasts] == [10, 3]
@@ -122,6 +123,7 @@ def test_whole_short_runs_are_not_few_beside_the_long_ones_of_others():
     assert played.tolist() == [[True, True], [True, True], [True, False], [False, False], [True, True]]
 
 
+@pytest.mark.slow
 def test_the_fit_of_the_analysis_of_variance_must_converge_too(monkeypatch):
     few = with_few(STUDY, 3, 0)
     assert primary_analysis(few, 3.0).converged

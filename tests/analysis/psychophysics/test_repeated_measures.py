@@ -55,6 +55,7 @@ def test_differences_between_people_change_nothing():
     assert analyse(shifted).p == pytest.approx(analyse(DRUGS).p)
 
 
+@pytest.mark.slow
 def test_the_correction_keeps_its_promise_where_the_conditions_vary_unequally():
     generator = np.random.default_rng(10)
     tables = generator.normal(size=(1500, 10, 5)) * np.array([1.0, 1.0, 1.0, 3.0, 6.0])

@@ -23,6 +23,7 @@ def warnings_of(trials, protocol):
     return analyse_study(trials, protocol).warnings
 
 
+@pytest.mark.slow
 def test_a_clean_study_has_no_warning(able_trials, protocol):
     assert warnings_of(able_trials, protocol) == ()
 
@@ -31,6 +32,7 @@ def test_no_trial_is_reported(protocol):
     assert warnings_of([], protocol) == ("There are no test trials, so there is no threshold of direction.",)
 
 
+@pytest.mark.slow
 def test_a_run_that_was_broken_off_is_named(able_trials, protocol):
     cut = [trial for trial in able_trials if not (trial.subject == "s02" and trial.run == 5 and trial.trial > 20)]
     frequency = next(trial.frequency_hz for trial in able_trials if trial.subject == "s02" and trial.run == 5)
@@ -41,6 +43,7 @@ def test_a_run_that_was_broken_off_is_named(able_trials, protocol):
     assert unequal == "The frequencies have unequally many thresholds, so the comparison intervals are approximate."
 
 
+@pytest.mark.slow
 def test_thresholds_that_the_cap_cut_are_named(simulate_study, protocol):
     trials = simulate_study(subjects=5, true_n=(0.3, 0.3, 0.3, 0.3, float("inf")), seed=2)
     bounds, guessed = warnings_of(trials, protocol)
@@ -62,6 +65,7 @@ def test_few_participants_are_reported(simulate_study, protocol, subjects, sente
     assert sentence in warnings_of(simulate_study(subjects=subjects, true_n=(0.4,) * 5), protocol)
 
 
+@pytest.mark.slow
 def test_a_run_that_the_trial_limit_stopped_is_never_dropped_in_silence(simulate_study, protocol):
     limited = replace(protocol, staircase=replace(protocol.staircase, trial_limit=90))
     trials = simulate_study(subjects=5, true_n=(0.4, 0.4, 0.4, 0.4, float("inf")), seed=2, rule=limited.staircase)

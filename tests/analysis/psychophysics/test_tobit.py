@@ -35,6 +35,7 @@ def test_with_a_single_frequency_it_is_scipys_fit_of_censored_values():
     assert np.exp(2 * fit.parameters[1]) + np.exp(2 * fit.parameters[2]) == pytest.approx(sd**2, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_differences_that_the_cap_cut_are_recovered_where_cuts_are_clean():
     found, covered = [], 0
     for seed in range(40):

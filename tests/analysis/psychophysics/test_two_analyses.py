@@ -22,6 +22,7 @@ def analysis(simulate_study, protocol):
     return analyse_study(simulate_study(), protocol)
 
 
+@pytest.mark.slow
 def test_what_the_cap_hides_is_reported(analysis):
     by_model, by_means = analysis.primary.contrasts[3], analysis.mean_contrasts[3]
     assert by_model.difference_db > by_means.difference_db + 3.0
@@ -77,6 +78,7 @@ def test_where_all_guess_no_difference_is_told(protocol, simulate_study):
     assert "Both agree" not in analysis.compared and "they disagree" not in analysis.compared
 
 
+@pytest.mark.slow
 def test_each_interval_near_the_cap_carries_the_coverage_that_was_measured_for_it(analysis, protocol, simulate_study):
     page = render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z")
     for name in ("model", "means", "tobit", "tukey", "run", "one-way"):
@@ -86,6 +88,7 @@ def test_each_interval_near_the_cap_carries_the_coverage_that_was_measured_for_i
     assert low.tobit == () and "Tobit" not in render_study_report(low, (), {}, "2026-01-02T03:04:05Z")
 
 
+@pytest.mark.slow
 def test_far_below_the_cap_the_two_agree(simulate_study, protocol):
     low = analyse_study(simulate_study(true_n=(0.2, 0.2, 0.3, 0.5, 0.8)), protocol)
     assert "agree within 1 dB" in low.compared
@@ -133,6 +136,7 @@ def test_the_direction_limit_is_between_the_frequencies_around_the_cap(analysis)
     assert "this cap" in limit.words
 
 
+@pytest.mark.slow
 def test_the_declaration_is_part_of_the_analysis(simulate_study, protocol):
     declared = replace(protocol, analysis=AnalysisSettings("hierarchical", (45.0, 5.0), 10))
     assert "Declared as primary" in analyse_study(simulate_study(subjects=3), declared).declared

@@ -102,6 +102,7 @@ def test_a_full_study_is_one_page_that_needs_nothing_else(render_report, simulat
         assert words in html
 
 
+@pytest.mark.slow
 def test_the_page_can_be_read_aloud(render_report, simulate_study):
     structure = parse_page(render_report(simulate_study(subjects=1)))
     assert ("html", {"lang": "en"}) in structure.attributes
@@ -148,6 +149,7 @@ def test_one_participant_is_told_what_cannot_be_computed(render_without_figures,
     assert "not computed" in html
 
 
+@pytest.mark.slow
 def test_a_clean_study_says_that_nothing_stands_out(render_without_figures, simulate_study):
     html = render_without_figures(simulate_study(subjects=5, true_n=(0.4,) * 5, seed=2, felt=True))
     assert "No irregularities" in html
@@ -165,11 +167,13 @@ def test_detection_catch_trials_and_practice_have_sections(render_report, all_tr
     assert not re.search(r"\b(nan|inf|None)\b", html)
 
 
+@pytest.mark.slow
 def test_without_such_trials_there_is_no_such_section(render_without_figures, simulate_study, full_protocol):
     html = render_without_figures(simulate_study(subjects=3), protocol=full_protocol)
     assert not any(section in html for section in SIDE_SECTIONS)
 
 
+@pytest.mark.slow
 def test_detection_is_compared_with_direction_only_where_both_are_thresholds(all_trial_kinds, full_protocol):
     table = detection_table(analyse_study(all_trial_kinds, full_protocol))
     for _, _, felt, told, above in table.rows:
@@ -212,6 +216,7 @@ def test_without_a_cut_nothing_is_without_coverage(render_without_figures, simul
     )
 
 
+@pytest.mark.slow
 def test_runs_that_the_trial_limit_stopped_are_in_the_tables(render_without_figures, simulate_study, protocol):
     limited = replace(protocol, staircase=replace(protocol.staircase, trial_limit=90))
     trials = simulate_study(subjects=3, true_n=(0.4, 0.4, 0.4, 0.4, float("inf")), rule=limited.staircase)
@@ -220,12 +225,14 @@ def test_runs_that_the_trial_limit_stopped_are_in_the_tables(render_without_figu
     assert "missing because of the trial limit" in html
 
 
+@pytest.mark.slow
 def test_no_number_is_ever_nan(render_report, simulate_study):
     trials = [replace(trial, delivered_mps2=None) for trial in simulate_study(subjects=2) if trial.trial < 12]
     html = render_report(trials)
     assert not re.search(r"\b(nan|inf|None)\b", html)
 
 
+@pytest.mark.slow
 def test_text_from_outside_is_escaped(render_report, simulate_study):
     trials = [replace(trial, subject="<script>x</script>") for trial in simulate_study(subjects=1)]
     html = render_report(trials, provenance={"parent": "<b>&"})
@@ -234,6 +241,7 @@ def test_text_from_outside_is_escaped(render_report, simulate_study):
     assert "&lt;b&gt;&amp;" in html
 
 
+@pytest.mark.slow
 def test_the_same_study_gives_the_same_page(render_report, simulate_study):
     trials = [trial for trial in simulate_study(subjects=1) if trial.run < 3]
     assert render_report(trials) == render_report(trials)

@@ -111,6 +111,7 @@ def test_a_field_that_came_later_counts_only_where_it_changes_something(old, new
     assert (changed == OLD["sweep"]) is same
 
 
+@pytest.mark.slow
 @given(title=st.text(min_size=1, max_size=40), source=st.text(max_size=40))
 @settings(max_examples=80, deadline=None)
 def test_any_text_survives_being_written(threshold, title, source):

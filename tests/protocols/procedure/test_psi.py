@@ -81,6 +81,7 @@ def test_the_next_level_leaves_the_least_entropy_by_brute_force(count):
     assert expected_entropy(chosen) == pytest.approx(expected_entropy(best), abs=1e-8)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=15)
 @given(st.lists(st.booleans(), min_size=40, max_size=40), st.sampled_from([0.5, 1.7, 3.0]))
 def test_no_answers_lead_above_the_cap_and_the_same_answers_lead_to_the_same_levels(answers, cap_n):

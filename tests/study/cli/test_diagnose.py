@@ -47,6 +47,7 @@ def test_friction_is_named_on_stdout_and_the_folder_is_written(run, files, tmp_p
     assert (tmp_path / "out" / "improved.toml").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sketched")
 def test_or_the_document_for_a_program(run, files, tmp_path):
     code, out, err = run(*given(files, tmp_path / "out", "--json"))

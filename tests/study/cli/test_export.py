@@ -45,6 +45,7 @@ def test_every_column_is_described():
     assert set(TRIAL_COLUMNS) == set(column_names(Trial))
 
 
+@pytest.mark.slow
 def test_a_psych_ds_dataset_names_all_its_columns(data, tmp_path):
     assert main(["export", str(data), "--out", str(tmp_path / "ds")]) == 0
     description = json.loads((tmp_path / "ds" / "dataset_description.json").read_text("utf-8"))

@@ -68,6 +68,7 @@ def test_a_program_reads_one_entry_per_recording(written, capsys):
     assert first["coherence"][0]["share"] > 0.8
 
 
+@pytest.mark.slow
 def test_a_page_with_figures_is_written(written, tmp_path, capsys):
     assert main(["look", str(written), "--out", str(tmp_path / "page")]) == 0
     assert f"Report: {tmp_path / 'page' / 'report.html'}" in capsys.readouterr().err
@@ -78,6 +79,7 @@ def test_a_page_with_figures_is_written(written, tmp_path, capsys):
     assert drawn == {f"{name}-1.{kind}" for name in ("signals", "spectra", "coherence") for kind in ("svg", "png")}
 
 
+@pytest.mark.slow
 def test_missing_samples_and_short_recordings_are_drawn_too(lever, tmp_path):
     few = replace(
         lever,

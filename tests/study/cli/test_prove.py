@@ -52,6 +52,7 @@ def test_it_says_misses_first_and_leaves_table_and_page(done, run, tmp_path):
     assert (tmp_path / "small.csv").exists() and (tmp_path / "small-misses.csv").exists()
 
 
+@pytest.mark.slow
 def test_for_a_program_it_says_json(done, run):
     code, out, _ = run(*given(done, "--json"))
     assert (code, json.loads(out)["cases"]) == (0, CASES)

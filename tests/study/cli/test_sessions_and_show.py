@@ -30,6 +30,7 @@ def taken(tmp_path_factory, small_text) -> Path:
     return folder / "data"
 
 
+@pytest.mark.slow
 def test_sessions_are_a_table_with_a_word_for_how_each_stands(run, taken):
     code, out, err = run("sessions", "--data", taken)
     assert (code, err) == (0, "")

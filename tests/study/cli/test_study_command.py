@@ -19,6 +19,7 @@ def test_a_simulated_participant_takes_the_study_and_results_go_to_stdout(run, s
     assert (tmp_path / "d" / "ideal1_001" / "analysis" / "report.html").exists()
 
 
+@pytest.mark.slow
 def test_without_a_terminal_a_simulated_participant_sits_down_and_it_says_so(run, small_file, tmp_path, monkeypatch):
     with (tmp_path / "nothing").open("w+") as nothing:
         monkeypatch.setattr("sys.stdin", nothing)
@@ -106,6 +107,7 @@ def test_leaving_is_not_finishing(run, small_file, tmp_path, monkeypatch):
     assert f"hapteq resume {tmp_path / 'd' / 'ideal1_001'}" in err
 
 
+@pytest.mark.slow
 def test_a_simulated_participant_does_not_take_a_persons_code(run, small_file, tmp_path, session_logs):
     data = tmp_path / "d"
     assert run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)[0] == 0

@@ -80,6 +80,7 @@ def killing(worker, then=lambda: None):
     return on_finished
 
 
+@pytest.mark.slow
 def test_without_workers_it_ends_in_words_and_goes_on_with_another(address, here, tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "WORKER_TIMEOUT_S", 2.0)
     out = tmp_path / "power"

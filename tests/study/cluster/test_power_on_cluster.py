@@ -40,6 +40,7 @@ def test_a_cluster_gives_the_same_numbers_to_the_bit(plan, local, here, tmp_path
     assert finished[-1] == 60
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_worker_that_dies_loses_no_study(plan, local, here, kill_a_worker, tmp_path):
     with cluster_workers(local.scheduler_address) as pool:

@@ -46,6 +46,7 @@ def elsewhere(rehearsal, tmp_path):
     return replace(rehearsal, data=tmp_path / "data")
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_cluster_plays_the_same_sessions_and_keeps_those_that_are_there(rehearsal, local, here, tmp_path):
     there, done = elsewhere(rehearsal, tmp_path), []

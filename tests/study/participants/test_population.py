@@ -51,6 +51,7 @@ def measured_n(protocol) -> np.ndarray:
     return np.array([[found[frequency] for frequency in FREQUENCIES] for found in sittings])
 
 
+@pytest.mark.slow
 def test_measured_means_rise_with_frequency_up_to_35_hz(measured_n):
     means = measured_n.mean(axis=0)
     assert (np.diff(means[:4]) > 0.1).all()

@@ -81,6 +81,7 @@ def check_the_attack(facts, protocol, runs: int):
     assert all(row.asked_often for row in new)
 
 
+@pytest.mark.slow
 def test_asking_when_unsure_moved_thresholds_and_no_longer_does(facts, protocol):
     check_the_attack(facts, protocol, runs=20)
 

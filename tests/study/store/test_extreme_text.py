@@ -64,6 +64,7 @@ def test_models_and_protocols_and_maps_of_unlikely_values_are_refused_by_name(tm
         read_mechanical_model(tmp_path / "twin.toml")
 
 
+@pytest.mark.slow
 def test_a_table_of_a_hundred_thousand_columns_is_refused_at_once(tmp_path):
     (tmp_path / "a.csv").write_text(",".join(f"c{n}" for n in range(100_000)) + "\n" + ",".join(["1"] * 100_000) + "\n")
     with pytest.raises(ImportRefusedError, match="It has 100000 columns"):

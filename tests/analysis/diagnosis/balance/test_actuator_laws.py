@@ -36,6 +36,7 @@ def laws_by_name(balance):
     return {law.law.effect: law for law in balance.named}
 
 
+@pytest.mark.slow
 def test_a_dead_band_is_recovered_with_its_width(dead_band):
     law = laws_by_name(dead_band)["force_deadband"]
     assert law.values["width"] == pytest.approx(1.5, rel=0.1)

@@ -76,6 +76,7 @@ def test_a_late_command_is_seen_and_its_friction_named(late_axis, record_samples
     assert balance.named[0].values["level"] == pytest.approx(LEVEL, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_command_in_time_is_not_shifted(balances_of_both):
     _, (balance,) = balances_of_both
 

@@ -56,6 +56,7 @@ def test_a_late_command_is_in_the_first_model_beside_the_limit(record_follower, 
     assert model.actuator.delay_s == pytest.approx(late / RATE_HZ, abs=1.2 / RATE_HZ)
 
 
+@pytest.mark.slow
 def test_a_servo_without_a_limit_gets_no_name(record_follower, find_balance):
     (balance,) = find_balance(record_follower(1e3))
 

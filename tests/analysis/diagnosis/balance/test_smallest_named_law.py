@@ -23,6 +23,7 @@ def find_friction_balance(axis_module, find_balance):
     return found
 
 
+@pytest.mark.slow
 def test_friction_of_a_hundredth_of_the_force_is_a_candidate(find_friction_balance):
     found = find_friction_balance(0.01)
     assert not found.named

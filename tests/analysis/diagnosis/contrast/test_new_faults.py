@@ -41,6 +41,7 @@ def test_a_law_that_holds_the_named_one_takes_nothing_from_its_probability(rig):
     assert found.probability > 0.9
 
 
+@pytest.mark.slow
 def test_the_error_is_that_of_the_faulty_recording_however_many_clean_ones_there_are(rig):
     """Scaled by its own error, what is left of a set is at least as much as a description of its own leaves: also where
     there is no time to undo a fault."""

@@ -55,7 +55,9 @@ def test_what_undoing_a_fault_loses_stays_as_it_was(compared_base):
     assert np.abs(blocks[-8:]).max() < 1e-3 * np.abs(plain[-8:]).max()
 
 
-@pytest.mark.parametrize(("times", "belongs"), [((0.99, 0.99), True), ((0.85, 1.15), False)])
+@pytest.mark.parametrize(
+    ("times", "belongs"), [pytest.param((0.99, 0.99), True, marks=pytest.mark.slow), ((0.85, 1.15), False)]
+)
 def test_a_law_that_holds_the_named_one_is_of_its_class_where_it_leaves_less_everywhere(rig, times, belongs):
     found = rig.make_contrast("coulomb_friction", 0.6).comparison
     assert found is not None

@@ -46,6 +46,7 @@ def test_a_law_that_takes_nearly_all_of_a_louder_error_is_named_though_some_nois
     assert laws[0].variables == ("x",)
 
 
+@pytest.mark.slow
 def test_a_law_holds_elsewhere_only_where_little_of_the_held_out_error_is_left(search_result):
     _, _, found = search_result
     assert holds_on_held_out(found.explanation)
@@ -99,6 +100,7 @@ def test_a_law_too_weak_to_be_known_takes_no_other_laws_name_away(search_result)
     assert [each.variables for each in list_fitted_laws(named.found.after.fitted.hypothesis)] == [("x",)]
 
 
+@pytest.mark.slow
 def test_a_law_whose_round_is_not_known_is_named_by_no_check(search_result):
     """A weak law was found after it, and its exponent was rounded since: its checks are those of no round by name."""
     context, known, found = search_result

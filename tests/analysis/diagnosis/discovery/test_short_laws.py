@@ -163,6 +163,7 @@ def test_short_is_one_term_or_one_on_each_axis_that_depends_on_another(sums, sho
     assert is_short_description(make_discovery(*sums)) is short
 
 
+@pytest.mark.slow
 def test_a_law_search_that_crashes_keeps_what_the_catalogue_names(seed=12):
     def crashes(result):
         raise ValueError("operands could not be broadcast together")

@@ -137,7 +137,9 @@ def measure_of_segments(seed, varies, count=SEGMENTS):
     ]
 
 
-@pytest.mark.parametrize(("varies", "noise_holds"), [(VARIES, (0.0, 0.75)), (0.0, (0.88, 1.0))])
+@pytest.mark.parametrize(
+    ("varies", "noise_holds"), [pytest.param(VARIES, (0.0, 0.75), marks=pytest.mark.slow), (0.0, (0.88, 1.0))]
+)
 def test_segments_show_what_varies_between_them(varies, noise_holds):
     held = np.mean([measure_of_segments(seed, varies) for seed in range(DRAWS)], axis=0)
     assert noise_holds[0] <= held[0] <= noise_holds[1]

@@ -103,7 +103,7 @@ def test_what_is_no_motion_is_not_read_as_a_position(quantity, unit):
         diagnose_values(replace(cooled, response=replace(cooled.response, quantity=quantity, unit=unit)))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
 def test_a_linear_decay_names_nothing(seed):
     found = diagnose_values(
         make_recording(

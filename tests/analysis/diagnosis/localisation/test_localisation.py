@@ -15,6 +15,7 @@ MOVED, AT_SENSOR = SensorRule("motion", 50.0, 49.0), SensorRule("response sensor
 RUBS = StateRegion("velocity", "v", "sign", 0.86, 1.0, 1e-5, "by the sign of v")
 
 
+@pytest.mark.slow
 def test_friction_is_a_force_along_its_axis_tied_to_the_sign_of_velocity(friction_findings):
     local = friction_findings.localisation
     assert local.entry.ranking[0].name == "a force along x"

@@ -74,6 +74,7 @@ def friction_choice():
     return bench, pair, predict_menu_gains(bench, *pair)
 
 
+@pytest.mark.slow
 def test_dry_friction_and_presliding_are_distinguished_by_the_proposed_recording(friction_choice):
     bench, (named, rival), gains = friction_choice
     chosen = choose_experiments([gains])
@@ -206,6 +207,7 @@ def test_a_weight_strapped_on_tells_what_no_louder_sweep_can():
     assert all(other.gain < weight.gain / 3 for other in others)
 
 
+@pytest.mark.slow
 def test_what_was_recorded_so_far_holds_the_rival(friction_choice):
     bench, (named, rival), gains = friction_choice
     held = predict_menu_gains(bench, named, rival, numbers=1e12)

@@ -37,6 +37,7 @@ def start_fit(context, name, values):
     return evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), law)
 
 
+@pytest.mark.slow
 def test_a_rival_started_from_shared_sensitivities_converges_to_its_own_fit(friction_fit):
     context, plain, known = friction_fit
     rival = start_fit(context, "asymmetric_friction", {"level_positive": 0.02, "level_negative": 0.03})

@@ -172,6 +172,7 @@ def test_of_three_the_one_that_stood_in_is_dropped(saturated_lag):
     assert len(left.rounds) == len(left.steps) == 2
 
 
+@pytest.mark.slow
 def test_rivals_are_kept_only_where_they_were_compared(saturated_lag):
     first = claim("amplifier_lag", time_constant=3e-4)
     three = explain_by(
@@ -207,6 +208,7 @@ def test_three_stay_where_any_two_leave_more_than_laws_of_real_devices_do(make_c
     assert effect_names(drop_needless(context, found, unlimited_time)) == effect_names(found)
 
 
+@pytest.mark.slow
 def test_a_third_goes_though_it_shows_where_two_leave_as_little_as_laws_of_real_devices_do(make_context):
     context, found = three_effects(make_context, 5e4)
     two = found.steps[1]

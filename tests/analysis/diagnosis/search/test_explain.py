@@ -60,6 +60,7 @@ def test_an_interval_holds_the_truth_and_claims_no_more_than_a_law_is_exact_to(f
     assert 2 * INTERVAL_SHARE * estimate.value <= high - low < 0.1 * estimate.value
 
 
+@pytest.mark.slow
 def test_the_same_recording_gives_the_same_answer(friction_findings, friction_recording, diagnosed):
     again = diagnose_recording(friction_recording, diagnosed.device(1))
     assert again.diagnosis == friction_findings.diagnosis
@@ -82,6 +83,7 @@ def test_no_strength_is_no_name(diagnosed):
     assert named_effects(diagnose_recording(diagnosed.recorded(1, nothing), diagnosed.device(1))) == []
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_not_asked_for_changes_nothing(friction_findings, friction_recording, diagnosed):
     more = diagnose_recording(friction_recording, diagnosed.device(1), (*AMONG, "sensor_drift"))
     assert named_effects(more) == named_effects(friction_findings)
@@ -93,6 +95,7 @@ def test_without_the_true_name_no_other_explains(friction_recording, diagnosed):
     assert other.diagnosis.verdict in ("unexplained", "partly_explained")
 
 
+@pytest.mark.slow
 def test_a_mirrored_axis_rubs_alike(friction_recording, diagnosed, friction_findings):
     mirrored = replace(
         friction_recording,

@@ -122,6 +122,7 @@ def fit_claims(context, *claims):
     return Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
 
 
+@pytest.mark.slow
 def test_the_profile_distinguishes_a_present_number_from_zero_and_an_absent_one_not(friction_context):
     both = fit_claims(friction_context, FRICTION, OPEN)
     assert compute_null_distance(friction_context, both, 0) > 1

@@ -51,6 +51,7 @@ def test_friction_is_found_beside_a_stiffness_far_from_its_calibration(far_diagn
     assert deviations["stiffness fx"] == pytest.approx(-9.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_what_was_moved_is_said(far_diagnosis):
     assert MODEL_MOVED in far_diagnosis.remarks
     assert far_diagnosis.tuning.bound == WIDER_RETUNING_BOUND

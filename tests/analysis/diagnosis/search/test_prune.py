@@ -67,6 +67,7 @@ def test_a_stopgap_goes_once_the_true_law_has_its_numbers(friction_context):
     ]
 
 
+@pytest.mark.slow
 def test_two_that_are_needed_stay(friction_and_force_context):
     found = make_explanation(
         friction_and_force_context,

@@ -127,6 +127,7 @@ def test_without_measurements_nothing_is_said(simulate_study):
     assert cue_findings([replace(trial, delivered_mps2=None) for trial in simulate_study(2, ABLE_N, 1)]) == ()
 
 
+@pytest.mark.slow
 def test_trials_without_harmonics_are_counted_and_the_others_are_judged(simulate_study, protocol):
     whole = deliver(simulate_study(4, ABLE_N, 1), 3.0, Cue.SPECTRUM, seed=6)
     at_25 = [number for number, trial in enumerate(whole) if trial.frequency_hz == 25.0]
@@ -156,6 +157,7 @@ def test_trials_without_harmonics_are_counted_and_the_others_are_judged(simulate
     )["cue_gaps"]
 
 
+@pytest.mark.slow
 def test_the_report_and_the_document_name_the_planted_mismatch(simulate_study, protocol):
     trials = simulate_study(4, ABLE_N, 1)
     pages = {}

@@ -34,6 +34,7 @@ def study(simulate_study):
     return answers, primary_analysis(answers, 3.0)
 
 
+@pytest.mark.slow
 def test_each_answer_is_in_one_point_of_its_person_and_frequency(study):
     answers, fit = study
     for place in range(5):

@@ -1,6 +1,7 @@
 """Slopes of people: a known median is recovered with the thresholds integrated out, and not at the common mode."""
 
 import numpy as np
+import pytest
 
 from analysis.psychophysics.hierarchy.curve import USUAL_SLOPE, Family
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
@@ -11,6 +12,7 @@ from analysis.psychophysics.two_analyses import SIMULATED_RULE
 CROWD, PEOPLE, STUDIES = Crowd((5.0, 15.0, 25.0, 35.0), (0.35, 0.6, 0.85, 1.2)), 10, 8
 
 
+@pytest.mark.slow
 def test_slopes_are_those_of_the_people_and_not_steeper():
     studies = [simulate_study(CROWD, SIMULATED_RULE, PEOPLE, (501, number)) for number in range(STUDIES)]
     fits = [fit_hierarchy(study.answers) for study in studies]

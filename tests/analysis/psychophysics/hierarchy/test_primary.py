@@ -84,6 +84,7 @@ def test_answers_that_contradict_nothing_give_no_lower_bound():
     assert median.above_cap and median.lower_db is None and median.lower_n is None
 
 
+@pytest.mark.slow
 def test_guessers_leave_everything_finite():
     (study,) = simulate_studies(Crowd((5.0, 45.0), (0.5, 1e4)), 1, people=5)
     found = primary_analysis(study.answers, 3.0)
@@ -181,6 +182,7 @@ def test_a_median_that_falls_below_the_cap_again_is_told_beside_the_limit():
     assert "again" not in estimate_direction_limit(HZ, rising, 10.0, 0.95).words
 
 
+@pytest.mark.slow
 def test_the_limit_is_below_a_frequency_whose_median_is_shown_to_be_above_the_cap():
     """Far above the cap the influence functions are as wide as the extrapolation: 14 ± 4.5 dB at 45 Hz."""
     rng = np.random.default_rng(4)

@@ -86,6 +86,7 @@ def test_gradient_and_hessian_are_those_of_the_integral(prepared_quadrature, fam
     np.testing.assert_allclose(found.hessian, by_scores, atol=0.02)
 
 
+@pytest.mark.slow
 def test_a_person_without_answers_at_a_frequency_has_an_integral(prepared_quadrature):
     from dataclasses import replace
 
@@ -113,6 +114,7 @@ def test_medians_are_higher_than_by_the_method_of_laplace():
     assert abs(np.mean(errors)) < 0.3
 
 
+@pytest.mark.slow
 def test_most_above_the_cap_and_the_search_still_ends():
     """Guessing at the cap, a person may have a steep slope and a high threshold, or a flat slope: two maxima."""
     crowd = Crowd((5.0, 15.0, 25.0, 35.0, 45.0), (3.5,) * 5, frequency_sd_db=(1.0, 1.0, 1.7, 2.5, 3.5))

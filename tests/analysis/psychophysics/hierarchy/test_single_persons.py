@@ -65,6 +65,7 @@ def test_one_participant_has_thresholds_by_likelihood_in_report_document_and_fig
     assert "psychometric-1-s01" in [picture.name for picture in study_pictures(analysis)]
 
 
+@pytest.mark.slow
 def test_people_at_one_frequency_have_their_own_numbers_and_a_study_needs_none(simulate_study, protocol):
     trials = simulate_study(subjects=3)
     single = analyse_study([trial for trial in trials if trial.frequency_hz == 15.0], protocol)

@@ -80,6 +80,7 @@ def test_answers_hold_the_levels_that_were_played_and_means_those_of_the_stairca
     np.testing.assert_allclose(on_grid, np.round(on_grid), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_rules_are_compared_as_they_are_played_and_psi_is_not_roved():
     crowd, rules = Crowd((5.0,), (0.6,)), list_compared_rules(RULE)
     plain, roved = (compare_rules(replace(crowd, rove_db=width), rules, 10, 3) for width in (0.0, ROVE_DB))

@@ -142,7 +142,7 @@ ALIKE = [("coulomb_friction", (0, 1, 2), {"level": 0.2}), ("hardening_stiffness"
     [
         ([], 1, 1), ([], 4, 1), ([], 4, 4),
         ([STIFF], 4, 1), ([STIFF], 4, 4), ([SMOOTH], 4, 4), ([LOOSE], 8, 1),
-        pytest.param(SEVERAL, 8, 1, marks=pytest.mark.slow), (ALIKE, 4, 1),
+        pytest.param(SEVERAL, 8, 1, marks=pytest.mark.slow), pytest.param(ALIKE, 4, 1, marks=pytest.mark.slow),
     ],
 )  # fmt: skip
 def test_three_axes_move_as_the_plain_recipe_says(bench, named, steps, fine):

@@ -23,6 +23,7 @@ def test_the_error_falls_by_the_factor_of_seventeen_lines_and_a_parabola(pairs, 
         assert before / after == pytest.approx(2.74, rel=0.1)
 
 
+@pytest.mark.slow
 def test_the_peak_at_eleven_hertz_is_not_cut_beyond_the_noise(pairs, plants):
     """Averaged over the seeds, what is left is bias."""
     peak = [smooth.within(10.5, 11.5) for _, smooth in pairs]

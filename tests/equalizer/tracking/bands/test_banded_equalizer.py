@@ -107,6 +107,7 @@ def test_an_impact_with_content_above_the_band_is_played_as_strongly_as_wanted(b
     assert in_band_error(*banded) < 0.005 < in_band_error(*plain)
 
 
+@pytest.mark.slow
 def test_the_split_leaves_the_middle_band_flat_and_without_coupling(device, band_model, low, high):
     lines, period = np.arange(20, 141), 4000
     spectrum = np.zeros(period // 2 + 1, complex)
@@ -153,6 +154,7 @@ def test_the_predicted_acceleration_is_that_of_the_device(band_model, low, high,
     assert np.allclose(sum(found.by_band), found.entering)
 
 
+@pytest.mark.slow
 def test_above_the_cap_is_refused_or_solved_for(band_model, high, impact):
     equalizer = BandedEqualizer(band_model, LinearPhaseSplit(BandEdges(None, 36.0), RATE_HZ, 8.0), None, high)
     free = equalizer.play(impact)

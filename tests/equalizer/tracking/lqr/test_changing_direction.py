@@ -47,6 +47,7 @@ def test_and_on_a_device_s_own_equations(device_model, random_rotation, differen
     assert difference(after.forces, right) <= 1e-10
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(st.lists(st.integers(0, 99), min_size=5, max_size=30))
 def test_a_turn_at_every_tick_is_solved_again_at_every_tick(problem_of, random_rotation, difference, trajectory, seeds):

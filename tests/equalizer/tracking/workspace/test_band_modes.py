@@ -17,7 +17,7 @@ def model_of(A, B, C, D=None) -> IdentifiedModel:
     )
 
 
-@pytest.mark.parametrize("index", [pytest.param(0, marks=pytest.mark.slow), 1, 2])
+@pytest.mark.parametrize("index", [pytest.param(0, marks=pytest.mark.slow), pytest.param(1, marks=pytest.mark.slow), 2])
 def test_the_device_s_own_resonances_are_found_in_an_identified_model(three, index):
     shift = 1 + 0.1 * index
     modes = band_modes(three.models[index], BAND)
@@ -39,6 +39,7 @@ def test_poles_that_share_a_resonance_are_one(plants, three):
     assert [mode.natural_hz for mode in twice] == pytest.approx([mode.natural_hz for mode in once], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_more_poles_than_the_device_has_change_nothing(plants, workspaces, three):
     plant = plants.omega_like()
     response = workspaces.measuring.swept(plants, plant, 1)

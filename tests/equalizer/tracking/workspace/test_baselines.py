@@ -43,6 +43,7 @@ def rows(plants, three, measured, workspaces):
     }
 
 
+@pytest.mark.slow
 def test_every_way_is_judged_at_every_place(rows):
     assert list(rows)[:6] == [("centre", name) for name in NAMES]
     assert len(rows) == 19

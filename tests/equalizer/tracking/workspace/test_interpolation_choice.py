@@ -20,6 +20,7 @@ def test_a_model_left_out_shows_that_moving_resonances_are_better_interpolated(t
     assert len(choice.at((0.02, 0.01, 0.0)).models) == 1
 
 
+@pytest.mark.slow
 def test_a_place_of_the_user_s_own_decides_where_one_is_given(workspaces, three_bent):
     truth = workspaces.plant(0.25, bend=1.0).response(LINES)
     choice = choose_interpolation(three_bent, [HeldOutPlace(workspaces.place_m(0.25), LINES, truth)])

@@ -112,6 +112,7 @@ def test_a_recorded_protocol_recorded_again_is_the_same_recording(tmp_path, caps
     assert again.device == "replay of simulated omega.3"
 
 
+@pytest.mark.slow
 def test_a_simulated_participant_takes_a_study_on_a_replayed_device(rigs, file, small_text, tmp_path, capsys):
     protocol = tmp_path / "short.toml"
     protocol.write_text(small_text)

@@ -122,6 +122,7 @@ def test_where_nothing_is_proposed_the_start_stays_open_and_the_random_one_is_pl
     assert (folder.path / FOLLOW_UP_FOLDER / "open" / name / FURTHER_RECORDING.format(2)).exists()
 
 
+@pytest.mark.slow
 def test_a_case_whose_process_died_keeps_all_its_recordings(tmp_path, monkeypatch):
     """It is asked again by the next run, with what was sealed."""
 

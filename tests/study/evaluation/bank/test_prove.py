@@ -191,6 +191,7 @@ def test_a_folder_of_another_bank_is_refused(proof, tmp_path):
         open_proof_folder(tmp_path, SEED, True)
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_is_sealed(tmp_path):
     def interrupt(what, done, of):
         if what == "diagnosing":

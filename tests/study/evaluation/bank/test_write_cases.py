@@ -13,6 +13,7 @@ def case():
     return draw_case(11, ["force_gain"], strength=0.5, name="bench case-11")
 
 
+@pytest.mark.slow
 def test_nothing_missing_is_an_empty_list(case):
     assert concealed_effects_json(replace(case, truth=())) == []
 

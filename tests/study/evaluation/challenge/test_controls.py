@@ -23,6 +23,7 @@ def test_shuffling_keeps_the_command_and_each_sample(asked):
     assert np.array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_a_silent_recording_holds_noise_alone(asked):
     (silent,) = asked["a silent recording"]
     assert not silent.recording.command.samples.any()

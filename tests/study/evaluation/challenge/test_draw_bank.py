@@ -62,6 +62,7 @@ def test_a_hand_is_concealed_from_calibrated_models_alone(bank):
     )
 
 
+@pytest.mark.slow
 def test_a_small_rig_records_its_axes_alone():
     settings = CaseSettings((2,), 1000, 3)
     case = draw_case(50_011, ("mains_hum",), "retuned", 0.8, "bench", settings)

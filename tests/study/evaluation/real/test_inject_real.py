@@ -116,6 +116,7 @@ def test_what_a_fault_changes_is_what_a_base_of_the_clean_half_misses(split):
     assert held_out_change(sound, rest, slightly) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_the_labels_say_what_was_put_in_and_the_clean_half_stays(carrier, tmp_path: Path):
     folder = open_proof_folder(tmp_path / "bank", 4, False)
     names = seal_injections(folder, (carrier,), 8, 4)

@@ -146,6 +146,7 @@ def test_a_recording_at_which_the_program_crashes_is_reported_and_the_others_are
     assert "ZeroDivisionError" in done.page.read_text()
 
 
+@pytest.mark.slow
 def test_interrupted_the_same_command_continues(folder: Path, tmp_path: Path) -> None:
     def leave(what: str, share: float) -> None:
         if what.startswith("torn"):

@@ -175,7 +175,9 @@ def test_formulas_that_nothing_has_computed_are_said(book):
     [
         (b'r="B5"', b'r="5B"', "Sheet 'Data' is damaged"),
         (b"</sheetData>", b"", "Sheet 'Data' is damaged"),
-        (b'<row r="21"', b'<row r="99999999999"', "has cells beyond the 1048576 rows"),
+        pytest.param(
+            b'<row r="21"', b'<row r="99999999999"', "has cells beyond the 1048576 rows", marks=pytest.mark.slow
+        ),
         (b"</row>", b"<c/>" * 20 + b"<c >" * 16385 * 21 + b"</row>", "cells in 21 rows; save the sheet as .csv"),
     ],
 )

@@ -83,6 +83,7 @@ def test_a_session_closes_a_data_folder_that_others_can_read(opened, tmp_path):
     assert stat.S_IMODE(outside.stat().st_mode) == 0o644
 
 
+@pytest.mark.slow
 def test_an_analysis_beside_the_sessions_is_private_even_where_they_are_not_yet(opened):
     shutil.rmtree(opened / "P04_001")
     run("analyze", opened)

@@ -24,6 +24,7 @@ def test_the_target_of_the_staircase_is_that_of_its_rule(tmp_path, up, down, tar
     assert f"level at which {target} of the answers" in said if target else "%" not in said
 
 
+@pytest.mark.slow
 def test_seeds_hash_and_device_are_exported(tmp_path, small_text):
     (tmp_path / "small.toml").write_text(small_text)
     data, out = tmp_path / "data", tmp_path / "bids"

@@ -60,6 +60,7 @@ def gone_within(pid: int, seconds: float) -> bool:
     return False
 
 
+@pytest.mark.slow
 def test_a_session_runs_to_its_report_and_is_listed(begun, order, session):
     end = begun.wait_for(is_a(Finished))
     assert Path(end.results.report).is_file()

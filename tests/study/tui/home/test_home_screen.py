@@ -86,6 +86,7 @@ def with_equalized_first(home, *models):
     return replace(home, protocols=(line, *home.protocols), models=models)
 
 
+@pytest.mark.slow
 def test_a_protocol_of_accelerations_asks_for_a_model_and_no_other_does(on_screen, home):
     async def story(sight):
         assert "Model" in sight.text and "centre.h5" in sight.text

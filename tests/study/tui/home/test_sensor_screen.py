@@ -66,6 +66,7 @@ def test_what_cannot_be_meant_is_refused(on_screen, keys, said):
     assert said in seen[0] and app.asked == []
 
 
+@pytest.mark.slow
 def test_esc_stops_it_and_goes_back(on_screen, home):
     story, seen = story_of(("f7",), (*PORT, "enter"), LayDown(1, "+x up", None), ("escape",))
     app = on_screen(HomeScreen(home), story, (132, 40))

@@ -172,7 +172,9 @@ def test_markup_in_notes_and_warnings_is_text(on_screen, session):
     on_screen(SessionScreen(view), story)
 
 
-@pytest.mark.parametrize("theme", ["hapteq-dark", "hapteq-light", "hapteq-contrast"])
+@pytest.mark.parametrize(
+    "theme", ["hapteq-dark", "hapteq-light", pytest.param("hapteq-contrast", marks=pytest.mark.slow)]
+)
 def test_it_stands_a_small_window_in_every_theme(on_screen, session, theme):
     async def story(sight):
         for page in "12345":

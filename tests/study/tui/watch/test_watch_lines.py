@@ -48,6 +48,7 @@ def told(views) -> list[str]:
     return [line for before, now in zip([None, *views], views, strict=False) for line in changes(before, now)]
 
 
+@pytest.mark.slow
 def test_each_trial_is_reported_once_when_it_is_closed(views):
     lines = [line for line in told(views[:-1]) if line.startswith("trial ") and "shown" in line]
     assert len(lines) == views[-1].answers

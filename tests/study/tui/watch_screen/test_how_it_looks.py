@@ -36,7 +36,7 @@ def test_the_screen_looks_as_it_did(seated, size, theme, alarms):
     seated(story, view(alarms=alarms), size, theme)
 
 
-@pytest.mark.parametrize("size", [(40, 10), (60, 15), (80, 24), (200, 60)])
+@pytest.mark.parametrize("size", [(40, 10), (60, 15), (80, 24), pytest.param((200, 60), marks=pytest.mark.slow)])
 def test_no_size_breaks_it(seated, size):
     async def story(seat):
         await seat.press("d", "d")

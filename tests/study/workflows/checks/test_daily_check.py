@@ -149,6 +149,7 @@ def fine_setup(*_: object, on_progress: object) -> Examination:
     return Examination((), DeviceReport("omega3", simulated=False, findings=found), timing)
 
 
+@pytest.mark.slow
 def test_from_the_acceptance_to_the_first_day_at_the_command_line(device_like, monkeypatch, tmp_path, capsys):
     """The loop in real time, the proof under force and the first checks aside, which have tests of their own."""
     state = {"seed": 1, "noise": 0.05}

@@ -30,6 +30,7 @@ def session(tmp_path_factory, small_text):
     return conduct_new(plan, "simulated", make_simulated_participant("ideal", 3, VirtualClock())).folder.path
 
 
+@pytest.mark.slow
 def test_all_trials_are_one_recording_with_its_frequencies_one_after_the_other(session):
     found = session_recordings(session, seed=1)
     assert found.simulated and found.name == session.name
@@ -98,6 +99,7 @@ def test_only_what_is_there_is_claimed(session):
     assert len(said) == 2
 
 
+@pytest.mark.slow
 def test_trials_with_gaps_or_flags_are_left_out_and_reported(session, tmp_path):
     copy = copied(session, tmp_path)
     first, second, *_ = sorted((copy / "recordings").glob("*.h5"))

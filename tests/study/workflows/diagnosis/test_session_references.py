@@ -29,6 +29,7 @@ def test_the_reference_is_read_in_the_place_of_the_trials(folder):
     assert any("no change was detected" in remark for remark in found.remarks)
 
 
+@pytest.mark.slow
 def test_a_reference_that_was_changed_since_is_left_out_and_the_trials_are_read(folder):
     references = find_references(folder.path)
     assert references is not None

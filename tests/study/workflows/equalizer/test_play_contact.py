@@ -53,6 +53,7 @@ def refusal(folder, tmp_path, **more) -> StudyError:
     return refused.value
 
 
+@pytest.mark.slow
 def test_the_model_gives_the_transient_that_one_gain_misses(done):
     found, told = done
     assert found.equalized.error < 0.5 * found.single_gain.error

@@ -99,6 +99,7 @@ def refused(folder, tmp_path, model, recording="0.h5") -> StudyError:
     return refusal.value
 
 
+@pytest.mark.slow
 def test_physics_that_name_nothing_to_take_off_are_refused_with_the_reason(folder, tmp_path):
     said = refused(folder, tmp_path, mechanical(ModelEffect("viscous_damping", None, {"damping": 3.0})))
     assert "cannot be subtracted" in said.title

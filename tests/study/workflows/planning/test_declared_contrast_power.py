@@ -41,6 +41,7 @@ def test_every_analysis_judges_the_declared_pair():
     assert by_pair[()].published_found == (tukey["5 Hz", "45 Hz"] < 0.05)
 
 
+@pytest.mark.slow
 def test_a_folder_goes_on_with_its_own_pair_alone(tmp_path):
     plan = PowerPlan(Crowd((5.0, 45.0), (0.7, 1.4)), RULE, (3,), 10, 3)
 

@@ -41,6 +41,7 @@ def session(taken, tmp_path):
     return shutil.copytree(taken[0], tmp_path / "P01_001")
 
 
+@pytest.mark.slow
 def test_detection_has_a_table_of_its_own(session):
     (row,) = read_thresholds(session / "detection.csv")
     assert (row.frequency_hz, row.complete) == (35.0, True)
@@ -81,6 +82,7 @@ def test_a_changed_detection_table_is_found(session):
     assert problem.startswith("detection.csv does not agree with the log")
 
 
+@pytest.mark.slow
 def test_a_detection_table_of_an_earlier_analysis_does_not_stay(sitter, tmp_path):
     out = tmp_path / "out"
     out.mkdir()

@@ -53,6 +53,7 @@ def view_of(folder):
     return follow(folder.path).look("2030-01-01T00:00:00.000+00:00")
 
 
+@pytest.mark.slow
 def test_more_friction_in_mid_session_is_named_with_number_and_time(probed):
     view = view_of(probed(2.0))
     assert view.probes >= 11
@@ -61,6 +62,7 @@ def test_more_friction_in_mid_session_is_named_with_number_and_time(probed):
     assert any(line.startswith("Drift      friction along x 0.") for line in status(view))
 
 
+@pytest.mark.slow
 def test_where_nothing_changes_nothing_is_named(probed):
     view = view_of(probed(1.0))
     assert view.probes >= 11
@@ -80,6 +82,7 @@ def test_a_recording_that_is_gone_is_left_out(sitter):
     assert DriftReader(folder).look((lost, replace(lost, number=1, recording=""))) == ()
 
 
+@pytest.mark.slow
 def test_two_references_tell_what_changed_at_the_device_alone(sitter, monkeypatch):
     """Ends after the first trials, and goes on with more friction: between the sittings, and so without a hand too."""
     probes = ProbeSettings(levels_n=(0.4,), interval_s=15.0, reference_s=6.0)

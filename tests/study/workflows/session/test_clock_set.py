@@ -112,6 +112,7 @@ def test_a_simulated_session_that_continues_does_so_after_its_own_last_entry(sit
     assert VirtualClock.resume_at("2001-01-01T00:00:00.000+00:00").utc() > "2026"
 
 
+@pytest.mark.slow
 def test_a_second_session_on_the_same_day_continues_with_the_dose_of_the_first(sitter):
     first = conduct_new(sitter.plan(observer=None), "simulated", sitter.participant())
     second = conduct_new(sitter.plan(observer=None), "simulated", sitter.participant(2, leave))

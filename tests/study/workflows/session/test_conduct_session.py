@@ -48,6 +48,7 @@ def test_the_same_seed_gives_the_same_trials(sitter):
     assert onsets[0] == pytest.approx(onsets[1], abs=0.002)  # the log's times are rounded to milliseconds
 
 
+@pytest.mark.slow
 def test_another_seed_gives_others(sitter):
     first = sitter.whole("P01").state
     sitter.seed = 12
@@ -68,6 +69,7 @@ def test_what_was_really_played_is_measured_and_kept(sitter):
     assert recording.excitation is not None
 
 
+@pytest.mark.slow
 def test_a_louder_level_is_a_stronger_acceleration(sitter):
     sitter.observer = "guesser"
     trials = [t for t in sitter.whole().state.trials if t.frequency_hz == 35.0]

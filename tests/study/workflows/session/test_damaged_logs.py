@@ -155,6 +155,7 @@ def test_a_finished_session_is_finished_by_resume_and_then_said_to_be(session):
         finish_closed(folder, fold_session(folder))
 
 
+@pytest.mark.slow
 def test_a_report_from_before_the_end_is_written_again_by_resume(session):
     folder = SessionFolder(session)
     statistics, sha256 = session / "analysis" / "anova.json", sha256_of(folder.log)

@@ -61,6 +61,7 @@ def conducted(small_text, tmp_path_factory):
     return take(planned(small_text, tmp_path_factory.mktemp("equalized")))
 
 
+@pytest.mark.slow
 def test_both_directions_are_wanted_equally_strong_and_the_harder_one_reaches_the_cap(conducted):
     equalized = conducted.state.opened.equalized
     assert {scale.frequency_hz for scale in equalized.levels} == {5.0, 25.0, 35.0}
@@ -159,6 +160,7 @@ def test_a_model_that_does_not_cover_the_protocol_is_refused(plan):
     assert "--band 5 50" in said
 
 
+@pytest.mark.slow
 def test_a_spring_that_is_in_the_model_is_not_accounted_for_twice(conducted, plan):
     """Under the same spring the model is the device: no force is left to the spring; another spring is refused."""
     info = conducted.state.opened.device
@@ -204,6 +206,7 @@ def test_a_protocol_of_accelerations_needs_a_model(plan):
         take(replace(plan, model=None))
 
 
+@pytest.mark.slow
 def test_the_report_says_first_how_good_the_model_is(conducted, plan, tmp_path):
     data = conducted.folder.path.parent
     page = analyze_data(data, tmp_path / "out").report.read_text()

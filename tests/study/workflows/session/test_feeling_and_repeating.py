@@ -21,6 +21,7 @@ def conducted(sitter, observer, seed=11):
     return conduct_new(sitter.plan(f"{observer[:4].upper()}{seed}", observer), "simulated", participant)
 
 
+@pytest.mark.slow
 def test_what_is_felt_is_what_the_session_measures(sitter, monkeypatch):
     felt = []
     reply = DeliveredFeeler.reply

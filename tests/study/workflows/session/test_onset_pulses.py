@@ -45,6 +45,7 @@ def test_each_trial_has_its_pulse_and_a_lost_one_costs_no_trial(sitter, pulses):
     assert conducted.end_reason == "" and fold_session(conducted.folder).state == conducted.state
 
 
+@pytest.mark.slow
 def test_the_session_is_the_same_without_a_line(sitter, pulses, tmp_path, monkeypatch):
     with_line = sitter.whole("P01").state
     sitter.data = tmp_path / "other"
@@ -53,6 +54,7 @@ def test_the_session_is_the_same_without_a_line(sitter, pulses, tmp_path, monkey
     assert [trial.answer for trial in with_line.trials] == [trial.answer for trial in without.trials]
 
 
+@pytest.mark.slow
 def test_the_time_of_a_lost_pulse_is_part_of_the_response_time(sitter, tmp_path, monkeypatch):
     def response_times_s(lost_for_s: float) -> list[float]:
         def pulses(clock):

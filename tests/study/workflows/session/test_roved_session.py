@@ -35,6 +35,7 @@ def roved(sitter):
     return sitter
 
 
+@pytest.mark.slow
 def test_levels_vary_around_those_of_the_staircase_and_none_passes_the_force_cap(roved):
     roved.observer = "guesser"
     state = roved.whole().state
@@ -48,6 +49,7 @@ def test_levels_vary_around_those_of_the_staircase_and_none_passes_the_force_cap
     assert caught and {(t.level_n, t.nominal_n) for t in caught} == {(CAP_N, None)}
 
 
+@pytest.mark.slow
 def test_what_was_drawn_is_what_the_device_played_and_both_levels_are_logged(roved):
     done = roved.whole()
     events = [event for event in read_log(done.folder.log).events if isinstance(event, TrialPresented)]
@@ -84,6 +86,7 @@ def test_a_repeated_trial_comes_with_the_same_level(roved):
     assert void.nominal_n not in (None, void.level_n)
 
 
+@pytest.mark.slow
 def test_delivered_thresholds_are_those_at_the_staircases_levels(roved):
     """A device that delivers in proportion: the threshold in m/s² is that in newtons times the proportion."""
     trials = [replace(t, delivered_mps2=4.0 * t.level_n) for t in roved.whole().state.trials]

@@ -84,6 +84,7 @@ def test_without_repeats_the_key_is_refused_from_the_first_trial(sitter):
     assert all(trial.void_cause is None for trial in end.state.trials)
 
 
+@pytest.mark.slow
 def test_a_session_of_the_first_rules_continues_under_them(sitter, monkeypatch):
     """Its void trials are drawn anew: some seeds give the other direction, which the second rules would refuse."""
     kept = set()
@@ -99,6 +100,7 @@ def test_a_session_of_the_first_rules_continues_under_them(sitter, monkeypatch):
     assert kept == {True, False}
 
 
+@pytest.mark.slow
 def test_ctrl_c_counts_as_leaving_and_a_dead_program_does_not(sitter):
     def interrupt():
         raise KeyboardInterrupt

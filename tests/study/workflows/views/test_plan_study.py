@@ -44,6 +44,7 @@ def only(data, protocol=None, simulated=True):
     return study
 
 
+@pytest.mark.slow
 def test_done_begun_and_withdrawn_participants_and_who_comes_next(sitter, begin):
     begin("P01", to_the_end=True)
     begin("P02")

@@ -43,6 +43,7 @@ def only(data: Path):
     return line
 
 
+@pytest.mark.slow
 def test_a_finished_session_is_told_without_folding_it_and_like_folding_it(data):
     from study.workflows.results.fold_session import fold_session
     from study.workflows.views.session_line import line_of

@@ -29,6 +29,7 @@ def session(taken, tmp_path) -> Path:
     return Path(shutil.copytree(taken, tmp_path / "P01_001"))
 
 
+@pytest.mark.slow
 def test_thresholds_are_those_of_thresholds_csv(taken):
     header, *rows = session_view(taken).thresholds
     written = [line.split(",") for line in (taken / "thresholds.csv").read_text().splitlines()]
@@ -61,6 +62,7 @@ def test_report_and_figures_are_found_where_they_were_written(taken):
     assert {Path(path).name for path in view.figures} >= {"thresholds.png"}
 
 
+@pytest.mark.slow
 def test_a_report_is_there_once_it_is_written(session):
     shutil.rmtree(session / "analysis")
     before = session_view(session)

@@ -53,6 +53,7 @@ def find_view(maps, along):
     return next(view for view in maps.views if view.abscissa_name == along)
 
 
+@pytest.mark.slow
 def test_friction_shows_as_a_missing_force_that_turns_with_the_velocity(friction_maps):
     (maps,) = friction_maps[1]
     view = find_view(maps, "velocity")
@@ -63,6 +64,7 @@ def test_friction_shows_as_a_missing_force_that_turns_with_the_velocity(friction
     assert (maps.axis, maps.unit, view.unit, maps.completed) == ("force", "N", "m/s", WITH_CANDIDATES)
 
 
+@pytest.mark.slow
 def test_without_friction_nothing_stands_out():
     (maps,) = find_state_maps(0.0)[1]
     assert maps.share < 0.05
@@ -77,6 +79,7 @@ def test_a_loop_follows_the_measured_force_with_the_completed_law(friction_maps)
     assert np.ptp(loop.abscissa) > 0.09
 
 
+@pytest.mark.slow
 def test_what_nothing_completes_has_no_second_course():
     catalogue = frozenset({"coulomb_friction"})
     balance, _, recording = find_state_maps(LEVEL, catalogue)

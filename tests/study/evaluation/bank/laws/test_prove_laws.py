@@ -33,6 +33,7 @@ def test_the_diagnosis_is_told_to_look_for_laws_and_not_for_which(sealed):
     assert sorted(each.name for each in place.iterdir()) == ["model.toml", "recording.h5", "settings.json"]
 
 
+@pytest.mark.slow
 def test_fresh_motion_lies_with_the_label(sealed):
     label = read_label(sealed.label_file(0))
     truth = label["truth"]

@@ -44,6 +44,7 @@ def test_every_law_takes_its_turn():
     assert {kind.name for kind in LAW_KINDS} <= set(laws)
 
 
+@pytest.mark.slow
 def test_the_law_shows_and_fresh_motion_carries_its_force(found):
     _, case = found
     assert case.case.detectability > 1

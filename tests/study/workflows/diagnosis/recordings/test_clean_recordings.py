@@ -14,6 +14,7 @@ from tests.study.workflows.diagnosis.recordings.scripted import Scripted, asked_
 pytestmark = pytest.mark.usefixtures("sketched")
 
 
+@pytest.mark.slow
 def test_clean_recordings_go_to_the_engine_and_are_named_as_parents(files, findings, tmp_path, made):
     write_recording(tmp_path / "clean.h5", made.recorded(1, (), seed=9))
     engine = Scripted(findings)

@@ -14,6 +14,7 @@ from tests.study.workflows.diagnosis.recordings.scripted import Scripted, asked_
 pytestmark = pytest.mark.usefixtures("sketched")
 
 
+@pytest.mark.slow
 def test_the_folder_holds_document_model_page_and_figures(done, findings):
     names = {path.name for path in done.out.iterdir()}
     assert names == {"diagnosis.json", "improved.toml", "report.html", "figures"}

@@ -142,7 +142,7 @@ def snippet(mentioned: str) -> str:
     return code
 
 
-@pytest.mark.parametrize("mentioned", ["chai3d.h", "rclcpp/rclcpp.hpp"])
+@pytest.mark.parametrize("mentioned", ["chai3d.h", pytest.param("rclcpp/rclcpp.hpp", marks=pytest.mark.slow)])
 def test_the_snippets_of_the_page_compile(vendor, exported, tmp_path, mentioned):
     source = tmp_path / "snippet.cpp"
     source.write_text(snippet(mentioned))

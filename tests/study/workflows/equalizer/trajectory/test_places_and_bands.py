@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from equalizer.plant.model_quality import NOT_STORED
 from equalizer.tracking.lqr.padding import band_error
@@ -60,6 +61,7 @@ def test_a_place_that_is_not_finite_is_refused(plan):
     assert "--at is nan, 0, 0" in refusal(replace(plan, at_m=(float("nan"), 0.0, 0.0)), WrongUseError).happened
 
 
+@pytest.mark.slow
 def test_blended_parts_are_capped_together(plan):
     loud = with_models(plan, "left", "right", at_m=(0.0, 0.0, 0.0), trajectory=plan.trajectory.with_name("loud.csv"))
     assert "above the cap of 3 N" in refusal(loud).happened
@@ -80,6 +82,7 @@ def test_a_narrow_and_a_wide_model_of_one_place_play_bands(plants, plan, tmp_pat
     assert any(line.startswith("Loudness of the high band") for line in lines)
 
 
+@pytest.mark.slow
 def test_the_cap_holds_for_all_bands_together(plants, plan, tmp_path):
     write_trajectory(tmp_path / "wide.csv", table(noise(plants, 3.0, 60.0, rms=1.5)[:1000]))
     free = with_models(plan, "wide", "centre", trajectory=tmp_path / "wide.csv", cap_n=50.0)

@@ -86,6 +86,7 @@ def facts(end):
     return lines
 
 
+@pytest.mark.slow
 def test_the_log_is_the_same_in_every_language(sat):
     english = facts(sat["en"][0])
     assert len(english) > 30

@@ -40,11 +40,13 @@ def test_a_whole_sitting_from_consent_to_debrief(plan, full, seat, person):
     assert all(event.answers == {} for event in of(end, FormFilled) if event.form == "exclusion")
 
 
+@pytest.mark.slow
 def test_the_question_does_not_show_which_trial_is_a_catch_trial(plan, full, seat, person):
     conduct_new(plan(full), "simulated", seat)
     assert Phase.CATCH not in {question.phase for question in person.questions}
 
 
+@pytest.mark.slow
 def test_a_detection_trial_shakes_in_one_of_its_two_intervals(plan, full, seat, person):
     end = conduct_new(plan(full), "simulated", seat)
     intervals = [notice.title for notice in person.playing if notice.title.startswith("Interval")]
@@ -73,6 +75,7 @@ def test_without_consent_or_with_an_exclusion_nothing_is_played(plan, full, seat
     assert end.fault is Fault.NONE
 
 
+@pytest.mark.slow
 def test_a_set_up_that_differs_is_reported_and_noted(plan, full, seat, person):
     person.fill_in = lambda form: FormReply(
         {f.key: ("nothing" if f.key == "hearing" else f.choices[0] if f.choices else "") for f in form.fields}
@@ -84,6 +87,7 @@ def test_a_set_up_that_differs_is_reported_and_noted(plan, full, seat, person):
     assert [note.text for note in of(end, NoteTaken)] == person.told
 
 
+@pytest.mark.slow
 def test_practice_says_how_it_went(plan, full, seat, person):
     conduct_new(plan(full), "simulated", seat)
     results = [call for call in person.calls if hasattr(call, "passed")]
@@ -106,6 +110,7 @@ def test_the_same_seed_and_answers_give_the_same_trials_for_any_participant(plan
     ]
 
 
+@pytest.mark.slow
 def test_before_the_first_trial_the_computer_is_checked_with_the_device_and_both_are_logged(plan, full, seat):
     end = conduct_new(plan(full), "simulated", seat)
     (checked,) = of(end, DeviceChecked)
@@ -121,6 +126,7 @@ class NeverOnTime(VirtualClock):
         super().sleep(max(seconds, 0.0) + (0.067 if seconds < 0.002 else 0.0))
 
 
+@pytest.mark.slow
 def test_a_computer_that_is_too_late_is_a_warning_that_the_experimenter_continues_from_and_that_is_logged(plan, full):
     clock = NeverOnTime()
     person = Person(clock)
